@@ -5,9 +5,8 @@ from concurrent.futures import Future
 from dataclasses import replace
 
 from crazyflie_dashboard.control import ControlError, PageControl
-from crazyflie_dashboard.dashboard import (
+from crazyflie_dashboard.page_data import (
     MAX_COMMAND_AGE,
-    Dashboard,
     DryRunResult,
     MissionFile,
     Outcome,
@@ -58,8 +57,8 @@ def vehicle(name, x, y=0.0, z=0.0, **details):
     return VehicleSnapshot(name, **{**known, **details})
 
 
-class FakeDashboard(Dashboard):
-    """Carries out commands at once, and keeps what it was told."""
+class FakeDashboard:
+    """What pages call of a `Dashboard`: carries out commands at once, keeps what it was told."""
 
     def __init__(self):
         self.pages = PageControl()

@@ -2,9 +2,11 @@
 
 from concurrent.futures import Future
 
-from crazyflie_dashboard.dashboard import Command
+from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.discovery import Graph
-from crazyflie_dashboard.live_dashboard import LiveDashboard
+from crazyflie_dashboard.page_data import (
+    Command,
+)
 from crazyflie_driver import srv
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import ServiceError
@@ -64,7 +66,7 @@ class FakeFleet:
         topics = {f"/{each}/state": STATE for each in self.names}
         topics |= {f"/{each}/{STATUS}": "crazyflie_msgs/FlightStatus" for each in self.names}
         self.graph = Graph(topics, topics, services)
-        self.dashboard = LiveDashboard(
+        self.dashboard = Dashboard(
             self.process.handle("/dashboard"),
             lambda: self.graph,
             lambda service: self.alive(service),

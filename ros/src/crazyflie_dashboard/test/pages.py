@@ -72,6 +72,10 @@ class Browser:
         """Return the first element of a CSS selector."""
         return self.driver.find_element(By.CSS_SELECTOR, selector)
 
+    def count(self, selector):
+        """Return how many elements a CSS selector has."""
+        return len(self.driver.find_elements(By.CSS_SELECTOR, selector))
+
     def text(self, selector="body"):
         """Return the text that is seen of an element."""
         return self.find(selector).text

@@ -11,9 +11,11 @@ import rosgraph
 
 from crazyflie_dashboard import master
 from crazyflie_dashboard.control import ControlError
-from crazyflie_dashboard.dashboard import Command
+from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.dashboard_node import example_folders
-from crazyflie_dashboard.live_dashboard import LiveDashboard
+from crazyflie_dashboard.page_data import (
+    Command,
+)
 from crazyflie_dashboard.snapshot import Action, Kind
 from crazyflie_utils.main import ros_process
 from crazyflie_utils.refusal import RefusalError
@@ -27,7 +29,7 @@ LIMIT = 30.0
 def dashboard():
     process = ros_process()
     handle = process.handle("/dashboard")
-    found = LiveDashboard(
+    found = Dashboard(
         handle,
         partial(master.read, "/dashboard"),
         partial(master.is_answering, "/dashboard"),

@@ -7,7 +7,7 @@ from pages import Browser, Server, chromium, wait_for
 from selenium.webdriver.common.keys import Keys
 
 from crazyflie_dashboard import master
-from crazyflie_dashboard.live_dashboard import LiveDashboard
+from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_utils.main import ros_process
 
 
@@ -15,7 +15,7 @@ from crazyflie_utils.main import ros_process
 def dashboard():
     process = ros_process()
     handle = process.handle("/dashboard")
-    found = LiveDashboard(
+    found = Dashboard(
         handle, partial(master.read, "/dashboard"), partial(master.is_answering, "/dashboard"), []
     )
     process.start()

@@ -185,3 +185,13 @@ def test_messages_and_plots(browser):
 def test_a_lost_link_is_marked(browser, server):
     server.dashboard.change("cf1", link_quality=0.0)
     browser.has("0%", f"{browser.card('cf1')} .warn")
+
+
+def test_what_has_not_changed_is_not_sent_again(browser, driver):
+    driver.execute_script("window.seen = []; socket.onAny((event) => seen.push(event))")
+    # Each half a second the clock of clicks, and nothing else.
+    last = "return window.seen.slice(-3).join() === Array(3).fill('run_javascript').join()"
+    for tab in ("Vehicles", "Plots", "Missions", "Messages"):
+        browser.tab(tab)
+        driver.execute_script("window.seen = []")
+        wait_for(lambda: driver.execute_script(last), f"nothing but the clock in {tab}")

@@ -7,6 +7,7 @@ from functools import partial
 from http.server import HTTPServer, SimpleHTTPRequestHandler
 
 import pages
+from nicegui import core
 from pages import Browser, wait_for
 
 from crazyflie_dashboard.snapshot import Action
@@ -85,6 +86,18 @@ def test_a_connection_that_is_lost_and_comes_back_moves_nothing_and_has_no_contr
     browser.take_control()
     browser.press("Land")
     browser.has("on the ground", browser.card("cf1"))
+
+
+def test_a_browser_that_was_busy_for_seconds_keeps_its_page(browser, server, driver, monkeypatch):
+    monkeypatch.setattr(core.sio.eio, "ping_interval", 0.2)
+    browser.open()
+    browser.take_control()
+    before = server.dashboard.pages.pages
+    driver.execute_script("const end = performance.now() + 3000; while (performance.now() < end);")
+    browser.press("All")
+    browser.has("3 of 3 chosen")
+    assert server.dashboard.pages.pages == before
+    assert "you have control" in browser.text(".control")
 
 
 def test_a_page_of_another_address_needs_the_token(driver):

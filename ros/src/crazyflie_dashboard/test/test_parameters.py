@@ -2,7 +2,9 @@
 
 import pytest
 
-from crazyflie_dashboard.dashboard import ParameterInfo
+from crazyflie_dashboard.page_data import (
+    ParameterInfo,
+)
 from crazyflie_dashboard.parameters import of_firmware, parsed
 from crazyflie_utils.refusal import RefusalError
 

@@ -13,8 +13,12 @@ from geometry_msgs.msg import Point
 from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest
 
 from crazyflie_dashboard.answers import any_of, failed, gathered, settle
-from crazyflie_dashboard.dashboard import MAX_COMMAND_AGE, Command, Outcome
 from crazyflie_dashboard.discovery import Graph, Request, Service, Vehicle
+from crazyflie_dashboard.page_data import (
+    MAX_COMMAND_AGE,
+    Command,
+    Outcome,
+)
 from crazyflie_dashboard.snapshot import Action, VehicleSnapshot
 from crazyflie_driver import srv
 from crazyflie_model.angles import rpy_from_quaternion

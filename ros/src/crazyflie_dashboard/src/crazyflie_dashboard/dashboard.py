@@ -1,167 +1,246 @@
-"""What the page is written against: all that there is to see, and all that can be done.
+"""The dashboard of the running graph."""
 
-Everything here may be called from any thread and does not wait. What takes time returns a future,
-which fails with `RefusalError` (crazyflie_utils.refusal), whose text is for the operator; where a
-service has refused, it is the service's own.
-"""
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from typing import Any
 
-from abc import ABC, abstractmethod
-from concurrent.futures import Future
-from dataclasses import dataclass
-
+from crazyflie_dashboard import missions
+from crazyflie_dashboard.actions import Actions, Target, expect_fresh
+from crazyflie_dashboard.answers import settle
 from crazyflie_dashboard.control import PageControl
-from crazyflie_dashboard.snapshot import Action, Scene, Triple
-
-#: An older command, s, is not carried out: it has waited in a browser or a network.
-MAX_COMMAND_AGE = 1.0
-
-
-@dataclass(frozen=True)
-class Command:
-    """What an operator has asked vehicles for."""
-
-    action: Action
-    vehicles: tuple[str, ...]  #: Names.
-    clicked: float  #: When the operator did, by time.monotonic() of this computer.
-    goal: Triple | None = None  #: Of go to: x, y, z in m.
-    yaw: float | None = None  #: Of go to, rad; None keeps the heading.
-    height: float = 1.0  #: Of a takeoff, m.
-    speed: float = 0.5  #: Of go to, m/s.
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What has become of a command: ``text`` is "" when the vehicle does it, else the refusal."""
-
-    vehicle: str
-    text: str = ""
+from crazyflie_dashboard.discovery import Graph
+from crazyflie_dashboard.doctor_report import examine
+from crazyflie_dashboard.graph_model import GraphModel
+from crazyflie_dashboard.live_parameters import LiveParameters
+from crazyflie_dashboard.page_data import (
+    Command,
+    DryRunResult,
+    MissionFile,
+    Outcome,
+    ParameterInfo,
+    Series,
+)
+from crazyflie_dashboard.page_state import PageState
+from crazyflie_dashboard.snapshot import Action, Scene
+from crazyflie_utils import NodeHandle
+from crazyflie_utils.refusal import RefusalError
 
 
-@dataclass(frozen=True)
-class ParameterInfo:
-    """A parameter that can be changed."""
+class Dashboard:
+    """The graph, as pages see and command it: what they ask for is done in the node's turn.
 
-    owner: str  #: Node, or the vehicle of a firmware parameter.
-    name: str  #: As in topics/state, or group.name of a firmware parameter.
-    kind: str  #: "bool", "int", "float" or "str".
-    value: bool | int | float | str
-    unit: str = ""
-    help: str = ""
-    minimum: float | None = None
-    maximum: float | None = None
-    choices: tuple[str, ...] = ()  #: Of a text; any if there are none.
-    is_firmware: bool = False
+    Every method may be called from any thread, and does not wait. What takes time returns a
+    future, which fails with `RefusalError`, whose text is for the operator; where a service has
+    refused, it is the service's own.
 
-
-@dataclass(frozen=True)
-class MissionFile:
-    """A script of missions, or a trajectory (CSV), that can be flown."""
-
-    path: str
-    title: str
-    is_trajectory: bool
-
-
-@dataclass(frozen=True)
-class DryRunResult:
-    """What a dry run has shown: ``text`` is the reason if it has not passed, or a summary.
-
-    ``paths`` are the commanded positions by vehicle, for the scene.
+    Parameters
+    ----------
+    handle : NodeHandle
+    read_graph : callable
+        Returns the `Graph`; it may wait.
+    is_answering : callable
+        ``is_answering(service)``; it may wait.
+    folders : list of str
+        With missions and trajectories.
+    clock : callable
+        time.monotonic, by which commands grow old.
+    workers : concurrent.futures.Executor, optional
+        Its threads may wait.
     """
 
-    passed: bool
-    text: str
-    duration: float = 0.0
-    paths: tuple[tuple[str, tuple[Triple, ...]], ...] = ()
+    def __init__(
+        self,
+        handle: NodeHandle,
+        read_graph: Callable[[], Graph],
+        is_answering: Callable[[str], bool],
+        folders: list[str],
+        clock: Callable[[], float] = time.monotonic,
+        workers: Executor | None = None,
+    ):
+        #: Every page is opened and closed there; a method's ``page`` is its number.
+        self.pages = PageControl()
+        self._handle, self._folders, self._clock = handle, folders, clock
+        self._workers = workers or ThreadPoolExecutor(8, "dashboard")
+        self._model = GraphModel(handle, self._workers, read_graph, clock)
+        self._actions = Actions(handle, self._workers, clock, is_answering)
+        self._parameters = LiveParameters(handle, self._workers, self._model)
+        self._missions = missions.Missions()
+        self._model.missions = lambda: self._missions.running
+        self._open: dict[int, PageState] = {}
+        self.pages.on_first = lambda: handle.submit(self._model.begin)
+        self.pages.on_close = lambda page: handle.submit(self._close, page)
+        self.pages.on_empty = lambda: handle.submit(self._model.end)
 
+    def close(self) -> None:
+        """End what was begun here and flies nothing."""
+        self._actions.close()
+        self._workers.shutdown(wait=False, cancel_futures=True)
 
-@dataclass(frozen=True)
-class Series:
-    """Numbers over time of one plot: ``times`` in s before now are negative, oldest first."""
-
-    name: str
-    unit: str
-    times: tuple[float, ...]
-    values: tuple[float, ...]
-
-
-class Dashboard(ABC):
-    """The graph, as pages see and command it."""
-
-    pages: PageControl  #: Every page is opened and closed there; a method's ``page`` is its number.
-
-    @abstractmethod
     def scene(self) -> Scene:
         """Return the newest scene, made 20 times a second while a page is open."""
+        return self._model.scene
 
-    @abstractmethod
     def watch(self, page: int, vehicle: str | None) -> None:
         """Choose the vehicle whose plots a page shows."""
 
-    @abstractmethod
+        def do():
+            self._page(page).vehicle = vehicle
+            self._update_watched()
+
+        self._handle.submit(do)
+
     def plots(self, page: int) -> tuple[Series, ...]:
         """Return the last minute of the chosen vehicle and of the page's own fields."""
+        state = self._open.get(page)
+        if state is None:
+            return ()
+        plots = self._model.plots.get(state.vehicle or "")
+        return (plots.series() if plots is not None else ()) + state.series()
 
-    @abstractmethod
     def add_field(self, page: int, path: str) -> "Future[None]":
         """Plot a number of any topic, as in /topic/field/other[0], too."""
+        return self._do(lambda: self._page(page).add_field(path, self._model.graph.topics))
 
-    @abstractmethod
     def remove_field(self, page: int, path: str) -> None:
         """Plot it no longer."""
+        self._handle.submit(lambda: self._page(page).remove_field(path))
 
-    @abstractmethod
     def command(self, page: int, command: Command) -> "Future[tuple[Outcome, ...]]":
         """Carry out a command; each vehicle has its outcome.
 
         An emergency may come from any page. For the others the page must have control.
         """
 
-    @abstractmethod
+        def do():
+            if command.action != Action.EMERGENCY:
+                self.pages.expect_control(page)
+            now = self._model.scene.vehicles
+            targets = {
+                name: Target(model.vehicle, now[name])
+                for name, model in self._model.models.items()
+                if name in now
+            }
+            return self._actions.carry_out(command, targets, self._model.graph)
+
+        return self._do(do)
+
     def parameter_owners(self) -> tuple[str, ...]:
         """Return nodes with live parameters, and vehicles with those of firmware."""
+        return self._parameters.owners()
 
-    @abstractmethod
     def parameters(self, owner: str | None = None) -> "Future[tuple[ParameterInfo, ...]]":
         """Return the live parameters of a node or of a vehicle's firmware; of all nodes.
 
         For many vehicles those of one owner are much quicker.
         """
+        return self._do(self._parameters.of, owner)
 
-    @abstractmethod
     def set_parameter(
         self, page: int, parameter: ParameterInfo, text: str
     ) -> "Future[ParameterInfo]":
         """Set a parameter to what was typed; the result has the value that came back."""
 
-    @abstractmethod
+        def do():
+            self.pages.expect_control(page)
+            return self._parameters.set(parameter, text)
+
+        return self._do(do)
+
     def mission_files(self) -> tuple[MissionFile, ...]:
         """Return what can be flown."""
+        return missions.listed(self._folders)
 
-    @abstractmethod
     def dry_run(
         self, page: int, mission: MissionFile, vehicles: tuple[str, ...]
     ) -> "Future[DryRunResult]":
         """Fly a mission with ideal vehicles that stand where the real ones are."""
 
-    @abstractmethod
+        def show(done):
+            if done.exception() is None:
+                self._model.paths = dict(done.result().paths)
+
+        def do():
+            self.pages.expect_control(page)
+            result = self._missions.dry_run(mission, vehicles)
+            result.add_done_callback(lambda done: self._handle.submit(show, done))
+            return result
+
+        return self._do(do)
+
     def fly(
         self, page: int, mission: MissionFile, vehicles: tuple[str, ...], clicked: float
     ) -> "Future[str]":
         """Fly a mission after its dry run has passed; the future is done when it has ended."""
 
-    @abstractmethod
+        def do():
+            self.pages.expect_control(page)
+            expect_fresh(mission.title, self._clock() - clicked)
+            return self._missions.fly(mission, vehicles)
+
+        return self._do(do)
+
     def stop_mission(self, page: int, clicked: float) -> "Future[None]":
         """End the mission that flies; its vehicles land."""
 
-    @abstractmethod
+        def do():
+            self.pages.expect_control(page)
+            expect_fresh("stop", self._clock() - clicked)
+            self._missions.stop()
+
+        return self._do(do)
+
     def examine(self) -> "Future[None]":
         """Have the doctor look the graph over: its sentences are in the scene, 10 s later."""
 
-    @abstractmethod
+        def show(sentences):
+            self._model.sentences = sentences
+
+        def work():
+            self._handle.submit(show, examine())
+
+        return self._workers.submit(work)
+
     def watch_image(self, page: int, topic: str | None) -> "Future[None]":
         """Choose the camera that a page shows."""
+        return self._do(lambda: self._page(page).watch_image(topic, self._model.graph.topics))
 
-    @abstractmethod
     def image(self, page: int) -> bytes | None:
         """Return the newest picture of the page's camera, as JPEG or PNG."""
+        state = self._open.get(page)
+        return None if state is None else state.image
+
+    # In the node's turn.
+
+    def _do(self, work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """Have work done in its turn; the future has its result, or that of its future."""
+        outcome: Future[Any] = Future()
+
+        def run():
+            try:
+                result = work(*arguments)
+            except Exception as error:
+                outcome.set_exception(error)
+                return
+            if isinstance(result, Future):
+                result.add_done_callback(lambda done: settle(done, outcome))
+            else:
+                outcome.set_result(result)
+
+        self._handle.submit(run)
+        return outcome
+
+    def _page(self, number):
+        if number not in self.pages.pages:
+            raise RefusalError(f"page {number} is closed; load it again")
+        return self._open.setdefault(number, PageState(self._handle, self._clock))
+
+    def _close(self, number):
+        page = self._open.pop(number, None)
+        if page is not None:
+            page.close()
+            self._update_watched()
+
+    def _update_watched(self):
+        chosen = {page.vehicle for page in self._open.values()}
+        self._model.watch({name for name in self._model.models if name in chosen})

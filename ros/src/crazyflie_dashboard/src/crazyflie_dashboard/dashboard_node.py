@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from crazyflie_dashboard import master
 from crazyflie_dashboard.access import Access, AccessError, expect_free_port, is_loopback, new_token
-from crazyflie_dashboard.live_dashboard import LiveDashboard
+from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import Integer, Text
 
@@ -56,7 +56,7 @@ class DashboardNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         folders = [path for path in self._parameters.folders.split(":") if path]
-        dashboard = LiveDashboard(
+        dashboard = Dashboard(
             handle,
             lambda: master.read(handle.name),
             partial(master.is_answering, handle.name),

@@ -12,7 +12,10 @@ from collections.abc import Iterable
 from concurrent.futures import Future
 from pathlib import Path
 
-from crazyflie_dashboard.dashboard import DryRunResult, MissionFile
+from crazyflie_dashboard.page_data import (
+    DryRunResult,
+    MissionFile,
+)
 from crazyflie_utils.refusal import RefusalError
 
 #: Flies missions, and makes dry runs; how the line with the result of a dry run begins, and what

@@ -3,8 +3,10 @@
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from crazyflie_dashboard.dashboard import MissionFile
 from crazyflie_dashboard.page.session import CLICKED, Session
+from crazyflie_dashboard.page_data import (
+    MissionFile,
+)
 from crazyflie_dashboard.snapshot import Scene, Triple
 
 

@@ -9,8 +9,10 @@ import numpy as np
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from crazyflie_dashboard.dashboard import Series
 from crazyflie_dashboard.page.session import Session
+from crazyflie_dashboard.page_data import (
+    Series,
+)
 from crazyflie_dashboard.snapshot import Scene
 
 SPAN = 60.0  #: Time that is shown, s.
@@ -19,6 +21,8 @@ HEIGHT, GAP, TOP = 105, 34, 26  #: Of one plot, and the space between two and ab
 
 COLORS = ["#4ea1ff", "#35c98a", "#ffb545", "#ff6b6b", "#b58cff", "#5fd3e0"]
 
+DIM = {"color": "#93a0b2"}  #: Of texts.
+SPLIT_LINE = {"lineStyle": {"color": "#2a323e"}}
 NAME_STYLES = {f"c{i}": {"color": color, "fontSize": 11} for i, color in enumerate(COLORS)}
 
 
@@ -81,6 +85,8 @@ class PlotsPanel:
     def _draw(self) -> None:
         options = chart(self._series, self.is_stopped)
         self._chart.style(f"height: {options.pop('height')}px")
+        if self._chart.options == options:
+            return
         self._chart.options.clear()
         self._chart.options.update(options)
         self._chart.update()
@@ -136,69 +142,69 @@ def points(series: Series) -> list[tuple[float, float | None]]:
 
 
 def chart(series: Iterable[Series], can_be_measured: bool) -> dict[str, Any]:
-    """Return the options of ECharts, and the height (px) of all plots."""
+    """Return the options of ECharts, and the height (px) of all plots: one for each unit."""
     groups = [list(group) for _, group in groupby(series, key=lambda each: each.unit)]
     count = len(groups)
-    dim = {"color": "#93a0b2"}
-    lines = [
-        {
-            "name": each.name,
-            "type": "line",
-            "xAxisIndex": k,
-            "yAxisIndex": k,
-            "data": points(each),
-            "showSymbol": False,
-            "lineStyle": {"width": 1.5},
-            "color": COLORS[i % len(COLORS)],
-        }
-        for k, group in enumerate(groups)
-        for i, each in enumerate(group)
-    ]
     tops = [TOP + k * (HEIGHT + GAP) for k in range(count)]
     return {
         "height": TOP + count * (HEIGHT + GAP) + 10,
         "animation": False,
-        "textStyle": dim,
-        "title": [
-            {
-                # Each name in the color of its line.
-                "text": "  ".join(
-                    f"{{c{i % len(COLORS)}|{each.name}}}" for i, each in enumerate(group)
-                )
-                + f"   {group[0].unit}",
-                "top": top - 20,
-                "left": 40,
-                "textStyle": {**dim, "fontSize": 11, "fontWeight": "normal", "rich": NAME_STYLES},
-            }
-            for top, group in zip(tops, groups, strict=True)
-        ],
+        "textStyle": DIM,
+        "title": [_title(group, top) for group, top in zip(groups, tops, strict=True)],
         "tooltip": {"trigger": "axis", "confine": True, "appendToBody": False},
         "axisPointer": {"link": [{"xAxisIndex": "all"}]},
         "grid": [{"left": 44, "right": 10, "top": top, "height": HEIGHT} for top in tops],
-        "xAxis": [
-            {
-                "type": "value",
-                "gridIndex": k,
-                "min": -SPAN,
-                "max": 0,
-                "axisLabel": {**dim, "show": k == count - 1, "formatter": "{value} s"},
-                "splitLine": {"lineStyle": {"color": "#2a323e"}},
-            }
-            for k in range(count)
-        ],
-        "yAxis": [
-            {
-                "type": "value",
-                "gridIndex": k,
-                "scale": True,
-                "splitNumber": 3,
-                "axisLabel": {**dim, "fontSize": 10},
-                "splitLine": {"lineStyle": {"color": "#2a323e"}},
-            }
-            for k in range(count)
-        ],
+        "xAxis": [_time_axis(k, is_last=k == count - 1) for k in range(count)],
+        "yAxis": [_value_axis(k) for k in range(count)],
         "dataZoom": [{"type": "inside", "xAxisIndex": list(range(count))}]
         if can_be_measured
         else [],
-        "series": lines,
+        "series": [
+            _line(each, k, COLORS[i % len(COLORS)])
+            for k, group in enumerate(groups)
+            for i, each in enumerate(group)
+        ],
+    }
+
+
+def _title(group: list[Series], top: int) -> dict[str, Any]:
+    """Return the names of a plot's lines, each in the color of its line, and their unit."""
+    names = (f"{{c{i % len(COLORS)}|{each.name}}}" for i, each in enumerate(group))
+    style = {**DIM, "fontSize": 11, "fontWeight": "normal", "rich": NAME_STYLES}
+    text = f"{'  '.join(names)}   {group[0].unit}"
+    return {"text": text, "top": top - 20, "left": 40, "textStyle": style}
+
+
+def _time_axis(plot: int, is_last: bool) -> dict[str, Any]:
+    return {
+        "type": "value",
+        "gridIndex": plot,
+        "min": -SPAN,
+        "max": 0,
+        "axisLabel": {**DIM, "show": is_last, "formatter": "{value} s"},
+        "splitLine": SPLIT_LINE,
+    }
+
+
+def _value_axis(plot: int) -> dict[str, Any]:
+    return {
+        "type": "value",
+        "gridIndex": plot,
+        "scale": True,
+        "splitNumber": 3,
+        "axisLabel": {**DIM, "fontSize": 10},
+        "splitLine": SPLIT_LINE,
+    }
+
+
+def _line(series: Series, plot: int, color: str) -> dict[str, Any]:
+    return {
+        "name": series.name,
+        "type": "line",
+        "xAxisIndex": plot,
+        "yAxisIndex": plot,
+        "data": points(series),
+        "showSymbol": False,
+        "lineStyle": {"width": 1.5},
+        "color": color,
     }

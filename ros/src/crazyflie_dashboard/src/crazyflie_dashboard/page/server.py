@@ -7,7 +7,7 @@ from pathlib import Path
 
 import uvicorn
 from fastapi import FastAPI
-from nicegui import Client, ui
+from nicegui import Client, app, core, ui
 
 from crazyflie_dashboard.access import Access
 from crazyflie_dashboard.dashboard import Dashboard
@@ -20,6 +20,10 @@ HEAD = (FOLDER / "head.html").read_text() + (
     f"<style>{(FOLDER / 'dashboard.css').read_text()}</style>"
 )
 
+#: Longest time, s, for which a browser may be too busy to answer. After it the connection is lost,
+#: and the page is loaded anew, without its control and choices. NiceGUI's 2 s are passed by a
+#: browser that draws in software on a busy computer.
+ANSWER_TIMEOUT = 10.0
 CLOSING_TIME = 3.0  #: Longest time, s, that the server has to end.
 
 
@@ -48,6 +52,8 @@ class Page:
             message_history_length=0,
             show_welcome_message=False,
         )
+        # NiceGUI sets its own when it starts.
+        app.on_startup(lambda: setattr(core.sio.eio, "ping_timeout", ANSWER_TIMEOUT))
         logging.getLogger("nicegui").setLevel(logging.WARNING)
         config = uvicorn.Config(
             Gate(application, access),

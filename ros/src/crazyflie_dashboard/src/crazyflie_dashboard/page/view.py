@@ -115,8 +115,9 @@ class View:
         self._control.text = (
             f"page {page} · you have control" if has else f"page {page} · {other} has control"
         )
-        self._control.classes(remove="mine other none")
-        self._control.classes("mine" if has else "none" if controller is None else "other")
+        look = "mine" if has else "none" if controller is None else "other"
+        # In one call: two change the label, and send it, also where nothing is new.
+        self._control.classes(look, remove="mine other none")
         self._take.text = "Give up" if has else "Take control"
 
     async def _take_or_release(self) -> None:

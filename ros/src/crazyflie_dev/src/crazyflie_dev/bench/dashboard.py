@@ -1,21 +1,26 @@
 """What the dashboard costs a hundred vehicles in flight: without a page, and with one."""
 
 import functools
-import shutil
-import subprocess
 import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from crazyflie_dev.bench import graph, swarm
+from crazyflie_dev.bench.page_client import PageClient
 from crazyflie_dev.bench.row import NotMeasuredError, Row
 from crazyflie_utils.testing.launching import roslaunch
 
 _VEHICLES = 100
 _START_LIMIT = 180.0
-_SETTLING = 10.0  #: Until vehicles have a position, hover, and are found and drawn by a page, s.
-_URL = "http://127.0.0.1:8642/"
+_SETTLING = 10.0  #: Until vehicles have a position, hover, and are found by a page, s.
+_URL = "http://127.0.0.1:8642"
+
+#: While it is measured, all vehicles move by so much, m, in this time, s: of a fleet that hovers a
+#: page is sent nothing.
+_CLIMB, _DURATION = 0.5, round(swarm.DURATION) + 10
+
+_LEAST_RATE = 15.0  #: Scenes that come in a s; the page sends 20 of vehicles in motion.
 
 
 @dataclass(frozen=True)
@@ -31,13 +36,10 @@ class DashboardFigures:
 
 @functools.cache
 def measure() -> tuple[DashboardFigures, DashboardFigures]:
-    """Return figures of a fleet that hovers: without a page, and with one.
+    """Return figures of a fleet in motion: without a page, and with one.
 
-    Raises `NotMeasuredError` without Chromium.
+    The page is that of another computer: what drawing it costs is not the flight's.
     """
-    browser = shutil.which("chromium")
-    if browser is None:
-        raise NotMeasuredError("there is no chromium")
     fleet = ["crazyflie_examples", "sw_swarm.launch", f"n:={_VEHICLES}", "rviz:=false"]
     with tempfile.TemporaryDirectory() as folder:
         with roslaunch([*fleet, "dashboard:=true"], Path(folder) / "log"):
@@ -46,26 +48,23 @@ def measure() -> tuple[DashboardFigures, DashboardFigures]:
             time.sleep(_SETTLING)
             graph.call("/all/takeoff")
             time.sleep(_SETTLING)
-            without_page = _figures()
-            # The page is that of another computer: what drawing it costs is not the flight's.
-            page = subprocess.Popen(
-                ["nice", "-n", "19", browser, "--headless=new", "--no-sandbox", "--disable-3d-apis"]
-                + [f"--user-data-dir={folder}/profile", "--remote-debugging-port=0", _URL],
-                stderr=subprocess.DEVNULL,
-            )
-            try:
+            without_page = _figures(_CLIMB)
+            with PageClient(_URL) as page:
                 time.sleep(_SETTLING)
-                return without_page, _figures()
-            finally:
-                page.terminate()
-                page.wait(10.0)
+                return without_page, _figures(-_CLIMB, page)
 
 
-def _figures():
+def _figures(climb: float, page: PageClient | None = None) -> DashboardFigures:
+    move = f"{{relative: true, goal: {{z: {climb}}}, duration: {{secs: {_DURATION}}}}}"
+    graph.call("/all/go_to", move)
     process = graph.process_of("/dashboard")
+    scenes = page.scenes if page else 0
     used, began = graph.cpu_time([process]), time.monotonic()
     arrivals = swarm.listen(_VEHICLES)
-    cpu = 100.0 * (graph.cpu_time([process]) - used) / (time.monotonic() - began)
+    duration = time.monotonic() - began
+    cpu = 100.0 * (graph.cpu_time([process]) - used) / duration
+    if page and (rate := (page.scenes - scenes) / duration) < _LEAST_RATE:
+        raise NotMeasuredError(f"{rate:.1f} scenes a s have come; expected {_LEAST_RATE:g} or more")
     (period,) = swarm.percentiles(swarm.periods(arrivals), [99])
     latencies = [arrival - stamp for _, arrival, stamp in arrivals]
     return DashboardFigures(cpu, period, *swarm.percentiles(latencies, [99]))
@@ -80,28 +79,28 @@ def _rise(figure: str) -> float:
 ROWS = [
     Row(
         "dashboard_idle",
-        f"dashboard beside {_VEHICLES} vehicles, no page open",
+        f"dashboard beside {_VEHICLES} vehicles in motion, no page open",
         "% of a core",
         lambda: measure()[0].cpu,
         most=1.0,
     ),
     Row(
         "dashboard_page",
-        f"dashboard beside {_VEHICLES} vehicles, a page open",
+        f"dashboard beside {_VEHICLES} vehicles in motion, a page open",
         "% of a core",
         lambda: measure()[1].cpu,
         most=15.0,
     ),
     Row(
         "dashboard_period",
-        f"{_VEHICLES} vehicles: p99 of the control's period with a page, minus without",
+        f"{_VEHICLES} vehicles in motion: p99 of the control's period with a page, minus without",
         "ms",
         lambda: _rise("period"),
         most=1.0,
     ),
     Row(
         "dashboard_latency",
-        f"{_VEHICLES} vehicles: p99 of pose -> control with a page, minus without",
+        f"{_VEHICLES} vehicles in motion: p99 of pose -> control with a page, minus without",
         "ms",
         lambda: _rise("latency"),
         most=1.0,

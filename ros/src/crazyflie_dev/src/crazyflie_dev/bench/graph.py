@@ -36,11 +36,10 @@ def wait_for_service(name: str, limit: float = _LIMIT) -> None:
     raise NotMeasuredError(f"there is no service {name} after {limit:g} s")
 
 
-def call(service: str) -> None:
-    """Call a service of type std_srvs/Empty and wait for its answer."""
-    done = subprocess.run(
-        ["rosservice", "call", service], timeout=_LIMIT, capture_output=True, text=True, check=False
-    )
+def call(service: str, *request: str) -> None:
+    """Call a service and wait for its answer; the request is YAML, none for std_srvs/Empty."""
+    command = ["rosservice", "call", service, *request]
+    done = subprocess.run(command, timeout=_LIMIT, capture_output=True, text=True, check=False)
     if done.returncode:
         raise NotMeasuredError(f"{service}: {done.stderr.strip()}")
 

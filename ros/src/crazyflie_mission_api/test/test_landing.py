@@ -159,8 +159,8 @@ def test_a_flight_ends_so_too(monkeypatch, tmp_path):
     assert swarm.track("cf1")[-1, 2] == swarm.track("cf2")[-1, 2] == 0.0
     # Buffers are 0.15 m.
     assert swarm.nearest() > 0.3
-    # Nothing is left to be landed for it.
-    swarm.process.advance(8.0)
+    # Nothing is left to be landed for it: a mission that is not heard of for 5 s has died.
+    swarm.process.advance(6.0)
     assert swarm.process.logged("error") == []
 
 
@@ -168,11 +168,15 @@ def test_when_a_script_is_killed_the_fleet_lands_its_vehicles(monkeypatch, tmp_p
     swarm = Swarm(monkeypatch, tmp_path, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
     fleet = swarm.fleet()
     one_above_the_other(fleet)
-    fleet.wait(20.0)
+    # Longer than one that is not heard of is waited for.
+    fleet.wait(8.0)
     assert swarm.track("cf2")[-1, 2] > 1.7
     # All that it had goes with its process.
     fleet._handle.close()
-    swarm.process.advance(40.0)
+    for _ in range(40):
+        swarm.process.advance(1.0)
+        if {swarm.track(name)[-1, 2] for name in swarm.names} == {0.0}:
+            break
     assert swarm.track("cf1")[-1, 2] == swarm.track("cf2")[-1, 2] == 0.0
     assert swarm.nearest() > 0.3
     (text,) = swarm.process.logged("error")

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from crazyflie_model.elementwise import clip, functions, join, split, where
+from crazyflie_model.elementwise import clip, functions, join, nowhere, split, where
 
 NUMBERS = st.floats(-1e6, 1e6)
 
@@ -38,6 +38,11 @@ def test_floats_and_arrays_agree(values, a, b):
         where(values < a, values, b), [where(v < a, v, b) for v in split(values)]
     )
     assert all(low <= v <= high for v in clip(values, low, high))
+
+
+def test_nowhere():
+    conditions = [False, np.zeros(2, dtype=bool), True, np.array([False, True]), "unknown yet"]
+    assert [nowhere(each) for each in conditions] == [True, True, False, False, False]
 
 
 @pytest.mark.parametrize("name", ["sin", "cos", "tan", "sqrt", "hypot", "atan2", "asin"])

@@ -19,3 +19,4 @@ def test_of_many_vehicles():
     u = [np.full(len(AGES), each) for each in U]
     flown = watchdog_control(u, np.array(list(AGES)))
     assert np.stack(flown, axis=1).tolist() == list(AGES.values())
+    np.testing.assert_array_equal(watchdog_control(u, np.array([0, 1, 2, 3, 4, 499])), u)

@@ -53,7 +53,7 @@ QUICK = [
     TOP / "docs" / "software_example.md",
     TOP / "docs" / "course" / "02_a_package.md",
 ]
-"""Pages that are followed in each run of the tests, beside the one of the installation. They change
+"""Pages that are followed in each run of the tests. They change
 nothing of the workspace, so they are followed in a view of it, and nothing is built for them. What
 the others name is tested where it is made, and that they name it rightly, in test_pages.py."""
 

@@ -5,20 +5,13 @@ import os
 from pathlib import Path
 
 import pytest
-from catkin_pkg.packages import find_packages
-from workspaces import FAST, FLY, TOP
+from workspaces import FAST, FLY, INSTALLED, code_of, data_of
 
-PACKAGES = {
-    package.name: TOP / "ros" / "src" / path
-    for path, package in find_packages(str(TOP / "ros" / "src")).items()
-    if package.name not in ("crazyflie_dev", "crazyflie_tests") and not package.is_metapackage()
-}
 INSPECT = Path(__file__).with_name("inspect_install.py")
 
-
-def code_of(script):
-    """Return a script without its first line."""
-    return script.read_text().split("\n", 1)[1]
+# A copy of the workspace is built. What is installed is tested in test_install_rules.py; the
+# commands of the installation are those by which ./run makes the workspace that is tested.
+pytestmark = pytest.mark.long
 
 
 @contextlib.contextmanager
@@ -71,23 +64,20 @@ def test_tools_of_developers_are_not_installed(install_space):
 
 
 def test_modules_and_launch_files_are_complete(terminal, install_space):
-    terminal.run(f"python3 {INSPECT} {install_space} {' '.join(PACKAGES)}")
+    terminal.run(f"python3 {INSPECT} {install_space} {' '.join(INSTALLED)}")
 
 
 def test_users_scripts_find_their_modules(terminal):
     terminal.run("python3 -c 'import crazyflie, uav_trajectory, pycrazyswarm; crazyflie.Crazyflie'")
 
 
-@pytest.mark.parametrize("package", PACKAGES)
+@pytest.mark.parametrize("package", INSTALLED)
 def test_programs_and_data_are_installed(package, install_space):
     programs = {path.name: path for path in (install_space / "lib" / package).glob("*")}
-    for source in PACKAGES[package].glob("exec/*"):
+    for source in INSTALLED[package].glob("exec/*"):
         assert source.name in programs
         assert os.access(programs[source.name], os.X_OK)
         # catkin chooses the interpreter.
         assert code_of(programs[source.name]) == code_of(source)
-    share = install_space / "share" / package
-    for folder in ("launch", "config", "references", "rviz", "urdf", "msg", "srv"):
-        for source in (PACKAGES[package] / folder).rglob("*.*"):
-            installed = share / source.relative_to(PACKAGES[package])
-            assert installed.read_bytes() == source.read_bytes()
+    for name, source in data_of(package):
+        assert (install_space / "share" / package / name).read_bytes() == source.read_bytes()

@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from workspaces import FAST, clean_environment
+from workspaces import FAST, TOP, clean_environment
 
 from crazyflie_utils.testing.programs import free_port, running
 from crazyflie_utils.testing.waiting import wait_until
@@ -74,10 +74,10 @@ def environment(home):
     return {**variables, "ROS_MASTER_URI": f"http://localhost:{port}"}
 
 
-def test_a_launch_is_for_this_computer_only(workspace, environment):
+def test_a_launch_is_for_this_computer_only(environment):
     port = environment["ROS_MASTER_URI"].rpartition(":")[2]
     command = (
-        f"source {workspace}/ros/devel/setup.bash && "
+        f"source {TOP}/ros/devel/setup.bash && "
         f"exec roslaunch -p {port} crazyflie_examples sw_hover.launch {FAST}"
     )
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}

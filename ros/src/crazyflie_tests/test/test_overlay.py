@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from workspaces import BUILD_LIMIT, FAST, FLY, overlay
+from workspaces import BUILD_LIMIT, FAST, FLY, TOP, overlay
 
 MESSAGES = {
     "package.xml": """<package format="3">
@@ -40,11 +40,20 @@ def my_workspace(tmp_path):
     return folder
 
 
-# What is missing in the devel space is missing in the install space.
-@pytest.mark.parametrize("underlay", [pytest.param("devel", marks=pytest.mark.long), "install"])
-def test_controller_of_ones_own_flies(underlay, workspace, my_workspace, shell):
+@pytest.fixture(params=["devel", pytest.param("install", marks=pytest.mark.long)])
+def underlay(request):
+    """Return the space below: this workspace, or a copy that is installed.
+
+    What is missing in the second is missing in test_install_rules.py.
+    """
+    if request.param == "devel":
+        return TOP / "ros" / "devel"
+    return request.getfixturevalue("install_space")
+
+
+def test_controller_of_ones_own_flies(underlay, my_workspace, shell):
     terminal = shell(my_workspace)
-    terminal.run(f"source {workspace}/ros/{underlay}/setup.bash")
+    terminal.run(f"source {underlay}/setup.bash")
     terminal.run("catkin_make", BUILD_LIMIT)
     terminal.run("source devel/setup.bash")
     executable = terminal.run("catkin_find --first-only my_controller my_controller_node")

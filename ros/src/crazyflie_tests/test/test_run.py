@@ -6,20 +6,26 @@ import subprocess
 from pathlib import Path
 
 import pytest
+import workspaces
 import yaml
 from workspaces import TOP, clean_environment
 
 LIMIT = 300.0
 
+FAILING = Path(__file__).with_name("failing.test")
+
 
 @pytest.fixture
-def run_test(workspace, home):
+def run_test(tmp_path, home):
     """Return a function that calls ``./run test`` and returns its status and what it printed."""
+    top = tmp_path / "view"
+    top.mkdir()
+    workspaces.view(top)
 
     def run(*arguments):
         result = subprocess.run(
-            ["./run", "test", *arguments],
-            cwd=workspace,
+            ["./run", "test", *map(str, arguments)],
+            cwd=top,
             env=clean_environment(home),
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -32,30 +38,23 @@ def run_test(workspace, home):
 
 
 @pytest.fixture
-def failing(workspace):
-    """Return a package's test folder in which a unit test and a rostest fail."""
-    folder = workspace / "ros" / "src" / "crazyflie_msgs" / "test"
-    files = {
-        "test_failing.py": "def test_fails():\n    assert 2 + 2 == 5\n",
-        "rostest_failing.py": "def test_fails():\n    assert 2 + 2 == 5\n",
-        "failing.test": '<launch><test pkg="crazyflie_utils" type="pytest_node" test-name="failing"'
-        f' args="{folder}/rostest_failing.py" time-limit="30"/></launch>',
-    }
-    for name, text in files.items():
-        (folder / name).write_text(text)
-    yield folder
-    for name in files:
-        (folder / name).unlink()
+def folder(tmp_path):
+    """Return a folder with a unit test that fails, and one that passes."""
+    folder = tmp_path / "test"
+    folder.mkdir()
+    (folder / "test_failing.py").write_text("def test_fails():\n    assert 2 + 2 == 5\n")
+    (folder / "test_passing.py").write_text("def test_passes():\n    pass\n")
+    return folder
 
 
-def test_failures_make_the_status(run_test, failing):
+def test_failures_make_the_status(run_test, folder):
     # What passes afterwards does not hide it: neither a rostest's failure nor a unit test's.
-    passing = str(failing / "test_messages.py")
-    status, printed = run_test(str(failing / "failing.test"), passing)
+    passing = folder / "test_passing.py"
+    status, printed = run_test(FAILING, passing)
     assert status == 1, printed
     assert printed.count("assert (2 + 2) == 5") > 0
-    files = [failing / "test_failing.py", f"{failing / 'test_failing.py'}::test_fails"]
-    status, printed = run_test("crazyflie_msgs", *map(str, files), passing)
+    files = [folder / "test_failing.py", f"{folder / 'test_failing.py'}::test_fails"]
+    status, printed = run_test(folder, *files, passing)
     assert status == 1, printed
     assert len(re.findall("^E +assert .2 . 2. == 5", printed, re.MULTILINE)) == 3
     assert len(re.findall("^[0-9]+ passed", printed, re.MULTILINE)) == 1

@@ -3,8 +3,10 @@
 import os
 import shutil
 import socket
+from collections.abc import Iterator
 from pathlib import Path
 
+from catkin_pkg.packages import find_packages
 from terminal import Terminal
 
 from crazyflie_utils.testing.programs import free_port
@@ -23,6 +25,13 @@ FAST = "rviz:=false sim_time:=true real_time_factor:=0 simulator_dt:=0.01 compos
 
 BUILD_LIMIT = 900.0
 """The longest that a build may take, s; it takes about 20."""
+
+INSTALLED = {
+    package.name: TOP / "ros" / "src" / path
+    for path, package in find_packages(str(TOP / "ros" / "src")).items()
+    if package.name not in ("crazyflie_dev", "crazyflie_tests") and not package.is_metapackage()
+}
+"""Packages that are installed -> where their sources are."""
 
 _NOT_COPIED = (".git", ".venv*", "build", "devel", "install", "out", "__pycache__", ".hypothesis")
 
@@ -68,6 +77,19 @@ def clean_environment(home: Path) -> dict[str, str]:
         "ROS_IP": "127.0.0.1",
         "ROS_MASTER_URI": f"http://127.0.0.1:{free_port(socket.SOCK_STREAM)}",
     }
+
+
+def code_of(script: Path) -> str:
+    """Return a script without its first line."""
+    return script.read_text().split("\n", 1)[1]
+
+
+def data_of(package: str) -> Iterator[tuple[Path, Path]]:
+    """Yield the data of an installed package: path in its share folder, and source."""
+    top = INSTALLED[package]
+    for folder in ("launch", "config", "references", "rviz", "urdf", "msg", "srv"):
+        for source in (top / folder).rglob("*.*"):
+            yield source.relative_to(top), source
 
 
 def overlay(folder: Path, *packages: str) -> Path:

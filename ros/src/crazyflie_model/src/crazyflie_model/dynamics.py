@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
-from crazyflie_model.elementwise import Number, Vector, functions, join, split, where
+from crazyflie_model.elementwise import Number, Vector, functions, join, nowhere, split, where
 from crazyflie_model.integrators import rk4_step
 from crazyflie_model.units import GRAVITY
 
@@ -88,7 +88,7 @@ class SevenDimensional(Dynamics):
         """
         px, py, z, vx, vy, vz, yaw = x
         below = z <= 0.0
-        if below is False:
+        if nowhere(below):
             return x
         stopped = below & (vz < 0.0)
         speed = functions(vx).hypot(vx, vy)

@@ -83,6 +83,13 @@ def where(condition: bool | NDArray[np.bool_], value: Many, other: Many) -> Many
     return np.where(condition, value, other)
 
 
+def nowhere(condition: bool | NDArray[np.bool_]) -> bool:
+    """Tell whether a condition surely holds for no vehicle: then there is nothing to compute."""
+    if isinstance(condition, bool):
+        return not condition
+    return isinstance(condition, _numpy().ndarray) and not condition.any()
+
+
 @overload
 def clip(value: float, low: float, high: float) -> float: ...
 

@@ -43,6 +43,14 @@ def test_the_least_distance_at_the_last_moment(offset, is_refused):
         check(["a", "b", "c"], TIMES, places)
 
 
+def test_the_pair_that_is_nearest_for_its_limit_is_refused():
+    # a and b have 0.4 m and need 0.3 m; b and c have 0.6 m and need 1.1 times 0.6 m.
+    places = standing([0.0, 0.0, 1.0], [0.4, 0.0, 1.0], [1.0, 0.0, 1.0])
+    clearance = Clearance(0.3, {"b": 0.3, "c": 0.3})
+    with pytest.raises(MissionError, match=r"^b and c would be 0.6 m apart, .* at least 0.66 m"):
+        clearance.check(["a", "b", "c"], TIMES, places)
+
+
 def head_on(speed, least):
     """Return times and places of two vehicles that approach each other until so near (m, m/s)."""
     times = np.arange(0.0, (2.0 - least) / (2.0 * speed) + 1e-9, 0.1)

@@ -7,7 +7,7 @@ import pytest
 
 from crazyflie_demo.figure8 import figure8
 from crazyflie_mission_api import Bounds, DryRun, Limits, MissionError, plan
-from crazyflie_mission_api.dry_run import dry_run
+from crazyflie_mission_api.dry_run import DryRunClock, dry_run
 from crazyflie_mission_api.group_state import Rules
 from crazyflie_mission_api.trajectories import duration, moved, stretched
 
@@ -170,6 +170,21 @@ def test_a_dry_run_has_the_positions_of_the_vehicles(group):
     assert dry_run(group, lambda fleet: fleet.takeoff(1.0)) > 4.0
 
 
+def test_a_dry_run_begins_on_the_ground_and_tells_its_duration(group):
+    assert dry_run(group, lambda fleet: fleet.wait(2.0)) == pytest.approx(2.0)
+    group.takeoff(1.0)
+    with pytest.raises(MissionError, match="cf1, cf2: in flight; expected to be on the ground"):
+        dry_run(group, lambda fleet: None)
+
+
+def test_waiting_ends_with_its_condition_or_at_its_deadline():
+    clock = DryRunClock()
+    assert clock.wait_until(lambda: True, 5.0)
+    assert clock.time() == 0.0
+    assert not clock.wait_until(lambda: False, 0.12)
+    assert clock.time() == 0.12
+
+
 def test_a_dry_run_has_the_headings_of_the_vehicles():
     group = DryRun(STARTS, headings={"cf1": math.pi / 2})
 
@@ -192,6 +207,9 @@ BAD = {
     r"cf1 and cf2 would be 0\.\d+ m apart, \d\.\d s from now": lambda t: t["cf1"].go_to(
         (0.9, 0, 1)
     ),
+    r"cf1 and cf2 would be 0\.\d+ m apart, \d\.\d s from now; expected at": lambda t: t[
+        "cf1"
+    ].go_to((2, 0, 1)),
     "cf1: go_to: the speed is .* m/s at .* expected at most 0.5 m/s; a longer duration": lambda t: (
         t["cf1"].go_to((0, 1, 1), duration=1.0)
     ),

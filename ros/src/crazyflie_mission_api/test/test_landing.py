@@ -119,6 +119,62 @@ def test_who_does_not_reach_a_free_place_stays_in_the_air_and_is_named(tower):
     assert tower.position("cf2")[2] == pytest.approx(0.0)
 
 
+@pytest.mark.parametrize(
+    ("measured", "counts"),
+    [(None, (0.0, 0.0, 2.0)), ((0.1, 0.0, 2.0), (0.0, 0.0, 2.0)), ((0.2, 0.0, 2.0),) * 2],
+)
+def test_a_vehicle_that_is_not_where_it_should_be_counts_where_it_is(
+    tower, monkeypatch, measured, counts
+):
+    monkeypatch.setattr(tower._vehicles["cf1"], "position", lambda: measured)
+    assert tower._places()["cf1"] == pytest.approx(counts)
+
+
+def test_the_way_aside_takes_as_long_as_the_limits_demand(tower, monkeypatch):
+    vehicle, ways = tower._vehicles["cf1"], []
+    go_to = vehicle.go_to
+
+    def note(goal, yaw, duration):
+        ways.append((math.dist(vehicle.position(), goal), duration))
+        return go_to(goal, yaw, duration)
+
+    monkeypatch.setattr(vehicle, "go_to", note)
+    tower["cf1"].land()
+    distance, duration = ways[0]
+    # From rest to rest the polynomial has at most 7.513 times the distance per duration squared.
+    assert duration == pytest.approx(math.sqrt(7.513 * distance / 1.0), rel=0.01)
+
+
+def test_a_vehicle_that_is_late_at_a_free_place_is_waited_for(tower, monkeypatch):
+    vehicle, clock = tower._vehicles["cf1"], tower.clock
+
+    def land(duration):
+        monkeypatch.undo()
+        return vehicle.land(duration)
+
+    monkeypatch.setattr(vehicle, "land", land)
+    monkeypatch.setattr(
+        vehicle, "position", lambda: vehicle.trajectory.goal(clock.time() - 1.0).position
+    )
+    tower.land()
+    assert tower.flying == []
+
+
+def test_a_vehicle_that_touches_down_late_is_waited_for(tower, monkeypatch):
+    vehicle, clock = tower._vehicles["cf3"], tower.clock
+    monkeypatch.setattr(vehicle, "has_landed", lambda: clock.time() > vehicle.trajectory.end + 1.0)
+    tower.land()
+    assert tower.flying == []
+
+
+def test_a_vehicle_that_does_not_come_down_is_named(tower, monkeypatch):
+    monkeypatch.setattr(tower._vehicles["cf3"], "has_landed", lambda: False)
+    with pytest.raises(MissionError, match="^cf3: land: not on the ground 15 s after it should be"):
+        tower.land()
+    assert tower.flying == ["cf3"]
+    assert tower._commanded["cf3"].destination.position == pytest.approx((3.0, 0.0, 0.0))
+
+
 def test_without_a_free_place_a_mission_is_refused_before_it_flies():
     corridor = Rules(bounds=Bounds((-0.05, -0.01, 0.0), (0.75, 0.01, 4.0)), separation=0.7)
     group = DryRun({"cf0": (0.0, 0.0, 0.0), "cf1": (0.7, 0.0, 0.0)}, corridor)

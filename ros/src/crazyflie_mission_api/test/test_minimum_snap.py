@@ -56,6 +56,13 @@ def test_passes_its_waypoints_smoothly_and_rests_at_both_ends():
             assert Polynomial(axis).deriv(order)(time) == pytest.approx(0.0, abs=1e-7)
 
 
+def test_a_heading_is_kept_until_another_is_told():
+    pieces = plan([(0, 0, 1), (1, 0, 1, 0.5), (2, 0, 1)], LIMITS)
+    yaws = [piece.evaluate(0.0).yaw for piece in pieces]
+    yaws.append(pieces[-1].evaluate(pieces[-1].duration).yaw)
+    assert yaws == pytest.approx([0.0, 0.5, 0.5], abs=1e-9)
+
+
 def test_no_curve_through_the_same_points_at_the_same_times_has_less_snap():
     pieces = plan(SQUARE, LIMITS)
     # A bump that vanishes, with three derivatives, where one piece begins and ends.

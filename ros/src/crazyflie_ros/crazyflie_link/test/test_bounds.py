@@ -6,6 +6,7 @@ import struct
 import pytest
 
 from crazyflie_link.address import Address
+from crazyflie_link.broadcast import is_broadcast
 from crazyflie_link.checks import (
     LARGEST_FLOAT,
     SMALLEST_FLOAT,
@@ -17,6 +18,7 @@ from crazyflie_link.errors import RefusedError, ValueRangeError
 from crazyflie_link.link_monitor import LinkHealth, LinkMonitor, Uptime
 from crazyflie_link.localization import Localization
 from crazyflie_link.packed_poses import PackedPoses, pack
+from crazyflie_link.safe_crazyflie import packet
 
 # Addresses and numbers.
 
@@ -138,6 +140,32 @@ def test_more_than_half_a_limit_between_two_looks_is_a_busy_machine():
     # The period begins at 0.23 - 0.45 / 2 = 0.005.
     assert states(monitor, 0.23, 0.4, 0.453, pings=False) is LinkHealth.ALIVE
     assert states(monitor, 0.456, pings=False) is LinkHealth.SILENT
+
+
+@pytest.mark.parametrize(("answered", "is_poor"), [(3, True), (4, False)])
+def test_a_link_is_poor_when_three_of_five_pings_are_answered(answered, is_poor):
+    monitor = LinkMonitor(0.0)
+    # The answer to the last one may be under way.
+    for k in range(6):
+        monitor.ping_sent(bytes([k]))
+    for k in range(answered):
+        monitor.ping_answered(bytes([k]), 0.0)
+    assert monitor.is_poor() == is_poor
+
+
+def test_the_quality_is_that_of_the_last_twenty_pings():
+    monitor = LinkMonitor(0.0)
+    for k in range(21):
+        monitor.ping_sent(bytes([k]))
+    monitor.ping_answered(b"\1", 0.0)
+    assert monitor.quality() == pytest.approx(1 / 19)
+
+
+def test_over_udp_a_broadcast_has_no_bits_of_the_link():
+    sent = packet(7, 0, b"\0")
+    assert not is_broadcast(sent)
+    sent.header &= 0xF3
+    assert is_broadcast(sent)
 
 
 # Packed poses (crtp_localization_service.c): 16 bits of mm, and 32 of the quaternion, whose first

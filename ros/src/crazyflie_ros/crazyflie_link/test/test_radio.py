@@ -158,7 +158,7 @@ def test_scanning(monkeypatch):
     radio().scan_interface.assert_called_once_with(0xE7E7E7E701)
 
 
-@pytest.mark.parametrize("address", ["", "E7E7E7E7E7E7", "hello", "-1"])
+@pytest.mark.parametrize("address", ["", "10000000000", "hello", "-1"])
 def test_scanning_for_no_address(address):
     with pytest.raises(AddressError):
         scan(address)

@@ -117,6 +117,10 @@ def test_memories(target, flying):
 def test_own_packets(target, flying):
     flying.send_packet(13, 2, b"hello")
     assert only_packet(target, 13, 2) == b"hello"
+    flying.send_packet(0, 0, b"lowest")
+    flying.send_packet(15, 1, b"highest")
+    assert only_packet(target, 0, 0) == b"lowest"
+    assert only_packet(target, 15, 1) == b"highest"
     flying.send_packet(13, 3, bytes(30))
     assert only_packet(target, 13, 3) == bytes(30)
     for arguments in ((16, 0, b""), (0, 4, b""), (0, 0, bytes(31))):

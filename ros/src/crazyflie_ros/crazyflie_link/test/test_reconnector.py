@@ -1,0 +1,74 @@
+"""When a link is kept, and when it is tried again, with a clock that is moved by hand."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from crazyflie_link import reconnector as module
+from crazyflie_link.errors import LinkLostError
+from crazyflie_link.link_monitor import LinkHealth
+from crazyflie_link.reconnector import LinkState, Reconnector
+
+
+def refuse():
+    raise LinkLostError("no vehicle")
+
+
+class Bench:
+    """A reconnector that finds no vehicle, its states, and a clock that waiting moves."""
+
+    def __init__(self, monkeypatch, is_urgent=False):
+        self.now, self.states = 5.0, []
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now))
+        self.reconnector = Reconnector(
+            "udp://here",
+            refuse,
+            lambda: "",
+            lambda: is_urgent,
+            lambda state, text: self.states.append(state),
+            True,
+        )
+        self.reconnector._closed = SimpleNamespace(wait=self.wait, is_set=lambda: False)
+
+    def wait(self, period):
+        self.now += period
+        return False
+
+
+def test_pauses_between_attempts_grow_up_to_five_seconds(monkeypatch):
+    bench, pauses = Bench(monkeypatch), []
+
+    def has_closed_within(pause):
+        pauses.append(pause)
+        return len(pauses) == 9
+
+    bench.reconnector._has_closed_within = has_closed_within
+    assert not bench.reconnector._reconnect()
+    assert pauses == pytest.approx([0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0])
+    assert bench.states == [LinkState.LOST]
+
+
+@pytest.mark.parametrize(("is_urgent", "end"), [(False, 6.0), (True, 5.05)])
+def test_an_urgent_attempt_does_not_wait(monkeypatch, is_urgent, end):
+    bench = Bench(monkeypatch, is_urgent)
+    assert not bench.reconnector._has_closed_within(1.0)
+    assert bench.now == pytest.approx(end, abs=0.06)
+
+
+def test_a_silent_link_is_kept_for_a_second(monkeypatch):
+    bench = Bench(monkeypatch)
+    is_usable = bench.reconnector._is_usable
+    assert is_usable(LinkHealth.ALIVE, "")
+    assert bench.states == []
+    assert is_usable(LinkHealth.SILENT, "silent")
+    bench.now += 0.9
+    assert is_usable(LinkHealth.SILENT, "silent")
+    assert is_usable(LinkHealth.ALIVE, "")
+    assert bench.states == [LinkState.LOST, LinkState.CONNECTED]
+    assert is_usable(LinkHealth.SILENT, "silent")
+    bench.now += 1.1
+    assert not is_usable(LinkHealth.SILENT, "silent")
+
+
+def test_a_link_to_a_restarted_vehicle_is_not_kept(monkeypatch):
+    assert not Bench(monkeypatch).reconnector._is_usable(LinkHealth.RESTARTED, "restarted")

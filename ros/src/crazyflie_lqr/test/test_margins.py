@@ -108,6 +108,8 @@ def test_a_loop_without_gain_has_no_margins_to_lose():
     K[2] = 0.0
     margins = loop_margins(replace(design, K=K, A=design.A - np.diag([0, 0, 0, 0, 0, 0, 1])), 2)
     assert (margins.gain_up, margins.phase, margins.delay) == (math.inf, math.inf, math.inf)
+    assert margins.gain_down == 0.0
+    assert math.isnan(margins.crossover)
 
 
 def test_response_of_a_loop_is_that_of_its_transfer_function():

@@ -168,6 +168,7 @@ def lift_and_z(value):
         (weights(q=off_diagonal(0.5)), r"Q is not symmetric: entry \(2, 3\) is 0\.5"),
         (weights(q=np.diag([math.nan] * 7)), "Q has entries that are not finite"),
         (weights(r=np.diag([1.0, 1.0, 1.0, 0.0])), "R is not positive definite"),
+        (weights(r=np.diag([1.0, 1.0, 1.0, 1e-12])), "R is not positive definite"),
         (weights(r=-R), "R is not positive definite"),
         (weights(r=R + np.triu(R + 1.0, 1)), "R is not symmetric"),
         (weights(n=NONE + 1.0), "N is too large"),

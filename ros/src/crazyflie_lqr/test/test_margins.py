@@ -77,6 +77,20 @@ def test_more_gain_than_the_margin_is_unstable(loop, delay):
         assert is_stable(design, factors) == stable
 
 
+@pytest.mark.parametrize("seed", ALL)
+def test_margins_of_a_loop_are_those_with_the_others_closed(seed):
+    factor = np.random.default_rng(seed).normal(size=(7, 7))
+    coupled = Weights(factor @ factor.T, 0.01 * np.eye(4), np.zeros((7, 4)))
+    design = design_gains(MODEL, coupled, 0.01, 0.02)
+    for loop in ALL:
+        margins = loop_margins(design, loop)
+        for limit, inside in ((margins.gain_up, 0.99), (margins.gain_down, 1.01)):
+            for excess, stable in ((inside, True), (2.0 - inside, False)):
+                factors = np.ones(4)
+                factors[loop] = excess * limit
+                assert limit == 0.0 or is_stable(design, factors) == stable
+
+
 @pytest.mark.parametrize("delay", [0.0, 0.013, 0.04])
 def test_more_delay_than_the_margin_is_unstable(delay):
     design = design_gains(MODEL, WEIGHTS, 0.01, delay)
@@ -94,6 +108,8 @@ def test_a_loop_without_gain_has_no_margins_to_lose():
     K[2] = 0.0
     margins = loop_margins(replace(design, K=K, A=design.A - np.diag([0, 0, 0, 0, 0, 0, 1])), 2)
     assert (margins.gain_up, margins.phase, margins.delay) == (math.inf, math.inf, math.inf)
+    assert margins.gain_down == 0.0
+    assert math.isnan(margins.crossover)
 
 
 def test_response_of_a_loop_is_that_of_its_transfer_function():

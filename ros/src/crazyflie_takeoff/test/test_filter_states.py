@@ -147,6 +147,12 @@ def test_an_emergency_comes_from_every_state():
     assert stopped == set(FilterState) - {FilterState.EMERGENCY}
 
 
+def test_no_control_ends_a_descent():
+    ends = {row.next for row in TABLE if row.state is FilterState.SINKING}
+    assert FilterState.SINKING.passes_nothing
+    assert FilterState.PASSING not in ends
+
+
 def test_states_are_those_of_the_message():
     assert {each.name: each.value for each in FilterState} == {
         name: getattr(FilterStatus, name) for name in FilterState.__members__

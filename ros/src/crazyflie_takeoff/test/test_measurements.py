@@ -261,6 +261,7 @@ def test_after_a_reset_of_the_clock_two_are_noticed_as_before():
     callers.note(90.0, "a")
     callers.advance(1.0)
     callers.note(1.25, "b")
+    callers.advance(1.25)
     assert callers.complaint == "two nodes publish controls, a and b; expected one"
 
 

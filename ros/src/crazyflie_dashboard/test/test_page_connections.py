@@ -10,6 +10,7 @@ import pages
 from nicegui import core
 from pages import Browser, wait_for
 
+from crazyflie_dashboard.page_data import MAX_COMMAND_AGE
 from crazyflie_dashboard.snapshot import Action
 
 
@@ -56,6 +57,7 @@ def test_a_page_that_is_loaded_again_in_flight_moves_nothing_and_has_no_control(
 
 
 def test_a_click_that_has_waited_moves_nothing(browser, server, driver):
+    server.dashboard.max_age = MAX_COMMAND_AGE
     browser.take_control()
     browser.choose("cf1")
     # A click waits while the browser is busy.

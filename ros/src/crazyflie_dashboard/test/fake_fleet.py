@@ -4,9 +4,7 @@ from concurrent.futures import Future
 
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.discovery import Graph
-from crazyflie_dashboard.page_data import (
-    Command,
-)
+from crazyflie_dashboard.page_data import Command
 from crazyflie_driver import srv
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import ServiceError

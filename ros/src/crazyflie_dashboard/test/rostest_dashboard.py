@@ -13,9 +13,7 @@ from crazyflie_dashboard import master
 from crazyflie_dashboard.control import ControlError
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.dashboard_node import example_folders
-from crazyflie_dashboard.page_data import (
-    Command,
-)
+from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action, Kind
 from crazyflie_utils.main import ros_process
 from crazyflie_utils.refusal import RefusalError

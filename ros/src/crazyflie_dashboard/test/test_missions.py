@@ -7,9 +7,7 @@ import time
 import pytest
 
 from crazyflie_dashboard.missions import Missions, listed
-from crazyflie_dashboard.page_data import (
-    MissionFile,
-)
+from crazyflie_dashboard.page_data import MissionFile
 from crazyflie_utils.refusal import RefusalError
 
 LIMIT = 30.0

@@ -2,9 +2,7 @@
 
 import pytest
 
-from crazyflie_dashboard.page_data import (
-    ParameterInfo,
-)
+from crazyflie_dashboard.page_data import ParameterInfo
 from crazyflie_dashboard.parameters import of_firmware, parsed
 from crazyflie_utils.refusal import RefusalError
 

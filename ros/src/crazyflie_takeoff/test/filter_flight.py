@@ -6,9 +6,7 @@ from crazyflie_takeoff.filter_states import FilterState, LossTimeouts
 from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.limits import Box, Limits
 from crazyflie_takeoff.motion import Motion
-from crazyflie_takeoff.safe_control import (
-    Setpoint,
-)
+from crazyflie_takeoff.safe_control import Setpoint
 from crazyflie_takeoff.safe_filter import SafeFilter
 
 G = 9.81

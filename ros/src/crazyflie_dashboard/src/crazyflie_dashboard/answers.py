@@ -8,9 +8,7 @@ from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
-from crazyflie_dashboard.page_data import (
-    Outcome,
-)
+from crazyflie_dashboard.page_data import Outcome
 from crazyflie_utils import ServiceError
 from crazyflie_utils.refusal import RefusalError
 

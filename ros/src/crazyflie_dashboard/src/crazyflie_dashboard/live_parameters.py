@@ -12,9 +12,7 @@ from typing_extensions import override
 
 from crazyflie_dashboard.answers import words
 from crazyflie_dashboard.graph_model import GraphModel
-from crazyflie_dashboard.page_data import (
-    ParameterInfo,
-)
+from crazyflie_dashboard.page_data import ParameterInfo
 from crazyflie_dashboard.parameters import described, of_firmware, parsed, values_of
 from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
 from crazyflie_utils import NodeHandle, ParameterError

@@ -5,9 +5,7 @@ from collections.abc import Callable, Mapping
 import roslib.message
 
 from crazyflie_dashboard import images
-from crazyflie_dashboard.page_data import (
-    Series,
-)
+from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.plots import Ring, expect_field, number_in, split_path
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.refusal import RefusalError

@@ -7,9 +7,7 @@ from typing import Any
 
 from dynamic_reconfigure.msg import Config, ConfigDescription
 
-from crazyflie_dashboard.page_data import (
-    ParameterInfo,
-)
+from crazyflie_dashboard.page_data import ParameterInfo
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.text_input import number_from_text
 

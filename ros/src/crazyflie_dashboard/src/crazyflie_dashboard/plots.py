@@ -8,9 +8,7 @@ from typing import Any
 
 import roslib.message
 
-from crazyflie_dashboard.page_data import (
-    Series,
-)
+from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.snapshot import VehicleSnapshot
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils.refusal import RefusalError

@@ -4,9 +4,7 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from crazyflie_dashboard.page.session import CLICKED, Session
-from crazyflie_dashboard.page_data import (
-    MissionFile,
-)
+from crazyflie_dashboard.page_data import MissionFile
 from crazyflie_dashboard.snapshot import Scene, Triple
 
 

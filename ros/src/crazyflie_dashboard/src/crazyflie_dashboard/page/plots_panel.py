@@ -10,9 +10,7 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from crazyflie_dashboard.page.session import Session
-from crazyflie_dashboard.page_data import (
-    Series,
-)
+from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.snapshot import Scene
 
 SPAN = 60.0  #: Time that is shown, s.

@@ -66,6 +66,15 @@ def test_vehicles_above_each_other_land_beside_each_other(tower):
     assert tower.position("cf3") == pytest.approx((3.0, 0.0, 0.0))
 
 
+def test_a_vehicle_flies_and_lands_beside_two_that_rest_near_each_other():
+    group = DryRun({"cf0": (0.0, 0.0, 0.0), "cf1": (0.28, 0.0, 0.0), "cf2": (2.0, 0.0, 0.0)})
+    group["cf2"].takeoff(1.0)
+    group.land()
+    assert places(group)[:, 2] == pytest.approx(0.0)
+    with pytest.raises(MissionError, match="cf0 and cf1 would be 0.28 m apart"):
+        group["cf1"].takeoff(1.0)
+
+
 def test_after_an_error_likewise():
     group = DryRun(ROW)
     with pytest.raises(ZeroDivisionError), group:

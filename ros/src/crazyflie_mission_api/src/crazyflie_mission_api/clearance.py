@@ -1,6 +1,6 @@
 """Distances between vehicles: of the mission, and of the fleet that keeps them apart."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -28,7 +28,9 @@ class Clearance:
         radii = np.array([self.buffers.get(name, -np.inf) for name in names])
         return np.maximum(self.separation, RELEASE_RATIO * (radii[:, None] + radii))
 
-    def check(self, names: Sequence[str], times: Array, places: Array) -> None:
+    def check(
+        self, names: Sequence[str], times: Array, places: Array, resting: Collection[str] = ()
+    ) -> None:
         """Refuse positions that are too near, or approached so fast that the fleet holds vehicles.
 
         Parameters
@@ -39,13 +41,16 @@ class Clearance:
             From now, s.
         places : ndarray, shape (n, m, 3)
             Where each is then, m.
+        resting : collection of str
+            Those on the ground with their motors off: two of them may be at any distance.
 
         Raises
         ------
         MissionError
         """
         first, second = np.triu_indices(len(names), 1)
-        limits = self.limits(names)[first, second]
+        rests = np.array([name in resting for name in names])
+        limits = np.where(rests[first] & rests[second], 0.0, self.limits(names)[first, second])
         for k, time in enumerate(times):
             distances = pdist(places[:, k] * SCALE)
             worst = int((distances - limits).argmin())

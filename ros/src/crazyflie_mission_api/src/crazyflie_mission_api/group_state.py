@@ -152,7 +152,7 @@ class GroupState:
         }
         resting = {name: TimedTrajectory.hover(p) for name, p in on_ground.items() if p is not None}
         everything = {**resting, **self._commanded, **changed}
-        check_apart(everything, self.time(), self.rules.clearance)
+        check_apart(everything, self.time(), self.rules.clearance, resting.keys() - changed.keys())
 
     def _check_names(self, names):
         for name in names:

@@ -1,7 +1,7 @@
 """Commanded positions of the vehicles of a group, by time."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
@@ -88,9 +88,12 @@ def check_with_skew(
 
 
 def check_apart(
-    trajectories: Mapping[str, TimedTrajectory], now: float, clearance: Clearance
+    trajectories: Mapping[str, TimedTrajectory],
+    now: float,
+    clearance: Clearance,
+    resting: Collection[str] = (),
 ) -> None:
-    """Refuse trajectories on which two vehicles come too near.
+    """Refuse trajectories on which two vehicles come too near, unless both are ``resting``.
 
     Raises
     ------
@@ -101,4 +104,4 @@ def check_apart(
     end = max(now, *(each.end for each in trajectories.values()))
     times = np.linspace(now, end, math.ceil((end - now) / _STEP) + 1, dtype=np.float64)
     places = np.stack([each.positions(times) for each in trajectories.values()])
-    clearance.check([*trajectories], times - now, places)
+    clearance.check([*trajectories], times - now, places, resting)

@@ -168,16 +168,17 @@ def test_geofences_are_drawn_as_long_as_they_are_there(fleet):
     assert fleet.dashboard.scene().fences == (((-1.0,) * 3, (2.0,) * 3),)
 
 
-def test_lines_of_markers_are_planned_paths(fleet):
-    add_topic(fleet, "/sweep/markers", MarkerArray._type)
+@pytest.mark.parametrize("topic", ["/sweep/markers", "/cf1/high_level/plan/markers"])
+def test_lines_of_markers_are_planned_paths(fleet, topic):
+    add_topic(fleet, topic, MarkerArray._type)
     points = [Point(0.0, 0.0, 1.0), Point(1.0, 0.0, 1.0), Point(float("nan"), 0.0, 1.0)]
     lanes = Marker(ns="lanes", type=Marker.LINE_STRIP, points=points)
     lanes.header.frame_id = "world"
-    fleet.process.publish("/sweep/markers", MarkerArray([lanes]))
+    fleet.process.publish(topic, MarkerArray([lanes]))
     fleet.process.advance(0.05)
     (path,) = fleet.dashboard.scene().paths.values()
     assert path == ((0.0, 0.0, 1.0), (1.0, 0.0, 1.0))
-    fleet.process.publish("/sweep/markers", MarkerArray([]))
+    fleet.process.publish(topic, MarkerArray([]))
     fleet.process.advance(0.05)
     assert fleet.dashboard.scene().paths == {}
 

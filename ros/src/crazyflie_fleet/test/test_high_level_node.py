@@ -7,6 +7,7 @@ import pytest
 from geometry_msgs.msg import Point
 from high_level_bench import SECONDS, TOP, Bench
 from std_msgs.msg import String
+from visualization_msgs.msg import Marker
 
 from crazyflie_driver import srv
 from crazyflie_fleet.conversions import full_state_message, to_message
@@ -30,7 +31,7 @@ def pieces_through(*points):
 @pytest.fixture
 def bench():
     """Return a vehicle that flies at (0, 0, 1)."""
-    made = Bench()
+    made = Bench(**{"frames/fixed": "hall"})
     made.be("flying")
     return made
 
@@ -84,6 +85,32 @@ def test_a_move_after_setpoints_begins_where_they_were(bench):
     bench.go_to((1.0, 0.0, 1.0))
     bench.process.advance(0.02)
     assert bench.references()[-1] == pytest.approx([0.31, 0.0, 1.0, 0.5, 0.0, 0.0], abs=0.005)
+
+
+def test_what_is_flown_is_shown_until_its_end(bench):
+    def plans():
+        return [m.markers[0] for m in bench.process.published(f"{TOP}/plan/markers")]
+
+    bench.go_to((1.0, 0.0, 1.5))
+    bench.fly(1.0)
+    (plan,) = plans()
+    assert (plan.action, plan.header.frame_id) == (Marker.ADD, "hall")
+    points = np.array([(p.x, p.y, p.z) for p in plan.points])
+    assert points[[0, 10, -1]] == pytest.approx(
+        np.array([(0.0, 0.0, 1.0), (0.5, 0.0, 1.25), (1.0, 0.0, 1.5)])
+    )
+    bench.go_to((0.0, 0.0, 1.0))
+    bench.fly(1.9)
+    assert [plan.action for plan in plans()] == [Marker.ADD, Marker.ADD]
+    bench.fly(0.2)
+    assert [plan.action for plan in plans()] == [Marker.ADD, Marker.ADD, Marker.DELETE]
+
+
+def test_what_is_not_flown_any_more_is_not_shown(bench):
+    bench.go_to((1.0, 0.0, 1.5))
+    bench.be("landing")
+    (_, last) = bench.process.published(f"{TOP}/plan/markers")
+    assert last.markers[0].action == Marker.DELETE
 
 
 def test_trajectories_are_uploaded_and_flown(bench):

@@ -13,7 +13,7 @@ from crazyflie_model.angles import rotate
 from crazyflie_takeoff.fence_box import follow_box
 from crazyflie_utils import NodeHandle
 
-_MARKERS = ("world/markers", "sweep/markers")  #: How the topics of markers end.
+_MARKERS = ("world/markers", "sweep/markers", "plan/markers")  #: How the topics of markers end.
 _FENCES = "geofence/parameter_updates"  #: How a topic with the live parameters of a geofence ends.
 _PATH = "nav_msgs/Path"
 

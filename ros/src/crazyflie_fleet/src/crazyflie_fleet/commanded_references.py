@@ -7,6 +7,7 @@ from typing import Any
 from crazyflie_fleet.conversions import reference_message
 from crazyflie_fleet.follower import Follower, Velocity
 from crazyflie_fleet.high_level_parameters import HighLevelParameters
+from crazyflie_fleet.plan_marker import PlanMarker
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_utils import NodeHandle, ServiceError
@@ -42,6 +43,7 @@ class CommandedReferences:
         self._state_time = 0.0
         self._measured = measured or self._received
         self._publisher = handle.publisher(parameters.reference_topic, parameters.reference_type)
+        self._plan = PlanMarker(handle, parameters.plan_topic, parameters.fixed_frame)
         if measured is None:
             state_type = PositionVelocityYawStateStamped
             handle.subscribe(parameters.state_topic, state_type, self._on_state, finite="state")
@@ -59,6 +61,8 @@ class CommandedReferences:
         self._command(self.follower, command, arguments)
         self._setpoint_time = None
         self._is_moving = True
+        if self.follower.trajectory is not None:
+            self._plan.show(self.follower.trajectory)
         self._set_timer()
 
     def checked(self, command: Callable[..., None], *arguments: Any) -> tuple[Any, ...]:
@@ -120,6 +124,8 @@ class CommandedReferences:
 
     def _set_timer(self):
         """Have a timer only while there are references to publish: a fleet has many vehicles."""
+        if not self._is_moving:
+            self._plan.clear()
         is_needed = self._is_moving or self._setpoint_time is not None
         if is_needed and self._timer is None:
             self._timer = self._handle.timer(self._parameters.time_step, self._on_timer)

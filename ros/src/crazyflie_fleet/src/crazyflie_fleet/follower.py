@@ -65,6 +65,11 @@ class Follower:
         """Return whether a move or a trajectory has not ended."""
         return self._trajectory is not None and time < self._begin + self._trajectory.duration
 
+    @property
+    def trajectory(self) -> Trajectory | None:
+        """Of the present command, from its beginning on; None before any, and of a setpoint."""
+        return self._trajectory
+
     def goal(self, time: float) -> Goal[float] | None:
         """Return the goal at ``time`` (s), at rest after the end; None before any command."""
         if self._trajectory is None:

@@ -2,7 +2,7 @@
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, SERVICE, TIME_STEP, TOPIC
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, SERVICE, TIME_STEP, TOPIC
 
 #: Namespace, below a vehicle's name, of the node; below /all of the same services for all.
 HIGH_LEVEL = "high_level"
@@ -35,6 +35,10 @@ class HighLevelParameters(Parameters):
     start_topic: str = parameter(
         TOPIC, "names those that begin trajectory 0 at once", START_TOPIC, "topics/start"
     )
+    plan_topic: str = parameter(
+        TOPIC, "what is flown until it has ended", "~plan/markers", "topics/plan"
+    )
+    fixed_frame: str = parameter(FRAME, "frame the references are in", "world", "frames/fixed")
     time_step: float = parameter(TIME_STEP, "from one reference to the next", 0.02)
 
     @property

@@ -40,6 +40,8 @@ def test_the_handle_of_a_goal_is_dragged_and_has_height_and_yaw(browser, server)
     browser.choose("cf1")
     browser.press("Take off")
     browser.click_floor(0.5, -0.5)
+    # With the click comes a height into the empty field.
+    wait_for(lambda: browser.in_scene("goal.visible"), "the goal")
     for label, text in (("z, m", "1.3"), ("yaw, °", "90")):
         browser.enter(f'input[aria-label="{label}"]', text)
     wait_for(lambda: browser.in_scene("goal.height") == 1.3, "the handle at its height")

@@ -81,7 +81,10 @@ def test_only_log_data_show_a_restart(make_bench, place, data, restarts):
     assert bench.vehicle.restarts == restarts
 
 
-def test_latencies_are_in_seconds(make_bench):
+@pytest.mark.parametrize("is_poor", [True, False])
+def test_the_figures_of_a_link(make_bench, is_poor):
     bench = make_bench()
+    bench.link.monitor.is_poor.return_value = is_poor
+    assert bench.vehicle.is_poor() == is_poor
     bench.link.cflib.link_statistics.latency.latency = 250.0
     assert bench.vehicle.latency() == 0.25

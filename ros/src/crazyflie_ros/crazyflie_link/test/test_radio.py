@@ -113,11 +113,14 @@ def test_a_link_ends_once_with_its_first_error(mock):
     assert isinstance(link.error, NoAnswerError)
 
 
-def test_a_link_that_is_not_set_up_has_no_monitor_and_is_not_lost(mock):
+def test_a_link_has_a_monitor_once_it_is_set_up_and_is_not_lost_before(mock):
     link = Link(Address.parse(URI), backend=mock)
     assert link.health() == (LinkHealth.ALIVE, "not connected yet")
     with pytest.raises(LinkLostError, match="not connected yet"):
         _ = link.monitor
+    link._on_connected(URI)
+    assert link.health() == (LinkHealth.ALIVE, "connected")
+    assert link.monitor.age(0.0) <= 0.0
     link.close()
 
 

@@ -11,7 +11,9 @@ from cflib.crtp.udpdriver import UdpDriver
 
 from crazyflie_link import safe_crazyflie
 from crazyflie_link.safe_crazyflie import SafeCrazyflie, init_drivers, table_cache
-from crazyflie_utils.testing.waiting import LIMIT, wait_until
+from crazyflie_utils.testing.waiting import wait_until
+
+LIMIT = 10.0
 
 
 def test_tables_are_kept_in_the_user_s_own_folder(monkeypatch, tmp_path):
@@ -64,6 +66,23 @@ def test_over_udp_requests_are_repeated_and_the_receiver_looks_up_soon(crazyflie
     assert driver.socket.settimeout.called == (name == "udp")
 
 
+def test_an_error_while_sending_is_reported_unless_the_link_was_closed(driver):
+    errors = []
+    crazyflie = SafeCrazyflie(None, errors.append)
+    crazyflie.link = driver
+    driver.send_packet.side_effect = OSError("broken")
+    crazyflie.send_packet(CRTPPacket())
+    assert len(errors) == 1
+
+    def close(_):
+        crazyflie.link = None
+        raise OSError("closed")
+
+    driver.send_packet.side_effect = close
+    crazyflie.send_packet(CRTPPacket())
+    assert len(errors) == 1
+
+
 def test_a_link_that_was_never_opened_has_an_end():
     crazyflie, ended = SafeCrazyflie(None, lambda text: None), threading.Event()
     crazyflie.disconnected.add_callback(lambda uri: ended.set())
@@ -97,5 +116,5 @@ def test_the_end_wakes_the_receiver(crazyflie):
 def test_a_callback_may_end_its_link(crazyflie, driver):
     crazyflie.packet_received.add_callback(lambda _: crazyflie.disconnect())
     driver.in_queue.put(CRTPPacket())
-    wait_until(lambda: driver.close.called)
-    wait_until(lambda: not crazyflie.incoming.is_alive())
+    wait_until(lambda: driver.close.called, limit=LIMIT)
+    wait_until(lambda: not crazyflie.incoming.is_alive(), limit=LIMIT)

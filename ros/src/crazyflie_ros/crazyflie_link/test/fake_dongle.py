@@ -47,6 +47,7 @@ class Dongle:
             self._acknowledges = bool(wValue)
 
     def write(self, endpoint, data, timeout):
+        assert endpoint == 1
         self._check()
         if not self._acknowledges:
             assert self._address == BROADCAST_ADDRESS

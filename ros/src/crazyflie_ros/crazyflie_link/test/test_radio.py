@@ -1,7 +1,9 @@
 """What needs a Crazyradio, on mocks of cflib."""
 
+import itertools
 import threading
-from unittest.mock import MagicMock, patch
+from types import SimpleNamespace
+from unittest.mock import ANY, MagicMock, patch
 
 import cflib.crtp
 import pytest
@@ -10,13 +12,16 @@ from cflib.crtp.radiodriver import RadioDriver
 from cflib.crtp.udpdriver import UdpDriver
 from cflib.utils.power_switch import PowerSwitch
 
+from crazyflie_link import link as module
 from crazyflie_link import scan
 from crazyflie_link.address import Address
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import AddressError, LinkLostError, NoAnswerError, NoDongleError
 from crazyflie_link.link import Link
+from crazyflie_link.link_monitor import LinkHealth, LinkMonitor
 from crazyflie_link.link_setup import Limits
 from crazyflie_link.reboot import MODES, reboot
+from crazyflie_link.safe_crazyflie import packet
 
 # cflib warns of one of its own attributes when a mock takes stock of them.
 pytestmark = pytest.mark.filterwarnings("ignore:link_quality_updated:DeprecationWarning")
@@ -81,6 +86,61 @@ def test_the_first_request_is_repeated(mock):
     with pytest.raises(NoAnswerError):
         link.open()
     assert mock.cflib.request_source.call_count >= 2
+
+
+@pytest.mark.parametrize(("protocol", "period"), [(-1, 0.0), (12, 0.2)])
+def test_the_first_request_is_not_repeated_at_once_or_after_its_answer(
+    mock, monkeypatch, protocol, period
+):
+    times = itertools.count(100.0, period)
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: next(times)))
+    link = Link(Address.parse(URI), Limits(first_answer=0.2), backend=mock)
+    mock.cflib.platform.get_protocol_version.return_value = protocol
+    with pytest.raises(NoAnswerError):
+        link.open()
+    mock.cflib.request_source.assert_not_called()
+
+
+def test_a_link_ends_once_with_its_first_error(mock):
+    link = Link(Address.parse(URI), backend=mock)
+    link.close("first")
+    link.close("second")
+    assert str(link.error) == "first"
+    mock.cflib.disconnect.assert_called_once_with()
+    link = Link(Address.parse(URI), backend=mock)
+    mock.fail("no driver found")
+    link.close("closed")
+    assert isinstance(link.error, NoAnswerError)
+
+
+def test_a_link_has_a_monitor_once_it_is_set_up_and_is_not_lost_before(mock):
+    link = Link(Address.parse(URI), backend=mock)
+    assert link.health() == (LinkHealth.ALIVE, "not connected yet")
+    with pytest.raises(LinkLostError, match="not connected yet"):
+        _ = link.monitor
+    link._on_connected(URI)
+    assert link.health() == (LinkHealth.ALIVE, "connected")
+    assert link.monitor.age(0.0) <= 0.0
+    link.close()
+
+
+def test_only_log_data_and_pings_show_that_a_vehicle_lives(mock):
+    link = Link(Address.parse(URI), backend=mock)
+    (receive,), _ = mock.cflib.packet_received.add_callback.call_args
+    (send,), _ = mock.cflib.packet_sent.add_callback.call_args
+    packets = [packet(5, 2, b"log"), packet(15, 0, b"ping"), packet(2, 1, b"x"), packet(15, 1, b"")]
+    for each in packets:
+        receive(each)
+        send(each)
+    with patch("crazyflie_link.link.LinkMonitor", spec=LinkMonitor) as monitor:
+        link._on_connected(URI)
+    for each in packets:
+        receive(each)
+        send(each)
+    monitor.return_value.log_received.assert_called_once()
+    monitor.return_value.ping_answered.assert_called_once_with(b"ping", ANY)
+    monitor.return_value.ping_sent.assert_called_once_with(b"ping")
+    link.close()
 
 
 def test_an_error_in_flight_is_a_lost_link(mock):
@@ -150,12 +210,18 @@ def test_scanning(monkeypatch):
 
     radio = driver_class(RadioDriver, side_effect=find_no_dongle)
     udp = driver_class(UdpDriver, return_value=[["udp://127.0.0.1:19850", ""]])
-    broken = driver_class(UdpDriver, side_effect=OSError("strange"))
+    broken = driver_class(UdpDriver, side_effect=OSError())
     monkeypatch.setattr(cflib.crtp, "CLASSES", [radio, udp, broken])
     found, problems = scan("E7E7E7E701")
     assert found == ["udp://127.0.0.1:19850"]
     assert [type(problem) for problem in problems] == [NoDongleError, NoAnswerError]
     radio().scan_interface.assert_called_once_with(0xE7E7E7E701)
+
+
+@pytest.mark.parametrize("address", ["0", "FFFFFFFFFF"])
+def test_the_lowest_and_the_highest_radio_address(monkeypatch, address):
+    monkeypatch.setattr(cflib.crtp, "CLASSES", [driver_class(UdpDriver, return_value=[])])
+    assert scan(address) == ([], [])
 
 
 @pytest.mark.parametrize("address", ["", "10000000000", "hello", "-1"])

@@ -16,12 +16,13 @@ class Radio:
     def __init__(self):
         self.queue = TransmitQueue()
         self.sent = []
-        self._free = threading.Event()
+        self.free = threading.Event()
         entered = threading.Event()
 
         def block():
+            self.thread = threading.current_thread()
             entered.set()
-            self._free.wait(LIMIT)
+            self.free.wait(LIMIT)
 
         self.queue.put(block)
         assert entered.wait(LIMIT)
@@ -33,7 +34,7 @@ class Radio:
         """Let everything be sent that waits, and return it."""
         done = threading.Event()
         self.queue.put_latest("end", done.set)
-        self._free.set()
+        self.free.set()
         assert done.wait(LIMIT)
         return self.sent
 
@@ -96,3 +97,13 @@ def test_nothing_is_taken_after_the_end(radio):
         radio.queue.put(radio.note(1))
     with pytest.raises(LinkLostError):
         radio.queue.put_latest("setpoint", radio.note(1))
+
+
+def test_what_waits_at_the_end_is_not_sent(radio):
+    radio.queue.put(radio.note("command"))
+    radio.queue.put_latest("setpoint", radio.note("setpoint"))
+    radio.queue.close()
+    radio.free.set()
+    radio.thread.join(LIMIT)
+    assert not radio.thread.is_alive()
+    assert radio.sent == []

@@ -1,0 +1,119 @@
+"""What is written to the memory of base stations, and stored, on a link without a vehicle."""
+
+import struct
+from types import SimpleNamespace
+
+import pytest
+from cflib.crazyflie.mem import LighthouseBsCalibration, LighthouseBsGeometry, MemoryElement
+from cflib.crtp.crtpstack import CRTPPort
+from cflib.localization import LighthouseConfigFileManager
+
+from crazyflie_link.errors import RefusedError, ValueRangeError
+from crazyflie_link.lighthouse import Lighthouse
+
+CALIBRATIONS = 16  #: The page of the first calibration; those of the geometries begin at 0.
+SYSTEM_TYPE = 2
+
+
+class Vehicle:
+    """A link to a vehicle with room for some base stations, and its parameters."""
+
+    def __init__(self, room=4):
+        self.pages, self.stored = {}, []
+        self.parameters, self.answer = {"lighthouse.systemType": 1}, b"\x0b\x01"
+        self._room = room
+        memory = SimpleNamespace(get_mems=self._memories)
+        self.cflib = SimpleNamespace(mem=memory)
+
+    def _memories(self, kind):
+        return [SimpleNamespace(id=7)] if kind == MemoryElement.TYPE_LH else []
+
+    def values(self):
+        return self.parameters
+
+    def write(self, name, value):
+        """Set a parameter; a change of the type makes the vehicle forget the stations."""
+        self.parameters[name] = value
+        self.pages.clear()
+
+    def request(self, data, request):
+        """Answer a request."""
+        if request.port != CRTPPort.MEM:
+            self.stored.append((request.port, request.channel, data))
+            return self.answer
+        number, address = struct.unpack_from("<BI", data)
+        assert number == 7
+        page, offset = divmod(address, 0x100)
+        if page % CALIBRATIONS >= self._room:
+            return data[:5] + b"\x05"
+        self.pages.setdefault(page, bytearray())[offset:] = data[5:]
+        return data[:5] + b"\0"
+
+    def valid(self):
+        """Return the pages of stations that are valid."""
+        return [page for page, data in sorted(self.pages.items()) if data[-1]]
+
+
+def lighthouse_file(path, *numbers):
+    geometries, calibrations = {}, {}
+    for number in numbers:
+        geometry, calibration = LighthouseBsGeometry(), LighthouseBsCalibration()
+        geometry.origin, geometry.valid = [1.0, 2.0, 2.0 + number], True
+        calibration.uid, calibration.valid = 1000 + number, True
+        geometries[number], calibrations[number] = geometry, calibration
+    LighthouseConfigFileManager.write(str(path), geometries, calibrations, SYSTEM_TYPE)
+    return str(path)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "stations.yaml"
+
+
+@pytest.mark.parametrize(("room", "mask"), [(4, 0x0F), (16, 0xFFFF)])
+def test_all_stations_that_the_vehicle_has_room_for_are_written_and_stored(path, room, mask):
+    vehicle = Vehicle(room)
+    file = lighthouse_file(path, 0, 3)
+    assert Lighthouse(lambda: vehicle).write_file(file, vehicle) == 2
+    assert vehicle.parameters == {"lighthouse.systemType": SYSTEM_TYPE}
+    assert sorted(vehicle.pages) == [*range(room), *range(CALIBRATIONS, CALIBRATIONS + room)]
+    assert vehicle.valid() == [0, 3, CALIBRATIONS, CALIBRATIONS + 3]
+    assert struct.unpack_from("<3f", vehicle.pages[3]) == (1.0, 2.0, 5.0)
+    assert struct.unpack("<L?", vehicle.pages[CALIBRATIONS + 3][-5:]) == (1003, True)
+    assert vehicle.stored == [(6, 1, struct.pack("<BHH", 11, mask, mask))]
+
+
+def test_a_type_that_is_right_is_not_written(path):
+    """The vehicle forgets all stations at that."""
+    vehicle = Vehicle()
+    vehicle.parameters["lighthouse.systemType"] = SYSTEM_TYPE
+    vehicle.write = None
+    Lighthouse(lambda: vehicle).write_file(lighthouse_file(path, 0), vehicle)
+    assert vehicle.valid() == [0, CALIBRATIONS]
+
+
+def test_without_room_for_a_station_of_the_file_nothing_is_stored(path):
+    vehicle = Vehicle(room=2)
+    with pytest.raises(RefusedError, match="base station 2"):
+        Lighthouse(lambda: vehicle).write_file(lighthouse_file(path, 0, 2), vehicle)
+    assert vehicle.stored == []
+
+
+@pytest.mark.parametrize("answer", [b"\x0b", b"\x0b\x00"])
+def test_stations_that_are_not_stored_are_refused(path, answer):
+    vehicle = Vehicle()
+    vehicle.answer = answer
+    with pytest.raises(RefusedError, match="storing"):
+        Lighthouse(lambda: vehicle).write_file(lighthouse_file(path, 0), vehicle)
+
+
+def test_files_that_cannot_be_written_change_nothing(path):
+    vehicle = Vehicle(room=16)
+    for file, text in (
+        (lighthouse_file(path, 0, 16), "base station 16; expected 0 to 15"),
+        (str(path.parent / "none.yaml"), "No such file"),
+    ):
+        with pytest.raises(ValueRangeError, match=text):
+            Lighthouse(lambda: vehicle).write_file(file, vehicle)
+    assert vehicle.parameters == {"lighthouse.systemType": 1}
+    assert vehicle.pages == {}

@@ -3,10 +3,11 @@
 import math
 from dataclasses import replace
 
+import control
 import numpy as np
 import pytest
 
-from crazyflie_lqr.design import Weights, design_gains, sampled
+from crazyflie_lqr.design import Design, Weights, design_gains, sampled
 from crazyflie_lqr.margins import loop_margins, loop_response
 from crazyflie_lqr.models import CONTROLS, full_state, near_hover
 
@@ -30,6 +31,48 @@ def test_a_double_integrator_has_its_closed_form():
     crossover = math.sqrt((velocity**2 + math.sqrt(velocity**4 + 4.0 * position**2)) / 2.0)
     assert margins.crossover == pytest.approx(crossover, rel=1e-4)
     assert margins.phase == pytest.approx(math.atan(velocity * crossover / position), rel=1e-4)
+
+
+def test_slow_and_fast_loops_have_their_crossovers():
+    slow = np.diag([1.0, 1, 4, 1, 1, 4, 1e-6])
+    design = design_gains(MODEL, replace(WEIGHTS, Q=slow))
+    yaw, thrust = (loop_margins(design, CONTROLS.index(name)) for name in ("yaw_dot", "thrust"))
+    assert yaw.crossover == pytest.approx(0.01, rel=1e-4)
+    assert thrust.crossover == pytest.approx(22.0, rel=0.1)
+
+
+def loop_of(numerator, denominator):
+    """Return a design with one control, whose loop is this strictly proper fraction in s."""
+    A = np.eye(len(numerator), k=-1)
+    A[0] = [-coefficient for coefficient in denominator[1:]]
+    return Design(-np.array([numerator]), A, np.eye(len(numerator), 1), 0.0)
+
+
+#: They have the gain 1 at four frequencies, and at two, the last time with a phase of 20 deg.
+OFTEN = loop_of([6.0, 4.0, 8.0, 8.0, 0.0], [1.0, 0.0, 4.0, 4.0, -1.0, 1.0])
+AHEAD = loop_of([5.0, 0.0, 0.0], [1.0, 10.4, 5.0, 10.0])
+
+
+def test_a_loop_that_crosses_often_loses_its_worst_margin_first():
+    def is_stable_with(factor):
+        return np.linalg.eigvals(OFTEN.A + factor * OFTEN.B @ OFTEN.K).real.max() < 0.0
+
+    margins = loop_margins(OFTEN, 0)
+    for limit, inside in ((margins.gain_up, 0.99), (margins.gain_down, 1.01)):
+        assert is_stable_with(inside * limit)
+        assert not is_stable_with((2.0 - inside) * limit)
+    assert margins.phase > 0.0
+    assert is_stable_with(np.exp(0.99j * margins.phase))
+    assert not is_stable_with(np.exp(1.01j * margins.phase))
+
+
+@pytest.mark.parametrize("design", [OFTEN, AHEAD])
+def test_a_continuous_loop_is_unstable_beyond_its_margin_of_delay(design):
+    margin = loop_margins(design, 0).delay
+    for excess, stable in ((0.99, True), (1.01, False)):
+        delay = control.ss(control.tf(*control.pade(excess * margin, 8)))
+        loop = control.ss(design.A, design.B, -design.K, 0.0) * delay
+        assert (control.feedback(loop).poles().real.max() < 0.0) == stable
 
 
 def test_a_sampled_integrator_has_its_closed_form():

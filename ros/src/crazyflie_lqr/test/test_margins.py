@@ -83,10 +83,18 @@ def test_a_sampled_integrator_has_its_closed_form():
     margins = loop_margins(design, loop)
     assert margins.gain_up == pytest.approx(1.0 / k, rel=1e-3)
     assert margins.gain_down == 0.0
-    near = loop_margins(replace(design, K=0.95 * margins.gain_up * design.K), loop)
+
+
+def test_a_sampled_integrator_that_is_almost_unstable_may_grow_a_little():
+    design = design_gains(MODEL, WEIGHTS, 0.01, 0.01)
+    loop = CONTROLS.index("yaw_dot")
+    near = loop_margins(replace(design, K=-95.0 / design.K[loop, 6] * design.K), loop)
     assert (near.gain_up, near.gain_down) == (pytest.approx(1.0 / 0.95, rel=1e-3), 0.0)
-    frequency, _ = loop_response(design, loop)
-    assert frequency.max() < math.pi / design.sample_time
+
+
+def test_response_of_a_sampled_loop_ends_below_half_the_sample_rate():
+    frequency, _ = loop_response(design_gains(MODEL, WEIGHTS, 0.01, 0.01), 0)
+    assert 0.9 * math.pi / 0.01 < frequency.max() < math.pi / 0.01
 
 
 @pytest.mark.parametrize("seed", ALL)
@@ -120,18 +128,17 @@ def test_more_gain_than_the_margin_is_unstable(loop, delay):
         assert is_stable(design, factors) == stable
 
 
-@pytest.mark.parametrize("seed", ALL)
-def test_margins_of_a_loop_are_those_with_the_others_closed(seed):
-    factor = np.random.default_rng(seed).normal(size=(7, 7))
+@pytest.mark.parametrize("loop", ALL)
+def test_margins_of_a_loop_are_those_with_the_others_closed(loop):
+    factor = np.random.default_rng(loop).normal(size=(7, 7))
     coupled = Weights(factor @ factor.T, 0.01 * np.eye(4), np.zeros((7, 4)))
     design = design_gains(MODEL, coupled, 0.01, 0.02)
-    for loop in ALL:
-        margins = loop_margins(design, loop)
-        for limit, inside in ((margins.gain_up, 0.99), (margins.gain_down, 1.01)):
-            for excess, stable in ((inside, True), (2.0 - inside, False)):
-                factors = np.ones(4)
-                factors[loop] = excess * limit
-                assert limit == 0.0 or is_stable(design, factors) == stable
+    margins = loop_margins(design, loop)
+    for limit, inside in ((margins.gain_up, 0.99), (margins.gain_down, 1.01)):
+        for excess, stable in ((inside, True), (2.0 - inside, False)):
+            factors = np.ones(4)
+            factors[loop] = excess * limit
+            assert limit == 0.0 or is_stable(design, factors) == stable
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.013, 0.04])

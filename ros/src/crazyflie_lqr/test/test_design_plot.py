@@ -22,7 +22,8 @@ def test_yaw_approaches_its_reference_exponentially():
 
 @pytest.mark.parametrize("times", [(0.0, 0.0), (0.02, 0.05)])
 def test_every_output_reaches_its_reference(times):
-    _, states, controls = step_responses(MODEL, design_gains(MODEL, WEIGHTS, *times))
+    time, states, controls = step_responses(MODEL, design_gains(MODEL, WEIGHTS, *times))
+    assert time[0] == 0.0
     for output in ("x", "y", "z", "yaw"):
         assert states[output][0] == pytest.approx(0.0)
         assert states[output][-1] == pytest.approx(1.0, abs=0.01)

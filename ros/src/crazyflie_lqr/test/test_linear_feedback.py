@@ -218,10 +218,10 @@ def test_an_integral_at_the_limit_may_shrink():
     assert controller.control(state(z=1.0), np.zeros(7), time + 0.2)[3] < u[3]
 
 
-def test_an_integral_that_does_not_cause_the_limit_may_shrink_there():
-    too_much = [0.0, 0.0, 0.0, 2.0 * MAX_THRUST]
-    shrunk = integrate(2, -0.5, 1.0, 0.1, too_much, k=-1.0, limit=9.0)
-    assert shrunk == pytest.approx(-0.4)
+@pytest.mark.parametrize(("thrust", "sign"), [(2.0 * MAX_THRUST, -1.0), (-MAX_THRUST, 1.0)])
+def test_an_integral_that_does_not_cause_the_limit_may_shrink_there(thrust, sign):
+    shrunk = integrate(2, 0.5 * sign, -sign, 0.1, [0.0, 0.0, 0.0, thrust], k=-1.0, limit=9.0)
+    assert shrunk == pytest.approx(0.4 * sign)
 
 
 SOFT = np.zeros((4, 7))

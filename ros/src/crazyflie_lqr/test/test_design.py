@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are, solve_discrete_are, solve_discrete_lyapunov
 from scipy.optimize import minimize
 
-from crazyflie_lqr.design import DesignError, Weights, design_gains, sampled
+from crazyflie_lqr.design import Design, DesignError, Weights, design_gains, sampled
 from crazyflie_lqr.models import LinearModel, full_state, near_hover
 
 MODEL = near_hover()
@@ -141,12 +141,31 @@ def test_gains_that_ignore_the_delay_would_not_fly():
     assert design_gains(MODEL, weights(), 0.01, 0.035).poles.real.max() < 0.0
 
 
+@pytest.mark.parametrize("k", [1e-5, 2.0])
+def test_a_control_of_no_effect_has_no_gain(k):
+    integrator = LinearModel("yaw", ("yaw",), np.zeros((1, 1)), np.array([[0, 0, 1.0, 1e-12]]))
+    design = design_gains(integrator, Weights(k**2 * np.eye(1), np.eye(4), np.zeros((1, 4))))
+    np.testing.assert_allclose(design.K, [[0.0], [0.0], [-k], [0.0]], rtol=1e-9)
+
+
+def test_poles_of_samples_are_continuous_ones():
+    design = Design(np.zeros((4, 2)), np.diag([-0.5, -1e-5]), np.zeros((2, 4)), 0.1)
+    # Half and turned about in 0.1 s; and gone.
+    expected = [(-math.log(2.0) + 1j * math.pi) / 0.1, -math.inf]
+    np.testing.assert_allclose(design.poles, expected)
+
+
 def test_poles_of_a_fast_sampled_design_are_those_of_the_continuous_one():
     # The sum over the samples stands for the integral: weights are per sample.
     dt = 1e-4
     fast = design_gains(MODEL, weights(Q * dt, R * dt), sample_time=dt).poles
     slow = design_gains(MODEL, weights()).poles
     np.testing.assert_allclose(np.sort(fast.real), np.sort(slow.real), rtol=0.02)
+
+
+def blind(direction):
+    """Return a Q that costs nothing in one direction."""
+    return np.eye(7) - np.outer(direction, direction) / np.dot(direction, direction)
 
 
 def off_diagonal(value):
@@ -174,6 +193,7 @@ def lift_and_z(value):
         (weights(n=NONE + 1.0), "N is too large"),
         (weights(q=np.diag([0.0, 1, 1, 1, 1, 1, 1])), "do not see x,"),
         (weights(q=np.diag([1.0, 1, 1, 1, 1, 1, 0])), "do not see yaw,"),
+        (weights(q=blind([0.7, 0.1, 0.705, 0, 0, 0, 0.03])), "do not see x, y, z, which"),
         # (2 z + u)^2: u = -2 z, by which it oscillates.
         (weights(np.diag([1, 1, 4, 1, 1, 0, 1]), np.eye(4), lift_and_z(2.0)), "see z, z_dot,"),
         (weights(q=1e30 * Q), "the Riccati equation has no stabilising solution"),

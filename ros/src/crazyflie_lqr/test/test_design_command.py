@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crazyflie_lqr.design_command import main
+from crazyflie_lqr import design_command
+from crazyflie_lqr.design import Design
+from crazyflie_lqr.design_command import main, report
 from crazyflie_lqr.gain_file import load_matrix
+from crazyflie_lqr.models import near_hover
 
 CONFIG = Path(__file__).parents[1] / "config"
 USUAL = {
@@ -24,6 +27,13 @@ def arguments(**changes):
     return shlex.split(" ".join(f"{k} {v}" for k, v in options.items() if v is not None))
 
 
+@pytest.fixture
+def without_report(monkeypatch):
+    """Leave out the report: it takes most of the time."""
+    monkeypatch.setattr(design_command, "report", lambda model, design: "")
+
+
+@pytest.mark.usefixtures("without_report")
 @pytest.mark.parametrize("path", sorted(CONFIG.glob("K_*.txt")), ids=lambda path: path.name)
 def test_shipped_gains_are_what_the_command_in_their_comment_makes(path, tmp_path):
     shipped = path.read_text().splitlines()
@@ -60,6 +70,23 @@ def test_prints_gains_poles_and_margins(capsys):
     assert gains[2].split() == ["yaw_dot", *"000000", "-2"]
 
 
+def test_poles_are_listed_the_slowest_first():
+    A = np.diag([-30.0, -30.0, -30.0, -2.0, -2.0, -1e-3, -1e-3])
+    A[5, 6], A[6, 5] = 5e-4, -5e-4
+    A[3, 4], A[4, 3] = 1.0, -1e-15  # Two that are the same but for rounding.
+    text = report(near_hover(), Design(np.zeros((4, 7)), A, np.zeros((7, 4)), 0.0))
+    assert "poles (rad/s): -0.001 +- 0.0005j, -2 (x2), -30 (x3)\n" in text
+
+
+def test_a_gain_that_may_only_shrink_to_a_ninth_is_in_decibels():
+    # s^3 + k (3 s^2 + 3 s + 1) is stable for k > 1/9.
+    A, B, K = -np.eye(7), np.zeros((7, 4)), np.zeros((4, 7))
+    A[:3, :3] = np.eye(3, k=1)
+    B[2, 3], K[3, :3] = 1.0, (-1.0, -3.0, -3.0)
+    thrust = report(near_hover(), Design(K, A, B, 0.0)).splitlines()[-1]
+    assert thrust.split()[1:3] == ["inf", "-19.1"]
+
+
 def test_margins_are_in_decibels(capsys):
     # z - 1 + k = 0 is stable up to k = 2; without a cost of the control k is 1.
     assert main(arguments(R="1 1 1e-6 1", sample_time=1.0)) == 0
@@ -67,6 +94,7 @@ def test_margins_are_in_decibels(capsys):
     assert yaw.split()[1:3] == ["6.02", "-inf"]
 
 
+@pytest.mark.usefixtures("without_report")
 def test_the_command_in_the_comment_makes_the_same_gains(tmp_path):
     Q = np.diag([1.0, 1, 4, 1, 1, 4, 100])
     Q[0, 1] = Q[1, 0] = 0.5
@@ -89,6 +117,7 @@ def test_sampled_design_says_so_and_keeps_it_in_the_comment(tmp_path, capsys):
     assert -10.0 < K[1, 0] < -1.0
 
 
+@pytest.mark.usefixtures("without_report")
 @pytest.mark.parametrize(
     "form", ["1 1 4 1 1 4 100", "1,1,4,1,1,4,100", "'1 1 4 1 1 4 100'", "{diagonal}", "{matrix}"]
 )
@@ -102,6 +131,7 @@ def test_weights_may_be_numbers_or_a_file(form, tmp_path):
     assert out.read_text() == (CONFIG / "K_hover.txt").read_text()
 
 
+@pytest.mark.usefixtures("without_report")
 def test_a_matrix_may_be_longer_than_a_name_of_a_file(tmp_path):
     out = tmp_path / "K.txt"
     words = ",".join(f"{value:.6f}" for value in np.diag([1, 1, 4, 1, 1, 4, 100]).ravel())

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from crazyflie_lqr.control_law import integrate
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback, LinearFeedback, heading_error
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 
@@ -215,6 +216,12 @@ def test_an_integral_at_the_limit_may_shrink():
     u = controller.control(state(z=1.0), np.zeros(7), time + 0.1)
     assert 15.7 < u[3] < 16.0
     assert controller.control(state(z=1.0), np.zeros(7), time + 0.2)[3] < u[3]
+
+
+@pytest.mark.parametrize(("thrust", "sign"), [(2.0 * MAX_THRUST, -1.0), (-MAX_THRUST, 1.0)])
+def test_an_integral_that_does_not_cause_the_limit_may_shrink_there(thrust, sign):
+    shrunk = integrate(2, 0.5 * sign, -sign, 0.1, [0.0, 0.0, 0.0, thrust], k=-1.0, limit=9.0)
+    assert shrunk == pytest.approx(0.4 * sign)
 
 
 SOFT = np.zeros((4, 7))

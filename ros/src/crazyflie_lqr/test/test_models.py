@@ -30,14 +30,15 @@ def jacobian(function, at):
 
 
 @pytest.mark.parametrize(
-    ("model", "rates"),
+    ("make_model", "rates"),
     [
-        (near_hover(), partial(NearHover().derivative, 0.0)),
-        (near_hover(), partial(Coupled7D().derivative, 0.0)),
-        (full_state(), first_order_attitude),
+        (near_hover, partial(NearHover().derivative, 0.0)),
+        (near_hover, partial(Coupled7D().derivative, 0.0)),
+        (full_state, first_order_attitude),
     ],
 )
-def test_is_the_derivative_at_hover(model, rates):
+def test_is_the_derivative_at_hover(make_model, rates):
+    model = make_model()
     x = np.zeros(model.x_dim)
     np.testing.assert_allclose(rates(x, HOVER), np.zeros(model.x_dim))
     np.testing.assert_allclose(model.A, jacobian(lambda v: rates(v, HOVER), x), atol=1e-6)

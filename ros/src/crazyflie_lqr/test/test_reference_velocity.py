@@ -160,3 +160,9 @@ def test_points_that_move_without_a_velocity_leave_the_next_velocity_alone():
     streamed(reference, 0.02, 3.0, lambda time: (0.5 * time, 0.0, 1.0), lambda time: (0.0,) * 3)
     reference.update([1.5, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], time=3.0)
     assert reference.value(3.0, [1.5, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])[3] == 1.0
+
+
+def test_the_largest_velocity_is_followed_as_it_is():
+    reports = []
+    streamed(guarded(reports), 0.1, 0.2, lambda t: [2.0 * t, 0.0, 1.0], lambda t: [2.0, 0.0, 0.0])
+    assert not reports

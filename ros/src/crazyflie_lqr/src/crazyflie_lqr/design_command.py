@@ -53,7 +53,7 @@ def report(model: LinearModel, design: Design) -> str:
     lines += [" " * 8 + "".join(f"{state:>10}" for state in model.states)]
     lines += [
         f"{control:8}" + "".join(f"{value:10.4g}" for value in row)
-        for control, row in zip(CONTROLS, design.K + 0.0, strict=True)
+        for control, row in zip(CONTROLS, design.K, strict=True)
     ]
     lines += ["poles (rad/s): " + _poles(design)]
     lines += ["loop      gain may grow, shrink (dB)   phase margin (deg)   at (rad/s)   delay (ms)"]
@@ -168,7 +168,7 @@ def _time(design):
 
 def _poles(design):
     texts: dict[str, int] = {}
-    for pole in sorted(design.poles, key=lambda p: (-p.real, abs(p.imag))):
+    for pole in sorted(design.poles, key=lambda p: -p.real):
         if pole.imag >= -1e-6 * abs(pole):
             text = f"{pole.real:.4g}"
             if pole.imag > 1e-6 * abs(pole):

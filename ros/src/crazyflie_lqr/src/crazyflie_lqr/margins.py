@@ -49,8 +49,6 @@ def loop_response(design: Design, loop: int) -> tuple[NDArray[np.float64], NDArr
 def loop_margins(design: Design, loop: int) -> Margins:
     """Return the margins of one loop; see `loop_response`."""
     frequency, response = loop_response(design, loop)
-    if not response.any():
-        return Margins(math.inf, 0.0, math.inf, math.nan, math.inf)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         gains, phases, _, _, crossovers, _ = control.stability_margins(

@@ -66,6 +66,22 @@ def test_a_loop_that_crosses_often_loses_its_worst_margin_first():
     assert not is_stable_with(np.exp(1.01j * margins.phase))
 
 
+@pytest.mark.parametrize(
+    ("loop", "up", "down"),
+    [
+        # L = 2 / (s - 1): the plant is unstable, and half the gain does not hold it any more.
+        (loop_of([2.0], [1.0, -1.0]), math.inf, 0.5),
+        # L = -1 / (s + 3) is stable up to three times the gain.
+        (loop_of([-1.0], [1.0, 3.0]), 3.0, 0.0),
+        # L = 0.3 / (z - 1.1), z = 1 + s / 10.
+        (replace(loop_of([0.3], [1.0, -1.1]), sample_time=0.1), 7.0, 1.0 / 3.0),
+    ],
+)
+def test_a_loop_may_lose_or_gain_as_much_as_at_rest(loop, up, down):
+    margins = loop_margins(loop, 0)
+    assert (margins.gain_up, margins.gain_down) == pytest.approx((up, down))
+
+
 @pytest.mark.parametrize("design", [OFTEN, AHEAD])
 def test_a_continuous_loop_is_unstable_beyond_its_margin_of_delay(design):
     margin = loop_margins(design, 0).delay

@@ -16,6 +16,8 @@ from crazyflie_lqr.design import Design
 
 _FREQUENCIES = 500
 
+_INFINITE = 1e9  #: An open integrator has at least this gain at rest, in spite of rounding.
+
 
 @dataclass(frozen=True)
 class Margins:
@@ -54,10 +56,11 @@ def loop_margins(design: Design, loop: int) -> Margins:
         gains, phases, _, _, crossovers, _ = control.stability_margins(
             control.frd(response, frequency, smooth=True), returnall=True
         )
-    if design.sample_time > 0.0:
-        # At half the sample rate the response is real: the last place to meet -1.
-        last = _broken_loop(design, loop)(-1.0).real
-        gains = [*gains, *([-1.0 / last] if last < 0.0 else [])]
+    # At rest and at half the sample rate the response is real: it may meet -1 there, too.
+    for point in (1.0, -1.0) if design.sample_time > 0.0 else (0.0,):
+        gain = _broken_loop(design, loop)(point, warn_infinite=False).real
+        if -_INFINITE < gain < 0.0:
+            gains = [*gains, -1.0 / gain]
     delays = np.radians(np.mod(phases, 360.0)) / crossovers
     worst = np.argmin(np.abs(phases)) if len(phases) else None
     return Margins(

@@ -52,7 +52,7 @@ class CallRecorder:
         """Return the functions of some modules; one within another counts as the outer one."""
         return {
             (code.co_filename, code.co_qualname.partition(".<locals>")[0])
-            for code in self._codes.values()
+            for code in list(self._codes.values())
             if code.co_filename in paths
         }
 

@@ -2,6 +2,8 @@
 
 import os
 import socket
+import threading
+from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 from doctor_findings import found, the_only
@@ -158,6 +160,14 @@ def test_radio():
     assert "usermod" in finding.remedy
     fine = Radio({"/dev/bus/usb/001/007": True}, True, ("plugdev",))
     assert not found(installation.check_radio(fine, uris))
+
+
+def test_a_node_is_no_master(monkeypatch):
+    with SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False) as node:
+        node.register_function(lambda _: [1, "", 1], "getPid")
+        threading.Thread(target=node.handle_request, daemon=True).start()
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{node.server_address[1]}")
+        assert not running_graph.is_master_online()
 
 
 def test_a_master_that_does_not_answer_blocks_no_check(monkeypatch):

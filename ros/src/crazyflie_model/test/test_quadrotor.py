@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
@@ -178,6 +178,7 @@ def test_the_quaternion_keeps_its_norm(quaternion, rates, speeds):
 
 
 @given(quaternion=QUATERNIONS, fall=st.floats(0.0, 5.0))
+@example(quaternion=(0.0, 1.0, 5e-324, 5e-324), fall=0.0)
 def test_on_the_ground_it_stands_upright_and_keeps_its_heading(quaternion, fall):
     before = state((1, 2, -0.01), (1, 1, -fall), quaternion, (1, 2, 3), 500.0)
     x = join(AIRFRAME.apply_ground_contact(split(before)))

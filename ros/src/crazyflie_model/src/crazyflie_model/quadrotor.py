@@ -23,6 +23,8 @@ from crazyflie_model.units import GRAVITY, HOVER_PWM
 BODY_DIM = 17  #: Components of the airframe's state.
 STILL_AIR = (0.0, 0.0, 0.0)  #: No wind, m/s.
 
+_LEAST_NORM = 1e-9  #: Of the part of an attitude that is a heading.
+
 
 @dataclass(frozen=True)
 class QuadrotorParameters:
@@ -190,8 +192,8 @@ class Airframe:
             return x
         qz, qw = x[8], x[9]
         norm = functions(qz).hypot(qz, qw)
-        # Upside down, heading is lost.
-        lost = norm == 0.0
+        # Upside down, heading is lost; the squares of tiny numbers have no digits left.
+        lost = norm < _LEAST_NORM
         norm = where(lost, 1.0, norm)
         upright: Vector[Number] = [
             0.0,

@@ -108,6 +108,7 @@ def main() -> int:
     except TimeoutError as error:
         print(error, file=sys.stderr)
         return 1
+    path.parent.mkdir(parents=True, exist_ok=True)
     subprocess.run(["dot", "-Tsvg", "-o", str(path)], input=graph, text=True, check=True)
     print(f"graph: {path}")
     return 0

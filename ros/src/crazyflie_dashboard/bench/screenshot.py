@@ -5,15 +5,18 @@ Usage: screenshot.py [FILE]
 """
 
 import os
+import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+from crazyflie_utils.testing.programs import free_port
+
 HERE = Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "test"))
 
-from pages import Browser, chromium, free_port, wait_for  # noqa: E402  Helpers of the tests.
+from pages import Browser, chromium, wait_for  # noqa: E402  Helpers of the tests.
 
 PICTURE = HERE.parents[4] / "docs" / "images" / "dashboard.png"
 
@@ -46,7 +49,7 @@ def draw(port: int, file: Path) -> None:
 def main() -> None:
     """Launch the example with the page, draw, and end it."""
     file = Path(sys.argv[1]) if len(sys.argv) > 1 else PICTURE
-    port, master = free_port(), free_port()
+    port, master = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_STREAM)
     environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{master}"}
     commands = (
         [

@@ -14,6 +14,7 @@ from selenium.webdriver.common.keys import Keys
 
 from crazyflie_dashboard.access import Access
 from crazyflie_dashboard.page import open_page
+from crazyflie_utils.testing.programs import free_port
 
 LONGEST_WAIT = 60.0
 """s, for what a loaded machine does in one."""
@@ -28,13 +29,6 @@ def wait_for(condition, what):
                 return result
         time.sleep(0.05)
     raise AssertionError(f"not within {LONGEST_WAIT} s: {what}")
-
-
-def free_port():
-    """Return a port on which nothing listens."""
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
 
 
 @contextlib.contextmanager
@@ -168,7 +162,7 @@ class Server:
     """The page of a dashboard, of a `FakeDashboard` by default."""
 
     def __init__(self, dashboard=None, host="127.0.0.1", token=""):
-        self.port = free_port()
+        self.port = free_port(socket.SOCK_STREAM)
         self.dashboard = dashboard or FakeDashboard()
         access = Access(host, self.port, token)
         self.url = access.url

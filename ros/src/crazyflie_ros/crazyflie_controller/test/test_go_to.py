@@ -101,9 +101,13 @@ def test_the_setpoint_does_not_depend_on_where_north_is(path, goal, turn):
         return Pose(*rotate_by_yaw(pose.x, pose.y, turn), pose.z, pose.yaw + turn)
 
     controllers = [GoToController(pids()) for _ in range(2)]
-    for pose in path:
-        # Exactly half a turn off, rounding decides which way to turn.
-        if abs(abs(math.remainder(goal.yaw - pose.yaw, 2.0 * math.pi)) - math.pi) < 1e-6:
+
+    def is_opposite(one, other):
+        return abs(abs(math.remainder(one.yaw - other.yaw, 2.0 * math.pi)) - math.pi) < 1e-6
+
+    for before, pose in zip([goal, *path], path, strict=False):
+        # Exactly half a turn off, rounding decides which way to turn; and which way it has turned.
+        if is_opposite(goal, pose) or is_opposite(before, pose):
             return
         one = controllers[0].update(pose, goal, 0.02)
         other = controllers[1].update(turned(pose), turned(goal), 0.02)

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -11,12 +12,20 @@ from typing import Any
 #: How long a program may take to end after each signal, s; roslaunch gives its nodes 15.
 _END_LIMIT = 60.0
 
+_PORTS = range(20000, 32768)  #: Above the usual ones of virtual vehicles.
+_RANDOM = random.SystemRandom()  #: Processes of a test run have the same seed.
+
 
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
-    """Return a UDP (or, with SOCK_STREAM, a TCP) port of this machine that is free now."""
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    """Return a UDP (or, with SOCK_STREAM, a TCP) port of this machine that is free now.
+
+    A program that asks for any port is not given it: it is none of Linux's ephemeral ports.
+    """
+    for port in _RANDOM.sample(_PORTS, len(_PORTS)):
+        with socket.socket(socket.AF_INET, kind) as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise OSError(f"no port of {_PORTS} is free")
 
 
 @contextlib.contextmanager

@@ -24,7 +24,7 @@ function(crazyflie_add_pytest path)
 endfunction()
 
 # Say how many halves of a processor tests of this package take: 2 if they compute all the time,
-# 3 if they fly in many processes in real time. Others count as one half, for they mostly wait.
+# 4 if they fly in many processes in real time. Others count as one half, for they mostly wait.
 # ``ctest -j`` then runs fewer beside them, and begins with them.
 #
 # :param halves: of a processor

@@ -70,13 +70,14 @@ export default {
       this.renderer?.setAnimationLoop(null);
       this.renderer?.forceContextLoss();
       this.$el.children[0].replaceWith(canvas);
-      Object.assign(this, { canvas, renderer, isSmooth });
+      const isSoftware = this.drawsInSoftware(renderer.getContext());
+      Object.assign(this, { canvas, renderer, isSmooth, isSoftware });
       renderer.setAnimationLoop((time) => this.draw(time / 1000));
     },
 
     // Tell whether pictures are drawn without a graphics card.
-    isSoftware() {
-      const gl = this.renderer.getContext(), names = gl.getExtension("WEBGL_debug_renderer_info");
+    drawsInSoftware(gl) {
+      const names = gl.getExtension("WEBGL_debug_renderer_info");
       return /swiftshader|llvmpipe|software/i.test(gl.getParameter(names?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER));
     },
 
@@ -89,7 +90,8 @@ export default {
       this.isOld = true;
     },
 
-    // Draw what has changed; a scene in which nothing moves costs nothing.
+    // Draw what has changed; a scene in which nothing moves costs nothing. Without a graphics card,
+    // propellers that turn at the same place are no reason: a picture costs 25 ms of a processor.
     draw(time) {
       const place = this.following && this.vehicles.positionOf(this.following);
       if (place) {
@@ -97,7 +99,7 @@ export default {
         this.controls.target.copy(place);
       }
       this.controls.update();
-      if (!this.isOld && !this.vehicles.isTurning) return;
+      if (!this.isOld && (this.isSoftware || !this.vehicles.isTurning)) return;
       this.isOld = false;
       this.vehicles.place(this.camera, time);
       this.renderer.render(this.scene, this.camera);
@@ -107,7 +109,7 @@ export default {
     },
 
     setVehicles(names) {
-      if (names.length > FEW && this.isSmooth && this.isSoftware()) {
+      if (names.length > FEW && this.isSmooth && this.isSoftware) {
         this.setRenderer(false);
         this.resize();
       }

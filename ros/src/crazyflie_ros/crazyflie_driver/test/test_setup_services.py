@@ -4,8 +4,6 @@ import math
 import struct
 
 import pytest
-from cflib.crazyflie.mem import LighthouseBsCalibration, LighthouseBsGeometry
-from cflib.localization import LighthouseConfigFileManager
 from genpy import Duration
 from geometry_msgs.msg import Point
 from safety_helpers import FLYING, is_
@@ -22,6 +20,7 @@ from crazyflie_driver.srv import (
     UploadCompressedTrajectoryRequest,
     WriteLighthouseRequest,
 )
+from crazyflie_link.testing.lighthouse_file import write_lighthouse_file
 from crazyflie_utils import ServiceError
 from crazyflie_virtual.testing import virtual_vehicle
 
@@ -95,25 +94,18 @@ def test_recovery_from_a_crash(virtual):
     assert not supervisor.is_crashed
 
 
-def lighthouse_file(path, *numbers):
-    geometries, calibrations = {}, {}
-    for number in numbers:
-        geometry, calibration = LighthouseBsGeometry(), LighthouseBsCalibration()
-        geometry.origin, geometry.valid = [1.0, 2.0, 2.0 + number], True
-        calibration.uid, calibration.valid = 1000 + number, True
-        geometries[number], calibrations[number] = geometry, calibration
-    LighthouseConfigFileManager.write(str(path), geometries, calibrations)
-    return WriteLighthouseRequest(str(path))
+def base_stations(path, *numbers):
+    return WriteLighthouseRequest(write_lighthouse_file(path, *numbers))
 
 
 def test_base_stations_from_a_file(virtual, tmp_path):
     server, vehicle = virtual
     pages = vehicle._storage.lighthouse
-    server.call("/cf9/write_lighthouse", lighthouse_file(tmp_path / "two.yaml", 0, 3))
+    server.call("/cf9/write_lighthouse", base_stations(tmp_path / "two.yaml", 0, 3))
     assert struct.unpack_from("<3f", pages[3]) == (1.0, 2.0, 5.0)
     assert struct.unpack("<L?", pages[16 + 3][-5:]) == (1003, True)
     # What was known of others is not valid any more.
-    server.call("/cf9/write_lighthouse", lighthouse_file(tmp_path / "one.yaml", 0))
+    server.call("/cf9/write_lighthouse", base_stations(tmp_path / "one.yaml", 0))
     assert [pages[number][-1] for number in range(4)] == [1, 0, 0, 0]
 
 
@@ -128,16 +120,16 @@ def test_a_wrong_lighthouse_file(virtual, tmp_path):
         server.call("/cf9/write_lighthouse", WriteLighthouseRequest(str(tmp_path / "none.yaml")))
     # The vehicle has room for four.
     with pytest.raises(ServiceError, match="writing base station 4.*refuses"):
-        server.call("/cf9/write_lighthouse", lighthouse_file(tmp_path / "five.yaml", 4))
+        server.call("/cf9/write_lighthouse", base_stations(tmp_path / "five.yaml", 4))
     with pytest.raises(ServiceError, match="base station 16; expected 0 to 15"):
-        server.call("/cf9/write_lighthouse", lighthouse_file(tmp_path / "many.yaml", 16))
+        server.call("/cf9/write_lighthouse", base_stations(tmp_path / "many.yaml", 16))
 
 
 def test_base_stations_are_not_written_in_flight(flying, tmp_path):
     server, vehicle = flying
     is_(vehicle, FLYING)
     with pytest.raises(ServiceError, match="expected it on the ground"):
-        server.call("/cf1/write_lighthouse", lighthouse_file(tmp_path / "one.yaml", 0))
+        server.call("/cf1/write_lighthouse", base_stations(tmp_path / "one.yaml", 0))
     assert vehicle.packets(4, 2) == []
 
 

@@ -4,15 +4,15 @@ import struct
 from types import SimpleNamespace
 
 import pytest
-from cflib.crazyflie.mem import LighthouseBsCalibration, LighthouseBsGeometry, MemoryElement
+from cflib.crazyflie.mem import MemoryElement
 from cflib.crtp.crtpstack import CRTPPort
-from cflib.localization import LighthouseConfigFileManager
 
 from crazyflie_link.errors import RefusedError, ValueRangeError
 from crazyflie_link.lighthouse import Lighthouse
+from crazyflie_link.testing.lighthouse_file import write_lighthouse_file
 
 CALIBRATIONS = 16  #: The page of the first calibration; those of the geometries begin at 0.
-SYSTEM_TYPE = 2
+SYSTEM_TYPE = 2  #: That of the files.
 
 
 class Vehicle:
@@ -54,17 +54,6 @@ class Vehicle:
         return [page for page, data in sorted(self.pages.items()) if data[-1]]
 
 
-def lighthouse_file(path, *numbers):
-    geometries, calibrations = {}, {}
-    for number in numbers:
-        geometry, calibration = LighthouseBsGeometry(), LighthouseBsCalibration()
-        geometry.origin, geometry.valid = [1.0, 2.0, 2.0 + number], True
-        calibration.uid, calibration.valid = 1000 + number, True
-        geometries[number], calibrations[number] = geometry, calibration
-    LighthouseConfigFileManager.write(str(path), geometries, calibrations, SYSTEM_TYPE)
-    return str(path)
-
-
 @pytest.fixture
 def path(tmp_path):
     return tmp_path / "stations.yaml"
@@ -73,7 +62,7 @@ def path(tmp_path):
 @pytest.mark.parametrize(("room", "mask"), [(4, 0x0F), (16, 0xFFFF)])
 def test_all_stations_that_the_vehicle_has_room_for_are_written_and_stored(path, room, mask):
     vehicle = Vehicle(room)
-    file = lighthouse_file(path, 0, 3)
+    file = write_lighthouse_file(path, 0, 3)
     assert Lighthouse(lambda: vehicle).write_file(file, vehicle) == 2
     assert vehicle.parameters == {"lighthouse.systemType": SYSTEM_TYPE}
     assert sorted(vehicle.pages) == [*range(room), *range(CALIBRATIONS, CALIBRATIONS + room)]
@@ -88,14 +77,14 @@ def test_a_type_that_is_right_is_not_written(path):
     vehicle = Vehicle()
     vehicle.parameters["lighthouse.systemType"] = SYSTEM_TYPE
     vehicle.write = None
-    Lighthouse(lambda: vehicle).write_file(lighthouse_file(path, 0), vehicle)
+    Lighthouse(lambda: vehicle).write_file(write_lighthouse_file(path, 0), vehicle)
     assert vehicle.valid() == [0, CALIBRATIONS]
 
 
 def test_without_room_for_a_station_of_the_file_nothing_is_stored(path):
     vehicle = Vehicle(room=2)
     with pytest.raises(RefusedError, match="base station 2"):
-        Lighthouse(lambda: vehicle).write_file(lighthouse_file(path, 0, 2), vehicle)
+        Lighthouse(lambda: vehicle).write_file(write_lighthouse_file(path, 0, 2), vehicle)
     assert vehicle.stored == []
 
 
@@ -104,13 +93,13 @@ def test_stations_that_are_not_stored_are_refused(path, answer):
     vehicle = Vehicle()
     vehicle.answer = answer
     with pytest.raises(RefusedError, match="storing"):
-        Lighthouse(lambda: vehicle).write_file(lighthouse_file(path, 0), vehicle)
+        Lighthouse(lambda: vehicle).write_file(write_lighthouse_file(path, 0), vehicle)
 
 
 def test_files_that_cannot_be_written_change_nothing(path):
     vehicle = Vehicle(room=16)
     for file, text in (
-        (lighthouse_file(path, 0, 16), "base station 16; expected 0 to 15"),
+        (write_lighthouse_file(path, 0, 16), "base station 16; expected 0 to 15"),
         (str(path.parent / "none.yaml"), "No such file"),
     ):
         with pytest.raises(ValueRangeError, match=text):

@@ -4,7 +4,7 @@ import subprocess
 import sys
 import threading
 from functools import partial
-from http.server import HTTPServer, SimpleHTTPRequestHandler
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
 import pages
 from nicegui import core
@@ -130,7 +130,7 @@ socket.onclose = () => fetch("http://" + url + "polling").then(
 def test_a_hostile_page_in_the_same_browser_opens_no_websocket(browser, server, driver, tmp_path):
     (tmp_path / "index.html").write_text(HOSTILE.replace("PORT", str(server.port)))
     files = partial(SimpleHTTPRequestHandler, directory=tmp_path)
-    with HTTPServer(("127.0.0.1", 0), files) as other:
+    with ThreadingHTTPServer(("127.0.0.1", 0), files) as other:
         threading.Thread(target=other.serve_forever, daemon=True).start()
         driver.get(f"http://127.0.0.1:{other.server_port}/")
         wait_for(lambda: driver.title.startswith("tried:"), "the attack")

@@ -7,6 +7,7 @@ import time
 
 from fake_dashboard import FakeDashboard
 from selenium import webdriver
+from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
@@ -23,12 +24,15 @@ LONGEST_WAIT = 60.0
 def wait_for(condition, what):
     """Return the first true result of a condition; the page may replace what it looks at."""
     end = time.monotonic() + LONGEST_WAIT
+    cause = "no error"
     while time.monotonic() < end:
-        with contextlib.suppress(Exception):
+        try:
             if result := condition():
                 return result
+        except WebDriverException as error:
+            cause = error
         time.sleep(0.05)
-    raise AssertionError(f"not within {LONGEST_WAIT} s: {what}")
+    raise AssertionError(f"not within {LONGEST_WAIT} s: {what}; last: {cause}")
 
 
 @contextlib.contextmanager
@@ -38,7 +42,7 @@ def chromium(*arguments):
     options.binary_location = "/usr/bin/chromium"
     for argument in (
         *("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"),
-        *("--enable-unsafe-swiftshader", "--window-size=1100,800"),
+        *("--enable-unsafe-swiftshader", "--window-size=800,600"),
         *arguments,
     ):
         options.add_argument(argument)

@@ -2,13 +2,13 @@
 
 import os
 import sys
-import time
 
 import pytest
 
 from crazyflie_dashboard.missions import Missions, listed
 from crazyflie_dashboard.page_data import MissionFile
 from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.testing.waiting import wait_until
 
 LIMIT = 30.0
 
@@ -93,10 +93,7 @@ def test_one_mission_flies_at_a_time_until_it_is_stopped(missions, script):
     missions.dry_run(mission, ("cf1",)).result(LIMIT)
     end = missions.fly(mission, ("cf1",))
     assert missions.running[0].startswith("waits.py")
-    until = time.monotonic() + LIMIT
-    while missions.running != ("waits.py takeoff: cf1",) and time.monotonic() < until:
-        time.sleep(0.01)
-    assert missions.running == ("waits.py takeoff: cf1",)
+    wait_until(lambda: missions.running == ("waits.py takeoff: cf1",))
     with pytest.raises(RefusalError, match=r"waits.py flies; expected it to have ended"):
         missions.fly(mission, ("cf1",))
     missions.stop()

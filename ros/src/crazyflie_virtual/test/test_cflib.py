@@ -179,6 +179,7 @@ def is_acknowledged(command):
     try:
         command()
     except Exception:
+        # cflib raises Exception itself.
         return False
     return True
 

@@ -213,7 +213,8 @@ class Network(FakeGraph):
 
     def last_of(self, name, topic):
         """Return the last message of a process on a topic."""
-        return [m for _, by, at, m in self.heard if (by, at) == (f"/{name}", topic)][-1]
+        told = (m for _, by, at, m in reversed(self.heard) if (by, at) == (f"/{name}", topic))
+        return next(told)
 
 
 class HoverNetwork(Network):

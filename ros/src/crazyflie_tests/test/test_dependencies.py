@@ -48,10 +48,15 @@ def installed_by_the_list(*sections):
 
 
 @functools.cache
+def owners():
+    """Return the Debian package that each installed file belongs to."""
+    parts = (line.partition(": ") for line in output("dpkg-query", "-S", "*").splitlines())
+    return {path: package.partition(":")[0] for package, _, path in parts}
+
+
 def owner(path):
     """Return the Debian package that a file belongs to; None for none."""
-    found = subprocess.run(["dpkg", "-S", str(path)], capture_output=True, text=True, timeout=120)
-    return found.stdout.partition(":")[0] or None
+    return owners().get(str(path))
 
 
 def files(*suffixes):

@@ -3,8 +3,9 @@
 from pathlib import Path
 from unittest.mock import patch
 
-from roslaunch.config import load_config_default
+from roslaunch.config import ROSLaunchConfig
 from roslaunch.core import Node
+from roslaunch.xmlloader import XmlLoader
 
 
 def expand(path: Path, **arguments: object) -> tuple[dict[str, Node], dict[str, object]]:
@@ -13,10 +14,10 @@ def expand(path: Path, **arguments: object) -> tuple[dict[str, Node], dict[str, 
     Names of anonymous nodes are without what makes them unique.
     """
     given = [f"{name}:={value}" for name, value in arguments.items()]
+    config = ROSLaunchConfig()
     with patch("rosgraph.names.anonymous_name", lambda name: name):
-        config = load_config_default(
-            [(str(path), given)], None, verbose=False, assign_machines=False
-        )
+        # roslaunch would also load roscore's file, which starts two programs for ROS's version.
+        XmlLoader().load(str(path), config, argv=given, verbose=False)
     nodes = {node.namespace.rstrip("/") + "/" + node.name: node for node in config.nodes}
     return nodes, {name: parameter.value for name, parameter in config.params.items()}
 

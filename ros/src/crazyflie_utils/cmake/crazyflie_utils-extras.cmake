@@ -18,19 +18,21 @@ function(crazyflie_add_pytest path)
   endforeach()
   catkin_run_tests_target("pytest" "${name}" "pytest-${name}.xml" COMMAND "${command}")
   if(pytest_WORKERS)
-    # What waits is to begin early, beside what computes.
-    _crazyflie_set_tests_properties("pytest_${name}$" COST 2500)
+    # What waits most is to begin first, beside what needs most of the processors.
+    math(EXPR cost "2000 + ${pytest_WORKERS}")
+    _crazyflie_set_tests_properties("pytest_${name}$" COST ${cost})
   endif()
 endfunction()
 
-# Say how many halves of a processor tests of this package take: 2 if they compute all the time,
-# 4 if they fly in many processes in real time. Others count as one half, for they mostly wait.
-# ``ctest -j`` then runs fewer beside them, and begins with them.
+# Say how many halves of a processor tests of this package need: 2 if they fly in several processes
+# against the clock, 3 or 4 if in many. Others count as one half, whether they compute or wait.
+# ``ctest -j`` then runs fewer beside them. It begins with them: it would start others of one half
+# whenever one half is free, and come to them at the end, when nothing else is left.
 #
 # :param halves: of a processor
 # :param ARGN: what the names of the tests match, regular expressions
 function(crazyflie_busy_tests halves)
-  _crazyflie_set_tests_properties("${ARGN}" PROCESSORS ${halves} COST ${halves}000)
+  _crazyflie_set_tests_properties("${ARGN}" PROCESSORS ${halves} COST ${halves}500)
 endfunction()
 
 # Say that tests of this package measure what other tests beside them would change.

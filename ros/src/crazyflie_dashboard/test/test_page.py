@@ -197,3 +197,26 @@ def test_what_has_not_changed_is_not_sent_again(browser, driver):
         browser.tab(tab)
         driver.execute_script("window.seen = []")
         wait_for(lambda: driver.execute_script(last), f"nothing but the clock in {tab}")
+
+
+NEXT_PICTURES = """
+const done = arguments[0];
+let left = 10;
+const step = () => left-- ? requestAnimationFrame(step) : done();
+requestAnimationFrame(step);
+"""
+
+
+def test_vehicles_that_hover_are_not_drawn_again_without_a_graphics_card(browser, driver):
+    browser.take_control()
+    browser.choose("cf1")
+    browser.press("Take off")
+    browser.has("hovering", browser.card("cf1"))
+
+    def is_still():
+        before = browser.in_scene("renderer.info.render.frame")
+        driver.execute_async_script(NEXT_PICTURES)
+        return browser.in_scene("renderer.info.render.frame") == before
+
+    assert browser.in_scene("vehicles.isTurning")
+    wait_for(is_still, "pictures that are not drawn")

@@ -168,13 +168,19 @@ def test_programs_are_in_the_list(program):
 
 
 FLIGHTS = {
-    "sw_controller": (["demo"], ["crazyflie_dev.demo"]),
+    "sw_controller": (
+        ["demo"],
+        {"composed": True, "publish_base_link": False},
+        ["crazyflie_dev.demo"],
+    ),
     "virtual_hw_hover": (
         ["demo", "vehicles"],
+        {"composed": True},
         ["crazyflie_driver.server_node", "crazyflie_virtual.server_node"],
     ),
     "sw_swarm": (
         ["demo", "vehicles"],
+        {},
         [
             "crazyflie_dev.mission",
             "crazyflie_mission_api.mission_runner",
@@ -182,16 +188,15 @@ FLIGHTS = {
         ],
     ),
 }
-"""A launch file -> sections of debian.txt that suffice, modules of the flight beside its nodes."""
+"""A launch file -> sections of debian.txt that suffice, arguments, modules beside its nodes."""
 
 
 @pytest.mark.parametrize("flight", FLIGHTS)
 def test_a_flight_needs_no_other_section(flight):
-    sections, programs = FLIGHTS[flight]
+    sections, arguments, programs = FLIGHTS[flight]
     brought = installed_by_the_list(*sections)
     launch_file = SOURCES / "crazyflie_examples" / "launch" / f"{flight}.launch"
-    composed = {} if flight == "sw_swarm" else {"composed": True}
-    nodes, parameters = expand(launch_file, rviz=False, record=True, **composed)
+    nodes, parameters = expand(launch_file, rviz=False, record=True, **arguments)
     for package in {node.package for node in nodes.values()} - own_packages():
         assert owner(SHARE / package / "package.xml") in brought
     # A module that is None in sys.modules is one that is not installed.

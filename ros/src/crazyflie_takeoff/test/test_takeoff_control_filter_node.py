@@ -164,7 +164,7 @@ def test_a_number_that_is_no_flight_state_is_ignored(process):
     assert memory(process) == ["unknown", "flying"]
 
 
-BOX = {"min": (-1.0, -2.0, 0.3), "max": (1.5, 2.5, 3.0)}
+BOX = {"min": (-1.0, -2.0, 0.9), "max": (1.5, 2.5, 3.0)}
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ BOX = {"min": (-1.0, -2.0, 0.3), "max": (1.5, 2.5, 3.0)}
         ((1.9, 2.9, 3.4), False),
         ((-1.4, -2.4, 1.0), False),
         # It is open below: a takeoff begins there.
-        ((0.0, 0.0, 0.0), False),
+        ((0.0, 0.0, 0.2), False),
         ((2.1, 0.0, 1.0), True),
         ((0.0, 3.1, 1.0), True),
         ((0.0, 0.0, 3.6), True),
@@ -182,12 +182,24 @@ BOX = {"min": (-1.0, -2.0, 0.3), "max": (1.5, 2.5, 3.0)}
     ],
 )
 def test_motors_stop_half_a_metre_outside_each_wall(position, is_outside):
+    status = status_in_box(BOX, position)
+    assert (status.state == FilterStatus.EMERGENCY) == is_outside
+    assert ("0.60 m outside the geofence" in status.reason) == is_outside
+
+
+@pytest.mark.parametrize("position", [(99.0, -99.0, 99.0), (-99.0, 99.0, 0.2)])
+def test_without_a_corner_there_is_no_wall(position):
+    assert status_in_box({}, position).state == FilterStatus.PASSING
+
+
+def status_in_box(box, position):
+    """Return what the filter publishes after a second in flight at a place."""
     process = FakeProcess()
     topics = {"topics/state": "/state", "topics/box": "/geofence/parameter_updates"}
     assert process.launch(TakeoffControlFilterNode(), "/filter", {**FILTER, **topics})
     corners = [
         DoubleParameter(f"box/{corner}/{axis}", value)
-        for corner, values in BOX.items()
+        for corner, values in box.items()
         for axis, value in zip("xyz", values, strict=True)
     ]
     process.publish("/geofence/parameter_updates", Config(doubles=corners))
@@ -197,9 +209,7 @@ def test_motors_stop_half_a_metre_outside_each_wall(position, is_outside):
         process.publish("/state", PositionVelocityYawStateStamped(state=state))
         process.publish("/control/lqr", control(9.81))
         process.advance(0.01)
-    status = process.published("/in_flight_filter_status")[-1]
-    assert (status.state == FilterStatus.EMERGENCY) == is_outside
-    assert ("0.60 m outside the geofence" in status.reason) == is_outside
+    return process.published("/in_flight_filter_status")[-1]
 
 
 def test_whether_there_is_a_controller_is_told_once_a_change():

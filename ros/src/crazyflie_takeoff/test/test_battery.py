@@ -170,5 +170,7 @@ def test_the_box_of_a_running_geofence_counts_in_the_place_of_parameters():
     process.publish("/geofence/parameter_updates", low)
     with pytest.raises(ServiceError, match="0.20 m outside the geofence"):
         process.call("/takeoff", EmptyRequest())
+    with pytest.raises(ServiceError, match="0.10 m outside the geofence"):
+        process.reconfigure("/takeoff_server", **{"hover/z": 0.9})
     process.publish("/geofence/parameter_updates", Config())
     assert not process.call("/takeoff", EmptyRequest()).done()

@@ -149,7 +149,7 @@ def test_publishes_its_status(process):
         FlightStatus.FLYING
     ]
     assert statuses[0].reason == statuses[1].reason == ""
-    assert statuses[-1].reason.startswith("no control came for")
+    assert statuses[-1].reason.startswith("no control came for 1.6 s")
     assert [each.is_commanded for each in statuses] == [False] * 4
     process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.UNKNOWN))
     assert process.published("/in_flight_filter_status") == statuses

@@ -1,6 +1,7 @@
 """The battery and the geofence, and what people are told."""
 
 import pytest
+from dynamic_reconfigure.msg import Config, DoubleParameter
 from flight_words import until_on_ground, word
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import EmptyRequest
@@ -156,3 +157,20 @@ def test_a_hover_point_outside_the_geofence_is_refused():
     fence = {"box/max/z": 0.9, "box/min/x": -1.0}
     assert not process.launch(TakeoffServerNode(), "/takeoff_server", {**SERVER, **fence})
     assert "0.10 m outside the geofence" in process.logged("error")[0]
+
+
+def test_the_box_of_a_running_geofence_counts_in_the_place_of_parameters():
+    process = FakeProcess()
+    fence = {"box/max/z": 0.9, "topics/box": "/geofence/parameter_updates"}
+    assert process.launch(TakeoffServerNode(), "/takeoff_server", {**SERVER, **fence})
+    process.publish("/in_flight_filter_status", filter_status("on_ground"))
+    process.publish("/state", state(0.0))
+    process.advance(0.02)
+    low = Config(doubles=[DoubleParameter("box/max/z", 0.8)])
+    process.publish("/geofence/parameter_updates", low)
+    with pytest.raises(ServiceError, match="0.20 m outside the geofence"):
+        process.call("/takeoff", EmptyRequest())
+    with pytest.raises(ServiceError, match="0.10 m outside the geofence"):
+        process.reconfigure("/takeoff_server", **{"hover/z": 0.9})
+    process.publish("/geofence/parameter_updates", Config())
+    assert not process.call("/takeoff", EmptyRequest()).done()

@@ -73,6 +73,30 @@ def test_one_service_for_all_vehicles():
         assert len(outputs) >= 50
 
 
+def test_a_call_for_all_is_repeated_for_a_second():
+    """For filters that are just starting; and without a call nothing is sent."""
+    process = FakeProcess()
+    assert process.launch(AllEmergencyNode(), "/all_emergency")
+    process.advance(1.0)
+    assert process.published("/all/emergency") == []
+    process.call("/all/emergency", EmptyRequest())
+    assert len(process.published("/all/emergency")) == 1
+    process.advance(0.5)
+    assert len(process.published("/all/emergency")) == 11
+    # Another call begins anew.
+    process.call("/all/emergency", EmptyRequest())
+    process.advance(3.0)
+    assert len(process.published("/all/emergency")) == 11 + 20
+
+
+def test_a_call_that_no_filter_receives_is_an_error():
+    process = FakeProcess()
+    assert process.launch(AllEmergencyNode(), "/all_emergency")
+    process.transport.publishers["/all/emergency"].has_subscribers = lambda: False
+    with pytest.raises(ServiceError, match="no filter listens on /all/emergency"):
+        process.call("/all/emergency", EmptyRequest())
+
+
 # Many at once.
 
 

@@ -2,14 +2,17 @@
 
 from unittest import mock
 
+import lone_server
 import pytest
 from flight_words import thrusts
 from std_msgs.msg import Bool
-from takeoff_helpers import FILTER
+from takeoff_helpers import FILTER, GRAVITY, control
 
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_takeoff.flight import FlightStateMachine
 from crazyflie_takeoff.safe_filter import SafeFilter
 from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
+from crazyflie_utils.testing import FakeProcess
 
 
 @pytest.fixture(params=range(5))
@@ -77,3 +80,28 @@ def test_one_that_is_below_the_ground_is_stopped_in_time(moment):
     moment.vehicle_node.offset = -2.0
     moment.advance(0.18)
     assert thrusts(moment, wrong)[-1] == 0.0
+
+
+@pytest.mark.parametrize(("hold", "rate"), [(0.2, 25), (0.05, 50), (0.01, 100)])
+def test_the_filter_looks_more_often_than_a_control_is_lost(hold, rate):
+    process = FakeProcess()
+    parameters = {**FILTER, "loss/hold_after": hold}
+    assert process.launch(TakeoffControlFilterNode(), "/filter", parameters)
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+
+    def fly():
+        for _ in range(200):
+            process.publish("/control/lqr", control(GRAVITY))
+            process.advance(0.005)
+
+    fly()
+    with mock.patch.object(SafeFilter, "tick", autospec=True, side_effect=SafeFilter.tick) as tick:
+        fly()
+    assert tick.call_count == pytest.approx(rate, abs=1)
+
+
+def test_the_server_has_little_to_do_in_flight_only():
+    process = lone_server.flying()
+    process.advance(0.1)
+    assert count(process, FlightStateMachine) == pytest.approx(10, abs=1)
+    assert count(lone_server.on_ground(), FlightStateMachine) == pytest.approx(100, abs=1)

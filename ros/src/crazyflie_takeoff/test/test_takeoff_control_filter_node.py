@@ -5,7 +5,8 @@ import math
 import pytest
 from dynamic_reconfigure.msg import Config, DoubleParameter
 from std_msgs.msg import Empty
-from takeoff_helpers import FILTER, control
+from std_srvs.srv import EmptyRequest
+from takeoff_helpers import FILTER, control, state
 
 from crazyflie_msgs.msg import (
     FilterStatus,
@@ -13,8 +14,13 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_takeoff import diagnostics
 from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_takeoff.takeoff_control_filter_node import LISTENING_TIME, TakeoffControlFilterNode
+from crazyflie_takeoff.takeoff_control_filter_node import (
+    LISTENING_TIME,
+    SERVER_LIMIT,
+    TakeoffControlFilterNode,
+)
 from crazyflie_utils.testing import FakeProcess
 
 
@@ -122,8 +128,8 @@ def test_listens_at_first():
 
 def test_remembers_the_flight_state_for_the_server(process):
     assert memory(process) == ["unknown"]
-    for state in (FlightStatus.TAKING_OFF, FlightStatus.FLYING):
-        process.publish("/in_flight_flight_status", FlightStatus(state=state))
+    for code in (FlightStatus.TAKING_OFF, FlightStatus.FLYING):
+        process.publish("/in_flight_flight_status", FlightStatus(state=code))
     process.publish("/in_flight", Empty())
     assert memory(process) == ["unknown", "taking_off", "flying"]
 
@@ -143,7 +149,7 @@ def test_publishes_its_status(process):
         FlightStatus.FLYING
     ]
     assert statuses[0].reason == statuses[1].reason == ""
-    assert statuses[-1].reason.startswith("no control came for")
+    assert statuses[-1].reason.startswith("no control came for 1.6 s")
     assert [each.is_commanded for each in statuses] == [False] * 4
     process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.UNKNOWN))
     assert process.published("/in_flight_filter_status") == statuses
@@ -164,7 +170,7 @@ def test_a_number_that_is_no_flight_state_is_ignored(process):
     assert memory(process) == ["unknown", "flying"]
 
 
-BOX = {"min": (-1.0, -2.0, 0.3), "max": (1.5, 2.5, 3.0)}
+BOX = {"min": (-1.0, -2.0, 0.9), "max": (1.5, 2.5, 3.0)}
 
 
 @pytest.mark.parametrize(
@@ -173,7 +179,7 @@ BOX = {"min": (-1.0, -2.0, 0.3), "max": (1.5, 2.5, 3.0)}
         ((1.9, 2.9, 3.4), False),
         ((-1.4, -2.4, 1.0), False),
         # It is open below: a takeoff begins there.
-        ((0.0, 0.0, 0.0), False),
+        ((0.0, 0.0, 0.2), False),
         ((2.1, 0.0, 1.0), True),
         ((0.0, 3.1, 1.0), True),
         ((0.0, 0.0, 3.6), True),
@@ -182,12 +188,24 @@ BOX = {"min": (-1.0, -2.0, 0.3), "max": (1.5, 2.5, 3.0)}
     ],
 )
 def test_motors_stop_half_a_metre_outside_each_wall(position, is_outside):
+    status = status_in_box(BOX, position)
+    assert (status.state == FilterStatus.EMERGENCY) == is_outside
+    assert ("0.60 m outside the geofence" in status.reason) == is_outside
+
+
+@pytest.mark.parametrize("position", [(99.0, -99.0, 99.0), (-99.0, 99.0, 0.2)])
+def test_without_a_corner_there_is_no_wall(position):
+    assert status_in_box({}, position).state == FilterStatus.PASSING
+
+
+def status_in_box(box, position):
+    """Return what the filter publishes after a second in flight at a place."""
     process = FakeProcess()
     topics = {"topics/state": "/state", "topics/box": "/geofence/parameter_updates"}
     assert process.launch(TakeoffControlFilterNode(), "/filter", {**FILTER, **topics})
     corners = [
         DoubleParameter(f"box/{corner}/{axis}", value)
-        for corner, values in BOX.items()
+        for corner, values in box.items()
         for axis, value in zip("xyz", values, strict=True)
     ]
     process.publish("/geofence/parameter_updates", Config(doubles=corners))
@@ -197,9 +215,7 @@ def test_motors_stop_half_a_metre_outside_each_wall(position, is_outside):
         process.publish("/state", PositionVelocityYawStateStamped(state=state))
         process.publish("/control/lqr", control(9.81))
         process.advance(0.01)
-    status = process.published("/in_flight_filter_status")[-1]
-    assert (status.state == FilterStatus.EMERGENCY) == is_outside
-    assert ("0.60 m outside the geofence" in status.reason) == is_outside
+    return process.published("/in_flight_filter_status")[-1]
 
 
 def test_whether_there_is_a_controller_is_told_once_a_change():
@@ -211,3 +227,96 @@ def test_whether_there_is_a_controller_is_told_once_a_change():
     process.advance(1.0)
     told = [message.data for message in process.published("/in_flight_controller")]
     assert told == [False, True]
+
+
+@pytest.mark.parametrize("has_server", [True, False])
+def test_a_controller_is_lost_until_another_one_takes_its_place(has_server):
+    process = FakeProcess()
+    assert process.launch(TakeoffControlFilterNode(), "/filter", FILTER)
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    if not has_server:
+        process.transport.unpublished.add("/control/takeoff")
+    process.advance(9.0)
+    assert process.published("/in_flight_filter_status")[-1].state == FilterStatus.DOWN
+    told = process.published("/in_flight_controller")
+    # Without a server it may have had no reference.
+    assert told[-1].data != has_server
+    process.transport.unpublished.add("/control/lqr")
+    process.advance(0.2)
+    assert not told[-1].data
+    process.transport.unpublished.clear()
+    process.advance(0.2)
+    assert told[-1].data
+
+
+@pytest.mark.parametrize(("has_server", "listens"), [(True, SERVER_LIMIT), (False, LISTENING_TIME)])
+def test_a_server_that_still_recovers_is_waited_for(has_server, listens):
+    process = FakeProcess()
+    if not has_server:
+        process.transport.unpublished.add("/in_flight_flight_status")
+    assert process.launch(TakeoffControlFilterNode(), "/filter", FILTER)
+    while not thrusts(process):
+        process.publish("/control/lqr", control(9.0))
+        process.advance(0.01)
+        assert process.clock.time() < 103.0
+    assert process.clock.time() - 100.0 == pytest.approx(listens, abs=0.02)
+
+
+def test_one_that_has_published_its_state_is_not_waited_for():
+    process = FakeProcess()
+    assert process.launch(TakeoffControlFilterNode(), "/filter", FILTER)
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.LANDING))
+    process.advance(LISTENING_TIME)
+    process.publish("/control/lqr", control(9.0))
+    assert thrusts(process) == [9.0]
+
+
+@pytest.mark.parametrize(("height", "is_stopped"), [(0.05, True), (0.2, False)])
+def test_a_filter_that_starts_in_flight_looks_first_whether_the_vehicle_flies(height, is_stopped):
+    process = FakeProcess()
+    parameters = {**FILTER, "topics/state": "/state"}
+    assert process.launch(TakeoffControlFilterNode(), "/filter", parameters)
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    process.publish("/control/lqr", control(9.0))
+    assert thrusts(process) == []
+    process.publish("/state", state(height))
+    process.advance(0.01)
+    process.publish("/control/lqr", control(9.0))
+    process.advance(0.02)
+    assert set(thrusts(process)) == ({0.0} if is_stopped else {9.0})
+
+
+def test_the_status_in_words_is_published_when_they_change():
+    process = launch()
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    for _ in range(120):
+        process.publish("/control/lqr", control(9.81))
+        process.advance(0.05)
+    # The typed one has more to say.
+    assert [each.is_commanded for each in process.published("/in_flight_filter_status")] == [
+        False,
+        False,
+        True,
+    ]
+    assert memory(process) == ["unknown", "flying"]
+
+
+def test_levels_of_the_diagnostics(process):
+    def level():
+        count = len(process.published("/diagnostics"))
+        process.advance(1.0)
+        return process.published("/diagnostics")[count].status[0].level
+
+    assert level() == diagnostics.OK
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    assert level() == diagnostics.WARN
+    process.advance(1.0)
+    assert level() == diagnostics.ERROR
+    process.advance(9.0)
+    assert process.published("/in_flight_filter_status")[-1].state == FilterStatus.DOWN
+    assert level() == diagnostics.ERROR
+    # The server knows of it.
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.ON_GROUND))
+    assert level() == diagnostics.OK
+    process.call("/emergency", EmptyRequest())
+    assert level() == diagnostics.ERROR

@@ -5,6 +5,7 @@ import math
 import pytest
 from takeoff_helpers import BARE, SERVER
 
+from crazyflie_takeoff.flight_topics import derived_topic
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.testing import FakeProcess
 
@@ -46,3 +47,30 @@ def test_bad_parameters_are_named(name, value):
     assert not process.launch(TakeoffServerNode(), "/takeoff_server", parameters)
     assert f"/takeoff_server/{name} is" in process.logged("error")[0]
     assert "expected" in process.logged("error")[0]
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"landing/descent_speed": 0.0},
+        {"landing/descent_speed": 0.05},
+        {"landing/descent_speed": 1.0},
+        {"battery/low": 3.1, "battery/critical": 3.1},
+        {"hover/z": 3.0, "box/max/z": 3.0},
+    ],
+)
+def test_values_at_the_end_of_a_range_are_accepted(values):
+    assert FakeProcess().launch(TakeoffServerNode(), "/takeoff_server", {**SERVER, **values})
+
+
+def test_a_topic_has_its_own_name_or_that_of_another_with_a_suffix():
+    class Topics:
+        own, base = None, "/in_flight"
+        topic = derived_topic("own", "base", "_state")
+
+    topics = Topics()
+    assert topics.topic == "/in_flight_state"
+    topics.own = "/cf1/state"
+    assert topics.topic == "/cf1/state"
+    topics.own = topics.base = None
+    assert topics.topic is None

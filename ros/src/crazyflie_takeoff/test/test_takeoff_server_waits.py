@@ -4,7 +4,7 @@ import math
 
 import pytest
 from lone_server import call, flying, launch, on_ground, states, thrusts, toggles
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
 from std_srvs.srv import EmptyResponse
 from takeoff_helpers import SERVER, filter_status, state
 
@@ -276,3 +276,52 @@ def test_a_driver_is_asked_for_only_if_there_is_one():
     call(process, "/takeoff")
     process.advance(0.02)
     assert states(process)[-1] == "taking_off"
+
+
+# Another node.
+
+
+def test_takeoff_waits_for_what_the_node_says_that_may_inhibit_it():
+    process = on_ground(**{"topics/inhibition": "/inhibition"})
+    with pytest.raises(ServiceError, match="/takeoff refused: nothing has come on /inhibition"):
+        call(process, "/takeoff")
+    process.publish("/inhibition", String("cf2 stands too close"))
+    with pytest.raises(ServiceError, match="/takeoff refused: cf2 stands too close"):
+        call(process, "/takeoff")
+    process.publish("/inhibition", String(""))
+    assert not call(process, "/takeoff").done()
+
+
+# The filter ends a flight.
+
+
+@pytest.mark.parametrize("does", [FilterStatus.SINKING, FilterStatus.EMERGENCY])
+def test_a_takeoff_that_the_filter_ends_is_an_error(does):
+    process = on_ground()
+    takeoff = call(process, "/takeoff")
+    process.advance(0.5)
+    process.publish("/in_flight_filter_status", filter_status("taking_off", does, reason="lost"))
+    with pytest.raises(ServiceError, match="the flight was ended by the filter: lost"):
+        takeoff.result(0)
+
+
+def test_a_landing_that_the_filter_finishes_has_succeeded_but_not_one_that_it_stops():
+    process = flying()
+    land = call(process, "/land")
+    process.advance(0.5)
+    report = filter_status("landing", FilterStatus.SINKING, reason="lost")
+    process.publish("/in_flight_filter_status", report)
+    process.advance(0.5)
+    assert not land.done()
+    report = filter_status("landing", FilterStatus.DOWN, reason="lost")
+    process.publish("/in_flight_filter_status", report)
+    process.advance(0.02)
+    assert land.result(0) == EmptyResponse()
+
+    process = flying()
+    land = call(process, "/land")
+    process.advance(0.5)
+    report = filter_status("landing", FilterStatus.EMERGENCY, reason="it was called")
+    process.publish("/in_flight_filter_status", report)
+    with pytest.raises(ServiceError, match="the flight was ended by the filter: it was called"):
+        land.result(0)

@@ -241,8 +241,6 @@ class TakeoffServerNode(Node):
     def _recover(self):
         self._recovery_timer.stop()
         flight, position = self._flight, self._measured_position()
-        if flight.state is not ServerState.RECOVERING:
-            return
         flight.recover(position, self._parameters.ground)
         height = None if position is None else position[2] - flight.ground
         self._status.log_recovery(height)

@@ -221,6 +221,18 @@ def test_a_pose_from_the_future_does_not_stop_the_present(process, lookup):
     assert process.handle("/node").rejected_transforms() == {"is stamped in the future": 1}
 
 
+def test_poses_that_come_before_the_first_clock_are_not_complained_of():
+    process = FakeProcess(start=0.0)
+    lookup = process.handle("/node").listen_to_transforms()
+    hear(process, transform("world", "crazyflie", 87.3, x=1.0))
+    with pytest.raises(TransformError):
+        lookup("world", "crazyflie")
+    process.clock.set(87.3)
+    hear(process, transform("world", "crazyflie", 87.4, x=2.0))
+    assert x_of(lookup) == 2.0
+    assert process.logged("warn") == []
+
+
 def test_a_clock_that_is_set_back_is_followed_after_two_poses(process, lookup):
     hear(process, transform("crazyflie", "base", 0.0, x=0.1), topic="/tf_static")
     hear(process, transform("world", "crazyflie", 100.0, x=1.0))

@@ -201,9 +201,10 @@ class FrameTree:
         self._warn(text, (pose.parent, pose.child, reason))
 
     def _why_untimely(self, frame, stamp, now):
-        """Return why a pose must not be taken now; "" if it is known already."""
+        """Return why a pose must not be taken now; "" if nobody need know."""
         if stamp > now + self._ahead:
-            return "is stamped in the future"
+            # Until the first /clock of a simulation that runs, now is 0.
+            return "is stamped in the future" if now else ""
         if frame is None:
             return None
         latest = frame.latest.stamp

@@ -60,7 +60,7 @@ def test_after_a_stall_no_two_observations_have_the_same_time():
         begin = server.observe().time
         try:
             for moment in (0.2999, 0.3001):
-                server._process(begin + moment)
+                server._process(begin + moment, [])
         finally:
             server.stop()
         assert decode(observer.recv(1024)).time == pytest.approx(begin + 0.2999)

@@ -53,8 +53,10 @@ class VehicleServer(Server):
 
     @override
     def serve(self) -> None:
+        datagrams = list(received(self._socket))
+        # What has been received was sent before now.
         now = time.monotonic()
-        self._process(now)
+        self._process(now, datagrams)
         arrival = min(self._up.next_arrival(), self._down.next_arrival())
         wake = min(now - (now - self._begin) % _TICK + _TICK, arrival)
         select.select([self._socket], [], [], max(0.0, wake - time.monotonic()))
@@ -72,10 +74,10 @@ class VehicleServer(Server):
             physics.rates,
         )
 
-    def _process(self, now):
+    def _process(self, now, datagrams):
         self.vehicle.faults.pass_time(now - self._last_time)
         self._last_time = now
-        for item in received(self._socket):
+        for item in datagrams:
             self._up.push(now, item)
         lag = now - self._begin - self.vehicle.time
         if lag > _GREATEST_LAG:

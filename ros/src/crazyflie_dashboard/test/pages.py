@@ -42,7 +42,7 @@ def chromium(*arguments):
     options.binary_location = "/usr/bin/chromium"
     for argument in (
         *("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"),
-        *("--enable-unsafe-swiftshader", "--window-size=800,600"),
+        *("--enable-unsafe-swiftshader", "--window-size=1100,800"),
         *arguments,
     ):
         options.add_argument(argument)

@@ -80,4 +80,5 @@ class TransmitQueue:
             try:
                 send()
             except Exception:
+                # Whatever cflib raises, the next command must go out.
                 _log.exception("a packet could not be sent")

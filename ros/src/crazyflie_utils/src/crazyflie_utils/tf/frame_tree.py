@@ -201,7 +201,7 @@ class FrameTree:
         self._warn(text, (pose.parent, pose.child, reason))
 
     def _why_untimely(self, frame, stamp, now):
-        """Return why a pose must not be taken now; "" if nobody need know."""
+        """Return why a pose must not be taken now; "" if that needs no warning."""
         if stamp > now + self._ahead:
             # Until the first /clock of a simulation that runs, now is 0.
             return "is stamped in the future" if now else ""

@@ -17,7 +17,7 @@ def server():
 def driver():
     from pages import chromium
 
-    with chromium() as driver:
+    with chromium(scale=0.5) as driver:
         yield driver
 
 

@@ -36,13 +36,14 @@ def wait_for(condition, what):
 
 
 @contextlib.contextmanager
-def chromium(*arguments):
-    """Yield a headless Chromium that draws in software."""
+def chromium(*arguments, scale=1.0):
+    """Yield a headless Chromium that draws in software, so many points for each of a page."""
     options = webdriver.ChromeOptions()
     options.binary_location = "/usr/bin/chromium"
     for argument in (
         *("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"),
         *("--enable-unsafe-swiftshader", "--window-size=1100,800"),
+        f"--force-device-scale-factor={scale}",
         *arguments,
     ):
         options.add_argument(argument)

@@ -27,7 +27,7 @@ def dashboard():
 @pytest.fixture(scope="module")
 def browser(dashboard):
     server = Server(dashboard)
-    with chromium() as driver:
+    with chromium(scale=0.5) as driver:
         browser = Browser(driver, server.url)
         browser.open()
         browser.has("3 vehicles")

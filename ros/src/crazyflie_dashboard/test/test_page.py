@@ -100,6 +100,7 @@ def test_one_escape_is_no_emergency(browser, server):
 
 
 def test_boxes_show_what_is_chosen(browser):
+    browser.has("0 of 3 chosen")
     browser.press("All")
     browser.has("3 of 3 chosen")
     browser.press("None")

@@ -1,5 +1,8 @@
 """A vehicle and a controller for the tests, and processes that can be killed."""
 
+from bisect import bisect_right
+from collections import defaultdict
+
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_msgs.msg import (
@@ -165,7 +168,9 @@ class Network(FakeGraph):
 
     def __init__(self):
         super().__init__({})
-        self.heard = []
+        #: By topic: times, and what was said then by whom.
+        self._times = defaultdict(list)
+        self._said = defaultdict(list)
 
     def start(self, name, node, parameters=None):
         """Start a node in a process of its own; return the node."""
@@ -200,21 +205,25 @@ class Network(FakeGraph):
 
     def send(self, name, topic, message, latch):
         """Send a message of a process, and remember it."""
-        self.heard.append((self.time, name, topic, message))
+        self._times[topic].append(self.time)
+        self._said[topic].append((name, message))
         super().send(name, topic, message, latch)
 
     def on(self, topic, since=0.0):
         """Return what was said on a topic after a moment, as (time, message)."""
-        return [(time, m) for time, _, name, m in self.heard if name == topic and time > since]
+        times = self._times[topic]
+        first = bisect_right(times, since)
+        return [
+            (time, m) for time, (_, m) in zip(times[first:], self._said[topic][first:], strict=True)
+        ]
 
     def last(self, topic):
         """Return the last text on a topic."""
-        return self.on(topic)[-1][1].data
+        return self._said[topic][-1][1].data
 
     def last_of(self, name, topic):
         """Return the last message of a process on a topic."""
-        told = (m for _, by, at, m in reversed(self.heard) if (by, at) == (f"/{name}", topic))
-        return next(told)
+        return next(m for by, m in reversed(self._said[topic]) if by == f"/{name}")
 
 
 class HoverNetwork(Network):

@@ -13,8 +13,14 @@ PAGES = [
 ]
 """The pages whose commands are run."""
 
-PACKAGE_PAGES = sorted((TOP / "ros").glob("src/**/README.md")) + [
-    TOP / "ros" / "launch_shared" / "README.md"
+# Tools keep README files in hidden folders, as pytest does in .pytest_cache.
+PACKAGE_PAGES = [
+    *(
+        p
+        for p in sorted((TOP / "ros").glob("src/**/README.md"))
+        if not p.parent.name.startswith(".")
+    ),
+    TOP / "ros" / "launch_shared" / "README.md",
 ]
 
 _COMMENT = re.compile(r"<!-- (.*) -->")

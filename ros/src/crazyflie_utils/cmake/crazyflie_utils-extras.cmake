@@ -4,11 +4,17 @@
 # :param path: folder or file, relative to the package
 # :param APART: files of this folder that are tests of their own, which may run beside it
 # :param WORKERS: number of processes that share the files, if their tests mostly wait
+# :param CALCULATES: they never wait; they begin first, and leave the processors to whoever flies
+#     against the clock beside them
 function(crazyflie_add_pytest path)
-  cmake_parse_arguments(pytest "" "WORKERS" "APART" ${ARGN})
+  cmake_parse_arguments(pytest "CALCULATES" "WORKERS" "APART" ${ARGN})
   string(REPLACE "/" "_" name "${path}")
   set(report "${CATKIN_TEST_RESULTS_DIR}/${PROJECT_NAME}/pytest-${name}.xml")
-  set(command "${PYTHON_EXECUTABLE} -m pytest ${CMAKE_CURRENT_SOURCE_DIR}/${path} -q -p no:cacheprovider -p crazyflie_utils.testing.pytest_plugin --junit-xml=${report}")
+  # The plugin of anyio, which the dashboard brings, costs each program 0.1 s.
+  set(command "${PYTHON_EXECUTABLE} -m pytest ${CMAKE_CURRENT_SOURCE_DIR}/${path} -q -p no:cacheprovider -p no:anyio -p crazyflie_utils.testing.pytest_plugin --junit-xml=${report}")
+  if(pytest_CALCULATES)
+    string(PREPEND command "nice -n 10 ")
+  endif()
   if(pytest_WORKERS)
     string(APPEND command " -n ${pytest_WORKERS} --dist loadfile")
   endif()
@@ -21,6 +27,9 @@ function(crazyflie_add_pytest path)
     # What waits most is to begin first, beside what needs most of the processors.
     math(EXPR cost "2000 + ${pytest_WORKERS}")
     _crazyflie_set_tests_properties("pytest_${name}$" COST ${cost})
+  endif()
+  if(pytest_CALCULATES)
+    _crazyflie_set_tests_properties("pytest_${name}$" COST 3000)
   endif()
 endfunction()
 

@@ -29,8 +29,10 @@ def pytest_arguments(arguments: list[str]) -> list[str]:
             converted.append("--junit-xml=" + argument.removeprefix(_OUTPUT))
         elif argument != _TEXT:
             converted.append(argument)
+    # The plugin of anyio, which the dashboard brings, costs each test 0.1 s.
+    converted += ["-p", "no:cacheprovider", "-p", "no:anyio", "-v"]
     # rospy calls notifyAll, which Python 3.10 has deprecated, with every /clock.
-    return [*converted, "-p", "no:cacheprovider", "-v", "-W", "ignore:notifyAll:DeprecationWarning"]
+    return [*converted, "-W", "ignore:notifyAll:DeprecationWarning"]
 
 
 class InterruptIsFailure:

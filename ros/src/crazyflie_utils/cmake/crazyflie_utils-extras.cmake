@@ -4,7 +4,7 @@
 # :param path: folder or file, relative to the package
 # :param APART: files of this folder that are tests of their own, which may run beside it
 # :param WORKERS: number of processes that share the files, if their tests mostly wait
-# :param CALCULATES: they never wait; they begin first, and leave the processors to whoever flies
+# :param CALCULATES: they never wait; they begin early, and leave the processors to whoever flies
 #     against the clock beside them
 function(crazyflie_add_pytest path)
   cmake_parse_arguments(pytest "CALCULATES" "WORKERS" "APART" ${ARGN})
@@ -29,7 +29,7 @@ function(crazyflie_add_pytest path)
     _crazyflie_set_tests_properties("pytest_${name}$" COST ${cost})
   endif()
   if(pytest_CALCULATES)
-    _crazyflie_set_tests_properties("pytest_${name}$" COST 3000)
+    _crazyflie_set_tests_properties("pytest_${name}$" COST 2400)
   endif()
 endfunction()
 

@@ -23,6 +23,9 @@ _EMERGENCY_STOP = 0x03
 _LINK_BITS = 3 << 2
 _NULL_PACKET = (15, 3)  #: Port and channel of the packet by which vehicles are searched.
 
+_THAW = bytes(40)  #: A datagram that ends a freeze; packets are shorter.
+_THAW_LIMIT = 60.0  #: How long that may take on a busy machine, s.
+
 
 class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
     """A vehicle on a UDP port of this machine, by default any free one.
@@ -54,7 +57,8 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         self.answers: dict[tuple[int, int, int | None], bytes] = {}
         #: ``lose(count)`` returns whether the reply with this number is lost.
         self.lose: Callable[[int], bool] = lambda count: False
-        self.is_frozen = False  #: Whether it neither receives nor sends anything.
+        self._is_frozen = False
+        self._thawed = threading.Event()
         self._changed = threading.Condition()
         self._replies = 0
         self._blocks: dict[int, list[str]] = {}
@@ -67,6 +71,21 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="fake-vehicle", daemon=True)
         self._thread.start()
+
+    @property
+    def is_frozen(self) -> bool:
+        """Whether it neither receives nor sends anything; what is sent to it meanwhile is lost."""
+        return self._is_frozen
+
+    @is_frozen.setter
+    def is_frozen(self, frozen: bool) -> None:
+        if frozen or not self._is_frozen:
+            self._is_frozen = frozen
+            return
+        # Behind what may still wait in the socket: on a busy machine the thread may be late.
+        self._thawed.clear()
+        self._socket.sendto(_THAW, self._socket.getsockname())
+        assert self._thawed.wait(_THAW_LIMIT), "the thread of the vehicle hangs"
 
     @property
     def uri(self) -> str:
@@ -89,7 +108,7 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
 
     def send_datagram(self, datagram: bytes) -> None:
         """Send any datagram."""
-        if self._peer is not None and not self.is_frozen:
+        if self._peer is not None and not self._is_frozen:
             self._socket.sendto(datagram, self._peer)
 
     def packets(self, port: int, channel: int) -> list[bytes]:
@@ -118,7 +137,10 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
             except OSError:
                 # Nothing has come, or nothing listens to what was sent.
                 continue
-            if self.is_frozen or not datagram:
+            if datagram == _THAW:
+                self._is_frozen = False
+                self._thawed.set()
+            if self._is_frozen or not datagram:
                 continue
             self._peer = peer
             port, channel, data = datagram[0] >> 4, datagram[0] & 3, datagram[1:]

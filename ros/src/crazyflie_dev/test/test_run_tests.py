@@ -32,6 +32,23 @@ def test_long():
     assert False
 """
 
+LAUNCH = """
+import sys
+from pathlib import Path
+
+report = Path(sys.argv[1])
+report.parent.mkdir(parents=True, exist_ok=True)
+ran = Path(__file__).with_name("ran")
+is_first = not ran.exists()
+ran.touch()
+failure = "<failure message='beside others'/>" if is_first else ""
+check = f"<testcase classname='rostest_launch' name='test_shy'>{failure}</testcase>"
+node = "<testcase classname='rostest.runner.RosTest' name='testlaunch'/>"
+report.with_name("rosunit-launch.xml").write_text(f"<testsuite>{check}</testsuite>")
+report.write_text(f"<testsuite tests='1' failures='0' errors='0'>{node}</testsuite>")
+sys.exit(is_first)
+"""
+
 NO_MODULE = "import nowhere"
 
 
@@ -46,8 +63,13 @@ def run(tmp_path):
         for name, text in files.items():
             source = tmp_path / f"test_{name}.py"
             source.write_text(text)
-            report = tmp_path / "build" / "test_results" / "package" / f"pytest-{name}.xml"
-            command = f"{sys.executable} -m pytest {source} -q --junit-xml={report}"
+            results = tmp_path / "build" / "test_results" / "package"
+            if name == "launch":
+                report = results / "rostest-launch.xml"
+                command = f"{sys.executable} {source} {report}"
+            else:
+                report = results / f"pytest-{name}.xml"
+                command = f"{sys.executable} -m pytest {source} -q --junit-xml={report}"
             words = ["/usr/bin/env", sys.executable, CATKIN, report, "--return-code", command]
             # ctest reads a list of CMake.
             lines.append(f"add_test({name} " + " ".join(f'"{word}"' for word in words) + ")")
@@ -78,6 +100,15 @@ def test_what_passes_alone_is_flaky_and_no_pass(run, tmp_path, arguments, expect
     assert (tmp_path / "ran").read_text() == "xxxx"
     results = tmp_path / "build" / "test_results" / "package" / "pytest-flaky.xml"
     assert "beside others" in results.read_text()
+
+
+def test_a_check_of_a_rostest_that_passes_alone_is_flaky_once(run):
+    status, lines = run(launch=LAUNCH, good="def test_good(): pass")
+    assert status == 0
+    assert lines[-2:] == [
+        "1 passed, 0 failed, 1 flaky",
+        "FLAKY: package/rosunit-launch.xml: rostest_launch.test_shy",
+    ]
 
 
 def test_what_fails_alone_has_failed_and_what_is_long_is_left_out(run):

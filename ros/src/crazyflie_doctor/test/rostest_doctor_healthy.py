@@ -3,6 +3,8 @@
 import rosgraph
 from doctor_runs import about, run_doctor
 
+from crazyflie_utils.testing.peer import wait_until
+
 OF_THE_GRAPH = (
     "nodes",
     "types",
@@ -23,6 +25,8 @@ def nodes():
 
 
 def test_finds_nothing():
+    launched = {"/composed", "/robot_base_link_publisher"}
+    wait_until(lambda: launched <= nodes(), "the nodes of the launch file")
     before = nodes()
     status, lines = run_doctor()
     for check in OF_THE_GRAPH:

@@ -4,6 +4,7 @@ python3 -m crazyflie_dev.count_results build/test_results
 """
 
 import argparse
+import contextlib
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -67,13 +68,22 @@ def cases(path: Path) -> Iterator[Case]:
             yield replace(case, verdict="skipped")
         elif case.classname != _ROSTEST:
             yield case
-        elif not (results := results_of_node(case)).exists():
+        elif not (results := _results_of_node(path, case.name)).exists():
             yield replace(case, verdict="failed", reason=f"there is no {results.name}")
 
 
-def results_of_node(case: Case) -> Path:
-    """Return the file of results of the test node that a test of rostest stands for."""
-    return case.report.with_name(f"rosunit-{case.name.removeprefix('test')}.xml")
+def results_of_nodes(report: Path) -> Iterator[Path]:
+    """Yield the files of results that the test nodes of a rostest have left, from rostest's own."""
+    with contextlib.suppress(ElementTree.ParseError, OSError):
+        for element in ElementTree.parse(report).getroot().iter("testcase"):
+            if element.get("classname") == _ROSTEST:
+                results = _results_of_node(report, element.get("name", ""))
+                if results.exists():
+                    yield results
+
+
+def _results_of_node(report, name):
+    return report.with_name(f"rosunit-{name.removeprefix('test')}.xml")
 
 
 def summarize(folder: Path, results: Iterable[Case], is_strict: bool = True) -> bool:

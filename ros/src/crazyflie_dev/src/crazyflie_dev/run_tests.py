@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from crazyflie_dev.count_results import Case, cases, results_of_node, summarize
+from crazyflie_dev.count_results import Case, cases, results_of_nodes, summarize
 
 LONG = "long"
 """Label of ctest and marker of pytest for what ``--all`` adds."""
@@ -51,8 +51,7 @@ class Program:
             # So catkin notes that a program has died without results.
             report = report.with_name(f"MISSING-{report.name}")
         yield report
-        if report.name.startswith("rostest-"):
-            yield from (path for path in map(results_of_node, cases(report)) if path.exists())
+        yield from results_of_nodes(report)
 
     def only(self, case: Case) -> "Program":
         """Return the program that runs this test only.

@@ -17,6 +17,7 @@ def server():
 def driver():
     from pages import chromium
 
+    # A quarter of the pixels: to draw them in software is most of what these tests cost.
     with chromium(scale=0.5) as driver:
         yield driver
 

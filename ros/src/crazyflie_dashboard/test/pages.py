@@ -37,7 +37,7 @@ def wait_for(condition, what):
 
 @contextlib.contextmanager
 def chromium(*arguments, scale=1.0):
-    """Yield a headless Chromium that draws in software, so many points for each of a page."""
+    """Yield a headless Chromium that draws in software, ``scale`` pixels for each of CSS."""
     options = webdriver.ChromeOptions()
     options.binary_location = "/usr/bin/chromium"
     for argument in (

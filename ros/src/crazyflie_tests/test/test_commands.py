@@ -51,6 +51,7 @@ AT_A_TIME = 2
 QUICK = [
     TOP / "README.md",
     TOP / "docs" / "software_example.md",
+    TOP / "docs" / "course" / "02_a_package.md",
 ]
 """Pages that are followed in each run of the tests. They change
 nothing of the workspace, so they are followed in a view of it, and nothing is built for them. What

@@ -4,7 +4,7 @@
 # :param path: folder or file, relative to the package
 # :param APART: files of this folder that are tests of their own, which may run beside it
 # :param WORKERS: number of processes that share the files, if their tests mostly wait
-# :param CALCULATES: they never wait; they begin early, and leave the processors to whoever flies
+# :param CALCULATES: they hardly wait; they begin early, and leave the processors to whoever flies
 #     against the clock beside them
 function(crazyflie_add_pytest path)
   cmake_parse_arguments(pytest "CALCULATES" "WORKERS" "APART" ${ARGN})

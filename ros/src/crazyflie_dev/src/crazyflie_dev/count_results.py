@@ -74,6 +74,7 @@ def cases(path: Path) -> Iterator[Case]:
 
 def results_of_nodes(report: Path) -> Iterator[Path]:
     """Yield the files of results that the test nodes of a rostest have left, from rostest's own."""
+    # What cannot be read is a failed test to `cases`.
     with contextlib.suppress(ElementTree.ParseError, OSError):
         for element in ElementTree.parse(report).getroot().iter("testcase"):
             if element.get("classname") == _ROSTEST:

@@ -5,8 +5,8 @@ import threading
 
 from crazyflie_link.testing.fake_vehicle import FakeVehicle
 
-PING = bytes([0xF0])
-POSITION = bytes([0x70, 7]) + bytes(16)
+PING = bytes([0xFC])
+POSITION = bytes([0x7C, 7]) + bytes(16)
 
 
 def test_what_is_sent_to_a_frozen_vehicle_is_lost_also_if_its_thread_is_late():
@@ -22,4 +22,5 @@ def test_what_is_sent_to_a_frozen_vehicle_is_lost_also_if_its_thread_is_late():
         vehicle.lose = lambda _: False
         sender.sendto(PING, ("127.0.0.1", vehicle.port))
         vehicle.wait_for_packets(15, 0, 2)
-        assert vehicle.packets(7, 0) == []
+        assert vehicle.received == [(15, 0, b""), (15, 0, b"")]
+        assert vehicle.broadcasts == []

@@ -140,6 +140,7 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
             if datagram == _THAW:
                 self._is_frozen = False
                 self._thawed.set()
+                continue
             if self._is_frozen or not datagram:
                 continue
             self._peer = peer

@@ -5,7 +5,8 @@ import struct
 import bags
 import numpy as np
 import pytest
-from std_msgs.msg import String
+import rosbag
+from std_msgs.msg import Float32, String
 
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_reports.bag_file import MAGIC, BagError, BagFile
@@ -109,6 +110,34 @@ def test_a_bag_without_our_topics(tmp_path, write, complaints):
         read(path, tmp_path)
     for complaint in complaints:
         assert complaint in str(error.value)
+
+
+def test_a_definition_in_a_bag_runs_nothing(tmp_path):
+    trace = tmp_path / "trace"
+
+    class Hostile(Float32):
+        _full_text = (
+            f"int8 __module__;__import__('pathlib').Path('{trace}').touch();B=1\nfloat32 data\n"
+        )
+
+    path = bags.flight_bag(tmp_path / "a.bag")
+    with rosbag.Bag(str(path), "a") as bag:
+        bag.write("/battery", Hostile(data=3.7), bags.stamp(5.0))
+    log = read(path, tmp_path)
+    assert log.sources["/battery"].spool.rows()[0, -1] == pytest.approx(3.7)
+    assert not trace.exists()
+
+
+def test_a_type_without_a_local_definition_is_left_out(tmp_path):
+    class Unknown(Float32):
+        _type = "dynamic_reconfigure/Config"
+        _md5sum = "*"
+
+    path = bags.flight_bag(tmp_path / "a.bag")
+    with rosbag.Bag(str(path), "a") as bag:
+        bag.write("/lqr_controller/parameter_updates", Unknown(), bags.stamp(5.0))
+    log = read(path, tmp_path)
+    assert any("/lqr_controller/parameter_updates is left out" in each for each in log.remarks)
 
 
 @pytest.mark.parametrize(

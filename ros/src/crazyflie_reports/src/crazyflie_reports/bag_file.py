@@ -38,12 +38,10 @@ class _BrokenOffError(Exception):
 class Connection:
     """A topic of one publisher."""
 
-    #: topic, datatype, md5sum, definition: As the publisher named them; the definition is the text
-    #: of the message file.
+    #: topic, datatype, md5sum: As the publisher named them.
     topic: str
     datatype: str
     md5sum: str
-    definition: str
 
 
 class BagFile:
@@ -147,7 +145,6 @@ class BagFile:
             fields[b"topic"].decode(errors="replace"),
             texts[b"type"],
             texts[b"md5sum"],
-            texts[b"message_definition"],
         )
         self.connections.append(self._by_id[key])
 

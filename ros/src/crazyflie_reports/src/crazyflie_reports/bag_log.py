@@ -174,7 +174,7 @@ class _Reader:
                 self._add_transforms(time, content)
             else:
                 log.events.add(time, connection.topic, topic.namespace, content)
-        except Exception as error:  # Whatever generated code or a bag's own fields raise.
+        except Exception as error:  # Whatever a bag's own fields raise.
             self._errors.setdefault(connection.topic, f"{connection.topic}: {error}")
             self._bad[connection.topic] = self._bad.get(connection.topic, 0) + 1
 

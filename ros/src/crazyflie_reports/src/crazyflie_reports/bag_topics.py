@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import genpy.dynamic
 import roslib.message
 
 from crazyflie_model.angles import rpy_from_quaternion
@@ -144,7 +143,7 @@ class TopicError(Exception):
 def topic_of(connection: Connection, names: dict[str, str]) -> Topic | None:
     """Return how a connection is read; None if a report does not need it.
 
-    For ``names`` see `bag_log.read`. `TopicError`: its type has another definition here.
+    For ``names`` see `bag_log.read`. `TopicError`: its type is not defined here, or differently.
     """
     for role in ROLES:
         namespace = _namespace(connection.topic, names.get(role.name, role.topics))
@@ -173,20 +172,20 @@ def _namespace(topic, names):
 
 
 def _decoder(connection, convert):
-    known = roslib.message.get_message_class(connection.datatype)
-    if known is not None and known._md5sum != connection.md5sum:
+    # The definition in the bag is text of whoever wrote it: a class generated from it would run it.
+    message_type = roslib.message.get_message_class(connection.datatype)
+    if message_type is None:
+        raise TopicError(
+            f"{connection.topic} is left out: no package here defines {connection.datatype}"
+        )
+    if message_type._md5sum != connection.md5sum:
         raise TopicError(
             f"{connection.topic} is left out: its {connection.datatype} has the md5 sum "
-            f"{connection.md5sum}, expected {known._md5sum}"
+            f"{connection.md5sum}, expected {message_type._md5sum}"
         )
     if connection.datatype in FLOATS:
         numbers = struct.Struct(f"<{FLOATS[connection.datatype]}d")
         return lambda data: _decode_floats(data, numbers, convert)
-    try:
-        made = genpy.dynamic.generate_dynamic(connection.datatype, connection.definition)
-        message_type = made[connection.datatype]
-    except (genpy.MessageException, KeyError, SyntaxError) as error:
-        raise TopicError(f"{connection.topic} is left out: {error}") from None
 
     def decode(data):
         message = message_type()

@@ -10,7 +10,7 @@ NOW = 1.7e9
 def ages(*arrivals, age=None):
     """Return the ages of states, given as (stamp, now)."""
     age = age or StateAge()
-    return [age.update(stamp, now) for stamp, now in arrivals]
+    return [age.update(stamp, now, now) for stamp, now in arrivals]
 
 
 @pytest.mark.parametrize("delay", [-5.0, -0.1, 0.0, 0.01, 0.6, 30.0, 59.0])
@@ -65,11 +65,31 @@ def test_another_clock_that_begins_anew_does_so():
 def test_the_same_clock_is_recognised_after_something_of_another():
     age = StateAge()
     assert ages((NOW - 500.0, NOW), (NOW, NOW), age=age) == [0.0, 0.0]
-    assert age.update(NOW - 400.0, NOW) == 400.0
+    assert age.update(NOW - 400.0, NOW, NOW) == 400.0
 
 
 def test_after_a_reset_of_simulated_time_all_begins_anew():
     age = StateAge()
     ages((500.0, 500.0), age=age)
-    assert age.update(0.1, 0.1) == 0.0
-    assert age.update(0.2, 0.9) == pytest.approx(0.7)
+    assert age.update(0.1, 0.1, 0.1) == 0.0
+    assert age.update(0.2, 0.9, 0.9) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    "step", [sign * step for step in (0.05, 1.0, 30.0, 3600.0, 86400.0) for sign in (-1, 1)]
+)
+@pytest.mark.parametrize("offset", [0.0, 500.0, -500.0, 1e9])
+def test_states_are_answered_after_the_wall_clock_was_set(step, offset):
+    """Also where the source's clock, which is not set, is another one: ``offset`` s behind."""
+    age = StateAge()
+    for k in range(100):
+        now = NOW + 0.01 * k
+        assert abs(age.update(now - offset - 0.005, now, 0.01 * k)) < 0.01
+    stamp = NOW + 1.0 - offset - 0.005
+    # One state is under way; it may be refused.
+    age.update(stamp, NOW + 1.0 + step, 1.0)
+    source = 0.0 if offset else step
+    for k in range(101, 300):
+        now = NOW + 0.01 * k + step
+        stamp = NOW + 0.01 * k + source - offset - 0.005
+        assert age.update(stamp, now, 0.01 * k) < 0.5

@@ -98,6 +98,32 @@ def test_stamps_that_step_back_do_not_silence_it():
     assert rejected(process)["is stamped in the past"] == 2
 
 
+@pytest.mark.parametrize("kind", ["finite_difference", "kalman"])
+@pytest.mark.parametrize(
+    "step", [sign * step for step in (0.05, 0.08, 0.15, 1.0, 3600.0, 86400.0) for sign in (-1, 1)]
+)
+@pytest.mark.parametrize("is_under_way", [True, False])
+def test_no_velocity_is_calculated_from_two_clocks(step, is_under_way, kind):
+    process = launch(**{"filter/type": kind})
+    process.clock.wall_offset = 1.7e9
+
+    def moving_from(begin):
+        return lambda elapsed: ((begin + elapsed, 0.0, 1.0), (0.0, 0.0, 0.0))
+
+    fly(process, moving_from(0.0), 1.0)
+    pose = transform(process, (1.0, 0.0, 1.0))
+    process.clock.wall_offset += step
+    if is_under_way:
+        process.publish("/tf", TFMessage([pose]))
+    process.advance(0.01)
+    before = len(process.published("/state"))
+    fly(process, moving_from(1.01), 1.0)
+    speeds = [message.state.x_dot for message in process.published("/state")[before:]]
+    # A step back by less than 0.1 s costs the poses of so much time.
+    assert len(speeds) > 85
+    assert all(0.8 < speed < 1.2 for speed in speeds)
+
+
 def test_when_nothing_good_comes_it_is_silent_and_says_why():
     process = launch()
     hover(process, 0.5)

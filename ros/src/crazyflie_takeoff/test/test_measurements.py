@@ -54,12 +54,41 @@ def test_a_position_is_known_for_half_a_second():
 
 def test_the_usual_age_grows_by_a_tenth():
     delay = Delay()
-    assert delay.excess(1.0, 1.5) == 0.0
+    assert delay.excess(1.0, 1.5, 1.5) == 0.0
     # 10 s later 1 s more is usual.
-    assert delay.excess(9.0, 11.5) == pytest.approx(2.5 - 1.5)
-    assert delay.excess(12.0, 12.5) == 0.0
-    # A clock that is set back makes nothing usual.
-    assert delay.excess(1.0, 3.0) == pytest.approx(1.5)
+    assert delay.excess(9.0, 11.5, 11.5) == pytest.approx(2.5 - 1.5)
+    assert delay.excess(12.0, 12.5, 12.5) == 0.0
+    # After a reset of the clock the usual age stays.
+    assert delay.excess(1.0, 3.0, 3.0) == pytest.approx(1.5)
+
+
+CLOCK_STEPS = [sign * step for step in (0.05, 0.2, 1.0, 30.0, 3600.0, 86400.0) for sign in (-1, 1)]
+
+
+@pytest.mark.parametrize("step", CLOCK_STEPS)
+@pytest.mark.parametrize("is_under_way", [True, False])
+def test_messages_are_on_time_after_the_wall_clock_was_set(step, is_under_way):
+    delay, wall = Delay(), 1.7e9
+    for k in range(100):
+        assert delay.excess(wall + 0.01 * k - 0.005, wall + 0.01 * k, 0.01 * k) == pytest.approx(
+            0.0, abs=1e-6
+        )
+    stamp, wall = wall + 1.0 - 0.005, wall + step
+    if is_under_way:
+        assert delay.excess(stamp, wall + 1.0, 1.0) == 0.0
+    for k in range(101, 300):
+        excess = delay.excess(wall + 0.01 * k - 0.005, wall + 0.01 * k, 0.01 * k)
+        # Of a message that was stamped up to 0.05 s ahead, the age is learned.
+        assert excess < 0.051
+    # One that is late now is noticed as before.
+    assert delay.excess(wall + 3.0 - 0.605, wall + 3.0, 3.0) == pytest.approx(0.6, abs=0.06)
+
+
+def test_a_source_whose_clock_is_ahead_is_late_when_it_is():
+    delay = Delay()
+    for k in range(100):
+        assert delay.excess(0.01 * k + 0.15, 0.01 * k, 0.01 * k) == 0.0
+    assert delay.excess(1.15 - 0.4, 1.0, 1.0) == pytest.approx(0.25, abs=0.002)
 
 
 # The ground.

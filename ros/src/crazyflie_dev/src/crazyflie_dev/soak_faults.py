@@ -108,6 +108,12 @@ def _shift(offset: float) -> Callable[[Any, Flight], None]:
     return edit
 
 
+def _step_clock(flight):
+    step = flight.random.uniform(-5.0, 5.0)
+    flight.graph.step_wall_clock(step)
+    return lambda: flight.graph.step_wall_clock(-step)
+
+
 def _dropout(message, flight):
     return [] if flight.random.random() < 0.5 else [message]
 
@@ -206,6 +212,7 @@ FAULTS = [
     ),
     *(Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0, drops=name == FILTER) for name in NODES),
     Fault(STARVATION, _starvation.begin, 2.0, 12.0, drops=True, again=_starvation.again),
+    Fault("the wall clock is set", _step_clock, 0.1, 4.0),
     Fault("references are not finite", nothing, 0.1, 5.0, again=_refer_to(math.nan, 0.0, 1.0)),
     Fault("references are far away", nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 1.0)),
     Fault("references are old", nothing, 0.1, 5.0, again=_refer_to(0.5, 0.5, 0.3, age=30.0)),

@@ -242,7 +242,8 @@ class LinearFeedbackNode(Node):
         self._publisher.publish(stamped(ControlStamped, message.header.stamp, control=control))
 
     def _is_old(self, stamp):
-        age = self._age.update(stamp.to_sec(), self._handle.nanoseconds() * 1e-9)
+        time = self._handle.time()
+        age = self._age.update(stamp.to_sec(), self._handle.nanoseconds(time) * 1e-9, time)
         if age <= self._parameters.max_age:
             self._clocks_agree = True
             return False

@@ -5,28 +5,34 @@
 SAME_CLOCK = 60.0
 
 _DRIFT = 1e-3  #: By how much clocks that are not meant to agree may run apart, s/s.
+CLOCK_STEP = 0.02  #: A larger change of wall clock minus monotonic clock is a step, s.
 
 
 class StateAge:
     """Tells how old states are, also where their stamps are of another clock.
 
     A stamp that is within `SAME_CLOCK` of now is of this machine's clock, and from then on
-    all are: one that is minutes old then is old. Before that, what is known of the other clock
-    is the least by which a stamp was behind now, and the age is what is more than that.
-    Stamps of another clock that repeat or go back say nothing, and begin anew.
+    all are: one that is minutes old then is old. Before that, the smallest difference between now
+    and a stamp is taken for the offset of the other clock, and the age is the rest. The measurement
+    starts over where stamps of another clock repeat or go back, and where this machine's clock was
+    set.
     """
 
     def __init__(self) -> None:
         self._offset: float | None = None
-        self._stamp = self._now = 0.0
+        self._stamp = self._time = self._wall_offset = 0.0
 
-    def update(self, stamp: float, now: float) -> float:
-        """Return the age, s, of a state with a stamp (s; 0 is none); negative in the future."""
+    def update(self, stamp: float, now: float, time: float) -> float:
+        """Return the age, s, of a state with a stamp (s; 0 is none); negative in the future.
+
+        ``stamp`` and ``now`` are wall-clock time (s), ``time`` is the same moment by a clock that
+        is never set (s).
+        """
         if stamp == 0.0:
             return 0.0
-        difference, elapsed = now - stamp, now - self._now
-        if elapsed < 0.0:
-            # Simulated time was reset.
+        difference, elapsed = now - stamp, time - self._time
+        # Simulated time was reset, or the wall clock was set.
+        if elapsed < 0.0 or abs(now - time - self._wall_offset) > CLOCK_STEP:
             self._offset = None
         if abs(difference) <= SAME_CLOCK:
             self._offset = 0.0
@@ -34,5 +40,5 @@ class StateAge:
             self._offset = difference
         elif self._offset != 0.0:
             self._offset = min(self._offset + _DRIFT * elapsed, difference)
-        self._stamp, self._now = stamp, now
+        self._stamp, self._time, self._wall_offset = stamp, time, now - time
         return difference - self._offset

@@ -14,6 +14,7 @@ from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped, VehicleStatus
 from crazyflie_utils import NodeHandle, TransformError
 from crazyflie_utils.flight_status import WORDS
+from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 
 #: A position older than this is not known, s; as `commanded_references.MAX_STATE_AGE`.
 MAX_POSITION_AGE = 0.5
@@ -100,7 +101,8 @@ class RosVehicleState(MissionVehicle):
             return None
         # tf keeps the last pose of a vehicle that is not tracked any more.
         age = (self._handle.nanoseconds() - pose.stamp) * 1e-9
-        if age >= MAX_POSITION_AGE:
+        # A pose far ahead of now is one from before the clock was set back.
+        if not -MAX_FUTURE_STAMP_SIMULATED <= age < MAX_POSITION_AGE:
             return None
         return Pose(pose.position, pose.rotation, pose.stamp * 1e-9)
 

@@ -117,6 +117,9 @@ def test_a_position_of_long_ago_is_none(tf):
     text = "/cf in world: the last position is 1.5 s old; expected at most 0.5 s"
     with pytest.raises(tf2_ros.TransformException, match=text):
         vehicle(tf(98.5)).position()
+    # The clock was set back by an hour meanwhile.
+    with pytest.raises(tf2_ros.TransformException, match="the last position is -3600.0 s old"):
+        vehicle(tf(3700.0)).position()
 
 
 def test_the_world_has_the_name_that_the_script_was_given():

@@ -14,7 +14,7 @@ from crazyflie_msgs.msg import (
 from crazyflie_state_estimator import kalman
 from crazyflie_state_estimator.control_input import ControlInput
 from crazyflie_state_estimator.frozen_poses import FrozenPoseMonitor
-from crazyflie_state_estimator.motion import Motion, MotionEstimator
+from crazyflie_state_estimator.motion import ClockStepMonitor, Motion, MotionEstimator
 from crazyflie_state_estimator.parameters import (
     KALMAN,
     KalmanParameters,
@@ -43,6 +43,7 @@ class StateEstimatorNode(Node):
 
     def __init__(self) -> None:
         self._control = ControlInput()
+        self._clock_steps = ClockStepMonitor()
         self._last_success = 0.0
         self._stamp: int | None = None
         self._is_tilted: bool | None = None
@@ -137,18 +138,24 @@ class StateEstimatorNode(Node):
             return None
         self._stamp = pose.stamp
         self._publish_tilt(pose.rotation)
-        classification = self._gate.classify(pose.stamp * 1e-9, pose.position)
+        stamp, wall_time = pose.stamp * 1e-9, self._handle.nanoseconds(now) * 1e-9
+        if self._clock_steps.update(stamp, wall_time, now):
+            self._restart()
+        classification = self._gate.classify(stamp, pose.position)
         if classification is Classification.BAD:
             return None
         if classification is Classification.MOVED:
-            self._estimator.reset()
-            self._frozen.restart()
+            self._restart()
         attitude = rpy_from_quaternion(*pose.rotation)
         acceleration = self._control.acceleration(attitude[2], now)
-        if self._frozen.update(pose.stamp * 1e-9, pose.position, pose.rotation, acceleration):
+        if self._frozen.update(stamp, pose.position, pose.rotation, acceleration):
             self._reject_frozen()
             return self._departure(attitude)
         return self._estimator.update(pose.stamp, pose.position, attitude, acceleration)
+
+    def _restart(self):
+        self._estimator.reset()
+        self._frozen.restart()
 
     def _departure(self, attitude):
         """Return the predicted motion where the measured one has just turned out to be wrong."""

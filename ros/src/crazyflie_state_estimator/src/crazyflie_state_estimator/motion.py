@@ -17,6 +17,33 @@ class Motion(NamedTuple):
     attitude_rate: Components
 
 
+#: A larger change between wall clock and monotonic clock, or between the stamps of poses and their
+#: arrivals, is a step, s.
+CLOCK_STEP = 0.03
+STEP_TIMEOUT = 0.5  #: How long after a step of the wall clock stamps may still step, s.
+
+
+class ClockStepMonitor:
+    """Detects poses between whose stamps the wall clock was set: they give no velocity."""
+
+    def __init__(self) -> None:
+        self._offset = math.inf
+        self._stepped_at = -math.inf
+        self._stamp = self._time = 0.0
+
+    def update(self, stamp: float, now: float, time: float) -> bool:
+        """Return whether the clock was set between the last pose and this one.
+
+        ``stamp`` of the pose and ``now`` are wall-clock time (s), ``time`` is the same moment by a
+        clock that is never set (s).
+        """
+        if abs(now - time - self._offset) > CLOCK_STEP:
+            self._stepped_at = time
+        step = (stamp - self._stamp) - (time - self._time)
+        self._offset, self._stamp, self._time = now - time, stamp, time
+        return time - self._stepped_at < STEP_TIMEOUT and abs(step) > CLOCK_STEP
+
+
 class MotionEstimator:
     """Motion from a sequence of poses, by the poses' own stamps.
 

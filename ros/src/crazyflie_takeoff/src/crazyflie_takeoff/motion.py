@@ -6,6 +6,8 @@ from typing import NamedTuple
 MAX_STATE_AGE = 0.2  #: A state that is older does not count, s.
 MAX_POSITION_AGE = 0.5  #: A position that is older is not used by the server, s.
 DRIFT = 0.1  #: How fast the age that is taken for usual may grow, s/s.
+MIN_AGE = -0.05  #: A message that is stamped further ahead of now has no usual age, s.
+CLOCK_STEP = 0.02  #: A larger change of wall clock minus monotonic clock is a step, s.
 Position = tuple[float, float, float]  #: x, y, z in m, fixed frame, z up.
 
 
@@ -88,26 +90,34 @@ class MeasuredPosition:
 
 
 class Delay:
-    """How much later than usual messages come, by the stamps of their data.
+    """How much later than usual messages arrive, by the stamps of their data.
 
     The usual age is the smallest one, which is taken to grow at `DRIFT`: so a clock of another
-    machine that is a little off, or a source that needs its time, makes nothing late.
+    machine that is a little off, or a source that needs its time, makes nothing late. Where the
+    wall clock was set, the measurement starts over; a message that was stamped before the clock
+    was set back does not make its negative age the usual one.
     """
 
     def __init__(self) -> None:
         self._usual = math.inf
         self._stamp: float | None = None
         self._time = -math.inf
+        self._offset = 0.0
 
-    def excess(self, stamp: float, now: float) -> float:
-        """Return how much older than usual the data of a message are, s.
+    def excess(self, stamp: float, now: float, time: float) -> float:
+        """Return how much older than usual the data of a message are, s; at least 0.
 
-        ``stamp`` and ``now`` are by one clock, s; a stamp of zero, or the same again, has no age.
+        ``stamp`` and ``now`` are wall-clock time (s), ``time`` is the same moment by a clock that
+        is never set (s). A stamp of zero, or the same again, has no age.
         """
         if stamp == 0.0 or stamp == self._stamp:
             return 0.0
         self._stamp = stamp
+        if abs(now - time - self._offset) > CLOCK_STEP:
+            self._usual = math.inf
+        self._offset = now - time
         age = now - stamp
-        self._usual = min(age, self._usual + DRIFT * max(now - self._time, 0.0))
-        self._time = now
-        return age - self._usual
+        usual = self._usual + DRIFT * max(time - self._time, 0.0)
+        self._usual = min(age if age >= MIN_AGE else 0.0, usual)
+        self._time = time
+        return max(age - self._usual, 0.0)

@@ -152,7 +152,9 @@ class TakeoffControlFilterNode(Node):
         self._filter.relay.measure(motion, self._excess(self._state_delay, message))
 
     def _excess(self, delay, message):
-        return delay.excess(message.header.stamp.to_sec(), self._handle.nanoseconds() * 1e-9)
+        time = self._handle.time()
+        now = self._handle.nanoseconds(time) * 1e-9
+        return delay.excess(message.header.stamp.to_sec(), now, time)
 
     def _on_box(self, box):
         self._filter.watch.walls.change(box.without_floor())

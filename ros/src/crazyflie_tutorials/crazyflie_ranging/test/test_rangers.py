@@ -91,6 +91,15 @@ def test_silent_without_a_pose(simulated):
     assert "s old" in simulated.logged("warn")[-1]
 
 
+def test_a_pose_from_before_the_clock_was_set_back_is_old(simulated):
+    simulated.clock.wall_offset = 1.7e9
+    fly(simulated, 1.0)
+    assert simulated.logged("warn") == []
+    simulated.clock.wall_offset -= 3600.0
+    simulated.advance(1.0)
+    assert "is -3599.0 s old" in simulated.logged("warn")[-1]
+
+
 def test_silent_without_a_pose_of_the_box(simulated):
     for _ in range(20):
         simulated.publish("/tf", TFMessage([transform(simulated, "crazyflie", 0.0)]))

@@ -19,14 +19,17 @@ from crazyflie_utils.transport import Transport
 class ProcessContext:
     """One executor, one clock, one set of topics, one tf buffer.
 
-    With ``use_sim_time`` the clock is simulated time, which stands still until it is set.
+    With ``use_sim_time`` the clock is simulated time, which stands still until it is set; a test
+    passes a ``clock`` of its own.
     """
 
-    def __init__(self, transport: Transport, use_sim_time: bool):
+    def __init__(
+        self, transport: Transport, use_sim_time: bool, clock: SimulatedClock | None = None
+    ):
         self.transport = transport
         self.executor = Executor()
         self.topics = Topics(transport)
-        self.clock: SimulatedClock | SteadyClock = (
+        self.clock: SimulatedClock | SteadyClock = clock or (
             SimulatedClock() if use_sim_time else SteadyClock()
         )
         self.transforms = Transforms(

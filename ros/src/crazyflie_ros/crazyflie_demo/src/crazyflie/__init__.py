@@ -22,6 +22,7 @@ from uav_trajectory import Trajectory
 from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState, Position, TrajectoryPolynomialPiece, VelocityWorld
 from crazyflie_model.angles import quaternion_from_rpy
+from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 
 _WORLD = "world"  #: The fixed frame, unless the script's parameter ~frames/fixed says otherwise.
 _TF_LIMIT = 10.0  #: Longest time until a position, or a voltage, is received, s.
@@ -157,8 +158,9 @@ class Crazyflie:
         while True:
             stamp, position = self._latest_position()
             age = (rospy.Time.now() - stamp).to_sec()
-            # What has no stamp is static.
-            if stamp.is_zero() or age < _MAX_POSITION_AGE:
+            # A pose without a stamp is static; one far ahead of now is from before the clock was
+            # set back.
+            if stamp.is_zero() or -MAX_FUTURE_STAMP_SIMULATED <= age < _MAX_POSITION_AGE:
                 return np.array(position)
             if time.monotonic() > deadline:
                 raise tf2_ros.TransformException(

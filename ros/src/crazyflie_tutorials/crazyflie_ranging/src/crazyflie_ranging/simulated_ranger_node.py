@@ -13,6 +13,7 @@ from crazyflie_ranging.range_sensors import SENSOR_FILE, RangeSensor
 from crazyflie_ranging.ranger import Ranger
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer
+from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 from crazyflie_world.world import World
 from crazyflie_world.world_file import WORLD_FILE
 
@@ -94,7 +95,8 @@ class SimulatedRangerNode(Node):
     def _pose(self, frame: str) -> TransformStamped:
         pose = self._lookup(self._parameters.world.frame, frame)
         age = (self._handle.stamp() - pose.header.stamp).to_sec()
-        if age > self._parameters.silence:
+        # A pose far ahead of now is one from before the clock was set back.
+        if not -MAX_FUTURE_STAMP_SIMULATED <= age <= self._parameters.silence:
             raise TransformError(f"the pose of {frame} is {age:.1f} s old")
         return pose
 

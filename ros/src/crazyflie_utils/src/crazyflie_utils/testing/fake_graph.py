@@ -35,6 +35,7 @@ class FakeGraph:
         #: Process and topic: messages that do not reach this process.
         self.unheard: set[tuple[str, str]] = set()
         self.log: list[tuple[str, str]] = []  #: Level and text of what nodes have logged.
+        self._wall_offset = 0.0
         self._parameters = parameters
         self._processes: dict[str, _GraphProcess] = {}
         self._listeners: dict[str, list[Deliver]] = {}
@@ -45,6 +46,7 @@ class FakeGraph:
     def start(self, name: str, node: Node) -> None:
         """Start a process with one node; RuntimeError if the node could not be initialized."""
         process = self._processes[name] = _GraphProcess(name, self, self._parameters)
+        process.clock.wall_offset = self._wall_offset
         if not process.launch(node, name):
             raise RuntimeError(f"{name} was not initialized: {self.log[-1:]}")
 
@@ -75,7 +77,13 @@ class FakeGraph:
 
     def stamp(self) -> genpy.Time:
         """Return the ROS time of now."""
-        return genpy.Time.from_sec(self.time)
+        return genpy.Time.from_sec(self.time + self._wall_offset)
+
+    def step_wall_clock(self, step: float) -> None:
+        """Set the wall clock of all processes forward, or back if ``step`` (s) is negative."""
+        self._wall_offset += step
+        for process in self._processes.values():
+            process.clock.wall_offset = self._wall_offset
 
     def publish(self, topic: str, message: genpy.Message, caller: str = "") -> None:
         """Publish from outside, as the node ``caller``."""

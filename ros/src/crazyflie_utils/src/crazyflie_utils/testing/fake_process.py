@@ -6,6 +6,7 @@ from concurrent.futures import Future
 import genpy
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
+from typing_extensions import override
 
 from crazyflie_utils.clock import SimulatedClock
 from crazyflie_utils.node import Node
@@ -17,6 +18,18 @@ from crazyflie_utils.timers import SteadyTimers, TimerQueue
 _SHORTEST_PERIOD = 1e-4
 
 
+class WallClock(SimulatedClock):
+    """Simulated time whose stamps are those of a wall clock that can be set."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.wall_offset = 0.0  #: Wall clock minus `time`, s.
+
+    @override
+    def nanoseconds(self, moment: float | None = None) -> int:
+        return super().nanoseconds(moment) + round(self.wall_offset * 1e9)
+
+
 class FakeProcess(Process):
     """A process for tests: the real node handle, executor, timers and tf buffer.
 
@@ -24,11 +37,12 @@ class FakeProcess(Process):
     ``transport`` takes the place of one with them. ``start`` is the time at the beginning, s, of
     both clocks: ``clock`` is simulated time, and ``machine_clock`` that of the machine, by which
     ``steady`` timers and the limits of calls go. `advance` moves both, `advance_machine` and
-    ``clock.set`` one of them.
+    ``clock.set`` one of them. Stamps are those of ``clock`` plus its ``wall_offset`` (s): a change
+    of it is a step of the wall clock.
     """
 
     transport: FakeTransport
-    clock: SimulatedClock
+    clock: WallClock
 
     def __init__(
         self,
@@ -36,7 +50,7 @@ class FakeProcess(Process):
         start: float = 100.0,
         transport: FakeTransport | None = None,
     ):
-        super().__init__(transport or FakeTransport(parameters or {}), use_sim_time=True)
+        super().__init__(transport or FakeTransport(parameters or {}), True, WallClock())
         self.clock.set(start)
         self.machine_clock = SimulatedClock()
         self.machine_clock.set(start)

@@ -62,7 +62,7 @@ def filter_status(remembered="unknown", state=FilterStatus.PASSING, **fields):
 
 
 class PointMass:
-    """A vehicle that moves up and down: z_ddot = thrust - g, the ground is z = 0.
+    """A vehicle that moves up and down: z_ddot = thrust - g; the ground is at z = ``ground``.
 
     As the firmware does, it stops its motors 2 s after the last control.
     """
@@ -71,6 +71,7 @@ class PointMass:
 
     def __init__(self, z=0.0):
         self.z, self.z_dot = z, 0.0
+        self.ground = 0.0
         self.thrust, self.age = None, 0.0
         self.touchdown_speed = 0.0
 
@@ -88,13 +89,13 @@ class PointMass:
             return
         self.age += self.STEP
         acceleration = (self.thrust if self.age < 2.0 else 0.0) - GRAVITY
-        was_above = self.z > 0.0
+        was_above = self.z > self.ground
         self.z += self.z_dot * self.STEP + 0.5 * acceleration * self.STEP**2
         self.z_dot += acceleration * self.STEP
-        if self.z <= 0.0:
+        if self.z <= self.ground:
             if was_above:
                 self.touchdown_speed = -self.z_dot
-            self.z, self.z_dot = 0.0, max(self.z_dot, 0.0)
+            self.z, self.z_dot = self.ground, max(self.z_dot, 0.0)
 
 
 def feedback(reference, z, z_dot, gains=(20.0, 20.98)):

@@ -87,6 +87,69 @@ def test_waits_for_the_touchdown_when_the_height_is_known():
     assert clock.said[-1][1].thrust == 0.0
 
 
+def test_a_vehicle_that_sinks_in_the_ramp_was_not_on_the_ground():
+    flight = flying()
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 0.04)).run(0.3)
+    assert flight.flight_state is LANDING
+    clock.position = (0.0, 0.0, -0.05)
+    clock.run(0.1)
+    assert flight.flight_state is LANDING
+    clock.said.clear()
+    clock.position = (0.1, 0.0, -0.07)
+    begin = clock.ticks
+    clock.run(1.0)
+    # The controller has it again, on a way down without an end.
+    assert flight.flight_state is DESCENDING
+    assert [time for time, output in clock.said if output.toggle] == [begin / 100]
+    expected = [pytest.approx((0.1, 0.0, -0.07 - 0.003 * k, 0.0, 0.0, -0.3)) for k in range(100)]
+    assert [reference for _, reference in clock.references()] == expected
+    # As long as it sinks by 2 cm in 2 s, it is in the air.
+    for k in range(10):
+        clock.position = (0.1, 0.0, -0.091 - 0.021 * k)
+        clock.run(1.89)
+        assert flight.flight_state is DESCENDING
+    # 20 s are enough.
+    clock.position = (0.1, 0.0, -0.5)
+    clock.run(0.2)
+    assert flight.flight_state is LANDING
+    clock.run(3.0)
+    assert flight.flight_state is ON_GROUND
+
+
+def test_a_vehicle_that_has_stopped_sinking_is_down():
+    flight = flying()
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 0.04)).run(0.1)
+    clock.position = (0.0, 0.0, -0.5)
+    clock.run(0.1)
+    assert flight.flight_state is DESCENDING
+    begin = clock.ticks
+    assert clock.run_until(LANDING) == pytest.approx((begin + 190) / 100, abs=0.03)
+    clock.run(3.0)
+    assert flight.flight_state is ON_GROUND
+    # The next landing is to where the vehicle took off, again.
+    flight.request(Event.TAKEOFF)
+    clock.position = (0.0, 0.0, 0.5)
+    clock.run(6.1)
+    flight.request(Event.LAND)
+    clock.position = (0.0, 0.0, -0.44)
+    clock.run(0.5)
+    assert flight.flight_state is DESCENDING
+    clock.position = (0.0, 0.0, -0.46)
+    clock.run(0.01)
+    assert flight.flight_state is LANDING
+
+
+def test_the_bare_ramp_is_not_taken_back():
+    flight = flying(BARE)
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(0.5)
+    clock.position = (0.0, 0.0, 0.5)
+    clock.run(0.4)
+    assert flight.flight_state is LANDING
+
+
 def test_a_descent_without_a_state_goes_on_by_dead_reckoning():
     flight = flying()
     flight.request(Event.LAND)

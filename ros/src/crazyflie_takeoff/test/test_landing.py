@@ -1,7 +1,7 @@
 """Landings, asked for in a takeoff and at the end of the launch."""
 
 import pytest
-from flight_words import states, until_on_ground
+from flight_words import states, thrusts, until_on_ground
 from takeoff_helpers import SERVER, HoverNetwork, state
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped
@@ -76,6 +76,83 @@ def test_a_landing_that_begins_while_no_states_reach_the_server(network):
     network.advance(0.2)
     assert network.vehicle.z == 0.0
     assert 0.0 < network.vehicle.touchdown_speed < 0.5
+
+
+# A ground that is not where the vehicle took off.
+
+
+def above_a_table(table, height, **parameters):
+    """Return a network that has taken off from a table, and flies beside it (heights in m)."""
+    network = HoverNetwork({**SERVER, "hover/z": table + 0.5, **parameters})
+    network.vehicle.z = network.vehicle.ground = table
+    network.take_off()
+    reference = PositionVelocityStateStamped()
+    reference.state.z = table + height
+    network.process("controller").publish("/ref", reference)
+    network.advance(3.0)
+    network.vehicle.ground = 0.0
+    return network
+
+
+@pytest.mark.parametrize("speed", [0.1, 0.3, 1.0])
+@pytest.mark.parametrize("table", [0.15, 0.75, 2.0])
+def test_a_vehicle_from_a_table_lands_on_the_floor(table, speed):
+    network = above_a_table(table, 0.5, **{"landing/descent_speed": speed})
+    land = network.call("/land")
+    network.advance_until(land.done, 60.0)
+    assert land.exception() is None
+    assert network.vehicle.z == 0.0
+    assert network.vehicle.touchdown_speed < max(0.6, 1.2 * speed)
+    network.advance(0.2)
+    assert thrusts(network)[-1] == 0.0
+    # From the floor, it is an ordinary landing.
+    network.take_off()
+    land = network.call("/land")
+    network.advance_until(land.done, 60.0)
+    assert network.vehicle.touchdown_speed < max(0.6, 1.2 * speed)
+
+
+@pytest.mark.parametrize("height", [0.03, 0.3, 1.0])
+@pytest.mark.parametrize("table", [0.15, 0.75, 2.0])
+def test_the_filter_brings_a_vehicle_from_a_table_down_to_the_floor(table, height):
+    network = above_a_table(table, height)
+    network.kill("controller")
+    network.advance_until(lambda: network.last("/in_flight_state") == "on_ground", 60.0)
+    assert network.vehicle.z == 0.0
+    assert network.vehicle.touchdown_speed < 0.6
+    network.advance(0.2)
+    assert thrusts(network)[-1] == 0.0
+
+
+def test_the_filter_brings_the_second_flight_down_as_the_first(network):
+    for _ in range(2):
+        # The controller does not follow the descent, so the filter lands.
+        network.unheard.add(("/controller", "/ref"))
+        land = network.call("/land")
+        network.advance_until(land.done)
+        assert "has not come down" in network.last("/in_flight_status")
+        assert 0.2 < network.vehicle.touchdown_speed < 0.6
+        network.vehicle.touchdown_speed = 0.0
+        network.unheard.clear()
+        network.take_off()
+
+
+@pytest.mark.parametrize("faller", ["server", "filter"])
+def test_a_vehicle_that_lands_on_a_table_is_down_there(faller):
+    network = HoverNetwork(SERVER)
+    network.take_off()
+    network.vehicle.ground = 0.75
+    begin = network.time
+    if faller == "server":
+        network.call("/land")
+    else:
+        network.kill("controller")
+    network.advance_until(lambda: network.last("/in_flight_state") == "on_ground")
+    assert network.time - begin < 8.0
+    assert network.vehicle.z == 0.75
+    assert network.vehicle.touchdown_speed < 0.6
+    network.advance(0.2)
+    assert thrusts(network)[-1] == 0.0
 
 
 # The end of the launch.

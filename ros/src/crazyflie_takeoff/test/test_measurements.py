@@ -118,6 +118,32 @@ def test_a_vehicle_less_than_10_cm_above_the_ground_is_on_it():
     assert not ground.has_touched_down(None)
 
 
+def test_what_has_flown_is_down_where_it_stays_without_enough_thrust():
+    ground = Ground()
+    ground.measure(at(0.75), is_on_ground=True, in_flight=False)
+    assert ground.has_touched_down(at(0.75))
+    ground.measure(at(0.8), is_on_ground=False, in_flight=False)
+    assert ground.has_touched_down(at(0.75))
+    ground.measure(at(0.86), is_on_ground=False, in_flight=False)
+    # It may hover beside a table, as high as this.
+    assert not ground.has_touched_down(at(0.75))
+    for thrust, speed in [(0.76, 0.0), (0.74, 0.1), (0.74, -0.1)]:
+        for _ in range(100):
+            ground.advance(0.01, at(0.0, speed), thrust)
+        assert not ground.has_touched_down(at(0.0))
+    touchdowns = []
+    for _ in range(22):
+        ground.advance(1 / 64, at(0.0), 0.74)
+        touchdowns.append(ground.has_touched_down(at(0.0)))
+    assert touchdowns == [False] * 19 + [True] * 3
+    ground.advance(0.01, None, 0.74)
+    assert not ground.has_touched_down(at(0.0))
+    # The next takeoff is from there, and one that has the controller has flown, however low.
+    ground.measure(at(0.0), is_on_ground=True, in_flight=False)
+    ground.measure(at(0.03), is_on_ground=False, in_flight=True)
+    assert not ground.has_touched_down(at(0.03))
+
+
 # The driver.
 
 

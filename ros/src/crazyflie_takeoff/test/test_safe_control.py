@@ -121,15 +121,28 @@ def test_the_height_to_keep_is_where_the_vertical_speed_ends(z_dot, thrust):
 
 
 def test_a_descent_gets_faster_up_to_its_speed():
-    motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, -0.2))
     safe = SafeControl(G, motion)
     thrusts = [safe.advance(0.05, motion._replace(yaw=0.0), True).thrust - G for _ in range(40)]
     # 0.3 m/s^2 for 0.05 s; 0.4 m/s in the end.
-    assert thrusts[:2] == pytest.approx([-0.015 / 0.3, -0.03 / 0.3])
-    assert thrusts[-1] == pytest.approx(-0.4 / 0.3)
+    assert thrusts[:2] == pytest.approx([(0.2 - 0.015) / 0.3, (0.2 - 0.03) / 0.3])
+    assert thrusts[-1] == pytest.approx(-0.2 / 0.3)
     # A step that is too long counts as 0.05 s.
     thrust = SafeControl(G, motion).advance(9.0, motion._replace(yaw=0.0), True).thrust
-    assert thrust - G == pytest.approx(-0.015 / 0.3)
+    assert thrust - G == pytest.approx((0.2 - 0.015) / 0.3)
+
+
+def test_the_thrust_of_a_vehicle_that_does_not_sink_goes_down_further():
+    motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    safe = SafeControl(G, motion)
+    thrusts = [safe.advance(0.05, motion._replace(yaw=0.0), True).thrust - G for _ in range(40)]
+    # From a target of 0.2 m/s on, by 4 m/s^2 in a second, to 0.4 g.
+    assert thrusts[12] == pytest.approx(-0.195 / 0.3)
+    assert thrusts[13] == pytest.approx(-0.21 / 0.3 - 0.2)
+    assert thrusts[-1] == pytest.approx(-0.4 * G)
+    sinking = motion._replace(velocity=(0.0, 0.0, -0.4))
+    thrusts = [safe.advance(0.05, sinking._replace(yaw=0.0), True).thrust - G for _ in range(40)]
+    assert thrusts[-1] == 0.0
 
 
 def test_without_a_state_the_velocity_is_reckoned_from_the_control():

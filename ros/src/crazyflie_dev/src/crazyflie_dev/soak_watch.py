@@ -44,7 +44,8 @@ _LEGAL = {
     "taking_off": {"flying", "descending", "landing", "on_ground"},
     "flying": {"descending", "landing", "on_ground"},
     "descending": {"landing", "on_ground", "flying"},
-    "landing": {"on_ground"},
+    # The ground may be lower than where the vehicle took off.
+    "landing": {"on_ground", "descending"},
 }
 
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.control_filter import ControlFilter
 from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_takeoff.ground import Ground
+from crazyflie_takeoff.ground import Ground, is_sinking
 from crazyflie_takeoff.motion import Measurement, Motion
 from crazyflie_takeoff.safe_control import descent_time
 from crazyflie_takeoff.transition_table import Table, Transition, step
@@ -136,7 +136,8 @@ class FilterMachine:
         return self._ground.has_touched_down(self._measured.fresh)
 
     def _descent_is_over(self):
-        return self.elapsed > self._descent_limit
+        motion = self._measured.fresh
+        return self.elapsed > self._descent_limit and (motion is None or not is_sinking(motion))
 
     def _may_be_reset(self):
         return self.elapsed >= RESET_DELAY

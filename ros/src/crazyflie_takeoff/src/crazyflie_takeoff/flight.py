@@ -124,7 +124,9 @@ class FlightStateMachine:
         if position is not None:
             self._position = position
             if self.state is ServerState.ON_GROUND:
-                context.ground = position[2]
+                context.ground, context.ground_is_below = position[2], True
+            if self.state is ServerState.RAMPING_DOWN and context.ramp_height is None:
+                context.ramp_height = position[2]
         if self.state is ServerState.DESCENDING:
             self._plan_descent(is_seen_again)
         while self.accepts(Event.TICK):
@@ -142,10 +144,14 @@ class FlightStateMachine:
     def _plan_descent(self, is_seen_again):
         context, position = self._context, self._position
         waits = context.filter.event is Event.FILTER_HOLDS and context.elapsed < FILTER_LIMIT
-        if position is not None and (context.descent is None or is_seen_again or waits):
+        if position is None or not (context.descent is None or is_seen_again or waits):
+            return
+        if context.ground_is_below:
             remaining = max(context.descent_end - context.elapsed, SHORTEST_DESCENT)
             speed = max(context.descent_speed, (position[2] - context.ground) / remaining)
             context.descent = Descent(context.elapsed, position, context.ground, speed)
+        else:
+            context.descent = Descent(context.elapsed, position, None, context.descent_speed)
 
     def _thrust(self):
         context = self._context

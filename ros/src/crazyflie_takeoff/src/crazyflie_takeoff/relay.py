@@ -64,8 +64,8 @@ class Relay(Generic[Control]):
         """Take a state that was measured ``age`` s ago."""
         self.measured.update(motion, age)
         self.watch.measure(motion, age)
-        if self.choice.server_reports_ground:
-            self.ground.z = motion.position[2]
+        choice = self.choice
+        self.ground.measure(motion, choice.server_reports_ground, choice.in_flight)
 
     def takeoff(self, time: float, control: Control, setpoint: Setpoint) -> Control | Setpoint:
         """Return what to pass on of a takeoff control."""

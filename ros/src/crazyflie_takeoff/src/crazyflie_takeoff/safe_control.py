@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.units import GRAVITY
+from crazyflie_takeoff.ground import TOUCHDOWN_SPEED
 from crazyflie_takeoff.motion import Motion
 
 #: More time than this never passes between two ticks, s: after a clock was set, or the process was
@@ -26,6 +27,9 @@ AVERAGING = 2.0  #: Time constant of the mean of the commanded thrust, s.
 #: m/s^2: the thrust is then as much below hover, which may have been learned 2 % too high. From 1 m
 #: a vehicle without a state meets the ground at 0.7 m/s, from 2 m at 1.0 m/s.
 SINK_RATE = 0.3
+
+#: How fast the thrust of a vehicle that is to sink and does not goes down, m/s^2 per s.
+PRESS_RATE = 4.0
 
 SINK_SPEED = 0.4  #: The target speed goes down to this while the speed is measured, m/s.
 SETTLING = 0.3  #: Time constant at which the speed follows its target, s.
@@ -118,6 +122,7 @@ class SafeControl:
         self._yaw = 0.0 if motion is None else motion.yaw
         self._place: tuple[float, float, float] | None = None
         self._target = 0.0
+        self._pressure = 0.0  # Thrust that is taken off because the vehicle does not sink, m/s^2.
         self._seen = motion
         if motion is not None:
             self._reckon(age)
@@ -147,11 +152,23 @@ class SafeControl:
         forward, left = rotate_by_yaw(x, y, -self._yaw)
         pitch = limited(math.atan(forward / GRAVITY), MAX_SAFE_TILT)
         roll = limited(-math.atan(left / GRAVITY), MAX_SAFE_TILT)
-        correction = (self._target - self._velocity[2]) / SETTLING
+        self._press(step, sinks and measured is not None)
+        correction = (self._target - self._velocity[2]) / SETTLING - self._pressure
         correction = min(max(correction, -MAX_BRAKING), MAX_CORRECTION)
         thrust = min(self._hover + correction, MAX_SUBSTITUTE)
         self._control = Setpoint(roll, pitch, 0.0, thrust)
         return self._control
+
+    def _press(self, step, sinks):
+        """Let the thrust go down further while the vehicle does not sink as it is told to.
+
+        On the ground that shows that it is down; in the air it sinks where hover was overestimated.
+        """
+        stays = (
+            sinks and self._target < -0.5 * SINK_SPEED and abs(self._velocity[2]) < TOUCHDOWN_SPEED
+        )
+        self._pressure += PRESS_RATE * step if stays else -PRESS_RATE * step
+        self._pressure = min(max(self._pressure, 0.0), MAX_BRAKING)
 
     def _offset(self, measured):
         """Return where the place is, seen from the vehicle, m; zero while that is not known."""

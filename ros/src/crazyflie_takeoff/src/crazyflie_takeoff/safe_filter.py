@@ -203,6 +203,7 @@ class SafeFilter(Generic[Control]):
             # The state stops before the control does: the last one is what there is.
             motion, age = self._measured.within(LAST_STATE), self._measured.age
             self._safe = SafeControl(self.relay.hover, motion, age, self.relay.passed)
+            self.relay.ground.begin_descent()
 
     def _fly(self, elapsed):
         # The step before it took over is reckoned then; after a longest one the clock was set.
@@ -211,6 +212,8 @@ class SafeFilter(Generic[Control]):
         own = self._safe.advance(step, self._measured.fresh, sinks)
         own = self.watch.gaps.apply(own, self.relay.hover, self._safe.climb)
         self._own = own._replace(thrust=min(own.thrust, MAX_SUBSTITUTE))
+        thrust = self._own.thrust / self.relay.hover
+        self.relay.ground.advance(step, self._measured.fresh, thrust)
         return self._own
 
     def _step_until(self, time):

@@ -17,6 +17,8 @@ from crazyflie_takeoff.transition_table import Table, Transition
 LIFT_OFF_THRUST = GRAVITY + 0.2  #: Thrust of the open-loop part of a takeoff, m/s^2.
 LIFT_OFF_TIME = 3.0  #: A vehicle that a controller has not lifted off in this time, s, cannot fly.
 RAMP_DURATION = 1.0  #: How long the thrust of a landing goes down, s; zero thrust follows.
+#: A vehicle that sinks by more than this in the ramp of a landing was not on the ground, m.
+RAMP_DROP = 0.1
 TOUCHDOWN_LIMIT = 2.0  #: How long after the ramp a vehicle may take to come down, s.
 #: A vehicle above this height is in flight if no flight state is remembered, m.
 FLYING_HEIGHT = 0.15
@@ -41,11 +43,14 @@ class FlightContext:
     plan: Plan  # Replaced at any time; what has begun goes on as it was planned.
     filter: FilterReport = NO_FILTER
     ground: float = 0.0  # Height (z) of the ground, where the vehicle was last on it, m.
+    # Whether it is below the vehicle: not where this sank past it beside a table.
+    ground_is_below: bool = True
     time: float = -math.inf  # Of the latest tick, s.
     begun: float | None = None  # When the present activity began, s; None until the next tick.
     measured: Position | None = None  # None when it is not known at present.
     reference: tuple[float, ...] | None = None  # To publish: x, y, z, m, x_dot, y_dot, z_dot, m/s.
     descent: Descent | None = None
+    ramp_height: float | None = None  # The first that was measured in the ramp of a landing, m.
     descent_speed: float = 0.0  # Of the plan, when the activity began, m/s.
     descent_end: float = math.inf  # When a descent has to be over, s after it began.
     zero_sent: float = -math.inf  # When zero thrust was sent last, s.
@@ -57,7 +62,7 @@ class FlightContext:
 
     @property
     def is_down(self) -> bool:
-        """Whether the vehicle is seen on the ground."""
+        """Whether the vehicle is seen as low as the ground from which it took off."""
         return self.measured is not None and self.measured[2] - self.ground < TOUCHDOWN_HEIGHT
 
 
@@ -65,7 +70,7 @@ class FlightContext:
 
 
 def _begin(flight):
-    flight.begun = flight.descent = None
+    flight.begun = flight.descent = flight.ramp_height = None
     flight.descent_speed = flight.plan.descent_speed
     flight.descent_end = math.inf
     flight.zero_sent = -math.inf
@@ -74,6 +79,12 @@ def _begin(flight):
 def _begin_at_once(flight):
     _begin(flight)
     flight.begun = flight.time
+
+
+def _descend_further(flight):
+    _begin_at_once(flight)
+    flight.ground_is_below = False
+    flight.descent = Descent(0.0, flight.measured, None, flight.descent_speed)
 
 
 def _send_hover_point(flight):
@@ -130,7 +141,17 @@ def _takeoff_over_but_still_down(flight):
 
 def _down_or_descent_over(flight):
     descent = flight.descent
-    return descent is None or flight.is_down or descent.is_over(flight.elapsed)
+    if descent is None or descent.is_over(flight.elapsed):
+        return True
+    if flight.ground_is_below or flight.measured is None:
+        return flight.is_down
+    return descent.follow(flight.elapsed, flight.measured[2])
+
+
+def _still_sinks(flight):
+    is_known = flight.measured is not None and flight.ramp_height is not None
+    drops = is_known and flight.measured[2] < flight.ramp_height - RAMP_DROP
+    return drops and flight.descent_speed > 0.0
 
 
 def _ramp_over(flight):
@@ -175,6 +196,8 @@ TABLE: Table[ServerState, FlightContext] = (
         )
     ),
     Transition(_S.DESCENDING, _E.TICK, _down_or_descent_over, _S.RAMPING_DOWN, _begin_at_once),
+    # The height of the ground is that of the place where the vehicle took off, such as a table.
+    Transition(_S.RAMPING_DOWN, _E.TICK, _still_sinks, _S.DESCENDING, _descend_further),
     Transition(_S.RAMPING_DOWN, _E.TICK, _ramp_over, _S.TOUCHING_DOWN),
     Transition(_S.TOUCHING_DOWN, _E.TICK, _down_or_not_seen_or_too_late, _S.ON_GROUND, _begin),
     *(

@@ -8,7 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_are
 
-from crazyflie_state_estimator.kalman import MEMORY, ConstantAccelerationFilter
+from crazyflie_state_estimator.kalman import (
+    ACCELERATION_WALK,
+    ACCELERATION_WALK_WITH_CONTROL,
+    MEMORY,
+    POSITION_NOISE,
+    ConstantAccelerationFilter,
+)
 
 NOISE, WALK, DT = 0.001, 3.0, 0.01
 
@@ -124,6 +130,23 @@ def test_a_known_acceleration_is_taken_over_at_once():
     settled = slice(150, None)
     assert np.abs(with_control[settled, 0] - rate[1:][settled]).max() < 1e-3
     assert np.abs(without[settled, 0] - rate[1:][settled]).max() > 0.1
+
+
+@pytest.mark.parametrize("frequency", [0.25, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("knows_acceleration", [False, True])
+def test_the_rate_of_a_sine_lags_by_less_than_25_ms(frequency, knows_acceleration):
+    omega = 2.0 * math.pi * frequency
+    times = DT * np.arange(1000)
+    signal = 4.0 / omega**2 * np.sin(omega * times)
+    # Held from one sample to the next, the control is that of the middle.
+    acting = [np.array([each]) for each in -4.0 * np.sin(omega * (times - DT / 2.0))]
+    walk = ACCELERATION_WALK_WITH_CONTROL if knows_acceleration else ACCELERATION_WALK
+    subject = ConstantAccelerationFilter(POSITION_NOISE, walk)
+    _, rates = run(subject, signal[:, None], accelerations=acting if knows_acceleration else None)
+    phases = omega * times[501:]
+    in_phase, behind = 2.0 * np.mean(rates[500:].T * [np.cos(phases), np.sin(phases)], axis=1)
+    assert math.atan2(behind, in_phase) / omega < 0.025
+    assert math.hypot(in_phase, behind) == pytest.approx(4.0 / omega, rel=0.3)
 
 
 @pytest.mark.parametrize("offset", [-3.0, 9.81])

@@ -1,11 +1,16 @@
 """Poses that cannot be, and a vehicle that tips over."""
 
 import math
+from random import Random
 
 import numpy as np
 import pytest
 from estimator_helpers import fly, launch, transform
 from tf2_msgs.msg import TFMessage
+
+from crazyflie_msgs.msg import Control, ControlStamped
+
+G = 9.81
 
 # Poses that cannot be.
 
@@ -46,6 +51,75 @@ def test_a_vehicle_that_was_carried_is_found_again_after_three_tenths_of_a_secon
     states = hover(process, 0.2, x=2.0)
     assert len(states) >= 18
     assert {(state.x, state.x_dot) for state in states} == {(2.0, 0.0)}
+
+
+# A pose that has jumped in flight.
+
+
+def fly_with(process, control, position, duration):
+    """Broadcast ``position(elapsed)`` while a control is flown; return the new states."""
+    before = len(process.published("/state"))
+    for k in range(round(duration * 100)):
+        process.publish("/control/final", ControlStamped(control=Control(*control)))
+        process.publish("/tf", TFMessage([transform(process, position(0.01 * k))]))
+        process.advance(0.01)
+    return [message.state for message in process.published("/state")[before:]]
+
+
+HOVER, OFF = (0.0, 0.0, 0.0, G), (0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture
+def flying():
+    """Return the process of an estimator that has seen a takeoff and a hover at 1 m."""
+    process = launch(**{"topics/control": "/control/final"})
+    fly_with(process, OFF, lambda _: (0.0, 0.0, 0.0), 0.5)
+    # Up by 1 m in 2 s, half of which are a deceleration.
+    fly_with(process, (0.0, 0.0, 0.0, G + 1.0), lambda t: (0.0, 0.0, 0.5 * t * t), 1.0)
+    fly_with(process, (0.0, 0.0, 0.0, G - 1.0), lambda t: (0.0, 0.0, 0.5 + t - 0.5 * t * t), 1.0)
+    states = fly_with(process, HOVER, lambda _: (0.0, 0.0, 1.0), 2.0)
+    assert states[-1].z == 1.0
+    return process
+
+
+@pytest.mark.parametrize(
+    "jump", [(0.5, 0.0, 1.0), (1.0, -1.0, 1.0), (0.0, 0.0, 3.0), (9.0, 0.0, 0.0)]
+)
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_a_place_to_which_the_pose_has_jumped_in_flight_is_not_believed(flying, jump, noise):
+    random = Random(1)
+
+    def place(_):
+        return tuple(x + random.gauss(0.0, noise) for x in jump)
+
+    assert fly_with(flying, HOVER, place, 2.0) == []
+    # Nor while the filter lets the vehicle sink.
+    assert fly_with(flying, (0.0, 0.0, 0.0, G - 0.5), place, 2.0) == []
+    # It was carried: the motors are off.
+    states = fly_with(flying, OFF, place, 0.9)
+    assert len(states) >= 8
+    assert states[-1].x == pytest.approx(jump[0], abs=0.02)
+
+
+def test_poses_that_have_jumped_and_move_as_the_control_demands_are_believed(flying):
+    assert fly_with(flying, HOVER, lambda _: (1.0, 0.0, 1.0), 0.5) == []
+    # Down at 0.5 m/s^2, which makes 0.15 m in 0.77 s.
+    states = fly_with(
+        flying, (0.0, 0.0, 0.0, G - 0.5), lambda t: (1.0, 0.0, 1.0 - 0.25 * t * t), 1.0
+    )
+    assert 10 < len(states) < 30
+    assert states[-1].z == pytest.approx(0.75, abs=0.02)
+
+
+def test_outliers_in_flight_do_not_delay_the_pose_that_comes_back(flying):
+    random = Random(1)
+
+    def near(x):
+        return lambda _: (random.gauss(x, 0.0005), 0.0, 1.0)
+
+    fly_with(flying, HOVER, near(0.0), 1.0)
+    assert fly_with(flying, HOVER, near(1.0), 0.25) == []
+    assert len(fly_with(flying, HOVER, near(0.0), 0.2)) >= 17
 
 
 def test_poses_with_nearly_the_same_stamp_are_no_speed():

@@ -10,12 +10,12 @@ from crazyflie_fleet.high_level_parameters import HighLevelParameters
 from crazyflie_fleet.plan_marker import PlanMarker
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.timers import Timer
 
-#: Of a state that says where the vehicle is, and of the last setpoint of a stream, s.
-MAX_STATE_AGE = 0.5
+SETPOINT_TIMEOUT = 0.5  #: A stream without a setpoint for this long has stopped, s.
 _HOLD_DURATION = 0.5  #: Of the move to the goal of the last setpoint, s.
 
 
@@ -53,7 +53,7 @@ class CommandedReferences:
         measured = self._measured()
         if measured is None:
             topic = self._handle.resolve(self._parameters.state_topic)
-            raise ServiceError(f"no state has come on {topic} for {MAX_STATE_AGE:g} s")
+            raise ServiceError(f"no state has come on {topic} for {MAX_POSITION_AGE:g} s")
         return measured
 
     def begin(self, command: Callable[..., None], *arguments: Any) -> None:
@@ -136,7 +136,7 @@ class CommandedReferences:
     def _on_timer(self):
         now = self._handle.time()
         last = self._setpoint_time
-        if last is not None and not 0.0 <= now - last < MAX_STATE_AGE:
+        if last is not None and not 0.0 <= now - last < SETPOINT_TIMEOUT:
             self.end_setpoints()
         if self._is_moving:
             # The last one, at rest, is published, too.
@@ -152,5 +152,5 @@ class CommandedReferences:
         self._state_time = self._handle.time()
 
     def _received(self):
-        is_fresh = 0.0 <= self._handle.time() - self._state_time < MAX_STATE_AGE
+        is_fresh = 0.0 <= self._handle.time() - self._state_time < MAX_POSITION_AGE
         return self._state if is_fresh else None

@@ -16,8 +16,9 @@ from crazyflie_fleet.lander import LANDING_TOPIC
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
 from crazyflie_fleet.straight_move import StraightMove, evaluate
 from crazyflie_fleet.vehicle_nodes import REFERENCE, SAFE_REFERENCE
-from crazyflie_fleet.vehicle_states import MAX_STATE_AGE, VehicleStates
+from crazyflie_fleet.vehicle_states import VehicleStates
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_utils.refusal import RefusalError
@@ -274,7 +275,7 @@ class ReferencesNode(Node):
             x, y, z = position.tolist()
             consequence = f"the others keep apart from its last place, ({x:.2f}, {y:.2f}, {z:.2f})"
         self._handle.warn(
-            f"{name} is in flight, and no state of it has come for {MAX_STATE_AGE:g} s: its "
+            f"{name} is in flight, and no state of it has come for {MAX_POSITION_AGE:g} s: its "
             f"position is not known; {consequence}",
             throttle=SILENCE_PERIOD,
             key=("silence", name),

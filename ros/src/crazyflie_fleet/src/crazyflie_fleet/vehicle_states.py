@@ -11,10 +11,9 @@ from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_fleet.vehicle_nodes import FLIGHT_STATUS, STATE
 from crazyflie_model.polynomials import Goal
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
+from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.vectors import to_tuple
-
-MAX_STATE_AGE = 0.5  #: Of a state that counts for the position of its vehicle, s.
 
 _IN_FLIGHT = (FlightStatus.TAKING_OFF, FlightStatus.FLYING, FlightStatus.DESCENDING)
 
@@ -62,9 +61,9 @@ class VehicleStates:
             handle.subscribe(f"/{name}/{STATE}", PositionVelocityYawStateStamped, on_state)
 
     def are_fresh(self) -> NDArray[np.bool_]:
-        """Return which positions are finite and younger than `MAX_STATE_AGE`, shape (n,)."""
+        """Return which positions are finite and younger than `MAX_POSITION_AGE`, shape (n,)."""
         age = self._handle.time() - self._times
-        return (age >= 0.0) & (age < MAX_STATE_AGE) & np.isfinite(self.positions).all(axis=1)
+        return (age >= 0.0) & (age < MAX_POSITION_AGE) & np.isfinite(self.positions).all(axis=1)
 
     def goal(self, number: int) -> Goal[float] | None:
         """Return position and velocity of one as a goal with the heading 0; None if not fresh."""

@@ -12,12 +12,11 @@ from crazyflie_mission_api.mission_vehicle import MissionVehicle
 from crazyflie_model.angles import Triple, quaternion_from_rpy
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped, VehicleStatus
+from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import NodeHandle, TransformError
 from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 
-#: A position older than this is not known, s; as `commanded_references.MAX_STATE_AGE`.
-MAX_POSITION_AGE = 0.5
 _LANDED_HEIGHT = 0.1  #: Above the start, m: a vehicle below has landed.
 #: States after a flight.
 _ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)

@@ -141,13 +141,13 @@ class StateEstimatorNode(Node):
         stamp, wall_time = pose.stamp * 1e-9, self._handle.nanoseconds(now) * 1e-9
         if self._clock_steps.update(stamp, wall_time, now):
             self._restart()
-        classification = self._gate.classify(stamp, pose.position)
+        attitude = rpy_from_quaternion(*pose.rotation)
+        acceleration = self._control.acceleration(attitude[2], now)
+        classification = self._gate.classify(stamp, pose.position, acceleration)
         if classification is Classification.BAD:
             return None
         if classification is Classification.MOVED:
             self._restart()
-        attitude = rpy_from_quaternion(*pose.rotation)
-        acceleration = self._control.acceleration(attitude[2], now)
         if self._frozen.update(stamp, pose.position, pose.rotation, acceleration):
             self._reject_frozen()
             return self._departure(attitude)

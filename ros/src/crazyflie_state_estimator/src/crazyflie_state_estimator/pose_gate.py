@@ -1,12 +1,27 @@
 """Rejection of poses that the vehicle cannot have flown to, and detection of tilt."""
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from enum import Enum
 
 #: A position that is too far away is accepted after the vehicle has been measured there for this
-#: time, s: it was carried there while it was not measured.
+#: time, s: it was carried there while it was not measured. Not in flight, see `MIN_RESPONSE`.
 PERSISTENCE = 0.3
+
+#: In flight, poses at a position that is too far away are accepted once the control has led the
+#: vehicle this far from where it was at the first of them, m, and their own displacement differs
+#: from that by less than this fraction of it.
+MIN_RESPONSE, MAX_RESPONSE_ERROR = 0.15, 0.4
+
+#: After outliers in flight, the vehicle may differ from the acceleration of its control by this
+#: much, m/s^2, for this time, s: it is up to 0.145 m from where that leads.
+ACCELERATION_ERROR, MAX_PREDICTION_TIME = 1.0, 0.5
+
+MAX_PREDICTION_STEP = 0.1  #: After a longer pause between poses, s, the clock may have been set.
+
+#: The velocity before an outlier is the mean of this time, s; over less than the latter it is 0.
+VELOCITY_WINDOW, MIN_VELOCITY_WINDOW = 0.1, 0.02
 
 #: Longest time for which a vehicle that was not measured is assumed to have flown on, s.
 MAX_COAST_TIME = 0.5
@@ -29,8 +44,30 @@ class Classification(Enum):
     MOVED = "moved"  #: Good, but the vehicle did not fly there: filters restart.
 
 
+class _Prediction:
+    """Where a vehicle flies that has the acceleration of its control."""
+
+    def __init__(self, pose: Pose, velocity: Sequence[float]):
+        self.begin, self.position = pose
+        self._time = self.begin
+        self._velocity = velocity
+
+    def advance(self, time: float, acceleration: Sequence[float]) -> None:
+        """Let time pass until ``time`` (s) with an acceleration, m/s^2."""
+        dt, self._time = min(time - self._time, MAX_PREDICTION_STEP), time
+        self.position = tuple(
+            x + dt * (v + 0.5 * dt * a)
+            for x, v, a in zip(self.position, self._velocity, acceleration, strict=True)
+        )
+        self._velocity = [v + dt * a for v, a in zip(self._velocity, acceleration, strict=True)]
+
+
 class PoseGate:
-    """Rejects poses that a vehicle of ``max_speed`` (m/s) cannot have flown to, and counts them."""
+    """Rejects poses that a vehicle of ``max_speed`` (m/s) cannot have flown to, and counts them.
+
+    In flight, it goes on where its control has led it since the last good pose, or where poses
+    move as the control demands; a place alone, however long it persists, is not believed.
+    """
 
     def __init__(self, max_speed: float):
         self.rejected = 0
@@ -46,34 +83,84 @@ class PoseGate:
         self._since = 0.0
         self._count = 0
         self._is_doubtful = False
+        self._recent: deque[Pose] = deque()  # Good poses of the last `VELOCITY_WINDOW`.
+        self._prediction: _Prediction | None = None  # Since the last good pose.
+        # First pose at the present place, and where the prediction was then.
+        self._first: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
-    def classify(self, time: float, position: Sequence[float]) -> Classification:
-        """Classify a pose by its position (m) and stamp (s); an earlier one resets the gate."""
+    def classify(
+        self, time: float, position: Sequence[float], acceleration: Sequence[float] | None = None
+    ) -> Classification:
+        """Classify a pose by its position (m) and stamp (s); an earlier one resets the gate.
+
+        ``acceleration`` is that of the control (m/s^2, fixed frame); None while it is not known, or
+        the thrust is not that of flight.
+        """
         pose = (time, tuple(position))
         if self._last is None or time < self._last[0]:
             self.reset()
-            self._last = self._previous = pose
+            self._previous = pose
+            self._accept(pose)
             return Classification.GOOD
         if self._previous is None or not self._is_reachable(self._previous, pose):
             self._since = time
             self._count = 0
+            self._first = None
         self._previous = pose
         self._count += 1
         is_recent = not self._is_doubtful or time - self._last[0] < TRUST_WINDOW
-        is_steady = is_recent or self._count >= CONFIRMATION
+        if is_recent and self._is_reachable(self._last, pose):
+            self._accept(pose)
+            return Classification.GOOD
+        leads_here = responds = True
+        if acceleration is not None:
+            leads_here, responds = self._compare_with_control(pose, acceleration)
+        is_steady = leads_here and self._count >= CONFIRMATION
         if is_steady and self._is_reachable(self._last, pose):
             self._accept(pose)
             return Classification.GOOD
-        if time - self._since >= PERSISTENCE - 1e-6:
+        if responds and time - self._since >= PERSISTENCE - 1e-6:
+            self._recent.clear()
             self._accept(pose)
             return Classification.MOVED
         self._is_doubtful = True
         self.rejected += 1
         return Classification.BAD
 
+    def _compare_with_control(self, pose, acceleration):
+        """Return whether the control leads to a pose, and whether poses move as it demands."""
+        time, position = pose
+        if self._prediction is None:
+            self._prediction = _Prediction(self._recent[-1], self._velocity())
+        prediction = self._prediction
+        prediction.advance(time, acceleration)
+        if self._first is None:
+            self._first = position, prediction.position
+        elapsed = min(time - prediction.begin, MAX_PREDICTION_TIME)
+        margin = NOISE_MARGIN + 0.5 * ACCELERATION_ERROR * elapsed**2
+        leads_here = math.dist(position, prediction.position) < margin
+        moved, led = (
+            [b - a for a, b in zip(first, now, strict=True)]
+            for first, now in zip(self._first, (position, prediction.position), strict=True)
+        )
+        way = math.hypot(*led)
+        responds = way > MIN_RESPONSE and math.dist(moved, led) < MAX_RESPONSE_ERROR * way
+        return leads_here, responds
+
+    def _velocity(self):
+        (begin, start), (end, position) = self._recent[0], self._recent[-1]
+        duration = end - begin
+        if duration < MIN_VELOCITY_WINDOW:
+            return [0.0] * len(start)
+        return [(b - a) / duration for a, b in zip(start, position, strict=True)]
+
     def _accept(self, pose):
         self._last = pose
         self._is_doubtful = False
+        self._prediction = None
+        self._recent.append(pose)
+        while pose[0] - self._recent[0][0] > VELOCITY_WINDOW:
+            self._recent.popleft()
 
     def _is_reachable(self, start, end):
         way = self.max_speed * min(end[0] - start[0], MAX_COAST_TIME) + NOISE_MARGIN

@@ -5,7 +5,7 @@ import math
 from crazyflie_takeoff.callers import OVERLAP, Callers
 from crazyflie_takeoff.control_limits import ClimbLimit, RunGaps
 from crazyflie_takeoff.limits import Debounce, Limits, Walls
-from crazyflie_takeoff.motion import MAX_STATE_AGE, Motion
+from crazyflie_takeoff.motion import MAX_FEEDBACK_AGE, Motion
 
 HANDOVER = 3  #: So many changes of the controller are a handover from one to the other.
 #: How long a limit has to be exceeded, s: a single measurement that is wrong is no crash.
@@ -86,7 +86,7 @@ class FlightWatch:
         for callers in (self._takeoff_callers, self._commanded_callers):
             callers.advance(time)
         self._position_age += step
-        is_fresh = self._position_age < MAX_STATE_AGE
+        is_fresh = self._position_age < MAX_FEEDBACK_AGE
         crash = self._position_debounce.advance(step, self._position_complaint if is_fresh else "")
         if self.is_tilted:
             crash = "the vehicle has tilted over"

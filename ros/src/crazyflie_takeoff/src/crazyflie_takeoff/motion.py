@@ -3,8 +3,9 @@
 import math
 from typing import NamedTuple
 
-MAX_STATE_AGE = 0.2  #: A state that is older does not count, s.
-MAX_POSITION_AGE = 0.5  #: A position that is older is not used by the server, s.
+#: A state that is older is not used to control the vehicle, and to watch its limits, s.
+MAX_FEEDBACK_AGE = 0.2
+MAX_POSITION_AGE = 0.5  #: A position that is older is not where the vehicle is, s.
 DRIFT = 0.1  #: How fast the age that is taken for usual may grow, s/s.
 MIN_AGE = -0.05  #: A message that is stamped further ahead of now has no usual age, s.
 CLOCK_STEP = 0.02  #: A larger change of wall clock minus monotonic clock is a step, s.
@@ -41,8 +42,8 @@ class Measurement:
 
     @property
     def fresh(self) -> Motion | None:
-        """The state, unless it is older than `MAX_STATE_AGE`."""
-        return self.within(MAX_STATE_AGE)
+        """The state, unless it is older than `MAX_FEEDBACK_AGE`."""
+        return self.within(MAX_FEEDBACK_AGE)
 
 
 class MeasuredPosition:

@@ -156,6 +156,19 @@ def test_simulated_vehicles_need_no_address(load):
             ":6: robots/cf2/uri is udp://a:1, as that of cf1 in line 3; expected an address ",
         ),
         (
+            TWO + "all: {motion_capture: {frame: body}}\n",
+            ":6: robots/cf2 has the frame body of motion capture, which is that of cf1; expected a "
+            "frame of its own",
+        ),
+        (
+            TWO + "    motion_capture: {frame: /cf1}\n",
+            ":8: robots/cf2/motion_capture/frame has the frame cf1 of motion capture, which is ",
+        ),
+        (
+            TWO.replace("0, 0, 0]", "0, 0, 0]\n    motion_capture: {frame: cf2}"),
+            ":5: robots/cf1/motion_capture/frame has the frame cf2 of motion capture, which is ",
+        ),
+        (
             TWO + "    type: cf21\n",
             ":8: robots/cf2/type is 'cf21'; expected none, as there are no types",
         ),

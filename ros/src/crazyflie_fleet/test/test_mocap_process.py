@@ -1,12 +1,17 @@
 """Motion capture of a fleet: what mocap_node is told."""
 
 import pytest
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped
+from simulated_fleet import NODES
+from std_msgs.msg import Header
+from std_srvs.srv import EmptyRequest
 from test_connect_node import Driver
+from tf2_msgs.msg import TFMessage
 
-from crazyflie_fleet import fleet_file
+from crazyflie_fleet import fleet_file, fleet_process
 from crazyflie_fleet.connect_node import FleetConnectNode
 from crazyflie_fleet.mocap_process import make_nodes
-from crazyflie_utils import ParameterError
+from crazyflie_utils import ParameterError, ServiceError
 from crazyflie_utils.testing import FakeProcess
 from mocap_optitrack.parameters import MocapParameters
 
@@ -113,3 +118,41 @@ def test_they_are_flown_with_the_kalman_filter(tmp_path):
     assert process.launch(FleetConnectNode(), "/fleet_add", {"fleet/file": str(path)})
     assert driver.updated == {"cf1": ["stabilizer/estimator"]}
     assert process.transport.parameters["/cf1/stabilizer/estimator"] == 2
+
+
+@pytest.mark.parametrize("frame", ["world", "cf1"])
+def test_a_frame_of_motion_capture_is_not_the_fixed_one(tmp_path, frame):
+    path = write(tmp_path / "fleet.yaml", ["frame: world" if frame == "world" else ""])
+    with pytest.raises(ParameterError, match=f"cf1 has the .*{frame}, as the fixed frame has"):
+        told_of(path, **{"frames/fixed": frame})
+
+
+@pytest.mark.parametrize(
+    ("poses", "reason"),
+    [
+        # Motion capture knows the bodies by the names of the vehicles as well.
+        ([("world", "cf1"), ("world", "a")], "frame cf1 has two parents, world on /tf and a on"),
+        ([("a", "b"), ("b", "a")], "frames are in a loop, each the parent of the one before: a, b"),
+    ],
+)
+def test_why_there_is_no_pose_is_said_by_takeoff(tmp_path, poses, reason):
+    path = write(tmp_path / "fleet.yaml", ["frame: a", "frame: b"])
+    process = FakeProcess()
+    process.transport.set_param("/fleet", {"simulated": False, "nodes": NODES})
+    process.transport.set_param("/fleet/fleet/file", str(path))
+    for name, node in fleet_process.make_nodes(process.handle("/fleet")).items():
+        assert process.launch(node, name), process.logged("error")
+
+    def broadcast():
+        still = Transform(rotation=Quaternion(w=1.0))
+        transforms = [
+            TransformStamped(Header(0, process.clock.stamp(), parent), child, still)
+            for parent, child in poses
+        ]
+        process.publish("/tf", TFMessage(transforms))
+
+    process.add_timer(0.01, broadcast)
+    process.advance(6.0)
+    text = f"/takeoff refused: no state has come on /cf1/state for 0.5 s; {reason}"
+    with pytest.raises(ServiceError, match=text):
+        process.call("/cf1/takeoff", EmptyRequest())

@@ -69,11 +69,13 @@ class FleetParameters(Parameters):
             About everything that is wrong with the file.
         """
         fleet = fleet_file.load(self.file) if self.file else fleet_file.grid(self.n, self.spacing)
-        if self.fixed_frame in fleet.names:
-            raise ParameterError(
-                f"{self.file}: a vehicle is named {self.fixed_frame}, as the fixed frame is; "
-                "expected another name"
-            )
+        for vehicle in fleet.vehicles:
+            for what, frame in (("name", vehicle.name), ("frame", vehicle.mocap_frame)):
+                if frame == self.fixed_frame:
+                    raise ParameterError(
+                        f"{self.file}: {vehicle.name} has the {what} {frame}, as the fixed frame "
+                        "has; expected another one"
+                    )
         return fleet.at_ports(self.virtual_port) if self.virtual_port else fleet
 
     def own_names(self, fleet: FleetConfig) -> tuple[str, ...]:

@@ -81,6 +81,7 @@ class FleetParser:
         self._raise_errors()
         enabled = [vehicle for vehicle in vehicles if vehicle.settings.enabled]
         self._check_addresses(enabled, robots)
+        self._check_frames(enabled, robots)
         self._raise_errors()
         disabled = [vehicle.name for vehicle in vehicles if not vehicle.settings.enabled]
         if not enabled:
@@ -172,6 +173,20 @@ class FleetParser:
                     _inner(robots[vehicle.name], "uri") or robots[vehicle.name],
                     f"is {vehicle.uri}, as that of {other} in line {line}; expected an address "
                     "of its own",
+                )
+
+    def _check_frames(self, vehicles, robots):
+        # Two with one frame would both fly by the pose of one body.
+        seen = {vehicle.name: vehicle.name for vehicle in vehicles}
+        for vehicle in vehicles:
+            frame = vehicle.mocap_frame
+            other = seen.setdefault(frame, vehicle.name)
+            if other != vehicle.name:
+                robot = robots[vehicle.name]
+                self._error(
+                    _inner(robot, "motion_capture/frame") or robot,
+                    f"has the frame {frame} of motion capture, which is that of {other}; expected "
+                    "a frame of its own",
                 )
 
     def _unplaced(self, vehicles):

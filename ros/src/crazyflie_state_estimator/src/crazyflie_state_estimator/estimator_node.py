@@ -1,7 +1,7 @@
 """ROS interface of the state estimators."""
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from std_msgs.msg import Bool, Header
+from std_msgs.msg import Bool, Header, String
 from typing_extensions import override
 
 from crazyflie_model.angles import rpy_from_quaternion
@@ -48,6 +48,7 @@ class StateEstimatorNode(Node):
         self._stamp: int | None = None
         self._is_tilted: bool | None = None
         self._frozen_poses = 0
+        self._tf_error = ""
         self._inner_type = type(self.state_type().state)
 
     def state(self, motion: Motion) -> list[float]:
@@ -89,6 +90,7 @@ class StateEstimatorNode(Node):
         parameters = self._parameters
         self._publisher = handle.publisher(parameters.state_topic, self.state_type)
         self._tilted = handle.publisher(f"{parameters.state_topic}_tilted", Bool, latch=True)
+        self._missing = handle.publisher(f"{parameters.state_topic}_missing", String, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._lookup = handle.listen_to_poses()
         if parameters.control_topic is not None:
@@ -129,6 +131,7 @@ class StateEstimatorNode(Node):
             self._report_no_state(now, "", pose)
             return
         self._last_success = now
+        self._tell_tf_error("")
         state = from_vector(self._inner_type, self.state(motion))
         frame = self._parameters.fixed_frame
         self._publisher.publish(stamped(self.state_type, pose.time, frame, state=state))
@@ -209,6 +212,7 @@ class StateEstimatorNode(Node):
         # shorter than the period of the transforms.
         if now - self._last_success < HOLD_LIMIT:
             return
+        self._tell_tf_error(reason)
         if pose is not None:
             rejected = sum(self._rejections().values())
             reason = (
@@ -220,6 +224,12 @@ class StateEstimatorNode(Node):
             throttle=1.0,
             key="no state",
         )
+
+    def _tell_tf_error(self, reason):
+        # The takeoff server answers with it.
+        if reason != self._tf_error:
+            self._tf_error = reason
+            self._missing.publish(String(reason))
 
 
 class PositionVelocityStateEstimatorParameters(StateEstimatorParameters):

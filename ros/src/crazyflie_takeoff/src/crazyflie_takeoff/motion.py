@@ -56,6 +56,7 @@ class MeasuredPosition:
         self._position: Position | None = None
         self._age = 0.0
         self._received = 0.0
+        self.missing_reason = ""  #: Why the estimator has no state, as it says; empty if it has.
 
     @property
     def is_measured(self) -> bool:
@@ -80,10 +81,8 @@ class MeasuredPosition:
                 f"states on {topic} are {self._age:.1f} s old when they come; do the clocks of all "
                 "computers agree, and are they quick enough?"
             )
-        return (
-            f"no state has come on {topic} for {MAX_POSITION_AGE:g} s; are the estimator and the "
-            "source of /tf running?"
-        )
+        why = self.missing_reason or "are the estimator and the source of /tf running?"
+        return f"no state has come on {topic} for {MAX_POSITION_AGE:g} s; {why}"
 
     def _silence(self, time):
         self._received = min(self._received, time)

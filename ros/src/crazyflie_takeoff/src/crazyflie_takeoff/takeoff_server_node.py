@@ -103,6 +103,7 @@ class TakeoffServerNode(Node):
                 finite="state",
                 latest_only=True,
             )
+            handle.subscribe(f"{parameters.state_topic}_missing", String, self._on_missing_state)
         self._timer = handle.varying_timer(TIME_STEP, self._on_timer)
         # Whether connections come about has nothing to do with simulated time.
         self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover, steady=True)
@@ -217,6 +218,9 @@ class TakeoffServerNode(Node):
         state = message.state
         age = self._handle.age(message.header.stamp)
         self._checks.position.measure(self._handle.time(), (state.x, state.y, state.z), age)
+
+    def _on_missing_state(self, message):
+        self._checks.position.missing_reason = message.data
 
     def _measured_position(self):
         return self._checks.position.value(self._handle.time())

@@ -89,6 +89,8 @@ class FrameTree:
 
         `TransformError`: a frame is unknown, the two are not connected, or not at that time.
         """
+        for name in (target, source):
+            self._check_parents(name)
         # tf2 need not begin as long as it would know no answer.
         for name in (target, source):
             if name not in self._names and target != source:
@@ -173,6 +175,27 @@ class FrameTree:
             yield name
             seen.add(name)
             name = self._parent(name)
+
+    def _check_parents(self, name):
+        """Refuse a frame above which one has two parents, or frames are in a loop: tf2 is silent.
+
+        So it is where two bodies are swapped, or a static transform has its frames the wrong way
+        round.
+        """
+        chain = list(self._chain(name))
+        for child in chain:
+            moving, static = self._frames.get(child), self._static.get(child)
+            if moving and static and moving.latest.parent != static.parent:
+                raise tf2_py.ConnectivityException(
+                    f"frame {child} has two parents, {moving.latest.parent} on /tf and "
+                    f"{static.parent} on /tf_static; expected one: are two bodies swapped?"
+                )
+        if (first := self._parent(chain[-1])) is not None:
+            loop = [*chain[chain.index(first) :], first]
+            raise tf2_py.ConnectivityException(
+                f"frames are in a loop, each the parent of the one before: {', '.join(loop)}; are "
+                "two bodies swapped?"
+            )
 
     def _parent(self, name):
         if name in self._frames:

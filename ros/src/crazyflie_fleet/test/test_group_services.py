@@ -4,11 +4,13 @@ import genpy
 import pytest
 from geometry_msgs.msg import Point
 from simulated_fleet import Swarm
+from std_srvs.srv import EmptyRequest
 
 from crazyflie_driver import srv
 from crazyflie_fleet.conversions import to_message
 from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import at_rest
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import ServiceError
 
 ODD, EVEN = 1, 2
@@ -96,7 +98,7 @@ def test_vehicles_cannot_all_go_to_one_place(swarm):
 
 def test_refusals_name_the_vehicles(swarm):
     request = srv.GoToRequest(ODD, True, Point(0.0, 0.0, 0.1), 0.0, seconds(2.0))
-    with pytest.raises(ServiceError, match="2 of 3 vehicles: cf1: .* on the ground.*; cf3: .*"):
+    with pytest.raises(ServiceError, match="2 of 3 vehicles: cf1, cf3: .* on the ground"):
         swarm.call("/all/high_level/go_to", request)
     with pytest.raises(ServiceError, match="keeps the heading 0"):
         turned = srv.GoToRequest(0, True, Point(0.0, 0.0, 0.1), 0.5, seconds(2.0))
@@ -108,3 +110,58 @@ def test_nothing_is_published_by_vehicles_that_do_not_move(swarm):
     count = len(swarm.process.published("/cf1/ref"))
     swarm.process.advance(2.0)
     assert len(swarm.process.published("/cf1/ref")) == count
+
+
+def status(process, name, refusal):
+    """Have a vehicle on the ground say why it would not take off."""
+    message = FlightStatus(state=FlightStatus.ON_GROUND, takeoff_refusal=refusal)
+    process.publish(f"/{name}/in_flight_flight_status", message)
+
+
+def test_a_fleet_that_has_just_started_takes_off_as_soon_as_all_would(swarm):
+    late = "states on state are 0.6 s old when they come"
+    status(swarm.process, "cf2", late)
+    answer = swarm.process.call("/takeoff_all", EmptyRequest())
+    swarm.process.advance(3.0)
+    assert (answer.done(), swarm.heights()) == (False, [0.0, 0.0, 0.0])
+    (said,) = [text for text in swarm.process.logged("info") if "takeoff waits" in text]
+    assert said.endswith(f"takeoff waits for vehicles, 10 s at most: 1 of 3 vehicles: cf2: {late}")
+    status(swarm.process, "cf2", "")
+    swarm.advance_until(answer.done, 10.0)
+    answer.result(0)
+    assert swarm.heights() == pytest.approx([1.0, 1.0, 1.0], abs=0.2)
+
+
+@pytest.mark.parametrize(("age", "waits"), [(0.0, 10.0), (60.0, 0.0)])
+def test_a_fleet_of_which_one_would_refuse_stays_on_the_ground(swarm, age, waits):
+    swarm.process.advance(age)
+    status(swarm.process, "cf2", "the battery is low")
+    begin = swarm.process.clock.time()
+    refused = "no vehicle takes off: 1 of 3 vehicles: cf2: the battery is low"
+    with pytest.raises(ServiceError, match=refused):
+        swarm.call("/takeoff_all", seconds=20.0)
+    assert swarm.process.clock.time() - begin == pytest.approx(waits, abs=0.6)
+    swarm.process.advance(3.0)
+    assert swarm.heights() == [0.0, 0.0, 0.0]
+
+
+def test_if_one_refuses_against_its_word_the_others_land_again(swarm):
+    swarm.call("/cf3/emergency")
+    swarm.process.advance(0.5)
+    status(swarm.process, "cf3", "")
+    text = "no vehicle takes off: 1 of 3 vehicles: cf3: .*emergency.*; those that had begun have la"
+    with pytest.raises(ServiceError, match=text):
+        swarm.call("/takeoff_all", seconds=20.0)
+    assert swarm.heights() == pytest.approx([0.0, 0.0, 0.0], abs=0.02)
+    states = [swarm.process.published(f"/cf{k}/in_flight_state")[-1].data for k in (1, 2, 3)]
+    assert states == ["on_ground"] * 3
+
+
+def test_a_second_call_takes_the_rest(swarm):
+    swarm.call("/cf2/takeoff")
+    swarm.call("/takeoff_all")
+    assert swarm.heights() == pytest.approx([1.0, 1.0, 1.0], abs=0.2)
+    said = swarm.process.logged("info")
+    assert any(t.endswith("flying already: cf2; taking off: cf1, cf3") for t in said)
+    with pytest.raises(ServiceError, match="refused: all vehicles fly already"):
+        swarm.call("/takeoff_all")

@@ -1,6 +1,7 @@
 """ROS interface of the services for all vehicles of a fleet."""
 
 from concurrent.futures import Future
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -13,24 +14,44 @@ from crazyflie_fleet.high_level_parameters import HIGH_LEVEL, START_TOPIC
 from crazyflie_fleet.lander import SERVICE_TIMEOUT, Lander, Refusals
 from crazyflie_fleet.mission_watch import MISSION_TIMEOUT, MissionWatch
 from crazyflie_fleet.vehicle_states import VehicleStates
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, ServiceError
 
 _HIGH_LEVEL_SERVICES = {
-    "takeoff": srv.Takeoff,
     "land": srv.Land,
     "stop": srv.Stop,
     "go_to": srv.GoTo,
     "start_trajectory": srv.StartTrajectory,
     "notify_setpoints_stop": srv.NotifySetpointsStop,
 }
+#: How long after the start of this node a takeoff waits for vehicles that refuse it, s of the
+#: machine's clock: the nodes of a hundred need a while to find each other.
+START_LIMIT = 60.0
+TAKEOFF_WAIT = 10.0  #: How long one call waits at most, s of the machine's clock.
+_PERIOD = 0.2  #: Between two looks at the vehicles meanwhile, s.
+
+_FLYING = (FlightStatus.TAKING_OFF, FlightStatus.FLYING)
+_NOT_BEGUN = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
+
+
+@dataclass
+class _Takeoff:
+    """A call that waits until every vehicle would take off."""
+
+    service: str
+    service_type: Any
+    request: Any
+    answer: "Future[Any]" = field(default_factory=Future)
+    waited: float = 0.0  # s.
 
 
 class FleetServicesNode(Node):
     """Offer one service for all vehicles where each has its own.
 
     A call is answered when all vehicles have answered, with an error that names each one that
-    has refused. Vehicles above each other land one after the other, also those of a mission that
-    has died. ``states`` are those of all vehicles of the fleet.
+    has refused. A fleet takes off as a whole or not at all. Vehicles above each other land one
+    after the other, also those of a mission that has died. ``states`` are those of all vehicles of
+    the fleet.
     """
 
     needed_in_flight = True
@@ -38,6 +59,9 @@ class FleetServicesNode(Node):
     def __init__(self, fleet: FleetConfig, states: VehicleStates):
         self._fleet = fleet
         self._states = states
+        self._numbers = {name: number for number, name in enumerate(states.names)}
+        self._takeoffs: list[_Takeoff] = []
+        self._age = 0.0
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -48,12 +72,15 @@ class FleetServicesNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._lander = Lander(handle, self._fleet, self._states)
         for service, call in (
-            ("takeoff", partial(self._call_all, "takeoff", Empty)),
+            ("takeoff", partial(self._on_takeoff, "takeoff", Empty)),
             ("land", self._on_land),
         ):
             handle.advertise_service(f"/all/{service}", Empty, call)
             handle.advertise_service(f"/{service}_all", Empty, call)
         handle.advertise_service("/all/go_to", srv.GoTo, partial(self._on_go_to, "go_to"))
+        path = f"{HIGH_LEVEL}/takeoff"
+        takeoff = partial(self._on_takeoff, path, srv.Takeoff)
+        handle.advertise_service(f"/all/{path}", srv.Takeoff, takeoff)
         for name, service_type in _HIGH_LEVEL_SERVICES.items():
             path = f"{HIGH_LEVEL}/{name}"
             call = partial(self._call_all, path, service_type)
@@ -63,11 +90,114 @@ class FleetServicesNode(Node):
             if name == "start_trajectory":
                 handle.advertise_service(START_TOPIC, service_type, call)
         self._missions = MissionWatch(handle, self._on_lost_mission)
+        handle.timer(_PERIOD, self._on_timer, steady=True)
 
     @override
     def enter_safe_state(self) -> None:
         """Answer the callers of landings; each vehicle has services of its own."""
         self._lander.abort()
+        takeoffs, self._takeoffs = self._takeoffs, []
+        for takeoff in takeoffs:
+            takeoff.answer.set_exception(
+                ServiceError("no vehicle takes off: the node has failed; see the log")
+            )
+
+    # Takeoffs.
+
+    def _on_takeoff(self, service, service_type, request):
+        if getattr(request, "group_mask", 0):
+            # Only the vehicles know who is a member.
+            return self._call_all(service, service_type, request)
+        takeoff = _Takeoff(service, service_type, request)
+        if not self._begin(takeoff):
+            waiting = self._takeoff_refusals()
+            self._handle.info(
+                f"takeoff waits for vehicles, {TAKEOFF_WAIT:g} s at most: {self._text(waiting)}"
+            )
+            self._takeoffs.append(takeoff)
+        return takeoff.answer
+
+    def _on_timer(self):
+        self._age += _PERIOD
+        takeoffs, self._takeoffs = self._takeoffs, []
+        for takeoff in takeoffs:
+            takeoff.waited += _PERIOD
+            if not self._begin(takeoff):
+                self._takeoffs.append(takeoff)
+
+    def _takeoff_refusals(self):
+        """Return why vehicles that do not fly yet refuse to take off: name to reason."""
+        reasons = {
+            name: self._states.takeoff_refusals[self._numbers[name]]
+            for name in self._fleet.names
+            if self._state(name) not in _FLYING
+        }
+        return {name: reason for name, reason in reasons.items() if reason}
+
+    def _begin(self, takeoff):
+        """Take off, or refuse; return False if the call is to wait."""
+        if refusals := self._takeoff_refusals():
+            if takeoff.waited < TAKEOFF_WAIT and self._age < START_LIMIT:
+                return False
+            text = f"no vehicle takes off: {self._text(refusals)}"
+            takeoff.answer.set_exception(ServiceError(text))
+            return True
+        names = self._fleet.names
+        # Those that fly refuse /NAME/takeoff; they go to the height of the firmware's takeoff.
+        flying = [name for name in names if self._state(name) in _FLYING]
+        if flying and takeoff.service_type is Empty:
+            names = [name for name in names if name not in flying]
+            if not names:
+                takeoff.answer.set_exception(ServiceError("refused: all vehicles fly already"))
+                return True
+            rest = ", ".join(names)
+            self._handle.info(f"flying already: {', '.join(flying)}; taking off: {rest}")
+        self._take_off(takeoff, names)
+        return True
+
+    def _take_off(self, takeoff, names):
+        """Call the takeoffs of vehicles; if one refuses, those that have begun land."""
+        open_calls = {*names}
+        begun: list[str] = []
+        refusals: dict[str, str] = {}
+        is_aborted = False
+
+        def on_answer(name, done):
+            nonlocal is_aborted
+            if is_aborted:
+                return
+            if done.exception() is not None:
+                refusals[name] = str(done.exception())
+                if self._state(name) in _NOT_BEGUN:
+                    is_aborted = True
+                    self._abort(takeoff, [each for each in begun if each != name], refusals)
+                    return
+            open_calls.discard(name)
+            if not open_calls:
+                self._reply(takeoff.answer, refusals, takeoff.service_type._response_class())
+
+        for name in names:
+            if is_aborted:
+                break
+            begun.append(name)
+            self._call(name, takeoff.service, takeoff.service_type, takeoff.request, on_answer)
+
+    def _abort(self, takeoff, begun, refusals):
+        text = f"no vehicle takes off: {self._text(refusals)}"
+        if begun:
+            self._handle.error(f"{text}; landing {', '.join(begun)}")
+            text = f"{text}; those that had begun have landed"
+
+        def on_landed(done):
+            left = f"; MAY STILL FLY: {self._text(done.result())}" if done.result() else ""
+            takeoff.answer.set_exception(ServiceError(text + left))
+
+        self._lander.land(begun).add_done_callback(on_landed)
+
+    def _state(self, name):
+        return self._states.flight_states[self._numbers[name]]
+
+    # Landings, and all else.
 
     def _on_land(self, _):
         answer: Future[Any] = Future()
@@ -97,7 +227,10 @@ class FleetServicesNode(Node):
             answer.set_result(response)
 
     def _text(self, refusals: Refusals) -> str:
-        texts = "; ".join(f"{name}: {text}" for name, text in sorted(refusals.items()))
+        names: dict[str, list[str]] = {}
+        for name, reason in sorted(refusals.items()):
+            names.setdefault(reason, []).append(name)
+        texts = "; ".join(f"{', '.join(each)}: {reason}" for reason, each in names.items())
         return f"{len(refusals)} of {len(self._fleet.vehicles)} vehicles: {texts}"
 
     def _on_go_to(self, service, request):
@@ -122,7 +255,11 @@ class FleetServicesNode(Node):
                 self._reply(answer, refusals, response)
 
         for name in self._fleet.names:
-            path = f"/{name}/{service}"
-            call = self._handle.call_service(path, service_type, request, SERVICE_TIMEOUT)
-            call.add_done_callback(partial(on_answer, name))
+            self._call(name, service, service_type, request, on_answer)
         return answer
+
+    def _call(self, name, service, service_type, request, on_answer):
+        call = self._handle.call_service(
+            f"/{name}/{service}", service_type, request, SERVICE_TIMEOUT
+        )
+        call.add_done_callback(partial(on_answer, name))

@@ -32,6 +32,10 @@ class VehicleStates:
         self.names = [vehicle.name for vehicle in vehicles]
         #: Shape (n,); `FlightStatus.state` of each; UNKNOWN before the first.
         self.flight_states = np.full(len(vehicles), FlightStatus.UNKNOWN)
+        #: Why each would refuse a takeoff; empty if it would not.
+        self.takeoff_refusals = [
+            f"nothing has come on /{name}/{FLIGHT_STATUS}" for name in self.names
+        ]
         self._vectorized = vectorized
         self._states = np.full((len(vehicles), 6), np.nan)
         self._times = np.full(len(vehicles), -np.inf)
@@ -97,3 +101,4 @@ class VehicleStates:
 
     def _on_flight_status(self, number, message):
         self.flight_states[number] = message.state
+        self.takeoff_refusals[number] = message.takeoff_refusal

@@ -185,7 +185,7 @@ def test_a_landing_that_fails_is_answered(monkeypatch):
     swarm.call("/all/takeoff")
     monkeypatch.setattr(lander, "next_round", lambda *_: {}["a bug"])
     with pytest.raises(
-        ServiceError, match="2 of 2 vehicles: cf1: the landing of the fleet has fail"
+        ServiceError, match="2 of 2 vehicles: cf1, cf2: the landing of the fleet has f"
     ):
         swarm.call("/all/land")
     monkeypatch.undo()

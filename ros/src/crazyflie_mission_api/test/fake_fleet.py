@@ -23,6 +23,8 @@ def fake_process(monkeypatch):
     """Return a process in which a `Fleet` finds vehicles."""
     monkeypatch.setattr(fleet, "RosClock", FakeClock)
     monkeypatch.setattr(fleet, "topic_types", lambda handle: {})
+    # What a mission has published is there at once.
+    monkeypatch.setattr(fleet, "mission_nodes", lambda handle: 0)
     process = FakeProcess()
     # A FakeProcess has started.
     monkeypatch.setattr(process, "start", lambda: process.advance(0.1))

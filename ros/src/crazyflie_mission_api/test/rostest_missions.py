@@ -100,6 +100,35 @@ def test_ctrl_c_lands_and_what_is_wrong_is_known_before(tmp_path):
         assert landed(tracks)
 
 
+ONE = """
+from crazyflie_mission_api import Fleet
+
+with Fleet({names}) as fleet:
+    fleet.takeoff(0.8)
+    fleet.wait({seconds})
+"""
+
+
+def test_a_second_mission_for_a_vehicle_is_refused_until_the_first_has_ended(tmp_path):
+    first = written(tmp_path, ONE.format(names=["cf1", "cf2"], seconds=1e6))
+    second = tmp_path / "second.py"
+    second.write_text(ONE.format(names=["cf2"], seconds=0.0))
+    with recorded(["cf1", "cf2"]) as tracks, script(first) as process:
+        try:
+            peer.wait_until(lambda: all(t[-1][2] > 0.7 for t in tracks.values()), "takeoff", LIMIT)
+            status, errors = run(second)
+            assert status == 1
+            assert re.search(r"cf2: the mission mission_\w+ has them, and runs", errors), errors
+            assert all(track[-1][2] > 0.7 for track in tracks.values())
+        finally:
+            process.kill()
+        peer.wait_until(lambda: landed(tracks), "landing by the fleet", LIMIT)
+        # One that was killed has left nothing behind.
+        status, errors = run(second)
+        assert (status, errors) == (0, "")
+        assert landed(tracks)
+
+
 def test_a_script_for_the_sdk_flies_a_simulated_vehicle(tmp_path):
     with recorded(["cf1"]) as tracks:
         x, y, _ = tracks["cf1"][-1]

@@ -1,8 +1,11 @@
 """A fleet on a fake process: one vehicle by its takeoff server, one by the driver."""
 
+import math
+
 import pytest
 from fake_fleet import fake_process
 from fake_vehicles import ControllerVehicle, DriverVehicle
+from std_msgs.msg import String
 
 from crazyflie_driver.srv import StartTrajectory, StartTrajectoryResponse
 from crazyflie_mission_api import Bounds, Fleet, MissionError, plan
@@ -274,3 +277,76 @@ def test_names_of_a_fleet_file(process, controlled, driven, tmp_path):
 def test_names_that_make_no_sense(process, controlled, driven, names, text):
     with pytest.raises(MissionError, match=text):
         Fleet(names, process=process, startup_timeout=0.1)
+
+
+# Other missions.
+
+
+def claim(process, mission, *words):
+    """Publish what a mission that runs elsewhere does: who flies, and behind a bar who is its."""
+    process.publish("/all/mission", String(" ".join((mission, *words))))
+
+
+def test_a_vehicle_of_a_mission_that_runs_is_refused(process, controlled, driven):
+    with Fleet(["cf1"], process=process, startup_timeout=0.5) as first:
+        text = rf"cf1: the mission {first._mission} has them, and runs; expected it to end before"
+        with pytest.raises(MissionError, match=text):
+            Fleet(NAMES, process=process, startup_timeout=0.5)
+        Fleet(["cf2"], process=process, startup_timeout=0.5)
+        first.takeoff(0.5)
+    with Fleet(["cf1"], process=process, startup_timeout=0.5) as second:
+        second.takeoff(0.5)
+
+
+def test_a_mission_that_was_killed_has_no_vehicles(fleet, process):
+    claim(process, "killed", "cf1", "|", *NAMES)
+    with fleet:
+        for seconds in (1.0, 3.5):
+            process.advance(seconds)
+            with pytest.raises(MissionError, match="cf1, cf2: the mission killed has them"):
+                fleet.takeoff(0.5)
+        process.advance(1.5)
+        fleet.takeoff(0.5)
+        assert fleet.flying == NAMES
+
+
+def test_a_mission_whose_vehicles_another_one_has_leaves_them(fleet, process, controlled, driven):
+    with pytest.raises(MissionError, match="cf2: the mission other has them"), fleet:
+        fleet.takeoff(0.8)
+        # It was stopped for a while.
+        claim(process, "other", "cf2", "|", "cf2")
+        fleet.go_to((0.0, 0.5, 0.0), relative=True)
+    assert "land" not in driven.called()
+    assert controlled.position[2] == 0.0
+
+
+def test_vehicles_of_other_missions_are_obstacles(fleet, process, controlled, driven):
+    other = ControllerVehicle(process, "cf3", (-1.0, 0.0, 0.8))
+    process.transport.parameters["/cf3/buffer"] = 0.3
+    process.add_timer(0.5, lambda: claim(process, "other", "cf3", "|", "cf3"))
+    process.advance(0.5)
+
+    def mission(group):
+        group.takeoff(0.8)
+        group["cf1"].go_to((-1.5, 0.0, 0.8))
+
+    with fleet:
+        with pytest.raises(MissionError, match="cf3 and cf1 would be .* m apart"):
+            fleet.fly(mission)
+        fleet.takeoff(0.8)
+        with pytest.raises(MissionError, match="cf3 and cf1 would be .* m apart"):
+            fleet["cf1"].go_to((-1.5, 0.0, 0.8))
+        fleet["cf1"].go_to((0.0, 0.8, 0.8))
+        fleet["cf1"].go_to((-1.0, 0.8, 0.8))
+        # It flies beneath.
+        fleet["cf1"].go_to((-1.0, 0.8, 1.8))
+        fleet["cf1"].go_to((-1.0, 0.0, 1.8))
+    assert math.dist(controlled.position[:2], other.position[:2]) > 0.3
+    assert other.position == [-1.0, 0.0, 0.8]
+
+
+def test_a_vehicle_of_another_mission_that_flies_is_somewhere(fleet, process):
+    claim(process, "other", "cf3", "|", "cf3")
+    text = "cf3: its position is not known, and another mission flies it"
+    with fleet, pytest.raises(MissionError, match=text):
+        fleet.takeoff(0.8)

@@ -146,7 +146,7 @@ class FleetServicesNode(Node):
         # Those that fly refuse /NAME/takeoff; they go to the height of the firmware's takeoff.
         flying = [name for name in names if self._state(name) in _FLYING]
         if flying and takeoff.service_type is Empty:
-            names = [name for name in names if name not in flying]
+            names = tuple(name for name in names if name not in flying)
             if not names:
                 takeoff.answer.set_exception(ServiceError("refused: all vehicles fly already"))
                 return True

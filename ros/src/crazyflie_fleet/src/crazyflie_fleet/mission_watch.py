@@ -1,41 +1,73 @@
-"""Detects missions that end while their vehicles fly."""
+"""Who flies which vehicles: the missions that run, and those that end while their vehicles fly."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from std_msgs.msg import String
 
 from crazyflie_utils import NodeHandle
 
-#: Published by missions in flight: their name, and the names of the vehicles in flight.
+#: Published by missions: their name, the vehicles in flight, and behind a bar all their vehicles;
+#: the name alone by one that ends.
 MISSION_TOPIC = "/all/mission"
 MISSION_PERIOD = 0.5  #: Between two of these messages, s of the machine's clock.
 #: A mission without a message for so long has died, s of the machine's clock.
 MISSION_TIMEOUT = 5.0
 
 
-class MissionWatch:
-    """Watchdog of missions: ``on_lost(names)`` gets the vehicles of a mission's last message."""
+class Claim(NamedTuple):
+    """A message of a mission: the names of its vehicles."""
 
-    def __init__(self, handle: NodeHandle, on_lost: Callable[[list[str]], None]):
+    flying: Sequence[str]
+    vehicles: Sequence[str]
+
+    def message(self, mission: str) -> String:
+        """Return the message of a mission."""
+        return String(" ".join([mission, *self.flying, "|", *self.vehicles]))
+
+
+class MissionWatch:
+    """The missions that run, but ``own``; a mission that has died has no vehicles any more.
+
+    ``on_lost(names)`` gets the vehicles that flew by the last message of a mission that has died.
+    """
+
+    def __init__(
+        self,
+        handle: NodeHandle,
+        on_lost: Callable[[Sequence[str]], None] = lambda names: None,
+        own: str = "",
+    ):
         self._on_lost = on_lost
-        self._vehicles: dict[str, list[str]] = {}
+        self._own = own
+        self.claims: dict[str, Claim] = {}  #: Of the missions that run, by their names.
+        self.heard: set[str] = set()  #: Names of missions, also of those that have ended.
         # Ticks since the last message, so that a suspended computer does not lose missions.
         self._ticks: dict[str, int] = {}
         handle.subscribe(MISSION_TOPIC, String, self._on_mission)
         handle.timer(MISSION_PERIOD, self._on_timer, steady=True)
 
     def _on_mission(self, message):
-        mission, *names = message.data.split() or [""]
-        self._vehicles[mission], self._ticks[mission] = names, 0
-        if not names:
+        mission, *rest = message.data.split() or [""]
+        if mission == self._own:
+            return
+        self.heard.add(mission)
+        if not rest:
             self._forget(mission)
+            return
+        bar = rest.index("|") if "|" in rest else len(rest)
+        flying = rest[:bar]
+        self.claims[mission] = Claim(flying, rest[bar + 1 :] or flying)
+        self._ticks[mission] = 0
 
     def _forget(self, mission):
-        del self._ticks[mission]
-        return self._vehicles.pop(mission)
+        self._ticks.pop(mission, None)
+        return self.claims.pop(mission, Claim((), ()))
 
     def _on_timer(self):
         for mission in [*self._ticks]:
             self._ticks[mission] += 1
             if self._ticks[mission] * MISSION_PERIOD > MISSION_TIMEOUT:
-                self._on_lost(self._forget(mission))
+                flying = self._forget(mission).flying
+                if flying:
+                    self._on_lost(flying)

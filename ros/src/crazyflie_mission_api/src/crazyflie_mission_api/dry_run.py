@@ -160,6 +160,9 @@ def dry_run(group: VehicleGroup, mission: Callable[[VehicleGroup], Any]) -> floa
         {name: vehicle.start_skew for name, vehicle in group._vehicles.items()},
         group.observer.step,
     )
+    # Where they are now.
+    obstacles = group.obstacles()
+    run.obstacles = lambda: obstacles
     with run:
         mission(run)
     return run.time()

@@ -1,11 +1,13 @@
 """Groups of simulated, virtual and real vehicles, by ROS."""
 
+import math
+import re
 import signal
 import sys
 import threading
 import time
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +17,11 @@ from typing_extensions import override
 
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.high_level_node import HighLevelNode
-from crazyflie_fleet.mission_watch import MISSION_PERIOD, MISSION_TOPIC
+from crazyflie_fleet.mission_watch import MISSION_PERIOD, MISSION_TOPIC, Claim, MissionWatch
 from crazyflie_fleet.vehicle_nodes import BUFFER
 from crazyflie_mission_api import observer
 from crazyflie_mission_api.dry_run import dry_run
-from crazyflie_mission_api.group_state import Rules
+from crazyflie_mission_api.group_state import Obstacle, Rules
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
 from crazyflie_mission_api.ros_clock import RosClock
 from crazyflie_mission_api.ros_vehicle import RosVehicle
@@ -29,12 +31,14 @@ from crazyflie_mission_api.synchronized_start import (
     SynchronizedStart,
     common_services,
 )
+from crazyflie_mission_api.timed_trajectory import TimedTrajectory
 from crazyflie_mission_api.vehicle_group import VehicleGroup
-from crazyflie_mission_api.vehicle_state import prefix
+from crazyflie_mission_api.vehicle_state import RosVehicleState, prefix
 from crazyflie_utils import NodeHandle, ParameterError
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, Number
 from crazyflie_utils.process import Process
+from crazyflie_utils.timers import Timer
 
 _SERVICES = (
     "takeoff",
@@ -49,6 +53,11 @@ _SERVICES = (
     "notify_setpoints_stop",
     "arm",
 )
+
+#: How long messages of all missions are awaited at the start, s of the machine's clock: the nodes
+#: of those that were killed are known to the master, and send none.
+_MISSIONS_LIMIT = 1.0
+_OBSTACLE_LIMIT = 1.0  #: For the position of another mission's vehicle, s of the machine's clock.
 
 _POLL = 0.2  #: Between two searches for vehicles, s.
 
@@ -81,7 +90,8 @@ class Fleet(VehicleGroup):
     Raises
     ------
     MissionError
-        A vehicle is not there; the text says what was looked for.
+        A vehicle is not there, and the text says what was looked for; or another mission that runs
+        has it.
     """
 
     def __init__(
@@ -101,6 +111,10 @@ class Fleet(VehicleGroup):
             process, self._end = begin_script("mission")
             catch_signals()
         self._handle = process.handle("/mission")
+        self._mission = f"{_program()}_{uuid.uuid4().hex[:8]}"
+        self._missions = MissionWatch(self._handle, own=self._mission)
+        self._heartbeat: Timer | None = None
+        self._others: dict[str, RosVehicleState] = {}
         try:
             vehicles = _connect(process, self._handle, chosen, startup_timeout)
             clock = RosClock(self._handle, lambda: process.exit_status is not None)
@@ -112,12 +126,13 @@ class Fleet(VehicleGroup):
             )
             super().__init__(vehicles, clock, rules)
             self.observer = observer.of_process
-            self._mission = f"mission_{uuid.uuid4().hex[:8]}"
-            self._in_flight = self._handle.publisher(MISSION_TOPIC, String)
-            self._handle.timer(MISSION_PERIOD, self._publish_flying, steady=True)
+            self.obstacles = self._find_obstacles
+            self._buffers = buffers
             process.start()
+            self._claim_vehicles()
             self._await_positions(startup_timeout)
         except BaseException:
+            self._release()
             self._end()
             raise
 
@@ -136,7 +151,7 @@ class Fleet(VehicleGroup):
         is_new = name not in self.flying
         super().adopt(name)
         if is_new:
-            self._handle.submit(self._publish_flying)
+            self._handle.submit(self._publish_claim)
 
     def dry_run(self, mission: Callable[[VehicleGroup], Any]) -> float:
         """Check ``mission(fleet)`` by a dry run; return its duration, s.
@@ -167,12 +182,71 @@ class Fleet(VehicleGroup):
             if self.flying:
                 self._handle.error(f"MAY STILL FLY: {', '.join(self.flying)}")
             else:
-                self._publish_flying()
+                self._release()
             self._end()
 
-    def _publish_flying(self):
-        # A fleet process lands them when these messages end.
-        self._in_flight.publish(String(" ".join([self._mission, *self.flying])))
+    # Other missions.
+
+    def _claim_vehicles(self):
+        """Have other missions know the vehicles, unless another one has them."""
+        if self.observer.dry_runs_only:
+            return
+        end = time.monotonic() + _MISSIONS_LIMIT
+        nodes = mission_nodes(self._handle)
+        while len(self._missions.heard) < nodes and time.monotonic() < end:
+            time.sleep(0.01)
+        self._refuse_claimed()
+        self._claim = self._handle.publisher(MISSION_TOPIC, String, latch=True)
+        self._publish_claim()
+        self._heartbeat = self._handle.timer(MISSION_PERIOD, self._publish_claim, steady=True)
+
+    def _refuse_claimed(self):
+        for mission, claim in [*self._missions.claims.items()]:
+            if taken := [name for name in self.names if name in claim.vehicles]:
+                for name in taken:
+                    # They are landed by the other one.
+                    self.release(name)
+                raise MissionError(
+                    f"{', '.join(taken)}: the mission {mission} has them, and runs; expected it to "
+                    "end before, or other vehicles"
+                )
+
+    @override
+    def _check_apart(self, changed: Mapping[str, TimedTrajectory]) -> None:
+        # The other one may have begun at the same moment, or while this one was stopped.
+        self._refuse_claimed()
+        super()._check_apart(changed)
+
+    def _publish_claim(self):
+        # A fleet process lands those that fly when these messages end.
+        self._claim.publish(Claim(self.flying, self.names).message(self._mission))
+
+    def _release(self):
+        if self._heartbeat is not None:
+            self._heartbeat.stop()
+            self._heartbeat = None
+            self._claim.publish(String(self._mission))
+
+    def _find_obstacles(self):
+        return {
+            name: Obstacle(self._place_of_other(name), name in claim.flying)
+            for claim in [*self._missions.claims.values()]
+            for name in claim.vehicles
+            if name not in self._all_vehicles
+        }
+
+    def _place_of_other(self, name):
+        if name not in self._others:
+            how = _how_seen(self._handle, name, self._handle.service_nodes())
+            self._others[name] = RosVehicleState(name, self._handle, *how)
+            if buffer := _buffer(self._handle, name):
+                self._buffers[name] = buffer
+        vehicle = self._others[name]
+        end = time.monotonic() + _OBSTACLE_LIMIT
+        self._clock.wait_until(
+            lambda: vehicle.position() is not None or time.monotonic() > end, math.inf
+        )
+        return vehicle.position()
 
     def _await_positions(self, timeout):
         end = time.monotonic() + timeout
@@ -243,24 +317,31 @@ def _connect(process, handle, names, timeout):
     return [found[name] for name in names]
 
 
+def _how_seen(handle, name, services):
+    """Return of a vehicle what `RosVehicleState` asks for: uses_driver, frames, has_yaw."""
+    top = prefix(name)
+    if f"{top}/high_level/go_to" in services:
+        has_yaw = handle.get_param(f"{top}/high_level/reference/yaw", BOOLEAN, False)
+        return False, _frames(handle, f"{top}/high_level"), has_yaw
+    driver = services.get(f"{top}/upload_trajectory")
+    if driver is not None and services.get(f"{top}/takeoff") == driver:
+        return True, (handle.get_param(f"{driver}/frames/fixed", FRAME, "world"), name), True
+    return False, None, topic_types(handle).get(f"{top}/ref") == _YAW_STATE
+
+
 def _vehicle(process, handle, name, services, synchronized_start):
     top = prefix(name)
     commander = f"{top}/high_level"
-    if f"{commander}/go_to" in services:
-        has_yaw = handle.get_param(f"{commander}/reference/yaw", BOOLEAN, False)
-        frames = _frames(handle, commander)
-        return RosVehicle(name, handle, _below(commander), synchronized_start, frames, has_yaw)
-    driver = services.get(f"{top}/upload_trajectory")
-    if driver is not None and services.get(f"{top}/takeoff") == driver:
-        fixed = handle.get_param(f"{driver}/frames/fixed", FRAME, "world")
-        return RosVehicle(name, handle, _below(top), frames=(fixed, name))
-    if {f"{top}/takeoff", f"{top}/land"} <= services.keys():
-        has_yaw = topic_types(handle).get(f"{top}/ref") == _YAW_STATE
+    uses_driver, frames, has_yaw = _how_seen(handle, name, services)
+    if uses_driver:
+        return RosVehicle(name, handle, _below(top), None, frames)
+    if f"{commander}/go_to" not in services:
+        if not {f"{top}/takeoff", f"{top}/land"} <= services.keys():
+            return None
         handle.set_param(f"{commander}/reference/yaw", has_yaw)
         if not HighLevelNode().initialize(process.handle(commander)):
             raise MissionError(f"{commander} could not be started; its reason is in the log")
-        return RosVehicle(name, handle, _below(commander), synchronized_start, has_yaw=has_yaw)
-    return None
+    return RosVehicle(name, handle, _below(commander), synchronized_start, frames, has_yaw)
 
 
 def _frames(handle, commander):
@@ -274,6 +355,16 @@ def _frames(handle, commander):
 def topic_types(handle: NodeHandle) -> dict[str, str]:
     """Return the types of all topics, as the master knows them."""
     return dict(rosgraph.Master(handle.name).getTopicTypes())
+
+
+def mission_nodes(handle: NodeHandle) -> int:
+    """Return how many nodes have had missions, those included that were killed."""
+    publishers, _, _ = rosgraph.Master(handle.name).getSystemState()
+    return sum(len(nodes) for topic, nodes in publishers if topic == MISSION_TOPIC)
+
+
+def _program():
+    return re.sub(r"\W", "_", Path(sys.argv[0]).stem) or "mission"
 
 
 def _below(top):

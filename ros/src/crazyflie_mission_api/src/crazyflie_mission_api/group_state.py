@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Self
+from typing import NamedTuple, Self
 
 from crazyflie_mission_api.clearance import Clearance
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError, number
@@ -15,6 +15,7 @@ from crazyflie_mission_api.observer import MissionObserver, command
 from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_apart
 from crazyflie_mission_api.trajectories import within_limits
 from crazyflie_model import trajectory
+from crazyflie_model.angles import Triple
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,13 @@ class Rules:
         number(self.arrival_timeout, "arrival_timeout", 0.0)
 
 
+class Obstacle(NamedTuple):
+    """A vehicle of another mission."""
+
+    position: Triple | None  #: m; None when it is not known.
+    is_flying: bool
+
+
 class GroupState:
     """Vehicles and their commanded trajectories."""
 
@@ -54,6 +62,8 @@ class GroupState:
         # Of all vehicles in flight; shared with subgroups.
         self._commanded: dict[str, TimedTrajectory] = {}
         self.observer = MissionObserver()  #: Called at each command.
+        #: Returns the vehicles of other missions, by name.
+        self.obstacles: Callable[[], Mapping[str, Obstacle]] = dict
 
     def __getitem__(self, names: str | tuple[str, ...]) -> Self:
         """Return a subgroup."""
@@ -144,12 +154,22 @@ class GroupState:
         return TimedTrajectory(pieces, begin, self._vehicles[name].start_skew)
 
     def _check_apart(self, changed):
-        """Check trajectories together with those of all other vehicles."""
+        """Check trajectories together with those of all other vehicles.
+
+        Vehicles of other missions count where they are: those missions check them among each other.
+        """
         on_ground = {
             name: vehicle.position()
             for name, vehicle in self._all_vehicles.items()
             if name not in self._commanded
         }
+        for name, obstacle in self.obstacles().items():
+            on_ground[name] = obstacle.position
+            if obstacle.is_flying and obstacle.position is None:
+                raise MissionError(
+                    f"{name}: its position is not known, and another mission flies it; expected to "
+                    "know how far away it is"
+                )
         resting = {name: TimedTrajectory.hover(p) for name, p in on_ground.items() if p is not None}
         everything = {**resting, **self._commanded, **changed}
         check_apart(everything, self.time(), self.rules.clearance, resting.keys() - changed.keys())

@@ -7,6 +7,7 @@ import numpy as np
 
 from crazyflie_fleet.landing import next_round
 from crazyflie_mission_api.group_state import GroupState, raise_failures
+from crazyflie_mission_api.limits import EVERYWHERE
 from crazyflie_mission_api.mission_vehicle import never
 from crazyflie_mission_api.observer import command
 from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_with_skew
@@ -77,12 +78,21 @@ class LandingGroup(GroupState):
 
     def _land_round(self, names, is_checked):
         places = self._places()
+        obstacles = self.obstacles()
+        places |= {name: o.position for name, o in obstacles.items() if o.position is not None}
         known = [*places]
-        fences = [self._all_vehicles[name].bounds.within(self.rules.bounds) for name in known]
+        fences = [
+            EVERYWHERE if name in obstacles else self._all_vehicles[name].bounds for name in known
+        ]
+        fences = [fence.within(self.rules.bounds) for fence in fences]
+        in_flight = {
+            *self._commanded,
+            *(name for name, obstacle in obstacles.items() if obstacle.is_flying),
+        }
         chosen = next_round(
             np.array([*places.values()]),
             np.array([name in names for name in known]),
-            np.array([name not in self._commanded for name in known]),
+            np.array([name not in in_flight for name in known]),
             self.rules.clearance.limits(known),
             np.array([fence.lower[:2] for fence in fences]),
             np.array([fence.upper[:2] for fence in fences]),

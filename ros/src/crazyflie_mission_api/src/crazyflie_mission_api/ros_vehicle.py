@@ -12,6 +12,7 @@ from crazyflie_driver import srv
 from crazyflie_fleet.conversions import to_message
 from crazyflie_mission_api.futures import done, in_turn
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
+from crazyflie_mission_api.mission_vehicle import MissionVehicle
 from crazyflie_mission_api.stream import SetpointStream
 from crazyflie_mission_api.synchronized_start import BroadcastStart, SynchronizedStart
 from crazyflie_mission_api.timed_trajectory import START_SKEW
@@ -33,7 +34,7 @@ _HOLD_TIMEOUT = 3.0  #: Of its answer, s of the machine's clock; the driver's ow
 _LANDING_RETRY_TIME = 10.0
 
 
-class RosVehicle(RosVehicleState):
+class RosVehicle(RosVehicleState, MissionVehicle):
     """A vehicle by the services of the driver, or by those of `HighLevelNode`.
 
     ``services`` are short names, such as go_to, to absolute names. Vehicles that a controller

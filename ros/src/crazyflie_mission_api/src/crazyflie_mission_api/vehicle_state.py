@@ -5,10 +5,8 @@ from functools import partial
 from typing import NamedTuple
 
 from geometry_msgs.msg import PoseStamped
-from typing_extensions import override
 
 from crazyflie_fleet.conversions import heading
-from crazyflie_mission_api.mission_vehicle import MissionVehicle
 from crazyflie_model.angles import Triple, quaternion_from_rpy
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped, VehicleStatus
@@ -37,7 +35,7 @@ def velocity_between(first: Pose, last: Pose) -> Triple:
     return x, y, z
 
 
-class RosVehicleState(MissionVehicle):
+class RosVehicleState:
     """Where a vehicle is, whether it can fly on, and whether it has landed.
 
     The driver publishes its pose and status; otherwise the takeoff server its status, and an
@@ -78,13 +76,13 @@ class RosVehicleState(MissionVehicle):
         topic = f"{top}/in_flight_flight_status"
         handle.subscribe(topic, FlightStatus, self._on_flight_status)
 
-    @override
     def position(self) -> Triple | None:
+        """Return the position, m; None when it is not known."""
         pose = self.pose()
         return None if pose is None else pose.position
 
-    @override
     def heading(self) -> float:
+        """Return the heading, rad; 0 when it is not known, or cannot change."""
         pose = self.pose() if self.has_yaw else None
         return 0.0 if pose is None else heading(*pose.rotation)
 
@@ -105,8 +103,8 @@ class RosVehicleState(MissionVehicle):
             return None
         return Pose(pose.position, pose.rotation, pose.stamp * 1e-9)
 
-    @override
     def fault(self) -> str:
+        """Return why the vehicle cannot fly on; empty if it can."""
         if self.uses_driver:
             status = self.driver_status
             is_cut_off = status.link in (VehicleStatus.LOST, VehicleStatus.DISCONNECTED)
@@ -117,8 +115,8 @@ class RosVehicleState(MissionVehicle):
             return f"it does not fly any more: {flight.reason or WORDS[flight.state]}"
         return ""
 
-    @override
     def has_landed(self) -> bool:
+        """Return whether the vehicle is on the ground, with its motors off."""
         if not self.uses_driver:
             return self.flight_status.state == FlightStatus.ON_GROUND
         place = self.position()

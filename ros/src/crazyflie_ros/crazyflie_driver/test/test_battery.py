@@ -36,3 +36,13 @@ def test_critical_needs_its_time(battery):
 def test_what_is_no_number_is_not_critical(battery):
     assert battery.update(math.nan, 0.0) is Charge.GOOD
     assert battery.update(math.nan, 10.0) is Charge.GOOD
+
+
+def test_what_comes_back_with_less_load_is_critical_still(battery):
+    for moment in (0.0, 5.0):
+        battery.update(2.9, moment)
+    assert [battery.update(volts, 6.0) for volts in (3.05, 3.19, 3.2)] == [
+        Charge.CRITICAL,
+        Charge.CRITICAL,
+        Charge.GOOD,
+    ]

@@ -195,3 +195,24 @@ def test_after_an_emergency_or_a_removal_nothing_passes(events):
     is_down = bool(link) and link[-1] is Event.LINK_LOST
     for time, is_zero in ((0.0, False), (0.1, True), (5.0, False)):
         assert bool(gate.refusal(time, is_zero)) is bool(latched or is_down)
+
+
+def test_a_stream_that_was_landed_for_its_battery_has_to_pause():
+    """The voltage comes back by itself as soon as the motors rest."""
+    gate = SetpointGate()
+    assert stream(gate, 0.0, 1.0) == (0, "")
+    gate.handle(Event.BATTERY_CRITICAL)
+    assert stream(gate, 1.0, 2.0) == (50, "the battery is critical")
+    # A pause alone does not do.
+    assert stream(gate, 4.0, 5.0) == (50, "the battery is critical")
+    gate.handle(Event.BATTERY_RECOVERED)
+    count, why = stream(gate, 5.0, 10.0)
+    assert count == 250
+    assert why.startswith("the vehicle was landed for its battery: pause the stream")
+    assert stream(gate, 12.0, 13.0) == (0, "")
+
+
+def test_a_battery_that_was_never_critical_blocks_nothing():
+    gate = SetpointGate()
+    gate.handle(Event.BATTERY_RECOVERED)
+    assert stream(gate, 0.0, 1.0) == (0, "")

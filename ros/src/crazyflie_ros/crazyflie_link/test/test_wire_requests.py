@@ -6,7 +6,12 @@ import pytest
 from cflib.crazyflie.mem import MemoryElement
 from wire_helpers import only_packet
 
-from crazyflie_link.errors import RefusedError, UnknownNameError, ValueRangeError
+from crazyflie_link.errors import (
+    AlreadyLandingError,
+    RefusedError,
+    UnknownNameError,
+    ValueRangeError,
+)
 from crazyflie_link.memory import find_memory, write_memory
 
 NAN = float("nan")
@@ -25,6 +30,23 @@ def test_external_pose(target, flying):
     for x in (NAN, 1e39):
         with pytest.raises(ValueRangeError):
             flying.localization.position(x, 0, 0)
+
+
+def test_a_lower_landing_takes_the_place_of_the_one_under_way(target, flying):
+    """The vehicle refuses a landing while it lands, but no move."""
+    flying.high_level.take_off(1.0, 2.0)
+    flying.high_level.land(0.0, 2.0)
+    with pytest.raises(AlreadyLandingError):
+        flying.high_level.land(-0.5, 1.5)
+    target.received.clear()
+    flying.high_level.land_lower(-0.5, 1.5)
+    go_to = struct.pack("<BBBB5f", 12, 0, 1, 0, 0.0, 0.0, 0.0, 0.0, 1.5)
+    land = struct.pack("<BBff?f", 8, 0, -0.5, 0.0, True, 1.5)
+    assert target.packets(8, 0) == [go_to, land]
+    assert target.flight.is_landing
+    for height, duration in ((NAN, 1.5), (-0.5, 0.0)):
+        with pytest.raises(ValueRangeError):
+            flying.high_level.land_lower(height, duration)
 
 
 def test_arming_and_the_supervisor(target, flying):

@@ -15,7 +15,8 @@ class Charge(enum.IntEnum):
 class Battery:
     """Classify voltages by limits in V.
 
-    The charge is critical after a time (s) below its limit: the voltage sinks under load.
+    The charge is critical after a time (s) below its limit, since the voltage sinks under load; and
+    as that comes back with less load, it is so until the voltage is no longer low.
     """
 
     def __init__(self, low: float, critical: float, critical_time: float):
@@ -32,11 +33,12 @@ class Battery:
         elif self._critical_since is None:
             self._critical_since = now
         since = self._critical_since
+        is_low = voltage < self._low
         if since is not None and now - since >= self._time:
             self.charge = Charge.CRITICAL
-        elif voltage < self._low:
+        elif is_low and self.charge is not Charge.CRITICAL:
             self.charge = Charge.LOW
-        else:
+        elif not is_low:
             self.charge = Charge.GOOD
         return self.charge
 

@@ -4,7 +4,7 @@ import contextlib
 import enum
 import time
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TypeVar
 
 from crazyflie_driver.battery import Battery, Charge
@@ -64,8 +64,7 @@ class FlightCommands:
     _pending_notify: int | None = None
     _notify_timer: Timer | None = None
     _feeds_watchdog: bool = False
-    # By what has begun them.
-    _landings: dict[str, Future[None]] = field(default_factory=dict)
+    refusal: str = ""  #: Why the vehicle is given no command that moves it; empty if it is.
 
     @property
     def is_high_level_flight_active(self) -> bool:
@@ -109,23 +108,6 @@ class FlightCommands:
 
         what = f"checking {command.name}"
         return self._jobs.submit(what, work, is_flight=True, urgent=command.ends_flight)
-
-    def land_with_retry(self, reason: str) -> None:
-        """Land; called again for the same reason, it lands again if that has failed."""
-        landing = self._landings.get(reason)
-        if landing is None or (landing.done() and landing.exception() is not None):
-            duration = self._safety.landing_duration
-            land = Command(LAND, lambda high_level: high_level.land(0.0, duration), duration)
-            self._landings[reason] = self.send(land, None)
-
-    def check_battery(self) -> None:
-        """Land a high-level flight whose battery is critical; see `land_with_retry`."""
-        if not self.is_high_level_flight_active:
-            self._landings.clear()
-        elif self._battery.charge is Charge.CRITICAL:
-            if "battery" not in self._landings:
-                self._handle.error(f"{self._name}: {self._battery.words()}: landing")
-            self.land_with_retry("battery")
 
     def notify(self, remain_valid_ms: int) -> None:
         """Announce that setpoints stop: at once on the ground, in flight with the next command."""
@@ -182,6 +164,8 @@ class FlightCommands:
                 )
                 return False
         elif command.name != STOP:
+            if self.refusal:
+                raise ServiceError(f"no {command.name}: {self.refusal}")
             self._check_leaving_stream()
         return True
 

@@ -6,6 +6,7 @@ from crazyflie_driver.battery import Battery
 from crazyflie_driver.connection import Connection
 from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.flight_state import FlightState
+from crazyflie_driver.landings import Landings
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.services import VehicleServices
@@ -29,6 +30,7 @@ class Lifecycle:
     _flight: FlightState
     _battery: Battery
     _commands: FlightCommands
+    _landings: Landings
     _mirror: ParameterMirror
     _services: VehicleServices
     _status: StatusPublisher
@@ -55,7 +57,7 @@ class Lifecycle:
         voltage = self._log.voltage
         if voltage is not None:
             self._battery.update(voltage, self._handle.time())
-            self._commands.check_battery()
+        self._landings.follow()
         if self._flight.is_flying and self._connection.is_connected:
             self._setpoints.gate.handle(Event.FLIGHT_REPORTED)
         self._setpoints.check_lift()

@@ -22,7 +22,7 @@ from crazyflie_utils.topics import Publisher
 #: Period of the log block that the diagnostics rest on, ms; its absence shows a restart.
 STATUS_PERIOD_MS = 100
 
-#: What is in it, as far as the firmware has it: 24 of the 26 bytes of a packet.
+#: What is in it, as far as the firmware has it: all of the 26 bytes of a packet.
 STATUS_VARIABLES = (
     "pm.vbat",
     "radio.rssi",
@@ -33,6 +33,7 @@ STATUS_VARIABLES = (
     "pm.state",
     "radio.numRxBc",
     "radio.numRxUc",
+    "ctrltargetZ.z",
 )
 
 _MOST_DATA = 30
@@ -65,6 +66,7 @@ class LogTopics:
     height: float | None = None
     vertical_speed: float | None = None
     heading: float | None = None
+    target_height: float | None = None  #: z that the vehicle's controller holds, m, fixed frame.
     #: Latest state; None until it has come on the present link.
     supervisor: SupervisorState | None = None
     #: Of the vehicle's Kalman filter, if it has one.
@@ -164,6 +166,8 @@ class LogTopics:
         self.height = latest.get("stateEstimate.z")
         self.vertical_speed = latest.get("stateEstimate.vz")
         self.heading = latest.get("stateEstimate.yaw")
+        target = latest.get("ctrltargetZ.z")
+        self.target_height = None if target is None else target / 1000.0
         if self.heading is not None:
             self._heading.publish(Float32(math.radians(self.heading)))
         # The Crazyradio's figure is the same, and comes without the firmware's help.

@@ -10,6 +10,7 @@ from typing_extensions import override
 
 from crazyflie_driver.all_vehicles import AllVehicles
 from crazyflie_driver.channel import Channel
+from crazyflie_driver.landings import Reason
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_driver.srv import (
     AddCrazyflie,
@@ -77,14 +78,14 @@ class CrazyflieServerNode(Node):
 
     def _follow_flights(self):
         # Flights on setpoints are ended by the node that sends these.
-        commands = [vehicle.commands for vehicle in self._vehicles.values()]
-        flying = [each for each in commands if each.is_high_level_flight_active]
+        vehicles = self._vehicles.values()
+        flying = [each for each in vehicles if each.commands.is_high_level_flight_active]
         if bool(flying) != self._in_flight:
             self._in_flight = bool(flying)
             self._inhibit_shutdown(self._in_flight)
         if self._is_shutting_down:
             for each in flying:
-                each.land_with_retry("shutdown")
+                each.landings.begin(Reason.SHUTDOWN)
 
     def _on_add(self, request):
         requested = VehicleParameters.from_request(request)

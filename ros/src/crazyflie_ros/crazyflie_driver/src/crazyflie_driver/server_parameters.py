@@ -24,14 +24,17 @@ class SafetyParameters(Parameters):
         _VOLTS, "below it the diagnostics warn and takeoff is refused", 3.2, "battery/low"
     )
     battery_critical: float = parameter(
-        _VOLTS, "below it a high-level flight is landed", 3.0, "battery/critical"
+        _VOLTS,
+        "below it a flight is landed, on high-level commands or on setpoints other than cmd_vel",
+        3.0,
+        "battery/critical",
     )
     battery_critical_time: float = parameter(
         _SECONDS, "after so long, since the voltage sinks under load", 5.0, "battery/critical_time"
     )
     landing_duration: float = parameter(
         Number("s", above=0.0, maximum=30.0),
-        "of landings that the driver itself begins",
+        "of landings that the driver itself begins, at least; longer where 0.5 m/s need more",
         3.0,
         "landing/duration",
     )

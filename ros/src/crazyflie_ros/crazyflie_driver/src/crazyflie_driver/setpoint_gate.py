@@ -18,8 +18,10 @@ class Block(enum.Flag):
 
     EMERGENCY = enum.auto()
     REMOVAL = enum.auto()
+    BATTERY = enum.auto()
     LINK_LOST = enum.auto()
     UNCONFIRMED = enum.auto()
+    LANDED = enum.auto()
     NOT_LIFTED = enum.auto()
 
 
@@ -28,6 +30,8 @@ class Event(enum.Enum):
 
     EMERGENCY_STOP = enum.auto()
     REMOVAL = enum.auto()
+    BATTERY_CRITICAL = enum.auto()
+    BATTERY_RECOVERED = enum.auto()
     LINK_LOST = enum.auto()
     LINK_BACK = enum.auto()
     FLIGHT_REPORTED = enum.auto()
@@ -37,12 +41,16 @@ class Event(enum.Enum):
 
 
 _NONE = Block(0)
-_ON_TRIAL = Block.UNCONFIRMED | Block.NOT_LIFTED
+_ON_TRIAL = Block.UNCONFIRMED | Block.LANDED | Block.NOT_LIFTED
 
 #: Event -> (blocks that have to hold, blocks that begin, blocks that end).
 TRANSITIONS = {
     Event.EMERGENCY_STOP: (_NONE, Block.EMERGENCY, _NONE),
     Event.REMOVAL: (_NONE, Block.REMOVAL, _NONE),
+    # The vehicle lands.
+    Event.BATTERY_CRITICAL: (_NONE, Block.BATTERY, _NONE),
+    # On the ground, where the voltage comes back by itself: the old stream has it fly no more.
+    Event.BATTERY_RECOVERED: (Block.BATTERY, Block.LANDED, Block.BATTERY),
     Event.LINK_LOST: (_NONE, Block.LINK_LOST, Block.UNCONFIRMED),
     # The vehicle may have been restarted, or its battery been changed, and be in a hand.
     Event.LINK_BACK: (Block.LINK_LOST, Block.UNCONFIRMED, Block.LINK_LOST),
@@ -62,10 +70,12 @@ _ADVICE = f"pause the stream for {PAUSE:g} s, send zero thrust or call a service
 REASONS = {
     Block.EMERGENCY: "emergency stop",
     Block.REMOVAL: "the vehicle is being removed",
+    Block.BATTERY: "the battery is critical",
     Block.LINK_LOST: "the link is lost",
     Block.UNCONFIRMED: (
         f"the link was lost, and the vehicle does not fly: {_ADVICE} that has it fly"
     ),
+    Block.LANDED: f"the vehicle was landed for its battery: {_ADVICE} that has it fly",
     Block.NOT_LIFTED: f"the vehicle was commanded to fly and did not lift off: {_ADVICE}",
 }
 

@@ -1,16 +1,17 @@
 """What is sent to a vehicle before its link ends, so that it neither falls nor is locked."""
 
-import contextlib
 import time
 from dataclasses import dataclass
 
 from crazyflie_driver.emergency import Emergency
 from crazyflie_driver.flight_state import FlightState
+from crazyflie_driver.landings import Landings, Reason
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.errors import AlreadyLandingError, CrazyflieError
+from crazyflie_link.errors import CrazyflieError
+from crazyflie_link.request_reply import REPLY_LIMIT
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils import NodeHandle
+from crazyflie_utils import NodeHandle, ServiceError
 
 _EMERGENCY_LIMIT = 1.0  #: Time limit of the vehicle's confirmation of an emergency stop, s.
 
@@ -32,7 +33,7 @@ class Shutdown:
     _emergency: Emergency
     _flight: FlightState
     _setpoints: SetpointTopics
-    _duration: float
+    _landings: Landings
 
     def land_or_stop(self, limit: float) -> str:
         """Return what could not be done within a limit (s), empty if nothing; blocks.
@@ -54,7 +55,7 @@ class Shutdown:
                     # Unless it is the link that has been lost meanwhile.
                     crazyflie.link()
                     self._warn("it is not known whether the vehicle flies: it is left as it is")
-        except CrazyflieError as error:
+        except (CrazyflieError, ServiceError, TimeoutError) as error:
             problem = f"its motors could not be stopped: {error}"
         if problem:
             self._warn(problem)
@@ -69,10 +70,7 @@ class Shutdown:
         on_setpoints = is_flying and setpoints.runs_motors and setpoints.can_land_autonomously()
         if self._flight.is_high_level(state) or on_setpoints:
             end = time.monotonic() + limit
-            if setpoints.is_streaming:
-                setpoints.notify_setpoints_stop()
-            with contextlib.suppress(AlreadyLandingError):
-                self._crazyflie.high_level.land(0.0, self._duration)
+            self._landings.begin(Reason.REMOVAL).result(REPLY_LIMIT + limit)
             if not _has_landed(self._flight, end):
                 return
         elif is_flying and not setpoints.is_streaming:

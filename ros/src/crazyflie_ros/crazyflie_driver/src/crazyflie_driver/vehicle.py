@@ -9,6 +9,7 @@ from crazyflie_driver.emergency import Emergency
 from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.jobs import Jobs
+from crazyflie_driver.landings import Landings
 from crazyflie_driver.lifecycle import Lifecycle
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.parameter_mirror import ParameterMirror
@@ -69,6 +70,9 @@ class DriverVehicle:
         self.commands = commands = FlightCommands(
             own, name, crazyflie, setpoints, flight, battery, emergency, jobs, server
         )
+        self.landings = landings = Landings(
+            own, name, battery, log, setpoints, commands, server.landing_duration
+        )
         mirror = ParameterMirror(own, prefix, crazyflie)
         services = VehicleServices(
             own, name, prefix, crazyflie, jobs, gate, flight, commands, emergency, mirror
@@ -82,12 +86,12 @@ class DriverVehicle:
             flight,
             battery,
             commands,
+            landings,
             mirror,
             services,
             status,
         )
-        duration = server.landing_duration
-        self._shutdown = Shutdown(own, name, crazyflie, emergency, flight, setpoints, duration)
+        self._shutdown = Shutdown(own, name, crazyflie, emergency, flight, setpoints, landings)
         status.publish()
 
     @property

@@ -119,6 +119,26 @@ class HighLevel(Subsystem):
             resend=duration > REPLY_LIMIT,
         )
 
+    def land_lower(self, height: float, duration: float) -> None:
+        """Sink to a height (m) in a duration (s) instead of the landing that is under way.
+
+        As a vehicle that lands refuses a landing, it is ended by a move of no length, in the packet
+        before. If that is lost, the landing goes on: `AlreadyLandingError`.
+        """
+        _check("landing", duration, ALL_GROUPS, height)
+
+        def send(commander):
+            commander.go_to(0.0, 0.0, 0.0, 0.0, duration, relative=True)
+            commander.land(height, duration, ALL_GROUPS, yaw=None)
+
+        # After the touchdown a repetition would start the motors.
+        self._command(
+            "the land command",
+            HighLevelCommander.COMMAND_LAND_2,
+            send,
+            resend=duration > REPLY_LIMIT,
+        )
+
     def stop(self, group_mask: int = ALL_GROUPS) -> None:
         """Stop the motors, wherever the vehicle is."""
         check_byte("group mask", group_mask)

@@ -1,0 +1,152 @@
+"""Landings that the driver begins, from the command until the vehicle stands."""
+
+import enum
+from concurrent.futures import Future
+from dataclasses import dataclass
+
+from crazyflie_driver.battery import Battery, Charge
+from crazyflie_driver.command import LAND, STOP, Command
+from crazyflie_driver.flight_commands import FlightCommands
+from crazyflie_driver.log_topics import LogTopics
+from crazyflie_driver.setpoint_gate import Event
+from crazyflie_driver.setpoint_topics import Control, SetpointTopics
+from crazyflie_driver.touchdown import STEP, STEP_TIME, Next, Touchdown, landing_duration
+from crazyflie_model.supervisor import SupervisorState
+from crazyflie_utils import NodeHandle
+
+_MARGIN = 1.0  #: A vehicle that is active for so long after its landing, s, lands again.
+_LOG_DELAY = 0.5  #: How long the log may take to show what a command has changed, s.
+
+
+class Reason(enum.Enum):
+    """Why the driver lands a vehicle: in words, and how long it may take, s."""
+
+    #: At 3.0 V under the load of hover a cell of 250 mAh has some 4 % left, which is 15 s; 5 s of
+    #: them have gone by before the charge is critical.
+    BATTERY = "the battery is critical", 5.0
+    #: A process waits 10 s for a flight, and the last metre takes its time.
+    SHUTDOWN = "the driver is to end", 7.0
+    REMOVAL = "the vehicle is being removed", 7.0
+
+    @property
+    def words(self) -> str:
+        """The reason, for messages."""
+        return self.value[0]
+
+    @property
+    def limit(self) -> float:
+        """How long the landing may take, s."""
+        return self.value[1]
+
+
+@dataclass(eq=False)
+class Landings:
+    """Land a vehicle, and see that it comes down: no other command takes its place.
+
+    The firmware lands at a height and stops the motors there, also without a link. With a link the
+    vehicle sinks further until it stands: see `Touchdown`.
+    """
+
+    _handle: NodeHandle
+    _name: str
+    _battery: Battery
+    _log: LogTopics
+    _setpoints: SetpointTopics
+    _commands: FlightCommands
+    _least_duration: float
+    _reason: Reason | None = None
+    _sent: Future[None] | None = None
+    # When it was sent, and when it should have been carried out, s.
+    _begin: float = 0.0
+    _end: float = 0.0
+    _touchdown: Touchdown | None = None
+
+    def begin(self, reason: Reason) -> Future[None]:
+        """Land; the result of the future is None once the vehicle has accepted it.
+
+        Called again while the vehicle is active, it lands again if that has failed, or if the
+        vehicle should be down.
+        """
+        if self._reason is None:
+            detail = self._battery.words() if reason is Reason.BATTERY else reason.words
+            self._handle.error(f"{self._name}: {detail}: landing")
+        if self._reason is not Reason.BATTERY:
+            self._reason = reason
+        self._commands.refusal = self._refusal()
+        sent = self._sent
+        if sent is None or not self._is_under_way(sent):
+            height = self._log.height
+            # Beside a table it may be below 0: it never climbs.
+            ground = 0.0 if height is None else min(0.0, height)
+            duration = landing_duration(height, self._least_duration, self._reason.limit)
+            self._touchdown = Touchdown(self._handle.time(), ground, duration)
+            sent = self._sent = self._send(LAND, lambda h: h.land(ground, duration), duration)
+        return sent
+
+    def follow(self) -> None:
+        """Take the next step of a landing, after each log of the vehicle.
+
+        A critical battery ends a flight by high-level commands, or on setpoints with a reference
+        (thrust is the business of the node that sends it).
+        """
+        state = self._log.supervisor
+        if state is None:
+            return
+        is_critical = self._battery.charge is Charge.CRITICAL
+        is_active = self._is_active(state)
+        if is_active and is_critical:
+            self.begin(Reason.BATTERY)
+        elif is_active and self._reason is not None:
+            self.begin(self._reason)
+        elif not is_active and self._is_logged():
+            self._reason = self._sent = self._touchdown = None
+            if not is_critical:
+                self._setpoints.gate.handle(Event.BATTERY_RECOVERED)
+        self._commands.refusal = self._refusal()
+        if self._sent is not None and _is_accepted(self._sent):
+            if self._reason is Reason.BATTERY:
+                self._setpoints.gate.handle(Event.BATTERY_CRITICAL)
+            if is_active and self._touchdown is not None:
+                self._descend(self._touchdown)
+
+    def _is_active(self, state):
+        if self._commands.is_high_level_flight_active:
+            return True
+        is_flying = SupervisorState.FLYING in state
+        return is_flying and self._setpoints.control is Control.REFERENCE
+
+    def _refusal(self):
+        if self._battery.charge is Charge.CRITICAL:
+            return self._battery.words()
+        return "" if self._reason is None else self._reason.words
+
+    def _is_logged(self):
+        # Whether the log shows what was sent.
+        is_sent = self._sent is None or self._sent.done()
+        return is_sent and self._handle.time() >= self._begin + _LOG_DELAY
+
+    def _is_under_way(self, sent):
+        if not sent.done():
+            return True
+        is_going_on = _is_accepted(sent) and not self._setpoints.is_streaming
+        return is_going_on and self._handle.time() < self._end
+
+    def _descend(self, touchdown):
+        log, now, height = self._log, self._handle.time(), self._log.height
+        step = touchdown.sample(now, height, log.vertical_speed, log.target_height)
+        if step is Next.STOP:
+            self._touchdown = None
+            self._sent = self._send(STOP, lambda h: h.stop(), 0.0)
+        elif step is Next.DESCENT and height is not None:
+            touchdown.descend(now)
+            lower = height - STEP
+            self._sent = self._send(LAND, lambda h: h.land_lower(lower, STEP_TIME), STEP_TIME)
+
+    def _send(self, name, send, duration):
+        self._begin = self._handle.time()
+        self._end = self._begin + duration + _MARGIN
+        return self._commands.send(Command(name, send, duration), None)
+
+
+def _is_accepted(sent):
+    return sent.done() and sent.exception() is None

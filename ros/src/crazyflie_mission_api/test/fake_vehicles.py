@@ -96,13 +96,16 @@ class DriverVehicle:
         handle.timer(0.05, self._on_timer)
 
     def tell(self, status):
-        """Publish the vehicle's status: "flying", "ready" or "lost", and anything more."""
+        """Publish the vehicle's status: "flying", "ready", "lost", with "battery critical"."""
         flies, lost = status.startswith("flying"), status.startswith("lost")
         self._status.publish(
             VehicleStatus(
                 link=VehicleStatus.LOST if lost else VehicleStatus.CONNECTED,
                 has_supervisor=not lost,
                 supervisor=VehicleStatus.FLYING if flies else VehicleStatus.ARMED,
+                battery=VehicleStatus.BATTERY_CRITICAL
+                if "battery critical" in status
+                else VehicleStatus.BATTERY_GOOD,
                 text=status,
             )
         )

@@ -109,10 +109,11 @@ def test_a_trajectory_that_is_too_long_for_a_memory_is_refused(fleet):
             fleet["cf2"].follow(long)
 
 
-def test_a_vehicle_that_is_in_trouble_ends_the_mission(fleet, controlled, driven):
-    with pytest.raises(MissionError, match="cf2: lost: nothing is heard"), fleet:
+@pytest.mark.parametrize("trouble", ["lost: nothing is heard", "flying; battery critical"])
+def test_a_vehicle_that_is_in_trouble_ends_the_mission(fleet, controlled, driven, trouble):
+    with pytest.raises(MissionError, match=f"cf2: {trouble}"), fleet:
         fleet.takeoff(0.8)
-        driven.tell("lost: nothing is heard")
+        driven.tell(trouble)
         fleet.wait(10.0)
     assert controlled.position[2] == 0.0
 

@@ -107,9 +107,14 @@ class RosVehicleState:
         """Return why the vehicle cannot fly on; empty if it can."""
         if self.uses_driver:
             status = self.driver_status
-            is_cut_off = status.link in (VehicleStatus.LOST, VehicleStatus.DISCONNECTED)
-            faults = SupervisorState(status.supervisor).faults
-            return status.text if is_cut_off or status.is_emergency or faults else ""
+            cannot_fly_on = (
+                status.link in (VehicleStatus.LOST, VehicleStatus.DISCONNECTED)
+                or status.is_emergency
+                or SupervisorState(status.supervisor).faults
+                # The driver lands it.
+                or status.battery == VehicleStatus.BATTERY_CRITICAL
+            )
+            return status.text if cannot_fly_on else ""
         flight = self.flight_status
         if flight.state in _ENDED:
             return f"it does not fly any more: {flight.reason or WORDS[flight.state]}"

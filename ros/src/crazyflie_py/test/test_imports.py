@@ -127,3 +127,19 @@ def test_a_grid_is_a_fleet_file():
     assert len(starts) == 6
     assert starts.mean(axis=0) == pytest.approx([0.0, 0.0, 0.0])
     assert np.ptp(starts, axis=0) == pytest.approx([0.5, 1.0, 0.0])
+
+
+def test_a_script_beside_its_own_pycrazyswarm(tmp_path):
+    own = tmp_path / "pycrazyswarm"
+    own.mkdir()
+    (own / "__init__.py").write_text("Crazyswarm = 'their own'\n")
+    script = tmp_path / "script.py"
+    script.write_text("from pycrazyswarm import Crazyswarm\nprint(Crazyswarm)\n")
+
+    def printed(*options):
+        command = [sys.executable, *options, script]
+        return subprocess.run(command, capture_output=True, text=True, timeout=60).stdout
+
+    # As docs/migrating.md says.
+    assert printed() == "their own\n"
+    assert printed("-P") == "<class 'crazyflie_py.crazyswarm_py.Crazyswarm'>\n"

@@ -16,6 +16,7 @@ from crazyflie_driver.srv import (
 from crazyflie_driver.vehicle_parameters import STANDARD_TOPICS, VehicleParameters
 from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters
+from crazyflie_fleet.vehicle_nodes import PLACE
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import TEXT, ListOf
 
@@ -72,6 +73,8 @@ class FleetConnectNode(Node):
         parameters = handle.load(FleetConnectParameters)
         fleet = parameters.fleet()
         self._vehicles = [fleet[name] for name in parameters.own_names(fleet)]
+        for vehicle in self._vehicles:
+            handle.set_param(f"/{vehicle.name}/{PLACE}", fleet.names.index(vehicle.name))
         missing = [vehicle.name for vehicle in self._vehicles if vehicle.uri is None]
         if missing:
             raise ParameterError(f"{parameters.file}: no uri of {', '.join(missing)}; expected one")

@@ -19,7 +19,15 @@ from crazyflie_fleet.vectorized_simulator_node import (
     VectorizedSimulatorNode,
     VectorizedSimulatorParameters,
 )
-from crazyflie_fleet.vehicle_nodes import BUFFER, INHIBITION, Tree, merged, node_classes, parameters
+from crazyflie_fleet.vehicle_nodes import (
+    BUFFER,
+    INHIBITION,
+    PLACE,
+    Tree,
+    merged,
+    node_classes,
+    parameters,
+)
 from crazyflie_takeoff.all_emergency_node import AllEmergencyNode
 from crazyflie_utils import Node, NodeHandle, ParameterError
 
@@ -46,6 +54,7 @@ class _NodeFactory:
         self._has_clock = False
         vectorized: dict[str, tuple[VehicleConfig, ...]] = {}
         fleet = config.fleet()
+        self._places = {name: place for place, name in enumerate(fleet.names)}
         vehicles = tuple(fleet[name] for name in config.own_names(fleet))
         others = tuple(each for each in fleet.vehicles if each not in vehicles)
         for model in MODELS if config.is_simulated and config.is_vectorized else ():
@@ -112,6 +121,7 @@ class _NodeFactory:
             for name in ("simulator", "state_estimator", "lqr_controller"):
                 del classes[name]
         self._handle.set_param(f"/{vehicle.name}/{BUFFER}", vehicle.buffer)
+        self._handle.set_param(f"/{vehicle.name}/{PLACE}", self._places[vehicle.name])
         frames = {"fixed": self._config.fixed_frame, "robot": vehicle.name}
         tree = parameters(vehicle, frames, self._common(vehicle.settings.model))
         if vehicle.name in self._unplaced:

@@ -30,6 +30,8 @@ FLIGHT_STATUS = f"{IN_FLIGHT}_flight_status"  #: Topics and services of a vehicl
 INHIBITION = "takeoff_inhibition"
 #: Parameter below a vehicle's name: its collision buffer, m, by which missions are planned.
 BUFFER = "buffer"
+#: Parameter below a vehicle's name: its place in the fleet file, from 0.
+PLACE = "place_in_fleet"
 
 SIMULATORS: dict[str, type[Node]] = {
     "near_hover": NearHoverSimulatorNode,

@@ -8,10 +8,12 @@ from concurrent.futures import Future
 from typing import Any
 
 from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
+from crazyflie_fleet.vehicle_nodes import PLACE
 from crazyflie_mission_api import Fleet, MissionError
 from crazyflie_mission_api.mission_vehicle import never
 from crazyflie_mission_api.ros_vehicle import CALL_TIMEOUT
 from crazyflie_utils import NodeHandle
+from crazyflie_utils.parameters.types import Integer
 
 _SEARCH_LIMIT = 5.0  #: For vehicles, s of the machine's clock.
 _ANSWER_LIMIT = 15.0  #: For the answer to a command, s of the machine's clock.
@@ -28,6 +30,7 @@ class Connection:
         self.handle = handle
         self.fleet = fleet
         self.is_unchecked = is_unchecked  #: Whether what is refused is a warning.
+        self.said: set[str] = set()  #: See `SimulatedParameters`.
 
     def call(self, service: str, service_type: Any, *arguments: Any) -> "Future[Any]":
         """Call a service by its absolute name; return the future of the answer."""
@@ -67,7 +70,7 @@ class Connection:
 
 
 def running_vehicles(handle: NodeHandle) -> list[str]:
-    """Return the names of the vehicles that run, in the order of their numbers.
+    """Return the names of the vehicles that run: in the order of their fleet file, then by number.
 
     Raises
     ------
@@ -79,7 +82,10 @@ def running_vehicles(handle: NodeHandle) -> list[str]:
         services = handle.service_nodes()
         tops = {_top(service) for service in services if _is_flown(service, services)}
         if names := tops - {"", "all"}:
-            return sorted(names, key=_number_key)
+            places = {
+                name: handle.get_param(f"/{name}/{PLACE}", Integer(0, 1000), 1000) for name in names
+            }
+            return sorted(names, key=lambda name: (places[name], _number_key(name)))
         time.sleep(0.1)
     raise MissionError(
         f"no vehicle runs: for {_SEARCH_LIMIT:g} s there was no service /NAME/{HIGH_LEVEL}/go_to "

@@ -49,7 +49,9 @@ class RosVehicleBackend(VehicleBackend):
         self._states = RosStates(vehicle, connection.fleet.clock)
         self.held = HeldVehicle(vehicle, connection)
         self._groups = 0
-        self._parameters = None if has_firmware else SimulatedParameters(self.name, self)
+        self._parameters = (
+            None if has_firmware else SimulatedParameters(self.name, self, connection.said)
+        )
         if position is None:
             place = vehicle.position()
             position = (math.nan,) * 3 if place is None else place
@@ -212,11 +214,11 @@ class RosVehicleBackend(VehicleBackend):
 
     @override
     def set_parameters(self, values: Mapping[str, float]) -> None:
-        for name in values:
-            self.get_parameter(name)
         if self._parameters is not None:
             self._parameters.update(values)
             return
+        for name in values:
+            self.get_parameter(name)
         paths = {key.replace(".", "/"): value for key, value in values.items()}
         for path, value in paths.items():
             self._connection.handle.set_param(f"/{self.name}/{path}", value)

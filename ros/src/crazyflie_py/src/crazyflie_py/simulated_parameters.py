@@ -31,11 +31,14 @@ class SimulatedParameters:
         Of the vehicle.
     planner : Planner or other object
         Has the ``groups``.
+    said : set of str
+        Names that were warned of, which vehicles have in common.
     """
 
-    def __init__(self, name: str, planner: HasGroups):
+    def __init__(self, name: str, planner: HasGroups, said: set[str]):
         self._name = name
         self._planner = planner
+        self._said = said
         self._values: dict[str, float] = {}
 
     def update(self, values: Mapping[str, float]) -> None:
@@ -43,7 +46,8 @@ class SimulatedParameters:
         for key, value in values.items():
             if key == "hlCommander.groupmask":
                 self._planner.groups = int(value)
-            elif key not in self._values and key not in _defaults():
+            elif key not in self._said and key not in _defaults():
+                self._said.add(key)
                 _log.warning(
                     "%s.setParam: %s is no parameter that the simulation knows; it is kept, "
                     "without effect",

@@ -38,6 +38,8 @@ class SimulatedVehicle:
         Returns the time of the simulation, s.
     max_speed, disturbance : float
         Options --maxvel and --disturbance, m/s.
+    said : set of str
+        See `SimulatedParameters`.
     """
 
     def __init__(
@@ -46,13 +48,14 @@ class SimulatedVehicle:
         time: Callable[[], float],
         max_speed: float,
         disturbance: float,
+        said: set[str],
     ):
         self.name, self.id, self.initial_position, _ = vehicle
         self._time = time
         self._motion = IdealMotion(self.initial_position, max_speed, disturbance)
         self._planner = Planner()
         self._memory = TrajectoryMemory(self.name, self._planner, self._warn)
-        self._parameters = SimulatedParameters(self.name, self._planner)
+        self._parameters = SimulatedParameters(self.name, self._planner, said)
         self._setpoint: Setpoint | None = None
         self._sent = 0.0
         self._expiry = math.inf

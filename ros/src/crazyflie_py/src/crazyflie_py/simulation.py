@@ -33,7 +33,7 @@ class Simulation(EachVehicle):
         self.dt: float = options.dt
         self._steps = 0
         self._residual = 0.0
-        limits = (options.maxvel, options.disturbance)
+        limits = (options.maxvel, options.disturbance, set[str]())
         self.vehicles = [SimulatedVehicle(vehicle, self.time, *limits) for vehicle in fleet]
         self._buffers = [vehicle.buffer for vehicle in fleet]
         self._close: set[tuple[int, int]] = set()

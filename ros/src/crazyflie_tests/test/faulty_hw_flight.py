@@ -154,7 +154,7 @@ def empty_the_battery(flight):
 @contextlib.contextmanager
 def another_battery(flight):
     """Switch the vehicle off, and on again with another battery for the time of a with block."""
-    os.kill(node_process("/virtual_crazyflie"), signal.SIGTERM)
+    os.kill(node_process("/virtual_crazyflie"), signal.SIGKILL)
     rospy.set_param("/virtual_crazyflie/fault/low_battery", False)
     wait_until(lambda: not flight.vehicle.is_logging(), "the vehicle to be off", LIMIT)
     vehicle = ["rosrun", "crazyflie_virtual", "virtual_crazyflie", "__name:=virtual_crazyflie"]

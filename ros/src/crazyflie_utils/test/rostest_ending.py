@@ -1,6 +1,7 @@
 """However a process is asked to end: it says a last word, and ends."""
 
 import signal
+import threading
 import xmlrpc.client
 
 import pytest
@@ -125,9 +126,10 @@ def hears_of_flights(node):
     return any(each[2] == "i" and each[4] == "/flights" and each[5] for each in connections)
 
 
-def test_processes_that_are_needed_in_flight_end_after_the_landing(flight):
+@pytest.mark.parametrize("ask", [interrupt, terminate])
+def test_processes_that_are_needed_in_flight_end_after_the_landing(flight, ask):
     for process in flight:
-        interrupt(process, "")
+        ask(process, "")
     wait_for_notice(flight[0])
     wait_until(lambda: "asked to land" in flight[0].output, "the pilot's leaving")
     with listening("/cf/sensors/instrument/time", Float64) as measurements:
@@ -139,20 +141,24 @@ def test_processes_that_are_needed_in_flight_end_after_the_landing(flight):
     assert [process.output.count("in flight; ends after") for process in flight] == [1, 0]
 
 
-def test_second_interrupt_ends_at_once_and_safely(flight):
+@pytest.mark.parametrize("ask", [interrupt, terminate])
+def test_second_signal_ends_at_once_and_safely(flight, ask):
     # The instrument is asked alone: no node ends the flight, and so it says that it waits.
     for process in reversed(flight):
-        interrupt(process, "")
+        ask(process, "")
         wait_for_notice(process)
-        interrupt(process, "")
+        ask(process, "")
         assert process.wait() == 0
 
 
-def test_termination_does_not_wait_for_flights(flight):
-    for process in flight:
-        terminate(process, "")
+def test_a_node_that_is_killed_by_ros_in_flight_waits_until_a_signal_comes(flight):
+    for process, name in zip(
+        reversed(flight), ("/cf/sensors/instrument", "/cf/pilot"), strict=True
+    ):
+        threading.Thread(target=kill_by_ros, args=(process, name), daemon=True).start()
+        wait_for_notice(process)
+        interrupt(process, name)
         assert process.wait() == 0
-        assert "in flight; ends after" not in process.output
 
 
 def test_flights_in_another_namespace_are_not_waited_for(flight):

@@ -15,6 +15,8 @@ from std_srvs.srv import Empty
 
 from crazyflie_driver.msg import GenericLogData, crtpPacket
 from crazyflie_driver.srv import (
+    AddCrazyflie,
+    AddCrazyflieRequest,
     Land,
     NotifySetpointsStop,
     RemoveCrazyflie,
@@ -22,6 +24,7 @@ from crazyflie_driver.srv import (
     UpdateParams,
 )
 from crazyflie_utils.testing.peer import LIMIT, listening
+from crazyflie_utils.testing.waiting import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
 
@@ -167,3 +170,39 @@ def test_a_vehicle_without_a_prefix(added, tmp_path):
     assert "effect" in rospy.get_param("/ring")
     call("/notify_setpoints_stop", NotifySetpointsStop, 0, 0)
     call("/remove_crazyflie", RemoveCrazyflie, added)
+
+
+def terminate(process):
+    return subprocess.Popen(["kill", str(process.pid)])
+
+
+def rosnode_kill(_):
+    return subprocess.Popen(["rosnode", "kill", "/ending_server"])
+
+
+@pytest.mark.parametrize("end", [terminate, rosnode_kill])
+def test_the_end_of_a_driver_with_the_watchdog_is_a_landing(end):
+    names = ("/add_crazyflie", "/remove_crazyflie")
+    command = ["rosrun", "crazyflie_driver", "crazyflie_server", "__name:=ending_server"]
+    command += ["_emergency_watchdog:=true", *(f"{name}:=/ending{name}" for name in names)]
+    with virtual_vehicle() as (virtual, uri):
+        output = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+        driver = subprocess.Popen(command, **output)
+        call("/ending/add_crazyflie", AddCrazyflie, AddCrazyflieRequest(uri=uri, tf_prefix="cf9"))
+        call("/cf9/takeoff", Takeoff, 0, 1.5, Duration(2))
+        wait_until(lambda: virtual.observe().position[2] > 1.4, "the takeoff")
+        asking = end(driver)
+        speeds = []
+
+        def is_down():
+            seen = virtual.observe()
+            speeds.append(-seen.velocity[2])
+            return seen.position[2] < 0.02
+
+        wait_until(is_down, "the ground", period=0.01)
+        # A fall from there ends with 5.4 m/s.
+        assert max(speeds) < 2.0
+        assert speeds[-1] < 1.0
+        text = driver.communicate(timeout=LIMIT)[0]
+        assert asking.wait(LIMIT) == 0
+    assert "cf9: the driver is to end: landing" in text

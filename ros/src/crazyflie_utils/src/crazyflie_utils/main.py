@@ -2,7 +2,6 @@
 
 import gc
 import io
-import signal
 import sys
 import threading
 import time
@@ -23,6 +22,7 @@ from crazyflie_utils.ros1.master_watch import MasterWatch
 from crazyflie_utils.ros1.transport import RosTransport
 from crazyflie_utils.shutdown import FLUSH_TIME, Shutdown, catch_signals, exit_at_once, fail
 
+_END_LIMIT = 5.0  #: How long, in s, the end waits for nodes that have no flight any more.
 _MASTER_LIMIT = 10.0  #: How long, in s, a node waits for a ROS master.
 #: How long, in s, a thread that has something to do waits for another that computes.
 _SWITCH_INTERVAL = 0.0005
@@ -188,7 +188,7 @@ def _run(process, make_nodes, signals):
                 if not node.initialize(process.handle(name)):
                     process.transport.log("fatal", f"{name}: not initialized; the process exits")
                     fail()
-            shutdown = Shutdown(process, nodes)
+            shutdown = Shutdown(process, nodes, signals)
     except ParameterError as error:
         handle.error(str(error))
         fail()
@@ -203,10 +203,12 @@ def _run(process, make_nodes, signals):
     threading.Thread(target=process.start, name="start", daemon=True).start()
     while not signals and process.exit_status is None and not rospy.is_shutdown():
         time.sleep(0.1)
-    if signals == [signal.SIGINT]:
-        shutdown.wait_for_flights(signals)
+    if len(signals) == 1 and not rospy.core.is_shutdown_requested():
+        shutdown.wait_for_flights()
     watch.stop()
     rospy.signal_shutdown(f"signal {signals}" if signals else "the node has ended")
+    # Another process may have asked for it, and a thread of rospy be at it.
+    shutdown.has_ended.wait(_END_LIMIT)
     if shutdown.is_stuck:
         exit_at_once(1)
     sys.exit(process.exit_status or 0)

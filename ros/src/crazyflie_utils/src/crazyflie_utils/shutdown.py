@@ -40,8 +40,8 @@ def catch_signals() -> list[int]:
 
     def note(number, _frame):
         caught.append(number)
-        # After a first SIGINT a flight may have to end; the next signal ends that.
-        if len(caught) > 1 or number != signal.SIGINT:
+        # After a first one a flight may have to end; the next signal ends that.
+        if len(caught) > 1:
             for each in ends:
                 signal.signal(each, signal.SIG_DFL)
 
@@ -51,17 +51,28 @@ def catch_signals() -> list[int]:
 
 
 class Shutdown:
-    """What a process with nodes, by absolute name, does before rospy closes its connections."""
+    """What a process with nodes, by absolute name, does before rospy closes its connections.
 
-    def __init__(self, process: Process, nodes: dict[str, Node]):
+    ``signals`` is the list of `catch_signals`.
+    """
+
+    def __init__(self, process: Process, nodes: dict[str, Node], signals: list[int]):
         self._process = process
         self._nodes = nodes
+        self._signals = signals
         self.is_stuck = False  #: Whether a callback has not returned.
+        self.has_ended = threading.Event()  #: Whether `run` has done all.
         needed = [name for name, node in nodes.items() if node.needed_in_flight]
         self._flights = Flights(process.topics, needed) if needed else None
 
     def run(self) -> None:
-        """Stop timers and nodes, and wait until the last messages are sent."""
+        """Stop timers and nodes, and wait until the last messages are sent.
+
+        When another process asks for it (``rosnode kill``, a node with the same name), flights are
+        waited for first, in a thread of rospy.
+        """
+        if not self._signals and self._process.exit_status is None:
+            self.wait_for_flights()
         work = threading.Thread(target=self._process.shut_down, args=(self._nodes,), daemon=True)
         work.start()
         work.join(_SHUTDOWN_LIMIT)
@@ -70,9 +81,10 @@ class Shutdown:
             text = f"a callback has not returned within {_SHUTDOWN_LIMIT:g} s; exiting"
             self._process.transport.log("fatal", text)
         time.sleep(FLUSH_TIME)
+        self.has_ended.set()
 
-    def wait_for_flights(self, signals: list[int]) -> None:
-        """Wait, 10 s at most, for flights that need these nodes; a second signal ends that."""
+    def wait_for_flights(self) -> None:
+        """Wait, 10 s at most, for flights that need these nodes; another signal ends that."""
         flights = self._flights
         if flights is None or not flights.in_flight:
             return
@@ -82,9 +94,11 @@ class Shutdown:
         # Not in this thread: a callback may never return.
         prepare = self._process.prepare_shutdown
         threading.Thread(target=prepare, args=(self._nodes,), name="end", daemon=True).start()
-        begin = time.monotonic()
+        begin, signals = time.monotonic(), len(self._signals)
         is_logged = bool(own)
-        while flights.in_flight and len(signals) == 1 and time.monotonic() < begin + _FLIGHT_LIMIT:
+        while flights.in_flight and time.monotonic() < begin + _FLIGHT_LIMIT:
+            if len(self._signals) > signals:
+                return
             time.sleep(0.05)
             if not is_logged and time.monotonic() > begin + _NOTICE_DELAY:
                 is_logged = True
@@ -95,7 +109,7 @@ class Shutdown:
         self._process.transport.log(
             "warn",
             f"{', '.join(names)}: in flight; ends after the landing, or in {_FLIGHT_LIMIT:g} s; "
-            "a second SIGINT ends at once",
+            "another signal ends at once",
         )
 
 

@@ -1,22 +1,62 @@
-"""The bench goes on when a figure cannot be measured."""
+"""The bench goes on when a figure cannot be measured, and compares with another workspace."""
 
 import json
+import os
+
+import pytest
 
 from crazyflie_dev.bench import __main__ as bench
-from crazyflie_dev.bench.row import Row
+from crazyflie_dev.bench import flights
+from crazyflie_dev.bench.__main__ import Row
+from crazyflie_dev.bench.listener import take_stamps
 
 
-def test_a_row_that_fails_is_one_of_the_results(monkeypatch, tmp_path, capsys):
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """Run the bench with two flights, one of which fails; return exit status and rows."""
+    rows = [Row("bad", "first", "the first", "s"), Row("good 3", "second", "the second", "s", 5.0)]
+
     def fail():
         raise TimeoutError("no answer")
 
-    rows = [Row("first", "the first", "s", fail), Row("second", "the second", "s", lambda: 2.0)]
-    out = tmp_path / "folder" / "bench.json"
+    def measure(number):
+        return {"second": float(number) * float(os.environ.get("FACTOR", 1.0))}
+
+    def run(*arguments):
+        out = tmp_path / "folder" / "bench.json"
+        monkeypatch.setattr("sys.argv", ["bench", "--out", str(out), *map(str, arguments)])
+        return bench.main(), json.loads(out.read_text())["rows"]
+
     monkeypatch.setattr(bench, "ROWS", rows)
-    monkeypatch.setattr("sys.argv", ["bench", "--out", str(out)])
-    assert bench.main() == 1
-    printed = capsys.readouterr().out
-    assert printed.startswith("2 figures, about 0 min")
-    assert "TimeoutError: no answer" in printed
-    first, second = json.loads(out.read_text())["rows"]
-    assert (first["failed"], second["value"]) == ("TimeoutError: no answer", 2.0)
+    monkeypatch.setattr(flights, "bad", fail, raising=False)
+    monkeypatch.setattr(flights, "good", measure, raising=False)
+    yield run
+    assert "FACTOR" not in os.environ
+
+
+def test_a_row_that_fails_is_one_of_the_results(run, capsys):
+    status, (first, second) = run()
+    assert status == 1
+    assert "TimeoutError: no answer" in capsys.readouterr().out
+    assert (first["failed"], second["value"]) == ("TimeoutError: no answer", 3.0)
+    assert (second["goal"], second["reached"]) == ("<= 5", True)
+
+
+def test_a_reference_is_measured_in_its_own_environment(run, tmp_path, capsys):
+    setup = tmp_path / "ros" / "devel" / "setup.bash"
+    setup.parent.mkdir(parents=True)
+    setup.write_text("export FACTOR=4\n")
+    status, (row,) = run("--beside", tmp_path, "--rounds", 2, "second")
+    assert (status, row["value"], row["reference"], row["ratio"]) == (0, 3.0, 12.0, 0.25)
+    assert "0.25 x reference, 12" in capsys.readouterr().out
+
+
+def test_every_row_has_a_flight():
+    assert {row.flight.split()[0] for row in bench.ROWS} <= vars(flights).keys()
+
+
+def test_stamps_are_taken_from_complete_messages_only():
+    message = (12).to_bytes(4, "little") + b"".join(k.to_bytes(4, "little") for k in (7, 2, 3))
+    received = bytearray(message + message[:9])
+    assert take_stamps(received, stamp_at=4) == [2_000_000_003]
+    assert received == message[:9]

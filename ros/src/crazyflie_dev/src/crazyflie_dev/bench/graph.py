@@ -1,31 +1,44 @@
 """A running graph of nodes, as the operating system and another process see it."""
 
 import json
-import os
 import subprocess
 import sys
+import tempfile
 import time
 import xmlrpc.client
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import psutil
 import rosgraph
 
-from crazyflie_dev.bench.row import NotMeasuredError
+from crazyflie_utils.testing.launching import roslaunch
 
-_LIMIT = 60.0  #: How long, in s, anything may take until it is there.
-
-_TICK = 1.0 / os.sysconf("SC_CLK_TCK")
+_LIMIT = 60.0  #: Longest wait for a service, a reply or the listener, s.
 
 _CALLER = "/bench"
 
 Arrivals = list[tuple[str, int, int]]  #: Topic, arrival and stamp, in ns of the machine's clock.
 
 
-def wait_for_service(name: str, limit: float = _LIMIT) -> None:
-    """Wait until a service is offered, at most ``limit`` s."""
-    end = time.monotonic() + limit
+class NotMeasuredError(Exception):
+    """A figure cannot be had here; the text says why."""
+
+
+@contextmanager
+def launched(file: str, *arguments: str, service: str = "/takeoff") -> Iterator[None]:
+    """Run a launch file of crazyflie_examples, without RViz, from when it offers a service on."""
+    launch = ["crazyflie_examples", file, "rviz:=false", *arguments]
+    with tempfile.TemporaryDirectory() as folder, roslaunch(launch, Path(folder) / "log"):
+        wait_for_service(service)
+        yield
+
+
+def wait_for_service(name: str) -> None:
+    """Wait until a service is offered; `NotMeasuredError` if there is none after 60 s."""
+    end = time.monotonic() + _LIMIT
     while time.monotonic() < end:
         # There may be no master yet.
         try:
@@ -33,7 +46,7 @@ def wait_for_service(name: str, limit: float = _LIMIT) -> None:
                 return
         except (rosgraph.MasterError, OSError):
             time.sleep(0.002)
-    raise NotMeasuredError(f"there is no service {name} after {limit:g} s")
+    raise NotMeasuredError(f"there is no service {name} after {_LIMIT:g} s")
 
 
 def call(service: str, *request: str) -> None:
@@ -53,29 +66,33 @@ def process_of(node: str) -> int:
 
 def cpu_time(processes: Iterable[int]) -> float:
     """Return the CPU time of processes until now, user and system, s."""
-    total = 0.0
-    for pid in processes:
-        # Behind the name, which may have spaces.
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-        total += (int(fields[11]) + int(fields[12])) * _TICK
-    return total
+    return sum(sum(psutil.Process(pid).cpu_times()[:2]) for pid in processes)
+
+
+@contextmanager
+def cpu_load(processes: list[int]) -> Iterator[list[float]]:
+    """Append to the list, at the end, the load by processes in a with block, % of a core."""
+    load: list[float] = []
+    used, began = cpu_time(processes), time.monotonic()
+    yield load
+    load.append(100.0 * (cpu_time(processes) - used) / (time.monotonic() - began))
 
 
 def memory(processes: Iterable[int]) -> float:
     """Return the memory of processes, MiB; what some share is divided among them (PSS)."""
-    total = 0
-    for pid in processes:
-        for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
-            if line.startswith("Pss:"):
-                total += int(line.split()[1])
-    return total / 1024.0
+    return sum(psutil.Process(pid).memory_full_info().pss for pid in processes) / 2**20
 
 
-def listen(seconds: float, *topics: tuple[str, str, str]) -> Arrivals:
-    """Listen to topics, each a node, topic and type, in another process; see `listener`."""
-    command = [sys.executable, "-m", "crazyflie_dev.bench.listener", str(seconds)]
-    for topic in topics:
-        command += topic
+def listen(seconds: float, *topics: tuple[str, str]) -> Arrivals:
+    """Listen to topics, each a node and a topic, from another process; see `listener`."""
+    # By its path, since a module of this name is also in the workspace that is compared.
+    program = Path(__file__).with_name("listener.py")
+    command = [
+        sys.executable,
+        str(program),
+        str(seconds),
+        *(word for each in topics for word in each),
+    ]
     done = subprocess.run(
         command, timeout=seconds + _LIMIT, capture_output=True, text=True, check=False
     )

@@ -1,6 +1,6 @@
 """Records arrival and stamp of the messages of topics, from another process.
 
-    python3 -m crazyflie_dev.bench.listener SECONDS NODE TOPIC TYPE [NODE TOPIC TYPE]...
+    python3 listener.py SECONDS NODE TOPIC [NODE TOPIC]...
 
 prints a list of [topic, arrival in ns, stamp in ns], as JSON; times are the machine's. It speaks
 TCPROS (http://wiki.ros.org/ROS/TCPROS) in one thread, decodes the stamps only, and is not
@@ -18,76 +18,66 @@ import xmlrpc.client
 from typing import Any
 
 import rosgraph
-import roslib.message
 from rosgraph.network import read_ros_handshake_header, write_ros_handshake_header
 
 _LENGTH = struct.Struct("<I")
 _TIME = struct.Struct("<2I")
 
-#: Where a stamp is in a serialized message; behind a sequence number if nothing else is said.
-_STAMP_AT = {"tf2_msgs/TFMessage": 8, "rosgraph_msgs/Clock": 0}
-_LIMIT = 10.0  #: How long, in s, a publisher may take to answer.
+#: Where a stamp is in a serialized message; in others it is behind a sequence number.
+_STAMP_AT = {"/tf": 8, "/clock": 0}
+_LIMIT = 10.0  #: How long a publisher may take to answer, s.
+_CALLER = "/bench_listener"
 
 
-class Connection:
-    """A connection to a topic of one node, by full names; the type is such as std_msgs/String."""
-
-    def __init__(self, node: str, topic: str, message_type: str):
-        self.topic = topic
-        self._stamp_at = _STAMP_AT.get(message_type, 4)
-        uri = rosgraph.Master("/bench_listener").lookupNode(node)
-        slave: Any = xmlrpc.client.ServerProxy(uri)
-        _, text, answer = slave.requestTopic("/bench_listener", topic, [["TCPROS"]])
-        if not answer:
-            raise ConnectionError(f"{node} does not publish {topic}: {text}")
-        _, host, port = answer
-        self.socket = socket.create_connection((host, port), _LIMIT)
-        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        fields = {
-            "topic": topic,
-            "type": message_type,
-            "md5sum": roslib.message.get_message_class(message_type)._md5sum,
-            "callerid": "/bench_listener",
-            "tcp_nodelay": "1",
-        }
-        write_ros_handshake_header(self.socket, fields)
-        received = io.BytesIO()
-        read_ros_handshake_header(self.socket, received, 65536)
-        self._buffer = received.getvalue()  # What has come behind the header.
-
-    def receive(self) -> list[int]:
-        """Return the stamps, in ns, of the messages that have come."""
-        data = self.socket.recv(65536)
-        if not data:
-            raise ConnectionError(f"the publisher of {self.topic} has hung up")
-        self._buffer += data
-        stamps = []
-        while len(self._buffer) >= _LENGTH.size:
-            end = _LENGTH.size + _LENGTH.unpack_from(self._buffer)[0]
-            if len(self._buffer) < end:
-                break
-            seconds, nanoseconds = _TIME.unpack_from(self._buffer, _LENGTH.size + self._stamp_at)
-            stamps.append(seconds * 1_000_000_000 + nanoseconds)
-            self._buffer = self._buffer[end:]
-        return stamps
+def connect(node: str, topic: str) -> tuple[socket.socket, bytearray]:
+    """Return a connection to a topic of one node, and what has come on it already."""
+    slave: Any = xmlrpc.client.ServerProxy(rosgraph.Master(_CALLER).lookupNode(node))
+    _, text, answer = slave.requestTopic(_CALLER, topic, [["TCPROS"]])
+    if not answer:
+        raise ConnectionError(f"{node} does not publish {topic}: {text}")
+    connection = socket.create_connection(tuple(answer[1:]), _LIMIT)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    names = {"topic": topic, "callerid": _CALLER}
+    any_type = {"type": "*", "md5sum": "*"}
+    write_ros_handshake_header(connection, {**names, **any_type, "tcp_nodelay": "1"})
+    received = io.BytesIO()
+    read_ros_handshake_header(connection, received, 65536)
+    return connection, bytearray(received.getvalue())
 
 
-def listen(seconds: float, connections: list[Connection]) -> list[tuple[str, int, int]]:
-    """Return topic, arrival and stamp, in ns, of all messages that arrive within ``seconds``."""
+def take_stamps(received: bytearray, stamp_at: int) -> list[int]:
+    """Remove the complete messages from what was received; return their stamps, ns."""
+    stamps = []
+    while len(received) >= _LENGTH.size:
+        end = _LENGTH.size + _LENGTH.unpack_from(received)[0]
+        if len(received) < end:
+            break
+        seconds, nanoseconds = _TIME.unpack_from(received, _LENGTH.size + stamp_at)
+        stamps.append(seconds * 1_000_000_000 + nanoseconds)
+        del received[:end]
+    return stamps
+
+
+def main() -> None:
+    """Listen for as long, and to the topics, that the command line names."""
     arrivals = []
     with selectors.DefaultSelector() as selector:
-        for each in connections:
-            selector.register(each.socket, selectors.EVENT_READ, each)
-        end = time.monotonic() + seconds
+        for node, topic in zip(sys.argv[2::2], sys.argv[3::2], strict=True):
+            connection, received = connect(node, topic)
+            selector.register(connection, selectors.EVENT_READ, (topic, connection, received))
+        end = time.monotonic() + float(sys.argv[1])
         while (left := end - time.monotonic()) > 0.0:
             for key, _ in selector.select(left):
                 now = time.time_ns()
-                arrivals += [(key.data.topic, now, stamp) for stamp in key.data.receive()]
-    return arrivals
+                topic, connection, received = key.data
+                data = connection.recv(65536)
+                if not data:
+                    raise ConnectionError(f"the publisher of {topic} has hung up")
+                received += data
+                stamps = take_stamps(received, _STAMP_AT.get(topic, 4))
+                arrivals += [(topic, now, stamp) for stamp in stamps]
+    json.dump(arrivals, sys.stdout)
 
 
 if __name__ == "__main__":
-    topics = iter(sys.argv[2:])
-    connections = [Connection(*each) for each in zip(topics, topics, topics, strict=True)]
-    found = listen(float(sys.argv[1]), connections)
-    json.dump(found, sys.stdout)
+    main()

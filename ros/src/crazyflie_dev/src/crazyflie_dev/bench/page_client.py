@@ -6,13 +6,11 @@ import re
 import threading
 import urllib.request
 import uuid
-from collections.abc import Coroutine
-from typing import Any
 from urllib.parse import urlencode
 
 import socketio
 
-from crazyflie_dev.bench.row import NotMeasuredError
+from crazyflie_dev.bench.graph import NotMeasuredError
 
 _LIMIT = 30.0  #: How long the dashboard may take to answer, s.
 _NICENESS = 19  #: Of the thread: a browser on another computer takes nothing from this one.
@@ -27,36 +25,24 @@ class PageClient:
     def __init__(self, url: str):
         self.scenes = 0  #: Messages with the poses of all vehicles that have come.
         self._url = url
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._client = socketio.AsyncClient(reconnection=False)
-        self._client.on("vehicles", self._on_vehicles)
+        self._is_open, self._is_over = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._read()), daemon=True)
 
     def __enter__(self) -> "PageClient":
-        with urllib.request.urlopen(self._url, timeout=_LIMIT) as answer:
-            found = re.search(r"'client_id': '([^']+)'", answer.read().decode())
-        if found is None:
-            raise NotMeasuredError(f"{self._url} is no page of NiceGUI 3: it names no client_id")
         self._thread.start()
-        self._wait_for(self._connect(found[1]))
+        if not self._is_open.wait(_LIMIT):
+            raise NotMeasuredError(f"{self._url} is no page of NiceGUI 3, or does not answer")
         return self
 
     def __exit__(self, *_: object) -> None:
-        try:
-            self._wait_for(self._client.disconnect())
-        finally:
-            self._loop.call_soon_threadsafe(self._loop.stop)
-            self._thread.join(_LIMIT)
+        self._is_over.set()
+        self._thread.join(_LIMIT)
 
-    def _run(self) -> None:
+    async def _read(self) -> None:
         # In Linux the niceness is a thread's.
         os.nice(_NICENESS)
-        self._loop.run_forever()
-
-    def _wait_for(self, work: Coroutine[Any, Any, None]) -> None:
-        asyncio.run_coroutine_threadsafe(work, self._loop).result(_LIMIT)
-
-    async def _connect(self, client_id: str) -> None:
+        with urllib.request.urlopen(self._url, timeout=_LIMIT) as answer:
+            (client_id,) = re.findall(r"'client_id': '([^']+)'", answer.read().decode())
         query = {
             "client_id": client_id,
             "document_id": uuid.uuid4(),
@@ -64,13 +50,19 @@ class PageClient:
             "next_message_id": 0,
             "implicit_handshake": "true",
         }
-        await self._client.connect(
+        client = socketio.AsyncClient(reconnection=False)
+        client.on("vehicles", self._on_vehicles)
+        await client.connect(
             f"{self._url}/?{urlencode(query)}",
             headers={"Origin": self._url},
             transports=["websocket"],
             socketio_path="/_nicegui_ws/socket.io",
             wait_timeout=_LIMIT,
         )
+        self._is_open.set()
+        while not self._is_over.is_set():
+            await asyncio.sleep(0.1)
+        await client.disconnect()
 
     def _on_vehicles(self, _: object) -> None:
         self.scenes += 1

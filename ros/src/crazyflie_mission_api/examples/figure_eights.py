@@ -9,9 +9,9 @@ import sys
 
 from crazyflie_demo.figure8 import figure8
 from crazyflie_mission_api import Fleet, Limits
-from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.trajectory import Pieces
 
 LIMITS = Limits(speed=1.0, acceleration=1.5)
 

@@ -5,8 +5,8 @@ import pytest
 
 from crazyflie_fleet.separation import RELEASE_RATIO, Separation
 from crazyflie_mission_api import DryRun, Limits, MissionError
-from crazyflie_mission_api.clearance import Clearance
 from crazyflie_mission_api.group_state import Rules
+from crazyflie_mission_api.limits import Clearance
 
 STARTS = {"cf1": (0.0, 0.0, 0.0), "cf2": (2.0, 0.0, 0.0), "cf3": (0.0, 2.0, 0.0)}
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from crazyflie_mission_api import MissionError
-from crazyflie_mission_api.clearance import Clearance
+from crazyflie_mission_api.limits import Clearance
 
 TIMES = np.array([0.0, 0.5, 1.0])
 BUFFERS = {"a": 0.15, "b": 0.15}

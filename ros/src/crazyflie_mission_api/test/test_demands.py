@@ -12,10 +12,10 @@ from crazyflie_mission_api.trajectories import (
     duration,
     excess,
     sampled,
-    stretched,
     within_limits,
 )
 from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.trajectory import stretched
 
 NOWHERE = (0.0,) * 8
 

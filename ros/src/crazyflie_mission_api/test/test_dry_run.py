@@ -9,7 +9,7 @@ from crazyflie_demo.figure8 import figure8
 from crazyflie_mission_api import Bounds, DryRun, Limits, MissionError, plan
 from crazyflie_mission_api.dry_run import DryRunClock, dry_run
 from crazyflie_mission_api.group_state import Rules
-from crazyflie_mission_api.trajectories import duration, moved, stretched
+from crazyflie_model.trajectory import duration, moved, stretched
 
 ROOM = Bounds((-2.0, -2.0, 0.0), (2.0, 2.0, 2.0))
 STARTS = {"cf1": (0.0, 0.0, 0.0), "cf2": (1.0, 0.0, 0.0)}

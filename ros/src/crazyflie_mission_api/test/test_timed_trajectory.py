@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from crazyflie_mission_api import DryRun, MissionError
-from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_with_skew
-from crazyflie_mission_api.trajectories import straight
+from crazyflie_mission_api.trajectories import TimedTrajectory, check_with_skew, straight
 
 WAY = straight((0.0, 0.0, 1.0), (1.0, 0.0, 1.0), seconds=2.0)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from crazyflie_mission_api.vehicle_state import Pose
+from crazyflie_mission_api.ros_vehicle import Pose
 from crazyflie_py.separation_watch import SeparationWatch
 from crazyflie_py.setpoints import Attitude, FullState, Hover, Position, VelocityWorld, led_to
 

@@ -7,12 +7,10 @@ from typing import Any
 
 from typing_extensions import override
 
-from crazyflie_mission_api.futures import done
 from crazyflie_mission_api.group_state import Rules
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, MissionError
-from crazyflie_mission_api.mission_vehicle import Clock, MissionVehicle
-from crazyflie_mission_api.timed_trajectory import TimedTrajectory
-from crazyflie_mission_api.trajectories import straight
+from crazyflie_mission_api.mission_vehicle import Clock, MissionVehicle, done
+from crazyflie_mission_api.trajectories import TimedTrajectory, straight
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_model.angles import Triple
 from crazyflie_model.trajectory import Pieces

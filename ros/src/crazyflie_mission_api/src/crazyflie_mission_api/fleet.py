@@ -23,22 +23,58 @@ from crazyflie_mission_api import observer
 from crazyflie_mission_api.dry_run import dry_run
 from crazyflie_mission_api.group_state import Obstacle, Rules
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
-from crazyflie_mission_api.ros_clock import RosClock
-from crazyflie_mission_api.ros_vehicle import RosVehicle
-from crazyflie_mission_api.synchronized_start import (
+from crazyflie_mission_api.mission_vehicle import Clock
+from crazyflie_mission_api.ros_vehicle import (
     ALL_OF_FLEET,
     BroadcastStart,
+    RosVehicle,
+    RosVehicleState,
     SynchronizedStart,
     common_services,
+    prefix,
 )
-from crazyflie_mission_api.timed_trajectory import TimedTrajectory
+from crazyflie_mission_api.trajectories import TimedTrajectory
 from crazyflie_mission_api.vehicle_group import VehicleGroup
-from crazyflie_mission_api.vehicle_state import RosVehicleState, prefix
 from crazyflie_utils import NodeHandle, ParameterError
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, Number
 from crazyflie_utils.process import Process
 from crazyflie_utils.timers import Timer
+
+_FROZEN = 10.0  #: How long simulated time may stand still, s of the machine's clock.
+
+
+class RosClock(Clock):
+    """The time of a process, real or simulated; ``has_ended()`` is whether ROS has shut down."""
+
+    def __init__(self, handle: NodeHandle, has_ended: Callable[[], bool]):
+        self._handle = handle
+        self._has_ended = has_ended
+        self._tick = threading.Condition()
+        handle.timer(0.02, self._wake)
+
+    @override
+    def time(self) -> float:
+        return self._handle.time()
+
+    @override
+    def wait_until(self, condition: Callable[[], bool], deadline: float) -> bool:
+        last, moved_at = self.time(), time.monotonic()
+        while not (done := condition()) and (now := self.time()) < deadline:
+            if self._has_ended():
+                raise MissionError("ROS has shut down; expected it to run as long as the mission")
+            if now != last:
+                last, moved_at = now, time.monotonic()
+            elif time.monotonic() - moved_at > _FROZEN:
+                raise MissionError(f"no /clock for {_FROZEN:g} s; is the simulation running?")
+            with self._tick:
+                self._tick.wait(0.1)
+        return done
+
+    def _wake(self):
+        with self._tick:
+            self._tick.notify_all()
+
 
 _SERVICES = (
     "takeoff",

@@ -7,11 +7,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from crazyflie_fleet.fleet_config import DOWNWASH
-from crazyflie_mission_api.limits import Array
-
-#: Factors of positions before distances are calculated.
-SCALE = np.array([1.0, 1.0, 1.0 / DOWNWASH])
+from crazyflie_mission_api.limits import SCALE, Array
 
 Point = tuple[float, float, float]
 

@@ -8,12 +8,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, Self
 
-from crazyflie_mission_api.clearance import Clearance
-from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError, number
+from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Clearance, Limits, MissionError, number
 from crazyflie_mission_api.mission_vehicle import Clock, MissionVehicle, never
 from crazyflie_mission_api.observer import MissionObserver, command
-from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_apart
-from crazyflie_mission_api.trajectories import within_limits
+from crazyflie_mission_api.trajectories import TimedTrajectory, check_apart, within_limits
 from crazyflie_model import trajectory
 from crazyflie_model.angles import Triple
 

@@ -10,8 +10,7 @@ from crazyflie_mission_api.group_state import GroupState, raise_failures
 from crazyflie_mission_api.limits import EVERYWHERE
 from crazyflie_mission_api.mission_vehicle import never
 from crazyflie_mission_api.observer import command
-from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_with_skew
-from crazyflie_mission_api.trajectories import straight
+from crazyflie_mission_api.trajectories import TimedTrajectory, check_with_skew, straight
 
 _DESCENT_SPEED = 0.3  #: Mean speed of landings, m/s.
 _SHORTEST_LANDING = 2.0  #: s.

@@ -1,26 +1,259 @@
 """Vehicles of a mission by ROS services and topics."""
 
+import math
+from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Future
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import genpy
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, PoseStamped
+from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
 from crazyflie_driver import srv
-from crazyflie_fleet.conversions import to_message
-from crazyflie_mission_api.futures import done, in_turn
+from crazyflie_fleet.conversions import heading, to_message
+from crazyflie_fleet.high_level_parameters import HIGH_LEVEL, START_TOPIC
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
-from crazyflie_mission_api.mission_vehicle import MissionVehicle
+from crazyflie_mission_api.mission_vehicle import MissionVehicle, done, forward, in_turn
 from crazyflie_mission_api.stream import SetpointStream
-from crazyflie_mission_api.synchronized_start import BroadcastStart, SynchronizedStart
-from crazyflie_mission_api.timed_trajectory import START_SKEW
-from crazyflie_mission_api.vehicle_state import RosVehicleState, prefix
-from crazyflie_model.angles import Triple
+from crazyflie_mission_api.trajectories import START_SKEW
+from crazyflie_model.angles import Triple, quaternion_from_rpy
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_model.trajectory import Pieces
-from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped, VehicleStatus
+from crazyflie_takeoff.motion import MAX_POSITION_AGE
+from crazyflie_utils import NodeHandle, ServiceError, TransformError
+from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.parameters.types import FINITE
+from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
+
+_LANDED_HEIGHT = 0.1  #: Above the start, m: a vehicle below has landed.
+#: States after a flight.
+_ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
+
+
+class Pose(NamedTuple):
+    """Position (m), rotation (quaternion x, y, z, w) and their time (s)."""
+
+    position: Triple
+    rotation: tuple[float, float, float, float]
+    time: float
+
+
+def velocity_between(first: Pose, last: Pose) -> Triple:
+    """Return the mean velocity, m/s, from one pose to a later one."""
+    span = last.time - first.time
+    x, y, z = ((b - a) / span for a, b in zip(first.position, last.position, strict=True))
+    return x, y, z
+
+
+class RosVehicleState:
+    """Where a vehicle is, whether it can fly on, and whether it has landed.
+
+    The driver publishes its pose and status; otherwise the takeoff server its status, and an
+    estimator its state. ``frames`` are the fixed and its own frame, if its position comes by tf;
+    with the driver only as long as there are no poses. ``has_yaw`` is whether it can have another
+    heading than 0.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        handle: NodeHandle,
+        uses_driver: bool,
+        frames: tuple[str, str] | None,
+        has_yaw: bool,
+    ):
+        self.name = name
+        self._handle = handle
+        self.uses_driver = uses_driver
+        self.has_yaw = has_yaw
+        #: flight_status, driver_status: The last ones.
+        self.flight_status = FlightStatus()
+        self.driver_status = VehicleStatus(link=VehicleStatus.CONNECTING)
+        self._pose: Pose | None = None
+        self._seen_at = -math.inf
+        # Of the last takeoff, m, and of the last landing, s.
+        self._ground = 0.0
+        self._landing_end = 0.0
+        top = prefix(name)
+        self._lookup = None if frames is None else partial(handle.listen_to_poses(), *frames)
+        if uses_driver:
+            handle.subscribe(f"{top}/pose", PoseStamped, self._on_pose, finite="pose")
+            handle.subscribe(f"{top}/vehicle_status", VehicleStatus, self._on_driver_status)
+            return
+        if frames is None:
+            state = PositionVelocityYawStateStamped
+            handle.subscribe(f"{top}/state", state, self._on_state, finite="state")
+        topic = f"{top}/in_flight_flight_status"
+        handle.subscribe(topic, FlightStatus, self._on_flight_status)
+
+    def position(self) -> Triple | None:
+        """Return the position, m; None when it is not known."""
+        pose = self.pose()
+        return None if pose is None else pose.position
+
+    def heading(self) -> float:
+        """Return the heading, rad; 0 when it is not known, or cannot change."""
+        pose = self.pose() if self.has_yaw else None
+        return 0.0 if pose is None else heading(*pose.rotation)
+
+    def pose(self) -> Pose | None:
+        """Return where the vehicle is; None when that is not known."""
+        if self._handle.time() - self._seen_at < MAX_POSITION_AGE:
+            return self._pose
+        if self._lookup is None:
+            return None
+        try:
+            pose = self._lookup()
+        except TransformError:
+            return None
+        # tf keeps the last pose of a vehicle that is not tracked any more.
+        age = (self._handle.nanoseconds() - pose.stamp) * 1e-9
+        # A pose far ahead of now is one from before the clock was set back.
+        if not -MAX_FUTURE_STAMP_SIMULATED <= age < MAX_POSITION_AGE:
+            return None
+        return Pose(pose.position, pose.rotation, pose.stamp * 1e-9)
+
+    def fault(self) -> str:
+        """Return why the vehicle cannot fly on; empty if it can."""
+        if self.uses_driver:
+            status = self.driver_status
+            cannot_fly_on = (
+                status.link in (VehicleStatus.LOST, VehicleStatus.DISCONNECTED)
+                or status.is_emergency
+                or SupervisorState(status.supervisor).faults
+                # The driver lands it.
+                or status.battery == VehicleStatus.BATTERY_CRITICAL
+            )
+            return status.text if cannot_fly_on else ""
+        flight = self.flight_status
+        if flight.state in _ENDED:
+            return f"it does not fly any more: {flight.reason or WORDS[flight.state]}"
+        return ""
+
+    def has_landed(self) -> bool:
+        """Return whether the vehicle is on the ground, with its motors off."""
+        if not self.uses_driver:
+            return self.flight_status.state == FlightStatus.ON_GROUND
+        place = self.position()
+        if place is None:
+            status = self.driver_status
+            state = SupervisorState(status.supervisor)
+            is_down = (
+                status.link == VehicleStatus.CONNECTED
+                and status.has_supervisor
+                and not status.is_emergency
+                and not state.faults
+                and SupervisorState.FLYING not in state
+            )
+        else:
+            is_down = place[2] < self._ground + _LANDED_HEIGHT
+        # Then the mission stops the motors: not in the last centimetres.
+        return is_down and self._handle.time() >= self._landing_end
+
+    def _on_pose(self, message):
+        p, q = message.pose.position, message.pose.orientation
+        self._seen_at = self._handle.time()
+        self._pose = Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w), self._seen_at)
+
+    def _on_state(self, message):
+        s = message.state
+        self._seen_at = self._handle.time()
+        rotation = quaternion_from_rpy(0.0, 0.0, s.yaw)
+        self._pose = Pose((s.x, s.y, s.z), rotation, self._seen_at)
+
+    def _on_flight_status(self, message):
+        self.flight_status = message
+
+    def _on_driver_status(self, message):
+        self.driver_status = message
+
+
+def prefix(name: str) -> str:
+    """Return the namespace of a vehicle; that of "/" is the root."""
+    return "" if name == "/" else f"/{name}"
+
+
+_STEP = 0.02  #: Vehicles that are to start within this time, s, are named in one message.
+ALL_OF_FLEET = f"/all/{HIGH_LEVEL}"  #: Namespace of a fleet's services for all.
+_TIMEOUT = 60.0  #: Of a service, s of the machine's clock.
+
+
+class SynchronizedStart:
+    """Publishes the names of the nodes that are to start."""
+
+    def __init__(self, handle: NodeHandle):
+        self._handle = handle
+        self._publisher = handle.publisher(START_TOPIC, String)
+        self._names: list[str] = []
+        handle.timer(_STEP, self._on_timer)
+
+    def start(self, node: str) -> None:
+        """Have a `HighLevelNode` start its uploaded trajectory 0."""
+        self._handle.submit(lambda: self._names.append(node))
+
+    def _on_timer(self):
+        if self._names:
+            names, self._names = self._names, []
+            self._publisher.publish(String(" ".join(names)))
+
+
+class BroadcastStart:
+    """Starts the uploaded trajectory 0 of all vehicles of a driver by its service for all.
+
+    Fewer than all, which are called within `_STEP`, are called one by one.
+    """
+
+    def __init__(self, handle: NodeHandle, top: str, names: Collection[str]):
+        self._handle = handle
+        self._service = f"{top}/start_trajectory"
+        self._names = {*names}
+        self._calls: dict[str, tuple[Callable[[], Future[Any]], Future[Any]]] = {}
+        handle.timer(_STEP, self._on_timer)
+
+    def start(self, name: str, call: Callable[[], "Future[Any]"]) -> "Future[Any]":
+        """Start a vehicle, alone by ``call()``; return the future of the answer."""
+        answer: Future[Any] = Future()
+        self._handle.submit(lambda: self._calls.update({name: (call, answer)}))
+        return answer
+
+    def _on_timer(self):
+        calls, self._calls = self._calls, {}
+        if calls.keys() == self._names:
+            request = srv.StartTrajectoryRequest(0, 0, 1.0, False, False)
+            common = self._handle.call_service(
+                self._service, srv.StartTrajectory, request, _TIMEOUT
+            )
+            for _, answer in calls.values():
+                forward(common, answer)
+            return
+        for call, answer in calls.values():
+            forward(call(), answer)
+
+
+def common_services(services: Mapping[str, str], names: Collection[str]) -> str | None:
+    """Return the namespace of services for exactly these vehicles, if there is one.
+
+    ``services`` are the names of all, to the nodes that offer them.
+    """
+    fleet = {s.split("/")[1] for s in services if s.endswith(f"/{HIGH_LEVEL}/go_to")} - {"all"}
+    if fleet:
+        is_there = f"/all/{HIGH_LEVEL}/go_to" in services and fleet == {*names}
+        return ALL_OF_FLEET if is_there else None
+    drivers = {
+        s.rpartition("/")[0].strip("/"): node
+        for s, node in services.items()
+        if s.endswith("/upload_trajectory")
+    }
+    nodes = {*drivers.values()}
+    if {*drivers} == {*names} and len(nodes) == 1:
+        top = f"{nodes.pop()}/all"
+        return top if f"{top}/go_to" in services else None
+    return None
+
 
 CALL_TIMEOUT = 60.0  #: Of a service, s of the machine's clock.
 MEMORY = 31  #: Pieces that the memory of a vehicle holds.

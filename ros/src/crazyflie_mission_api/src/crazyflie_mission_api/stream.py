@@ -10,8 +10,8 @@ from typing import Any
 from crazyflie_driver.msg import FullState
 from crazyflie_driver.setpoint_gate import OVERLAP
 from crazyflie_fleet.conversions import full_state_message
-from crazyflie_mission_api.futures import done
-from crazyflie_mission_api.timed_trajectory import TimedTrajectory
+from crazyflie_mission_api.mission_vehicle import done
+from crazyflie_mission_api.trajectories import TimedTrajectory
 from crazyflie_model.polynomials import Goal
 from crazyflie_model.trajectory import Pieces
 from crazyflie_utils import NodeHandle

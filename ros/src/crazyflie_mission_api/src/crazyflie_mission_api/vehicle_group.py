@@ -12,9 +12,12 @@ from crazyflie_mission_api.group_state import raise_failures, text
 from crazyflie_mission_api.landing import LandingGroup
 from crazyflie_mission_api.limits import Array, MissionError, number, point
 from crazyflie_mission_api.observer import command
-from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_with_skew
-from crazyflie_mission_api.trajectories import moved, straight, stretched
-from crazyflie_model.trajectory import Pieces, duration
+from crazyflie_mission_api.trajectories import (
+    TimedTrajectory,
+    check_with_skew,
+    straight,
+)
+from crazyflie_model.trajectory import Pieces, duration, moved, stretched
 
 Point = Sequence[float]
 

@@ -6,8 +6,7 @@ from geometry_msgs.msg import Point
 
 from crazyflie_driver import srv
 from crazyflie_fleet.separation import LOOK_AHEAD
-from crazyflie_mission_api.ros_vehicle import RosVehicle, seconds
-from crazyflie_mission_api.vehicle_state import Pose
+from crazyflie_mission_api.ros_vehicle import Pose, RosVehicle, seconds
 from crazyflie_model.angles import Triple
 from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_py.ros_connection import Connection

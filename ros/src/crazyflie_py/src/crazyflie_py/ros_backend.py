@@ -18,8 +18,7 @@ from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
 from crazyflie_fleet.settings import RobotSettings
 from crazyflie_mission_api import Fleet, MissionError
 from crazyflie_mission_api.fleet import catch_signals
-from crazyflie_mission_api.ros_vehicle import seconds
-from crazyflie_mission_api.synchronized_start import ALL_OF_FLEET, common_services
+from crazyflie_mission_api.ros_vehicle import ALL_OF_FLEET, common_services, seconds
 from crazyflie_model.angles import Triple
 from crazyflie_py import fleet as fleet_files
 from crazyflie_py.backend import EachVehicle, SwarmBackend, Visualizer

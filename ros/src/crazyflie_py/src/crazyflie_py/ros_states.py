@@ -4,8 +4,7 @@ import math
 from collections.abc import Callable
 
 from crazyflie_mission_api.mission_vehicle import Clock
-from crazyflie_mission_api.ros_vehicle import RosVehicle
-from crazyflie_mission_api.vehicle_state import Pose, velocity_between
+from crazyflie_mission_api.ros_vehicle import Pose, RosVehicle, velocity_between
 from crazyflie_model.angles import Triple, rpy_from_quaternion
 from crazyflie_py.backend import VehicleState
 

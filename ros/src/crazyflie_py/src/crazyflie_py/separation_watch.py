@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_mission_api.vehicle_state import Pose, velocity_between
+from crazyflie_mission_api.ros_vehicle import Pose, velocity_between
 from crazyflie_py.held_vehicle import HeldVehicle
 from crazyflie_py.ros_connection import Connection
 

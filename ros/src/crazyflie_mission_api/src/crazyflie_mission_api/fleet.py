@@ -43,6 +43,30 @@ from crazyflie_utils.timers import Timer
 
 _FROZEN = 10.0  #: How long simulated time may stand still, s of the machine's clock.
 
+_SERVICES = (
+    "takeoff",
+    "land",
+    "go_to",
+    "upload_trajectory",
+    "start_trajectory",
+    "stop",
+    "emergency",
+    "update_params",
+    "set_group_mask",
+    "notify_setpoints_stop",
+    "arm",
+)
+
+#: How long messages of all missions are awaited at the start, s of the machine's clock: the nodes
+#: of those that were killed are known to the master, and send none.
+_MISSIONS_LIMIT = 1.0
+
+_OBSTACLE_LIMIT = 1.0  #: For the position of another mission's vehicle, s of the machine's clock.
+
+_POLL = 0.2  #: Between two searches for vehicles, s.
+
+_YAW_STATE = "crazyflie_msgs/PositionVelocityYawStateStamped"
+
 
 class RosClock(Clock):
     """The time of a process, real or simulated; ``has_ended()`` is whether ROS has shut down."""
@@ -74,30 +98,6 @@ class RosClock(Clock):
     def _wake(self):
         with self._tick:
             self._tick.notify_all()
-
-
-_SERVICES = (
-    "takeoff",
-    "land",
-    "go_to",
-    "upload_trajectory",
-    "start_trajectory",
-    "stop",
-    "emergency",
-    "update_params",
-    "set_group_mask",
-    "notify_setpoints_stop",
-    "arm",
-)
-
-#: How long messages of all missions are awaited at the start, s of the machine's clock: the nodes
-#: of those that were killed are known to the master, and send none.
-_MISSIONS_LIMIT = 1.0
-_OBSTACLE_LIMIT = 1.0  #: For the position of another mission's vehicle, s of the machine's clock.
-
-_POLL = 0.2  #: Between two searches for vehicles, s.
-
-_YAW_STATE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 
 
 class Fleet(VehicleGroup):

@@ -33,6 +33,19 @@ _LANDED_HEIGHT = 0.1  #: Above the start, m: a vehicle below has landed.
 #: States after a flight.
 _ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
 
+_STEP = 0.02  #: Vehicles that are to start within this time, s, are named in one message.
+ALL_OF_FLEET = f"/all/{HIGH_LEVEL}"  #: Namespace of a fleet's services for all.
+CALL_TIMEOUT = 60.0  #: Of a service, s of the machine's clock.
+MEMORY = 31  #: Pieces that the memory of a vehicle holds.
+_SETTLING_TIME = 0.5  #: After the planned end of a landing, s.
+_HIGH_LEVEL = "commander/enHighLevel"  #: The firmware parameter that enables high-level commands.
+_HOLD_DURATION = 0.5  #: Of the go_to at the end of a stream, to where the vehicle is, s.
+_HOLD_TIMEOUT = 3.0  #: Of its answer, s of the machine's clock; the driver's own timeout is 1 s.
+
+#: How long a landing is tried while setpoints are streamed, s: without an answer they would end
+#: with the mission, and the vehicle would fall.
+_LANDING_RETRY_TIME = 10.0
+
 
 class Pose(NamedTuple):
     """Position (m), rotation (quaternion x, y, z, w) and their time (s)."""
@@ -177,11 +190,6 @@ def prefix(name: str) -> str:
     return "" if name == "/" else f"/{name}"
 
 
-_STEP = 0.02  #: Vehicles that are to start within this time, s, are named in one message.
-ALL_OF_FLEET = f"/all/{HIGH_LEVEL}"  #: Namespace of a fleet's services for all.
-_TIMEOUT = 60.0  #: Of a service, s of the machine's clock.
-
-
 class SynchronizedStart:
     """Publishes the names of the nodes that are to start."""
 
@@ -225,7 +233,7 @@ class BroadcastStart:
         if calls.keys() == self._names:
             request = srv.StartTrajectoryRequest(0, 0, 1.0, False, False)
             common = self._handle.call_service(
-                self._service, srv.StartTrajectory, request, _TIMEOUT
+                self._service, srv.StartTrajectory, request, CALL_TIMEOUT
             )
             for _, answer in calls.values():
                 forward(common, answer)
@@ -253,18 +261,6 @@ def common_services(services: Mapping[str, str], names: Collection[str]) -> str 
         top = f"{nodes.pop()}/all"
         return top if f"{top}/go_to" in services else None
     return None
-
-
-CALL_TIMEOUT = 60.0  #: Of a service, s of the machine's clock.
-MEMORY = 31  #: Pieces that the memory of a vehicle holds.
-_SETTLING_TIME = 0.5  #: After the planned end of a landing, s.
-_HIGH_LEVEL = "commander/enHighLevel"  #: The firmware parameter that enables high-level commands.
-_HOLD_DURATION = 0.5  #: Of the go_to at the end of a stream, to where the vehicle is, s.
-_HOLD_TIMEOUT = 3.0  #: Of its answer, s of the machine's clock; the driver's own timeout is 1 s.
-
-#: How long a landing is tried while setpoints are streamed, s: without an answer they would end
-#: with the mission, and the vehicle would fall.
-_LANDING_RETRY_TIME = 10.0
 
 
 class RosVehicle(RosVehicleState, MissionVehicle):

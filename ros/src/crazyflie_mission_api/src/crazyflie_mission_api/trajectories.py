@@ -14,6 +14,28 @@ from crazyflie_model.units import GRAVITY
 
 SAMPLES = 30  #: Points of a piece that are evaluated.
 
+_UNITS = {
+    "speed": "m/s",
+    "acceleration": "m/s^2",
+    "yaw_rate": "rad/s",
+    "tilt": "rad",
+    "max_thrust": "m/s^2",
+    "min_thrust": "m/s^2",
+}
+_TOLERANCE = 1e-6
+
+_SHORTEST = 1e-3  #: Of a trajectory, s: one that does not move has no demands.
+
+_STEP = 0.05  #: Between two times at which distances are checked, s.
+
+START_SKEW = 0.15
+"""Largest difference between the starts of vehicles behind the driver, s.
+
+Each is called by itself, unless all of a driver are started. bench/start_skew.py measured at most
+0.04 s for ten vehicles and 0.11 s for twenty, by UDP on a busy machine with two cores. A
+Crazyradio, which serves its vehicles one after the other, has not been measured.
+"""
+
 
 def sampled(pieces: Pieces) -> tuple[Array, Array]:
     """Return n times (s), shape (n,), and the trajectory at them, shape (3, 4, n).
@@ -54,17 +76,6 @@ def demands(values: Array) -> dict[str, Array]:
         "max_thrust": np.linalg.norm(thrust, axis=0),
         "min_thrust": -np.linalg.norm(thrust, axis=0),
     }
-
-
-_UNITS = {
-    "speed": "m/s",
-    "acceleration": "m/s^2",
-    "yaw_rate": "rad/s",
-    "tilt": "rad",
-    "max_thrust": "m/s^2",
-    "min_thrust": "m/s^2",
-}
-_TOLERANCE = 1e-6
 
 
 def excess(pieces: Pieces, limits: Limits) -> dict[str, tuple[float, float]]:
@@ -129,9 +140,6 @@ def straight(
     return [smooth_piece(at_rest(start, start_yaw), goal, yaw, seconds)]
 
 
-_SHORTEST = 1e-3  #: Of a trajectory, s: one that does not move has no demands.
-
-
 def within_limits(pieces: Pieces, limits: Limits) -> list[PolynomialPiece]:
     """Return the trajectory on the same path, as slow as the limits demand.
 
@@ -150,17 +158,6 @@ def within_limits(pieces: Pieces, limits: Limits) -> list[PolynomialPiece]:
     while excess(slow, limits):
         slow = stretched(slow, 1.05)
     return slow
-
-
-_STEP = 0.05  #: Between two times at which distances are checked, s.
-
-START_SKEW = 0.15
-"""Largest difference between the starts of vehicles behind the driver, s.
-
-Each is called by itself, unless all of a driver are started. bench/start_skew.py measured at most
-0.04 s for ten vehicles and 0.11 s for twenty, by UDP on a busy machine with two cores. A
-Crazyradio, which serves its vehicles one after the other, has not been measured.
-"""
 
 
 class TimedTrajectory:

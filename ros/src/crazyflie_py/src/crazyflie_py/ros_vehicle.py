@@ -1,33 +1,190 @@
 """A vehicle of Crazyswarm's API by ROS: behind the driver, or under the workspace's controller."""
 
 import math
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from typing import Any
 
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, Twist, Vector3
+from std_msgs.msg import Empty
 from std_srvs.srv import SetBool
 from typing_extensions import override
 
 from crazyflie_driver import srv
-from crazyflie_fleet.conversions import to_message
+from crazyflie_driver.msg import FullState as FullStateMessage
+from crazyflie_driver.msg import Hover as HoverMessage
+from crazyflie_driver.msg import Position as PositionMessage
+from crazyflie_driver.msg import VelocityWorld as VelocityWorldMessage
+from crazyflie_fleet.conversions import full_state_message, to_message
 from crazyflie_fleet.settings import FirmwareNumber
-from crazyflie_mission_api.ros_vehicle import RosVehicle, seconds
-from crazyflie_model.angles import Triple
+from crazyflie_mission_api.mission_vehicle import Clock
+from crazyflie_mission_api.ros_vehicle import Pose, RosVehicle, seconds, velocity_between
+from crazyflie_model.angles import Triple, rpy_from_quaternion
 from crazyflie_model.collision_avoidance import AvoidanceSettings
-from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.polynomials import Goal, PolynomialPiece
 from crazyflie_msgs.msg import FlightStatus, VehicleStatus
-from crazyflie_py.avoidance_parameters import avoidance_parameters
 from crazyflie_py.backend import VehicleBackend, VehicleState
-from crazyflie_py.held_vehicle import HeldVehicle
 from crazyflie_py.ros_connection import Connection
-from crazyflie_py.ros_setpoints import SetpointPublishers
-from crazyflie_py.ros_states import RosStates
-from crazyflie_py.setpoints import Setpoint
+from crazyflie_py.separation_watch import HeldVehicle
+from crazyflie_py.setpoints import (
+    Attitude,
+    FullState,
+    Hover,
+    MotorsOff,
+    Position,
+    Setpoint,
+    VelocityWorld,
+)
 from crazyflie_py.simulated_parameters import SimulatedParameters
-from crazyflie_utils import ParameterError
+from crazyflie_utils import NodeHandle, ParameterError
+from crazyflie_utils.topics import Publisher
+
+#: For the first setpoint, until the vehicle is connected, s of the machine's clock.
+_CONNECTION_LIMIT = 2.0
+
+_TOPICS: dict[type, tuple[str, Any]] = {
+    FullState: ("cmd_full_state", FullStateMessage),
+    Position: ("cmd_position", PositionMessage),
+    VelocityWorld: ("cmd_velocity_world", VelocityWorldMessage),
+    Hover: ("cmd_hover", HoverMessage),
+    Attitude: ("cmd_vel", Twist),
+    MotorsOff: ("cmd_stop", Empty),
+}
+
+_STATE_TIMEOUT = 10.0  #: For a pose, s of the vehicles' time.
+_VELOCITY_SPAN = 0.2  #: Longest time between two poses from which a velocity follows, s.
+
+_UNKNOWN: Triple = (math.nan, math.nan, math.nan)
+
+#: In place of an infinite corner, m: the parameter server has no infinity.
+_FIRMWARE_INFINITY = 1e9
 
 _NOT_FLYING = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
+
+
+class SetpointPublishers:
+    """Publishes the setpoints of one vehicle."""
+
+    def __init__(self, handle: NodeHandle, vehicle: RosVehicle):
+        self._handle = handle
+        self._vehicle = vehicle
+        self._publishers: dict[type, Publisher] = {}
+
+    def publish(self, setpoint: Setpoint) -> None:
+        """Publish a setpoint; ValueError for one that the vehicle cannot follow."""
+        if isinstance(setpoint, Attitude) and not self._vehicle.uses_driver:
+            raise ValueError(
+                f"{self._vehicle.name}: cmdVel cannot be followed: a controller of the workspace "
+                "flies it; expected cmdPosition, cmdFullState, cmdVelocityWorld or cmdHover"
+            )
+        publisher = self._publishers.get(type(setpoint)) or self._connect(type(setpoint))
+        publisher.publish(self._message(setpoint))
+
+    def _connect(self, kind):
+        name, message_type = _TOPICS[kind]
+        top = self._vehicle.services["go_to"].rpartition("/")[0]
+        publisher = self._publishers[kind] = self._handle.publisher(f"{top}/{name}", message_type)
+        end = time.monotonic() + _CONNECTION_LIMIT
+        while not publisher.has_subscribers() and time.monotonic() < end:
+            time.sleep(0.01)
+        return publisher
+
+    def _message(self, setpoint):
+        message = message_of(setpoint)
+        if hasattr(message, "header"):
+            message.header.stamp = self._handle.stamp()
+        return message
+
+
+def message_of(setpoint: Setpoint) -> Any:
+    """Return the driver's message, without a stamp; its yaw rates are clockwise, in deg/s."""
+    if isinstance(setpoint, FullState):
+        goal = Goal(
+            setpoint.position,
+            setpoint.velocity,
+            setpoint.acceleration,
+            setpoint.yaw,
+            setpoint.omega[2],
+        )
+        message = full_state_message(goal)
+        message.twist.angular = Vector3(*setpoint.omega)
+        return message
+    if isinstance(setpoint, Position):
+        x, y, z = setpoint.position
+        return PositionMessage(x=x, y=y, z=z, yaw=math.degrees(setpoint.yaw))
+    if isinstance(setpoint, VelocityWorld):
+        return VelocityWorldMessage(vel=Vector3(*setpoint.velocity), yawRate=-setpoint.yaw_rate)
+    if isinstance(setpoint, Hover):
+        return HoverMessage(
+            vx=setpoint.vx, vy=setpoint.vy, yawrate=-setpoint.yaw_rate, zDistance=setpoint.height
+        )
+    if isinstance(setpoint, Attitude):
+        linear = Vector3(setpoint.pitch, setpoint.roll, setpoint.thrust)
+        return Twist(linear, Vector3(0.0, 0.0, -setpoint.yaw_rate))
+    return Empty()
+
+
+class RosStates:
+    """States of one vehicle; accelerations are not known, NaN."""
+
+    def __init__(self, vehicle: RosVehicle, clock: Clock):
+        self._vehicle = vehicle
+        self._clock = clock
+        self._last: Pose | None = None
+        self._velocity = _UNKNOWN
+
+    def state(self) -> VehicleState:
+        """Return the state; its velocity is that between two poses.
+
+        Raises
+        ------
+        TimeoutError
+            No pose has come for 10 s.
+        """
+        pose, last = self._wait(lambda pose: True), self._last
+        if last is None or pose.time - last.time > _VELOCITY_SPAN:
+            last, pose = pose, self._wait(lambda new: new.time > pose.time)
+        if pose.time > last.time:
+            self._velocity = velocity_between(last, pose)
+        self._last = pose
+        rpy = rpy_from_quaternion(*pose.rotation)
+        return VehicleState(pose.position, self._velocity, _UNKNOWN, rpy)
+
+    def _wait(self, condition: Callable[[Pose], bool]) -> Pose:
+        def is_there():
+            pose = self._vehicle.pose()
+            return pose is not None and condition(pose)
+
+        self._clock.wait_until(is_there, self._clock.time() + _STATE_TIMEOUT)
+        pose = self._vehicle.pose()
+        if pose is None:
+            raise TimeoutError(
+                f"{self._vehicle.name}: no position for {_STATE_TIMEOUT:g} s; does motion capture "
+                "track it?"
+            )
+        return pose
+
+
+def avoidance_parameters(settings: AvoidanceSettings) -> dict[str, float]:
+    """Return the firmware parameters of collision avoidance.
+
+    Names are those of bitcraze/crazyflie-firmware, collision_avoidance.c.
+    """
+    values: dict[str, float] = {
+        "colAv.horizon": settings.horizon,
+        "colAv.maxSpeed": settings.max_speed,
+        "colAv.sidestepThrsh": settings.sidestep_threshold,
+        "colAv.vorTol": settings.tolerance,
+        "colAv.vorIters": settings.max_iterations,
+    }
+    for axis, radius, low, high in zip(
+        "XYZ", settings.radii, settings.box_min, settings.box_max, strict=True
+    ):
+        values[f"colAv.ellipsoid{axis}"] = radius
+        values[f"colAv.bboxMin{axis}"] = max(low, -_FIRMWARE_INFINITY)
+        values[f"colAv.bboxMax{axis}"] = min(high, _FIRMWARE_INFINITY)
+    return values
 
 
 class RosVehicleBackend(VehicleBackend):

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 from crazyflie_model.angles import Triple
 
+#: Age of a setpoint at which the firmware levels out, s (commander.h, WDT_TIMEOUT_STABILIZE).
+SETPOINT_TIMEOUT = 0.5
+
 
 @dataclass(frozen=True)
 class FullState:

@@ -3,26 +3,222 @@
 import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_model.angles import Triple
-from crazyflie_model.collision_avoidance import AvoidanceSettings
-from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.collision_avoidance import AvoidanceSettings, CollisionAvoidance
+from crazyflie_model.polynomials import PIECE_SIZE, Goal, PolynomialPiece
+from crazyflie_model.units import GRAVITY
 from crazyflie_py.backend import VehicleBackend, VehicleState
 from crazyflie_py.fleet import FleetVehicle
-from crazyflie_py.ideal_motion import IdealMotion, Motion, attitude
-from crazyflie_py.setpoints import Attitude, MotorsOff, Setpoint
+from crazyflie_py.setpoints import (
+    SETPOINT_TIMEOUT,
+    Attitude,
+    FullState,
+    Hover,
+    MotorsOff,
+    Position,
+    Setpoint,
+    VelocityWorld,
+)
 from crazyflie_py.simulated_parameters import SimulatedParameters
-from crazyflie_py.trajectory_memory import TrajectoryMemory
-from crazyflie_virtual.firmware.planner import ACTIVE, Planner
+from crazyflie_virtual.firmware.planner import (
+    ACTIVE,
+    DEFINITIONS,
+    IN_MEMORY,
+    MEMORY_SIZE,
+    POLYNOMIALS,
+    Planner,
+)
 from crazyflie_virtual.firmware.states import Estimate
+
+Array = NDArray[np.float64]
+
+_ROOM = MEMORY_SIZE // PIECE_SIZE  #: Pieces that the memory holds.
 
 _log = logging.getLogger(__name__)
 
 #: Height above the start from which motors are not stopped without a warning, m.
 _FALL_HEIGHT = 0.1
-#: Age of a setpoint at which the firmware levels out, s (commander.h, WDT_TIMEOUT_STABILIZE).
-_SETPOINT_TIMEOUT = 0.5
+
+
+class Motion(NamedTuple):
+    """Position (m), velocity (m/s), acceleration (m/s^2), each (3,), and yaw (rad)."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    yaw: float
+
+
+class IdealMotion:
+    """Motion of one vehicle, in steps.
+
+    Parameters
+    ----------
+    position : tuple, 3 components
+        At the beginning, m; the yaw is 0.
+    max_speed : float
+        m/s.
+    disturbance : float
+        Standard deviation of what is added to the velocity of velocity setpoints, m/s.
+    """
+
+    def __init__(self, position: Triple, max_speed: float, disturbance: float):
+        self._max_speed = max_speed
+        self._disturbance = disturbance
+        self._avoidance: CollisionAvoidance | None = None
+        self._others: Sequence[IdealMotion] = ()
+        self.now = Motion(np.array(position), np.zeros(3), np.zeros(3), 0.0)
+
+    def avoid(self, others: Sequence[Self], settings: AvoidanceSettings | None) -> None:
+        """Avoid others from now on; with None for settings, no more."""
+        self._others = others
+        self._avoidance = None if settings is None else CollisionAvoidance(settings)
+
+    def held(self) -> Motion:
+        """Return the motion of staying in place."""
+        return Motion(self.now.position, np.zeros(3), np.zeros(3), self.now.yaw)
+
+    def tracked(self, goal: Goal[float] | FullState, dt: float) -> Motion:
+        """Return the motion ``dt`` (s) from now, as far as avoidance and speed permit the goal."""
+        vectors = (goal.position, goal.velocity, goal.acceleration)
+        position, velocity, acceleration = map(np.array, vectors)
+        return self._limited(Motion(position, velocity, acceleration, goal.yaw), dt)
+
+    def at_setpoint(self, setpoint: Setpoint, dt: float) -> Motion:
+        """Return the motion ``dt`` (s) from now; an attitude keeps the vehicle in place."""
+        if isinstance(setpoint, FullState):
+            return self.tracked(setpoint, dt)
+        if isinstance(setpoint, Position):
+            zero = np.zeros(3)
+            goal = Motion(np.array(setpoint.position), zero, zero, setpoint.yaw)
+            return self._approached(self._limited(goal, dt), dt)
+        if isinstance(setpoint, VelocityWorld):
+            return self._at_velocity(np.array(setpoint.velocity), setpoint.yaw_rate, dt)
+        if isinstance(setpoint, Hover):
+            climb = (setpoint.height - self.now.position[2]) / dt
+            velocity = np.array([*setpoint.velocity(self.now.yaw), climb])
+            return self._at_velocity(velocity, setpoint.yaw_rate, dt)
+        return self.held()
+
+    def _limited(self, goal, dt):
+        if self._avoidance is not None:
+            position, velocity = self._avoidance.position_setpoint(
+                self.now.position, self._other_positions(), goal.position, goal.velocity
+            )
+            if np.array_equal(position, goal.position):
+                goal = goal._replace(velocity=velocity)
+            else:
+                goal = self._approached(goal._replace(position=position), dt)
+        way = goal.position - self.now.position
+        reach = self._max_speed * dt
+        if np.linalg.norm(way) <= reach:
+            return goal
+        return self._approached(
+            goal._replace(position=self.now.position + _clamped(way, reach)), dt
+        )
+
+    def _approached(self, goal, dt):
+        """Return a goal with the velocity at which it is reached."""
+        velocity = (goal.position - self.now.position) / dt
+        return goal._replace(velocity=velocity, acceleration=np.zeros(3))
+
+    def _at_velocity(self, velocity, yaw_rate, dt):
+        position = self.now.position
+        if self._avoidance is not None:
+            others = self._other_positions()
+            velocity = self._avoidance.velocity_setpoint(position, others, velocity)
+        velocity = _clamped(velocity, self._max_speed)
+        if self._disturbance:
+            velocity = velocity + self._disturbance * np.random.normal(size=3)
+        yaw = self.now.yaw + math.radians(yaw_rate) * dt
+        return Motion(position + dt * velocity, velocity, np.zeros(3), yaw)
+
+    def _other_positions(self):
+        return np.array([other.now.position for other in self._others]).reshape(-1, 3)
+
+
+def attitude(acceleration: Array, yaw: float) -> Triple:
+    """Return roll, pitch and yaw (rad) of a multirotor that accelerates, by differential flatness.
+
+    Its thrust is along its z axis, its x axis above the heading. Acceleration of shape (3,), m/s^2.
+    """
+    ax, ay, az = acceleration
+    c, s = math.cos(yaw), math.sin(yaw)
+    ahead, left, up = c * ax + s * ay, c * ay - s * ax, az + GRAVITY
+    pitch = math.atan2(ahead, up)
+    return math.atan2(-left, math.hypot(ahead, up)), pitch, yaw
+
+
+def _clamped(vector, limit):
+    length = float(np.linalg.norm(vector))
+    return vector * (limit / length) if length > limit else vector
+
+
+class TrajectoryMemory:
+    """Trajectories by the ids of scripts, which go to 255; those of the firmware go to 30.
+
+    Parameters
+    ----------
+    name : str
+        Of the vehicle.
+    planner : Planner
+    warn : callable
+        Gets a text.
+    """
+
+    def __init__(self, name: str, planner: Planner, warn: Callable[[str], None]):
+        self._name = name
+        self._planner = planner
+        self._warn = warn
+        self._slots: dict[int, tuple[int, range]] = {}
+
+    def upload(
+        self, trajectory_id: int, piece_offset: int, pieces: Sequence[PolynomialPiece]
+    ) -> None:
+        """Write pieces; ValueError when there is no room."""
+        where = f"{self._name}.uploadTrajectory"
+        room = range(piece_offset, piece_offset + len(pieces))
+        if room.stop > _ROOM:
+            raise ValueError(
+                f"{where}: {len(pieces)} pieces from pieceOffset {piece_offset} on; expected no "
+                f"more than {_ROOM} in all, the room in the memory"
+            )
+        slot = self._slots.get(trajectory_id, (len(self._slots), room))[0]
+        if slot >= DEFINITIONS:
+            raise ValueError(
+                f"{where}: trajectoryId is {trajectory_id}; expected one of the {DEFINITIONS} that "
+                f"are in use: {sorted(self._slots)}"
+            )
+        if trajectory_id >= DEFINITIONS:
+            self._warn(
+                f"{where}: trajectoryId is {trajectory_id}; a real vehicle refuses it, the "
+                f"firmware expects 0 to {DEFINITIONS - 1}"
+            )
+        for other, (_, taken) in self._slots.items():
+            if other != trajectory_id and set(taken) & set(room):
+                self._warn(
+                    f"{where}: pieces {room.start} to {room.stop - 1} overwrite trajectory "
+                    f"{other}; another pieceOffset keeps both"
+                )
+        self._slots[trajectory_id] = slot, room
+        begin = piece_offset * PIECE_SIZE
+        data = b"".join(piece.pack() for piece in pieces)
+        self._planner.memory[begin : begin + len(data)] = data
+        self._planner.define(slot, IN_MEMORY, POLYNOMIALS, begin, len(pieces))
+
+    def slot(self, trajectory_id: int) -> int:
+        """Return the planner's number of a trajectory; ValueError for one that is not there."""
+        if trajectory_id not in self._slots:
+            raise ValueError(
+                f"{self._name}.startTrajectory: trajectoryId is {trajectory_id}; expected one that "
+                f"uploadTrajectory has written: {sorted(self._slots) or 'there is none'}"
+            )
+        return self._slots[trajectory_id][0]
 
 
 class SimulatedVehicle:
@@ -211,9 +407,9 @@ class SimulatedVehicle:
         if now > self._expiry:
             self._setpoint = None
         if self._setpoint is not None:
-            if math.isinf(self._expiry) and now > self._sent + _SETPOINT_TIMEOUT + dt:
+            if math.isinf(self._expiry) and now > self._sent + SETPOINT_TIMEOUT + dt:
                 self._warn(
-                    f"{self.name}: no setpoint for {_SETPOINT_TIMEOUT:g} s; a real vehicle levels "
+                    f"{self.name}: no setpoint for {SETPOINT_TIMEOUT:g} s; a real vehicle levels "
                     "out and stops its motors 2 s after the last one"
                 )
             return self._motion.at_setpoint(self._setpoint, dt)

@@ -3,13 +3,12 @@
 import argparse
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from crazyflie_fleet.fleet_config import close_pairs
 from crazyflie_py.backend import EachVehicle
-from crazyflie_py.csv_output import CsvOutput
 from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.simulated_vehicle import SimulatedVehicle
 from crazyflie_py.visualizer import visualizer_for
@@ -17,6 +16,39 @@ from crazyflie_py.visualizer import visualizer_for
 _log = logging.getLogger(__name__)
 
 _ROUNDING = 1e-9  #: Part of a step by which a sleep may be too short for it, due to rounding.
+
+
+class CsvOutput:
+    """Files cfID_phaseN.csv in the working directory.
+
+    Columns: time since the beginning of the phase (s), position (m), roll, pitch, yaw (rad).
+    ``timeHelper.nextPhase()`` begins a phase; a script without it has one, number 0.
+    """
+
+    def __init__(self) -> None:
+        self._phase = 0
+        self._rows: dict[int, list[list[float]]] = {}
+
+    def update(self, time: float, vehicles: Iterable[SimulatedVehicle]) -> None:
+        """Add a row for each vehicle."""
+        for vehicle in vehicles:
+            state = vehicle.state()
+            row = [time, *state.position, *state.rpy]
+            self._rows.setdefault(vehicle.id, []).append(row)
+
+    def next_phase(self) -> None:
+        """Write the present phase, and begin the next one."""
+        self.close()
+        self._phase += 1
+
+    def close(self) -> None:
+        """Write the present phase."""
+        for vehicle_id, rows in self._rows.items():
+            data = np.array(rows)
+            data[:, 0] -= data[0, 0]
+            name = f"cf{vehicle_id}_phase{self._phase}.csv"
+            np.savetxt(name, data, "%.9g", ",", header="t,x,y,z,roll,pitch,yaw")
+        self._rows.clear()
 
 
 class Simulation(EachVehicle):

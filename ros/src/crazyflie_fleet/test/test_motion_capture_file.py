@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_fleet import motion_capture_file
+from crazyflie_fleet.crazyswarm2_files import load_motion_capture
 from crazyflie_fleet.mocap_process import make_nodes
 from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters.types import TEXT as TEXT_TYPE
@@ -28,7 +28,7 @@ def load(tmp_path):
     def load(text):
         path = tmp_path / "motion_capture.yaml"
         path.write_text(text)
-        return motion_capture_file.load(path)
+        return load_motion_capture(path)
 
     return load
 

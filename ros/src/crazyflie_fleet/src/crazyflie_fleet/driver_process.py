@@ -1,7 +1,7 @@
 """The driver of a fleet, with what crazyswarm2's files say about the radio."""
 
 from crazyflie_driver.server_node import CrazyflieServerNode
-from crazyflie_fleet import server_file
+from crazyflie_fleet.crazyswarm2_files import load_server
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import Text
@@ -29,7 +29,7 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     config = handle.load(DriverFleetParameters)
     given = config.fleet().broadcasts
     if config.server:
-        server = server_file.load(config.server)
+        server = load_server(config.server)
         given = {**given, **server.driver}
         for remark in server.remarks:
             handle.warn(remark)

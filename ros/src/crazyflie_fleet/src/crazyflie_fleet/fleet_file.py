@@ -1,17 +1,135 @@
 """The file that names the vehicles of a fleet, laid out as one of Crazyswarm 1 or crazyswarm2."""
 
 import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from crazyflie_fleet import crazyswarm1
+import yaml
+
 from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
 from crazyflie_fleet.fleet_parser import FleetParser, close_vehicles
-from crazyflie_fleet.settings import RobotSettings
+from crazyflie_fleet.settings import SINGLE_MARKER, RobotSettings
 from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters import yaml_file
+from crazyflie_utils.parameters.types import Integer
+from crazyflie_utils.parameters.yaml_file import Entry
+
+VEHICLES, TYPES = "crazyflies", "crazyflieTypes"  #: Keys at the top of the two files.
+
+_TYPE_KEYS = {
+    "bigQuad": ("big_quad",),
+    "batteryVoltageWarning": ("battery", "voltage_warning"),
+    # So it is spelt in their file.
+    "batteryVoltateCritical": ("battery", "voltage_critical"),
+    "batteryVoltageCritical": ("battery", "voltage_critical"),
+    "markerConfiguration": ("motion_capture", "marker"),
+    "dynamicsConfiguration": ("motion_capture", "dynamics"),
+    "firmwareParams": ("firmware_params",),
+}
+_ID = Integer(0, 255)
+_CHANNEL = Integer(0, 125)
 
 FIRST_PORT = 19850  #: UDP port of a grid's first vehicle.
 TYPES_FILE = "crazyflieTypes.yaml"  #: Name of Crazyswarm 1's second file, beside the first.
+
+
+def converted(vehicles: Entry, types: Entry | None) -> Entry:
+    """Return both files as crazyswarm2 lays out one; values keep their file and line.
+
+    Vehicle k is named cfk; its address is radio://0/CHANNEL/2M/E7E7E7E7 and k with two hexadecimal
+    digits. One without a channel has no address. Without ``types`` no vehicle has a type.
+
+    Raises
+    ------
+    ParameterError
+        A vehicle has no id, or another's.
+    """
+    robots: dict[str, yaml.Node] = {}
+    errors: list[str] = []
+    for entry in vehicles[VEHICLES].elements():
+        try:
+            name, node = _robot(entry, types is not None)
+            if name in robots:
+                line = robots[name].start_mark.line + 1
+                raise entry["id"].error(f"is that of {name} in line {line}; expected another")
+            robots[name] = node
+        except ParameterError as error:
+            errors += error.complaints
+    if errors:
+        raise ParameterError(*errors)
+    top = vehicles.node
+    parts = {key: entry.node for key, entry in vehicles.entries().items() if key != VEHICLES}
+    parts["robots"] = _mapping(robots, vehicles[VEHICLES].node)
+    if types is not None:
+        parts["robot_types"] = _mapping(
+            {name: _type(entry, types) for name, entry in types[TYPES].entries().items()},
+            types[TYPES].node,
+        )
+    return Entry("", _mapping(parts, top))
+
+
+def _robot(entry, has_types):
+    number = _number(entry["id"], _ID)
+    parts = {key: value.node for key, value in entry.entries().items()}
+    place = parts.pop("id")
+    if "channel" in parts:
+        channel = _number(entry["channel"], _CHANNEL)
+        parts["uri"] = _text(f"radio://0/{channel}/2M/E7E7E7E7{number:02X}", place)
+        del parts["channel"]
+    if not has_types:
+        parts.pop("type", None)
+    if "initialPosition" in parts:
+        parts["initial_position"] = parts.pop("initialPosition")
+    return f"cf{number}", _mapping(parts, entry.node)
+
+
+def _type(entry, types):
+    parts: dict[tuple[str, ...], yaml.Node] = {
+        _TYPE_KEYS.get(key, (key,)): value.node for key, value in entry.entries().items()
+    }
+    for key in ("marker", "dynamics"):
+        path: tuple[str, ...] = ("motion_capture", key)
+        if path in parts:
+            parts[path] = _text(str(parts[path].value), parts[path])
+    marker = parts.get(("motion_capture", "marker"))
+    if marker is not None and _points(types, marker.value) == 1:
+        parts["motion_capture", "tracking"] = _text(SINGLE_MARKER, marker)
+    groups: dict[str, dict[str, yaml.Node]] = {}
+    for keys, node in parts.items():
+        if len(keys) == 2:
+            groups.setdefault(keys[0], {})[keys[1]] = node
+    single = {keys[0]: node for keys, node in parts.items() if len(keys) == 1}
+    nested = {group: _mapping(inner, entry.node) for group, inner in groups.items()}
+    return _mapping({**single, **nested}, entry.node)
+
+
+def _points(types, configuration):
+    """Return the number of points of a marker configuration; 0 if there is none."""
+    entry = types
+    for key in ("markerConfigurations", configuration, "points"):
+        if key not in entry:
+            return 0
+        entry = entry[key]
+    return len(entry.entries())
+
+
+def _number(entry: Entry, expected: Integer) -> int:
+    try:
+        return expected(entry.value)
+    except ValueError:
+        raise entry.error(f"is {entry.value!r}; expected {expected}") from None
+
+
+def _mapping(parts: Mapping[str, yaml.Node], place: yaml.Node) -> yaml.MappingNode:
+    def pairs() -> Iterator[tuple[yaml.Node, yaml.Node]]:
+        for key, node in parts.items():
+            yield _text(key, node), node
+
+    return yaml.MappingNode("tag:yaml.org,2002:map", [*pairs()], place.start_mark, place.end_mark)
+
+
+def _text(value: str, place: yaml.Node) -> yaml.ScalarNode:
+    return yaml.ScalarNode("tag:yaml.org,2002:str", value, place.start_mark, place.end_mark)
 
 
 def load(path: str | Path) -> FleetConfig:
@@ -40,11 +158,11 @@ def parse(text: str, name: str = "crazyflies.yaml") -> FleetConfig:
 
 
 def _fleet(top, types):
-    if crazyswarm1.VEHICLES not in top:
+    if VEHICLES not in top:
         return FleetParser(top).fleet()
     parts = None if types is None else yaml_file.load(types)
-    parser = FleetParser(crazyswarm1.converted(top, parts))
-    if types is None and any("type" in each for each in top[crazyswarm1.VEHICLES].elements()):
+    parser = FleetParser(converted(top, parts))
+    if types is None and any("type" in each for each in top[VEHICLES].elements()):
         parser.remarks.add(f"{top.file}: there is no {TYPES_FILE} beside it; types have no effect")
     return parser.fleet()
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from crazyflie_fleet import motion_capture_file, server_file
+from crazyflie_fleet.crazyswarm2_files import load_motion_capture, load_server
 from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters, NodeParameters
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
@@ -106,9 +106,9 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
         A parameter, or the fleet file, is wrong.
     """
     config = handle.load(MocapFleetParameters)
-    given = motion_capture_file.load(config.motion_capture) if config.motion_capture else {}
+    given = load_motion_capture(config.motion_capture) if config.motion_capture else {}
     if config.server:
-        given |= server_file.load(config.server).motion_capture
+        given |= load_server(config.server).motion_capture
     for key, value in given.items():
         handle.set_param(f"{handle.name}/{key}", value)
     fleet, kind = config.fleet(), NodeParameters()

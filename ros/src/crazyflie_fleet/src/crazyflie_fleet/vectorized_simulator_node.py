@@ -1,18 +1,15 @@
-"""ROS interface of many vehicles that are simulated, estimated and controlled together.
-
-For each vehicle it is what a simulator, an estimator and a controller are, with the same topics.
-"""
+"""ROS interface of many simulated vehicles of one model."""
 
 import math
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from std_msgs.msg import Float64MultiArray, Header
+from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
 from typing_extensions import override
 
 from crazyflie_fleet.fleet_config import VehicleConfig
-from crazyflie_fleet.messages import array_message, control_message, state_message
 from crazyflie_fleet.vectorized_vehicles import VectorizedVehicles
 from crazyflie_fleet.vehicle_nodes import (
     FINAL_CONTROL,
@@ -30,8 +27,10 @@ from crazyflie_model.dynamics import Coupled7D, NearHover, SevenDimensional
 from crazyflie_model.elementwise import join, split
 from crazyflie_model.limits import MAX_SPEED
 from crazyflie_msgs.msg import (
+    Control,
     ControlStamped,
     PositionVelocityStateStamped,
+    PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
 from crazyflie_simulator.real_time_watch import RealTimeWatch
@@ -50,6 +49,33 @@ ALL_STATES = "states"
 
 #: Models of which vehicles can be flown together.
 MODELS: dict[str, type[SevenDimensional]] = {"near_hover": NearHover, "coupled_7d": Coupled7D}
+
+
+def state_message(header: Header, row: Sequence[float]) -> PositionVelocityYawStateStamped:
+    """Return a state: x, y, z, x_dot, y_dot, z_dot in m and m/s, yaw in rad."""
+    state = object.__new__(PositionVelocityYawState)
+    state.x, state.y, state.z, state.x_dot, state.y_dot, state.z_dot, state.yaw = row
+    message = object.__new__(PositionVelocityYawStateStamped)
+    message.header, message.state = header, state
+    return message
+
+
+def control_message(header: Header, row: Sequence[float]) -> ControlStamped:
+    """Return a control: roll and pitch in rad, yaw_dot in rad/s, thrust in m/s^2."""
+    control = object.__new__(Control)
+    control.roll, control.pitch, control.yaw_dot, control.thrust = row
+    message = object.__new__(ControlStamped)
+    message.header, message.control = header, control
+    return message
+
+
+def array_message(rows: NDArray[np.float64]) -> Float64MultiArray:
+    """Return the states of n vehicles, shape (n, 7)."""
+    n, size = rows.shape
+    layout = MultiArrayLayout(
+        [MultiArrayDimension("vehicle", n, n * size), MultiArrayDimension("state", size, size)], 0
+    )
+    return Float64MultiArray(layout, rows.ravel())
 
 
 def batch_control(

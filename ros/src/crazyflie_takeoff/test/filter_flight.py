@@ -2,12 +2,11 @@
 
 from takeoff_helpers import PointMass
 
-from crazyflie_takeoff.filter_states import FilterState, LossTimeouts
+from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, LossTimeouts
 from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.limits import Box, Limits
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import Setpoint
-from crazyflie_takeoff.safe_filter import SafeFilter
 
 G = 9.81
 ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState
@@ -23,7 +22,7 @@ class Flight:
     """A filter above a vehicle, whose true hover thrust is not what it is believed to be."""
 
     def __init__(self, height=1.0, hover=G, speed=0.0, sees=True, with_state=True):
-        self.filter = SafeFilter(TIMEOUTS, LIMITS)
+        self.filter = FilterMachine(TIMEOUTS, LIMITS)
         self.vehicle = PointMass(height)
         self.vehicle.z_dot = speed
         self.hover = hover
@@ -34,7 +33,7 @@ class Flight:
         self.flown = []
         self.filter.stop_listening(0.0)
         if with_state:
-            self.filter.choice.state = FLYING
+            self.filter.flight_state = FLYING
         self.fly(level(hover))
 
     @property
@@ -55,7 +54,7 @@ class Flight:
             self.vehicle.advance(0.01)
             if self.sees:
                 position = (0.0, 0.0, self.vehicle.z)
-                self.filter.relay.measure(Motion(position, (0.0, 0.0, self.vehicle.z_dot)))
+                self.filter.measure(Motion(position, (0.0, 0.0, self.vehicle.z_dot)))
             if self.controls:
                 thrust = self.hover + 2.0 * (self.target - self.vehicle.z_dot)
                 self.fly(self.filter.commanded(self.time, thrust, level(thrust)))

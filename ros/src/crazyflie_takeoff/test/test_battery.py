@@ -8,7 +8,7 @@ from std_srvs.srv import EmptyRequest
 from takeoff_helpers import SERVER, filter_status, state
 
 from crazyflie_msgs.msg import FlightStatus
-from crazyflie_takeoff.battery import Battery, Charge
+from crazyflie_takeoff.takeoff_checks import Battery, Charge
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.transport import ServiceError

@@ -7,9 +7,16 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
-from crazyflie_takeoff.callers import MEMORY, Callers
-from crazyflie_takeoff.control_limits import ClimbLimit, RunGaps, in_range
-from crazyflie_takeoff.limits import Box, Limits, Walls
+from crazyflie_takeoff.limits import (
+    MEMORY,
+    Box,
+    Callers,
+    ClimbLimit,
+    Limits,
+    RunGaps,
+    Walls,
+    in_range,
+)
 from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import MAX_BRAKING, MAX_SUBSTITUTE, Setpoint
 

@@ -16,8 +16,7 @@ from flight_clock import (
     in_state,
 )
 
-from crazyflie_takeoff.flight import FlightStateMachine
-from crazyflie_takeoff.server_states import Event, FilterReport
+from crazyflie_takeoff.server_table import Event, FilterReport, FlightStateMachine
 
 
 def test_landing_descends_first():

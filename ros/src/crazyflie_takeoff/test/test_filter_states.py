@@ -3,15 +3,15 @@
 from random import Random
 
 import pytest
+from filter_flight import LIMITS
 from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_msgs.msg import FilterStatus
-from crazyflie_takeoff.control_filter import ControlFilter
-from crazyflie_takeoff.filter_states import Event, FilterMachine, FilterState, LossTimeouts
+from crazyflie_takeoff.filter_machine import Event, FilterMachine, FilterState, LossTimeouts
 from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_takeoff.ground import Ground
-from crazyflie_takeoff.motion import Measurement, Motion
+from crazyflie_takeoff.motion import Motion
+from crazyflie_takeoff.safe_control import Setpoint
 
 TABLE = FilterMachine.TABLE
 LEGAL = {
@@ -26,9 +26,8 @@ class World:
     """A machine whose facts change at random."""
 
     def __init__(self):
-        self.choice, self.measured, self.ground = ControlFilter(), Measurement(), Ground()
-        timeouts = LossTimeouts(0.125, 1.5, 5.0, 3.0)
-        self.machine = FilterMachine(timeouts, self.choice, self.measured, self.ground)
+        self.machine = FilterMachine(LossTimeouts(0.125, 1.5, 5.0, 3.0), LIMITS)
+        self.measured = self.machine.relay.measured
 
     def change(self, random):
         """Let time pass, and facts change."""
@@ -42,15 +41,17 @@ class World:
             position = (0.0, 0.0, random.choice([0.0, 0.07, 1.0]))
             self.measured.update(Motion(position, (0.0, 0.0, random.choice([-0.4, 0.0]))), 0.0)
         if random.random() < 0.3:
-            self.choice.state = random.choice([None, *FlightState])
+            self.machine.flight_state = random.choice([None, *FlightState])
         if random.random() < 0.1:
-            self.choice.toggle()
+            self.machine.toggle()
         if random.random() < 0.1:
-            self.choice.takeoff(0.0, "control", self.machine.takeoff_thrust)
+            thrust = self.machine.takeoff_thrust
+            self.machine.takeoff(0.0, "control", Setpoint(0.0, 0.0, 0.0, thrust))
 
     def facts(self):
         """Return all that guards could change."""
-        parts = (self.machine, self.choice, self.measured, self.ground)
+        relay = self.machine.relay
+        parts = (self.machine, relay, relay.measured, relay.ground)
         return [vars(part).copy() for part in parts]
 
     def rows(self, event):
@@ -106,7 +107,7 @@ def test_whatever_happens_the_table_decides(seed):
 def test_how_long_the_filter_waits(state, event, facts, after):
     world = World()
     machine, age = world.machine, facts.pop("age", 0.0)
-    world.choice.state = FlightState.FLYING
+    machine.flight_state = FlightState.FLYING
     world.measured.update(Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)), age)
     machine.state, machine.is_needed = state, True
     vars(machine).update(facts)

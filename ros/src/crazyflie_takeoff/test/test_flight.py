@@ -17,8 +17,7 @@ from flight_clock import (
 )
 
 from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_takeoff.server_states import Event
-from crazyflie_takeoff.server_table import Plan
+from crazyflie_takeoff.server_table import Event, Plan
 from crazyflie_utils.refusal import RefusalError
 
 

@@ -5,17 +5,16 @@ from filter_flight import FLYING, LANDING, LIMITS, ON_GROUND, TAKING_OFF, TIMEOU
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_takeoff.filter_states import FilterState
+from crazyflie_takeoff.filter_machine import FilterMachine, FilterState
 from crazyflie_takeoff.safe_control import (
     SINK_SPEED,
     Setpoint,
 )
-from crazyflie_takeoff.safe_filter import SafeFilter
 
 
 def test_a_controller_that_speaks_is_passed_on_as_it_is():
-    control_filter = SafeFilter(TIMEOUTS, LIMITS)
-    control_filter.choice.state = FLYING
+    control_filter = FilterMachine(TIMEOUTS, LIMITS)
+    control_filter.flight_state = FLYING
     messages = [object() for _ in range(500)]
     for k, message in enumerate(messages):
         assert control_filter.tick(k / 100) is None
@@ -159,17 +158,17 @@ def test_a_foreign_server_that_only_toggles():
     assert flight.filter.takeoff(flight.time, "lift", level(G + 0.2)) == "lift"
     flight.run(1.0)
     flight.filter.toggle()
-    assert flight.filter.choice.in_flight
+    assert flight.filter.in_flight
     flight.run(2.0).lose()
     flight.run_until_off()
     assert flight.flown[-1] == 0.0
     flight.filter.toggle()
-    assert flight.filter.choice.remembered is None
+    assert flight.filter.remembered is None
 
 
 def test_a_takeoff_without_a_controller_is_brought_down():
-    control_filter = SafeFilter(TIMEOUTS, LIMITS)
-    control_filter.choice.state = TAKING_OFF
+    control_filter = FilterMachine(TIMEOUTS, LIMITS)
+    control_filter.flight_state = TAKING_OFF
     modes = []
     for k in range(500):
         if k < 100:
@@ -181,9 +180,9 @@ def test_a_takeoff_without_a_controller_is_brought_down():
 
 
 def test_zero_thrust_on_the_ground_is_no_loss():
-    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    control_filter = FilterMachine(TIMEOUTS, LIMITS)
     for state in (ON_GROUND, LANDING):
-        control_filter.choice.state = state
+        control_filter.flight_state = state
         control_filter.takeoff(0.0, "zero", level(0.0))
         assert [control_filter.tick(k / 100) for k in range(300)] == [None] * 300
 

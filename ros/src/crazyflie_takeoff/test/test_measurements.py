@@ -5,14 +5,14 @@ import math
 import pytest
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_takeoff.battery import Battery, Charge
-from crazyflie_takeoff.callers import Callers
-from crazyflie_takeoff.descent import DESCENT_MARGIN, Descent
-from crazyflie_takeoff.driver_connection import DriverConnection
-from crazyflie_takeoff.flight_watch import DescentWatch, FlightWatch
-from crazyflie_takeoff.ground import Ground
-from crazyflie_takeoff.limits import Box, Debounce, Limits, Walls
-from crazyflie_takeoff.motion import Delay, MeasuredPosition, Measurement, Motion
+from crazyflie_takeoff.filter_machine import FilterMachine, LossTimeouts
+from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.limits import Box, Callers, Debounce, DescentWatch, Limits, Walls
+from crazyflie_takeoff.motion import Delay, Ground, MeasuredPosition, Measurement, Motion
+from crazyflie_takeoff.relay import Relay
+from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.server_table import DESCENT_MARGIN, Descent
+from crazyflie_takeoff.takeoff_checks import Battery, Charge, DriverConnection
 
 
 def at(z, z_dot=0.0):
@@ -217,6 +217,14 @@ def test_a_complaint_has_to_last():
 # What ends a flight.
 
 
+def level(thrust):
+    return Setpoint(0.0, 0.0, 0.0, thrust)
+
+
+def measure(relay, motion):
+    relay.measure(motion, 0.0, is_on_ground=False, in_flight=True)
+
+
 def test_a_vehicle_that_is_to_land_has_to_come_down():
     watch = DescentWatch()
     said = [bool(watch.advance(0.25, 1.0)) for _ in range(8)]
@@ -227,37 +235,39 @@ def test_a_vehicle_that_is_to_land_has_to_come_down():
 
 
 def test_a_vehicle_is_outside_only_while_states_say_so():
-    watch = FlightWatch(LIMITS)
-    watch.measure(Motion((9.0, 0.0, 1.0), (0.0, 0.0, 0.0)), 0.0)
-    crashes = [bool(watch.advance(0.0625 * k, 0.0625, None)[0]) for k in range(5)]
+    relay = Relay(LIMITS, 0.1)
+    measure(relay, Motion((9.0, 0.0, 1.0), (0.0, 0.0, 0.0)))
+    crashes = [bool(relay.advance(0.0625 * k, 0.0625, 0.0625, False)[0]) for k in range(5)]
     assert crashes == [False, True, True, False, False]
 
 
 @pytest.mark.parametrize("fault", ["climb", "busy", "stays"])
 def test_each_fault_alone_ends_a_flight(fault):
-    watch = FlightWatch(LIMITS)
+    relay = Relay(LIMITS, 0.1)
     for k in range(30):
+        measure(relay, at(1.0, 2.9 if fault == "climb" else 0.0))
         if fault == "climb":
-            watch.climb.apply(99.0, 9.81, at(1.0), 10.0, False)
+            relay.takeoff("control", Setpoint(0.0, 0.0, 0.0, 99.0), False)
         step = 0.3 if fault == "busy" else 0.1
-        crash, objection = watch.advance(step * k, step, 1.0 if fault == "stays" else None)
+        crash, objection = relay.advance(step * k, step, step, fault == "stays")
     assert not crash
     words = {"climb": "the controls climb", "busy": "too busy", "stays": "has not come down"}
     assert words[fault] in objection
 
 
 def test_two_takeoff_servers_in_flight_are_noticed_at_once_and_two_controllers_soon():
-    watch = FlightWatch(LIMITS)
-    watch.note_takeoff(1.0, "/a", is_on_ground=True)
-    watch.note_takeoff(9.0, "/b", is_on_ground=True)
-    assert watch.contention == ""
-    watch.note_takeoff(17.0, "/a", is_on_ground=False)
-    assert watch.contention.startswith("two nodes publish takeoff controls")
-    watch = FlightWatch(LIMITS)
+    machine = FilterMachine(LossTimeouts(0.1, 0.5, 5.0, 3.0), LIMITS)
+    machine.takeoff(1.0, "zero", level(0.0), "/a")
+    machine.takeoff(9.0, "zero", level(0.0), "/b")
+    assert machine.relay.contention == ""
+    machine.flight_state = FlightState.FLYING
+    machine.takeoff(17.0, "zero", level(0.0), "/a")
+    assert machine.relay.contention.startswith("two nodes publish takeoff controls")
+    machine = FilterMachine(LossTimeouts(0.1, 0.5, 5.0, 3.0), LIMITS)
     for k, name in enumerate("ababa"):
-        assert watch.contention == ""
-        watch.note_commanded(1.0 + 0.1 * k, name)
-    assert watch.contention.startswith("two nodes publish commanded controls")
+        assert machine.relay.contention == ""
+        machine.commanded(1.0 + 0.1 * k, "fly", level(9.81), name)
+    assert machine.relay.contention.startswith("two nodes publish commanded controls")
 
 
 # The battery.

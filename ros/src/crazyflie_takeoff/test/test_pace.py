@@ -9,8 +9,8 @@ from std_msgs.msg import Bool
 from takeoff_helpers import FILTER, GRAVITY, control
 
 from crazyflie_msgs.msg import FlightStatus
-from crazyflie_takeoff.flight import FlightStateMachine
-from crazyflie_takeoff.safe_filter import SafeFilter
+from crazyflie_takeoff.filter_machine import FilterMachine
+from crazyflie_takeoff.server_table import FlightStateMachine
 from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
 from crazyflie_utils.testing import FakeProcess
 
@@ -32,7 +32,7 @@ def count(network, owner, duration=2.0):
 def test_in_flight_there_is_little_to_do(network):
     network.advance(0.5)
     assert count(network, FlightStateMachine) == pytest.approx(10, abs=1)
-    assert count(network, SafeFilter) == pytest.approx(25, abs=1)
+    assert count(network, FilterMachine) == pytest.approx(25, abs=1)
     network.call("/land")
     network.advance(0.1)
     assert count(network, FlightStateMachine, 1.0) == pytest.approx(100, abs=1)
@@ -95,7 +95,9 @@ def test_the_filter_looks_more_often_than_a_control_is_lost(hold, rate):
             process.advance(0.005)
 
     fly()
-    with mock.patch.object(SafeFilter, "tick", autospec=True, side_effect=SafeFilter.tick) as tick:
+    with mock.patch.object(
+        FilterMachine, "tick", autospec=True, side_effect=FilterMachine.tick
+    ) as tick:
         fly()
     assert tick.call_count == pytest.approx(rate, abs=1)
 

@@ -3,10 +3,16 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_takeoff.flight import FlightStateMachine
 from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_takeoff.server_states import TAKEOVERS, Event, FilterReport, ServerState
-from crazyflie_takeoff.server_table import TABLE, Plan
+from crazyflie_takeoff.server_table import (
+    TABLE,
+    TAKEOVERS,
+    Event,
+    FilterReport,
+    FlightStateMachine,
+    Plan,
+    ServerState,
+)
 
 G = 9.81
 PLAN = Plan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.3)

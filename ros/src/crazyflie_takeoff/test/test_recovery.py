@@ -2,10 +2,15 @@
 
 import pytest
 
-from crazyflie_takeoff.flight import FlightStateMachine
 from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_takeoff.server_states import TAKEOVERS, Event, FilterReport, ServerState
-from crazyflie_takeoff.server_table import Plan
+from crazyflie_takeoff.server_table import (
+    TAKEOVERS,
+    Event,
+    FilterReport,
+    FlightStateMachine,
+    Plan,
+    ServerState,
+)
 
 ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState
 

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from filter_flight import G, level
+from filter_flight import G
 
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import (
@@ -19,10 +19,10 @@ from crazyflie_takeoff.safe_control import (
 def test_learns_the_thrust_of_hover_also_from_a_climb():
     hover = HoverThrust()
     for k in range(1000):
-        hover.update(0.01, level(10.8 + (0.5 if k >= 900 else 0.0)), max(0.0, (k - 900) * 0.005))
+        hover.update(0.01, 10.8 + (0.5 if k >= 900 else 0.0), max(0.0, (k - 900) * 0.005))
     assert hover.value == pytest.approx(10.8, abs=0.03)
     for _ in range(1000):
-        hover.update(0.01, level(16.0), None)
+        hover.update(0.01, 16.0, None)
     assert hover.value == 1.25 * G
 
 
@@ -33,7 +33,7 @@ def test_learns_the_thrust_of_hover_also_from_a_climb():
 def test_learns_the_vertical_part_of_a_tilted_thrust(roll, pitch, vertical):
     tilted = HoverThrust()
     for _ in range(2000):
-        tilted.update(0.01, Setpoint(roll, pitch, 0.0, G / vertical), 0.0)
+        tilted.update(0.01, Setpoint(roll, pitch, 0.0, G / vertical).lift, 0.0)
     assert tilted.value == pytest.approx(G, rel=1e-6)
 
 
@@ -177,14 +177,14 @@ def test_how_long_braking_and_a_descent_take():
 
 def test_the_mean_of_hover_by_its_time_constant():
     hover = HoverThrust()
-    hover.update(2.0, level(G + 2.0), None)
+    hover.update(2.0, G + 2.0, None)
     assert hover.value == pytest.approx(G + 1.0)
-    hover.update(2.0, level(G + 1.0), 1.0)
+    hover.update(2.0, G + 1.0, 1.0)
     assert hover.value == pytest.approx(G + 1.0)
     # The mean of the speed is 1.5 m/s; (2 - 1.5) / 2 s is the acceleration.
-    hover.update(2.0, level(G + 1.0), 2.0)
+    hover.update(2.0, G + 1.0, 2.0)
     assert hover.value == pytest.approx(G + 0.75)
-    hover.update(2.0, level(G + 1.0), None)
+    hover.update(2.0, G + 1.0, None)
     assert hover.value == pytest.approx(G + 1.0)
 
 

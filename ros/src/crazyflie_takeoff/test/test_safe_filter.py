@@ -6,7 +6,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from crazyflie_model.limits import MIN_THRUST
-from crazyflie_takeoff.filter_states import FilterState
+from crazyflie_takeoff.filter_machine import FilterMachine, FilterState
 from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.limits import Debounce
 from crazyflie_takeoff.motion import Motion
@@ -15,7 +15,6 @@ from crazyflie_takeoff.safe_control import (
     MOTORS_OFF,
     Setpoint,
 )
-from crazyflie_takeoff.safe_filter import SafeFilter
 from crazyflie_utils.refusal import RefusalError
 
 # Limits.
@@ -30,7 +29,7 @@ def test_motors_stop_beyond_the_limits_and_stay_off(position, words):
     flight.sees = False
     stopped = None
     for k in range(200):
-        flight.filter.relay.measure(Motion(position, (0.0, 0.0, 0.0)))
+        flight.filter.measure(Motion(position, (0.0, 0.0, 0.0)))
         flight.run(0.01)
         if flight.filter.state is FilterState.EMERGENCY and stopped is None:
             stopped = k
@@ -43,7 +42,7 @@ def test_motors_stop_beyond_the_limits_and_stay_off(position, words):
 def test_one_measurement_that_is_wrong_is_no_crash():
     flight = Flight().run(1.0)
     for _ in range(20):
-        flight.filter.relay.measure(Motion((9.0, 0.0, 1.0), (0.0, 0.0, 0.0)))
+        flight.filter.measure(Motion((9.0, 0.0, 1.0), (0.0, 0.0, 0.0)))
         flight.run(0.05)
         flight.run(0.05)
     assert flight.filter.state is FilterState.PASSING
@@ -61,7 +60,7 @@ def test_complaints_that_come_and_go_do_not_add_up():
 def test_within_half_a_metre_of_the_wall_the_geofence_is_at_work():
     flight = Flight().run(0.1)
     for _ in range(100):
-        flight.filter.relay.measure(Motion((2.45, -2.45, 1.0), (0.0, 0.0, 0.0)))
+        flight.filter.measure(Motion((2.45, -2.45, 1.0), (0.0, 0.0, 0.0)))
         flight.sees = False
         flight.run(0.01)
     assert flight.filter.state is FilterState.PASSING
@@ -69,18 +68,18 @@ def test_within_half_a_metre_of_the_wall_the_geofence_is_at_work():
 
 def test_a_vehicle_that_tilts_over_is_stopped():
     flight = Flight().run(1.0)
-    flight.filter.watch.is_tilted = True
+    flight.filter.set_tilted(True)
     flight.run(0.02)
     assert flight.filter.state is FilterState.EMERGENCY
     assert "the vehicle has tilted over" in flight.filter.status.reason
 
 
 def test_a_vehicle_that_is_carried_exceeds_no_limit():
-    control_filter = SafeFilter(TIMEOUTS, LIMITS)
-    control_filter.choice.state = ON_GROUND
+    control_filter = FilterMachine(TIMEOUTS, LIMITS)
+    control_filter.flight_state = ON_GROUND
     for k in range(100):
-        control_filter.relay.measure(Motion((9.0, 0.0, -9.0), (0.0, 0.0, 0.0)))
-        control_filter.watch.is_tilted = True
+        control_filter.measure(Motion((9.0, 0.0, -9.0), (0.0, 0.0, 0.0)))
+        control_filter.set_tilted(True)
         control_filter.tick(k / 100)
     assert control_filter.state is FilterState.PASSING
 
@@ -89,13 +88,13 @@ def test_a_vehicle_that_is_carried_exceeds_no_limit():
 
 
 def test_a_controller_is_not_passed_on_while_the_server_sends_controls():
-    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    control_filter = FilterMachine(TIMEOUTS, LIMITS)
     assert control_filter.takeoff(0.0, "zero", MOTORS_OFF) == "zero"
     assert control_filter.commanded(0.1, "fly", level(12.0)) == "zero"
 
 
 def test_of_two_servers_on_the_ground_none_lifts_the_vehicle():
-    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    control_filter = FilterMachine(TIMEOUTS, LIMITS)
     for k, caller in enumerate("ab"):
         assert control_filter.takeoff(0.1 * k, "zero", MOTORS_OFF, caller) == "zero"
     assert control_filter.takeoff(0.2, "lift", level(0.5), "a") == MOTORS_OFF
@@ -108,7 +107,7 @@ def test_two_controllers_in_flight_are_no_reason_to_refuse_takeoffs():
     flight = Flight()
     for k in range(8):
         flight.filter.commanded(0.01 * k, "fly", level(G), "ab"[k % 2])
-    assert flight.filter.watch.contention
+    assert flight.filter.relay.contention
     assert flight.filter.status.takeoff_refusal == ""
 
 
@@ -118,10 +117,10 @@ def test_two_controllers_in_flight_are_no_reason_to_refuse_takeoffs():
     + [(1.0, "fly", FilterState.PASSING)],
 )
 def test_a_filter_that_starts_in_flight_passes_on_what_is_seen_in_the_air(z, passed, state):
-    control_filter = SafeFilter(TIMEOUTS, LIMITS, sees=True)
-    control_filter.choice.state = FLYING
+    control_filter = FilterMachine(TIMEOUTS, LIMITS, sees=True)
+    control_filter.flight_state = FLYING
     if z is not None:
-        control_filter.relay.measure(Motion((0.0, 0.0, z), (0.0, 0.0, 0.0)))
+        control_filter.measure(Motion((0.0, 0.0, z), (0.0, 0.0, 0.0)))
     control_filter.tick(0.0)
     assert control_filter.commanded(0.0, "fly", level(G)) == passed
     assert control_filter.state is state
@@ -130,19 +129,19 @@ def test_a_filter_that_starts_in_flight_passes_on_what_is_seen_in_the_air(z, pas
 @pytest.mark.parametrize("is_stopped", [True, False])
 @pytest.mark.parametrize("is_waiting", [True, False])
 def test_what_has_waited_while_the_filter_listened_is_passed_on(is_stopped, is_waiting):
-    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    control_filter = FilterMachine(TIMEOUTS, LIMITS)
     if is_waiting:
         assert control_filter.commanded(0.0, "fly", level(G)) is None
     if is_stopped:
         control_filter.stop("it was called")
-    control_filter.choice.state = FLYING
+    control_filter.flight_state = FLYING
     passes = is_waiting and not is_stopped
     assert control_filter.stop_listening(0.2) == ("fly" if passes else None)
 
 
 def test_a_vehicle_that_its_controller_does_not_bring_down_is_brought_down():
     flight = Flight().run(1.0)
-    flight.filter.choice.state = DESCENDING
+    flight.filter.flight_state = DESCENDING
     assert flight.run(2.0).filter.state is FilterState.SINKING
 
 
@@ -167,7 +166,7 @@ def test_a_filter_that_has_little_to_do_is_nominal():
     assert flight.filter.is_nominal
     flight.run(0.02)
     assert not flight.filter.is_nominal
-    flight.filter.machine.silence = 0.052
+    flight.filter.silence = 0.052
     assert not flight.filter.is_nominal
     flight.run(0.1)
     flight.controls = flight.sees = True
@@ -176,13 +175,13 @@ def test_a_filter_that_has_little_to_do_is_nominal():
     assert not flight.filter.is_nominal
     flight.run(0.2)
     assert flight.filter.is_nominal
-    flight.filter.watch.is_tilted = True
+    flight.filter.set_tilted(True)
     assert not flight.filter.is_nominal
 
 
 def test_on_the_ground_the_filter_is_nominal_without_a_controller():
-    control_filter = SafeFilter(TIMEOUTS, LIMITS)
-    control_filter.choice.state = ON_GROUND
+    control_filter = FilterMachine(TIMEOUTS, LIMITS)
+    control_filter.flight_state = ON_GROUND
     for k in range(100):
         control_filter.tick(k / 100)
     assert control_filter.is_nominal
@@ -191,7 +190,7 @@ def test_on_the_ground_the_filter_is_nominal_without_a_controller():
 
 
 def test_a_filter_that_has_not_seen_yet_whether_the_vehicle_is_on_the_ground_is_not_nominal():
-    control_filter = SafeFilter(TIMEOUTS, LIMITS, sees=True)
+    control_filter = FilterMachine(TIMEOUTS, LIMITS, sees=True)
     assert not control_filter.is_nominal
     control_filter.takeoff(0.0, "zero", MOTORS_OFF)
     assert control_filter.is_nominal
@@ -218,11 +217,11 @@ def test_an_emergency_is_latched_until_it_is_reset():
 
 
 def test_a_vehicle_on_the_ground_does_not_end_the_emergency_of_a_filter_that_has_just_started():
-    control_filter = SafeFilter(TIMEOUTS, LIMITS, sees=True)
-    control_filter.choice.state = FLYING
+    control_filter = FilterMachine(TIMEOUTS, LIMITS, sees=True)
+    control_filter.flight_state = FLYING
     control_filter.tick(0.0)
     control_filter.stop("it was called")
-    control_filter.relay.measure(Motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    control_filter.measure(Motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     control_filter.commanded(0.0, "control", level(G))
     assert control_filter.state is FilterState.EMERGENCY
 
@@ -246,7 +245,7 @@ EVENTS = st.lists(
 @example(["toggle", (0.0, 0.0), 1, 0.5, (0.0, -2.0), "commanded"])
 def test_whatever_happens_when(events):
     """Random messages, services and clocks: what must hold of all that is published."""
-    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    control_filter = FilterMachine(TIMEOUTS, LIMITS)
     thrusts = {"lift": G + 0.2, "ramp": 7.0, "zero": 0.0}
     time = 100.0
     for event in events:
@@ -267,9 +266,9 @@ def test_whatever_happens_when(events):
         elif event == "toggle":
             control_filter.toggle()
         elif isinstance(event, FlightState):
-            control_filter.choice.state = event
+            control_filter.flight_state = event
         elif isinstance(event, tuple):
-            control_filter.relay.measure(Motion((0.0, 0.0, event[0]), (0.0, 0.0, event[1])))
+            control_filter.measure(Motion((0.0, 0.0, event[0]), (0.0, 0.0, event[1])))
         elif isinstance(event, int):
             for _ in range(event):
                 time += 0.01

@@ -6,7 +6,7 @@ from std_msgs.msg import Bool
 from takeoff_helpers import SERVER, filter_status, state
 
 from crazyflie_msgs.msg import FilterStatus, FlightStatus
-from crazyflie_takeoff import diagnostics
+from crazyflie_takeoff import flight_topics
 
 FILTER_STATUS = "/in_flight_filter_status"
 
@@ -23,7 +23,7 @@ def logged(process):
 def diagnosis(process):
     """Return level and figures of the next diagnostics."""
     count = len(process.published("/diagnostics"))
-    process.advance(diagnostics.PERIOD)
+    process.advance(flight_topics.DIAGNOSTICS_PERIOD)
     (status,) = process.published("/diagnostics")[count].status
     return status.level, {each.key: each.value for each in status.values}
 
@@ -104,17 +104,17 @@ def test_levels_of_the_diagnostics():
     process.publish("/state", state(0.0))
     process.advance(0.3)
     level, figures = diagnosis(process)
-    assert level == diagnostics.WARN
+    assert level == flight_topics.WARN
     assert figures["state is fresh"] == "False"
 
     process = on_ground()
-    assert diagnosis(process)[0] == diagnostics.OK
+    assert diagnosis(process)[0] == flight_topics.OK
     process.publish(FILTER_STATUS, filter_status("on_ground", FilterStatus.EMERGENCY))
-    assert diagnosis(process)[0] == diagnostics.ERROR
+    assert diagnosis(process)[0] == flight_topics.ERROR
     process = flying()
-    assert diagnosis(process)[0] == diagnostics.OK
+    assert diagnosis(process)[0] == flight_topics.OK
     process.publish(FILTER_STATUS, filter_status("flying", FilterStatus.SINKING, reason="lost"))
-    assert diagnosis(process)[0] == diagnostics.ERROR
+    assert diagnosis(process)[0] == flight_topics.ERROR
 
 
 def test_whether_the_state_is_fresh_is_a_figure():
@@ -124,5 +124,5 @@ def test_whether_the_state_is_fresh_is_a_figure():
         process.publish("/state", state(0.0))
         process.advance(0.01)
     (status,) = process.published("/diagnostics")[-1].status
-    assert status.level == diagnostics.OK
+    assert status.level == flight_topics.OK
     assert {each.key: each.value for each in status.values}["state is fresh"] == "True"

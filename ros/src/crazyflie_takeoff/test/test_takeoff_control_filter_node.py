@@ -14,7 +14,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_takeoff import diagnostics
+from crazyflie_takeoff import flight_topics
 from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.takeoff_control_filter_node import (
     LISTENING_TIME,
@@ -307,16 +307,16 @@ def test_levels_of_the_diagnostics(process):
         process.advance(1.0)
         return process.published("/diagnostics")[count].status[0].level
 
-    assert level() == diagnostics.OK
+    assert level() == flight_topics.OK
     process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
-    assert level() == diagnostics.WARN
+    assert level() == flight_topics.WARN
     process.advance(1.0)
-    assert level() == diagnostics.ERROR
+    assert level() == flight_topics.ERROR
     process.advance(9.0)
     assert process.published("/in_flight_filter_status")[-1].state == FilterStatus.DOWN
-    assert level() == diagnostics.ERROR
+    assert level() == flight_topics.ERROR
     # The server knows of it.
     process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.ON_GROUND))
-    assert level() == diagnostics.OK
+    assert level() == flight_topics.OK
     process.call("/emergency", EmptyRequest())
-    assert level() == diagnostics.ERROR
+    assert level() == flight_topics.ERROR

@@ -9,7 +9,7 @@ from std_srvs.srv import EmptyResponse
 from takeoff_helpers import SERVER, filter_status, state
 
 from crazyflie_msgs.msg import FilterStatus, VehicleStatus
-from crazyflie_takeoff.driver_connection import MAX_CONNECTION_AGE
+from crazyflie_takeoff.takeoff_checks import MAX_CONNECTION_AGE
 from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
 from crazyflie_utils.transport import ServiceError
 

@@ -5,9 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from takeoff_helpers import PointMass, feedback
 
-from crazyflie_takeoff.flight import FlightStateMachine
-from crazyflie_takeoff.server_states import Event, ServerState
-from crazyflie_takeoff.server_table import Plan
+from crazyflie_takeoff.server_table import Event, FlightStateMachine, Plan, ServerState
 
 STIFF, SOFT = (20.0, 20.98), (1.5, 1.0)
 """Height gains of the simulation's and of the hardware's controller."""

@@ -10,7 +10,7 @@ from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.snapshot import Solid, Triple
 from crazyflie_model.angles import rotate
-from crazyflie_takeoff.fence_box import follow_box
+from crazyflie_takeoff.flight_topics import follow_box
 from crazyflie_utils import NodeHandle
 
 _MARKERS = ("world/markers", "sweep/markers", "plan/markers")  #: How the topics of markers end.

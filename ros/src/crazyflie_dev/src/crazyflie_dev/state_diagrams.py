@@ -3,7 +3,7 @@
 In a page, a comment names a table (`crazyflie_takeoff.transition_table`), and the Mermaid diagram
 below it is made of its rows; the first row's state is the initial one::
 
-    <!-- states: crazyflie_takeoff.filter_states:FilterMachine.TABLE -->
+    <!-- states: crazyflie_takeoff.filter_machine:FilterMachine.TABLE -->
 
 ``python3 -m crazyflie_dev.state_diagrams PAGE...`` draws the diagrams anew.
 """

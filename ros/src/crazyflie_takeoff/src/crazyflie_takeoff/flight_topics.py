@@ -1,12 +1,20 @@
-"""Parameters of both server and filter: their topics, and where the vehicle may be."""
+"""What server and filter share: parameters of topics and box, the geofence, and diagnostics."""
 
 import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from dynamic_reconfigure.msg import Config
+
 from crazyflie_takeoff.limits import NO_BOX, Box
-from crazyflie_utils import Parameters, parameter
+from crazyflie_utils import NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import METRES, TOPIC
+
+DIAGNOSTICS_PERIOD = 1.0  #: REP 107 recommends one report a second, s.
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
 class CornerParameters(Parameters):
@@ -75,3 +83,33 @@ class FlightTopicParameters(Parameters):
         "own_filter_status_topic", "in_flight_topic", "_filter_status"
     )
     controller_topic = derived_topic("own_controller_topic", "in_flight_topic", "_controller")
+
+
+def follow_box(handle: NodeHandle, topic: str, callback: Callable[[Box], None]) -> None:
+    """Call ``callback(box)`` with the box of a geofence, now and after each change.
+
+    ``topic`` has the geofence's live parameters, latched; without a corner there is no wall.
+    """
+
+    def on_config(message: Config) -> None:
+        values = {each.name: each.value for each in message.doubles}
+        lower = tuple(values.get(f"box/min/{axis}", -math.inf) for axis in "xyz")
+        upper = tuple(values.get(f"box/max/{axis}", math.inf) for axis in "xyz")
+        callback(Box(lower, upper))
+
+    handle.subscribe(topic, Config, on_config)
+
+
+def report(
+    handle: NodeHandle, level: int, message: str, figures: Mapping[str, str]
+) -> DiagnosticArray:
+    """Return a report of a node; the units are in the keys of the figures."""
+    status = DiagnosticStatus(
+        level=level,
+        name=handle.name.lstrip("/"),
+        message=message,
+        values=[KeyValue(key, value) for key, value in figures.items()],
+    )
+    array = DiagnosticArray(status=[status])
+    array.header.stamp = handle.stamp()
+    return array

@@ -1,37 +1,59 @@
-"""What is passed on of the controls that come: which one, within which limits, and for how long."""
+"""What is passed on of the controls that come, and within which limits."""
 
 import math
-from typing import Generic
+from typing import Any, TypeVar
 
-from crazyflie_model.limits import MIN_THRUST
-from crazyflie_takeoff.control_filter import TAKEOFF_CONTROL_LIMIT, Control, ControlFilter
-from crazyflie_takeoff.control_limits import in_range
-from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_takeoff.flight_watch import FlightWatch
-from crazyflie_takeoff.ground import TOUCHDOWN_HEIGHT, Ground
-from crazyflie_takeoff.limits import Limits
-from crazyflie_takeoff.motion import Measurement, Motion
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
+from crazyflie_takeoff.limits import (
+    Callers,
+    ClimbLimit,
+    Debounce,
+    DescentWatch,
+    Limits,
+    RunGaps,
+    Walls,
+    in_range,
+)
+from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Ground, Measurement, Motion
 from crazyflie_takeoff.safe_control import MOTORS_OFF, HoverThrust, Setpoint
 
 LEARNING_STEP = 0.2  #: Nothing is learned from controls that are further apart, s.
+HANDOVER = 3  #: A handover from one controller to another makes at most this many changes.
+#: How long a limit has to be exceeded, s: a single measurement that is wrong is no crash.
+CRASH_DURATION = 0.1
+
+Control = TypeVar("Control")
 
 
-class Relay(Generic[Control]):
-    """Chooses between controls, limits them, and fades late ones to hover.
+class Relay:
+    """Limits controls, fades late ones to hover, and watches the flight that they make.
 
     A control counts in full for half of ``hold`` (s), and is level hover from ``hold`` on.
     """
 
     def __init__(self, limits: Limits, hold: float):
-        self.choice: ControlFilter[Control] = ControlFilter()
-        self.watch = FlightWatch(limits)
         self.measured = Measurement()
         self.ground = Ground()
+        self.walls = Walls(limits)
+        self.gaps = RunGaps()
+        #: Whether the vehicle is tilted as only one that crashes is.
+        self.is_tilted = False
+        # The server is silent in flight: another one at once is a second one.
+        self.takeoff_callers = Callers("takeoff controls", 0)
+        self.commanded_callers = Callers("commanded controls", HANDOVER)
         self._hold = hold
         self._hover = HoverThrust()
+        self._climb = ClimbLimit(limits.climb)
+        self._descent = DescentWatch()
+        self._position_complaint = ""
+        self._position_debounce = Debounce(CRASH_DURATION)
         self._time = math.nan
-        self._commanded = self._allowed_command = MOTORS_OFF
-        self._passed = self._takeoff = MOTORS_OFF
+        self._command = self._allowed_command = self._passed = MOTORS_OFF
+        self._takeoff = MOTORS_OFF
+        # The latest of the controls that have passed unchanged since the last `flush`, for how long
+        # they have flown the vehicle, s, and the integral of their vertical thrust, m/s.
+        self._unchanged: Any = None
+        self._duration = self._impulse = 0.0
 
     @property
     def hover(self) -> float:
@@ -48,87 +70,144 @@ class Relay(Generic[Control]):
         return Setpoint(0.0, 0.0, 0.0, self.hover)
 
     @property
-    def _is_landing(self):
-        return self.choice.remembered is FlightState.DESCENDING
+    def is_nominal(self) -> bool:
+        """Whether nothing has been measured that would stop the motors."""
+        return not (self.is_tilted or self._position_complaint)
 
     @property
-    def landing_height(self) -> float | None:
-        """Height of a vehicle that its controller is to bring down, m; None of any other."""
+    def is_free(self) -> bool:
+        """Whether a control of flight that is in its ranges is passed on unchanged."""
+        is_clear = self.is_nominal and self.gaps.is_free and not self.contention
         motion = self.measured.fresh
-        if motion is None or not self._is_landing:
-            return None
-        height = self.ground.height(motion)
-        return height if height > TOUCHDOWN_HEIGHT else None
+        return is_clear and self._climb.is_free(motion, self.walls.highest(self.ground.z))
 
-    def measure(self, motion: Motion, age: float = 0.0) -> None:
-        """Take a state that was measured ``age`` s ago."""
+    @property
+    def contention(self) -> str:
+        """In words, that two nodes publish the same controls; empty if they do not."""
+        return self.takeoff_callers.complaint or self.commanded_callers.complaint
+
+    def measure(self, motion: Motion, age: float, is_on_ground: bool, in_flight: bool) -> None:
+        """Take a state that was measured ``age`` s ago, and what the server says of the vehicle."""
         self.measured.update(motion, age)
-        self.watch.measure(motion, age)
-        choice = self.choice
-        self.ground.measure(motion, choice.server_reports_ground, choice.in_flight)
+        self.ground.measure(motion, is_on_ground, in_flight)
+        self._position_complaint = self.walls.complaint(motion.position)
 
-    def takeoff(self, time: float, control: Control, setpoint: Setpoint) -> Control | Setpoint:
+    def advance(self, time: float, step: float, elapsed: float, lands: bool) -> tuple[str, str]:
+        """Let time pass until ``time``, by ``elapsed``, s; return crash and objection.
+
+        ``step`` is what counts of it for durations, s. Crash and objection are in words why the
+        motors are stopped in the air, and why the vehicle is landed; or empty. ``lands`` is whether
+        the controller is to bring the vehicle down.
+        """
+        self.measured.advance(elapsed)
+        self.gaps.run(time)
+        self.takeoff_callers.advance(time)
+        self.commanded_callers.advance(time)
+        motion = self.measured.fresh
+        crash = self._position_debounce.advance(
+            step, "" if motion is None else self._position_complaint
+        )
+        if self.is_tilted:
+            crash = "the vehicle has tilted over"
+        height = None if motion is None or not lands else self.ground.height(motion)
+        is_high = height is not None and height > TOUCHDOWN_HEIGHT
+        objection = self._climb.advance(step) or self.gaps.complaint
+        return crash, self._descent.advance(step, height if is_high else None) or objection
+
+    # Controls.
+
+    def pass_unchanged(self, time: float, control: Any) -> bool:
+        """Take a commanded control if it `is_free`; return whether it is in its ranges.
+
+        ``control`` has the fields of a `Setpoint`.
+        """
+        roll, pitch, thrust = control.roll, control.pitch, control.thrust
+        if not (
+            -MAX_TILT <= roll <= MAX_TILT
+            and -MAX_TILT <= pitch <= MAX_TILT
+            and MIN_THRUST <= thrust <= MAX_THRUST
+            and -MAX_YAW_RATE <= control.yaw_dot <= MAX_YAW_RATE
+        ):
+            return False
+        step, self._time = time - self._time, time
+        self._duration += step
+        self._impulse += step * thrust * math.cos(roll) * math.cos(pitch)
+        self._unchanged = control
+        return True
+
+    def flush(self) -> None:
+        """Take the controls that have passed unchanged since the last time for passed ones."""
+        if (control := self._unchanged) is None:
+            return
+        setpoint = Setpoint(control.roll, control.pitch, control.yaw_dot, control.thrust)
+        self._command = self._allowed_command = self._passed = setpoint
+        if self._duration > 0.0:
+            self._learn(self._duration, self._impulse / self._duration)
+        self.gaps.run(self._time)
+        self.commanded_callers.renew(self._time)
+        self._unchanged, self._duration, self._impulse = None, 0.0, 0.0
+
+    def takeoff(self, control: Control, setpoint: Setpoint, lands: bool) -> Control | Setpoint:
         """Return what to pass on of a takeoff control."""
-        self.choice.takeoff(time, control, setpoint.thrust)
-        self._takeoff = self._allowed(setpoint, 0.0, is_ramp=True)
+        self._takeoff = self._allowed(setpoint, 0.0, lands, is_ramp=True)
         return control if self._takeoff == setpoint else self._takeoff
 
-    def choose(self, time: float, control: Control, setpoint: Setpoint) -> Control | None:
-        """Return the control that is selected when a commanded one has come, or None."""
-        self._commanded = setpoint
-        return self.choice.commanded(time, control)
+    def command(self, setpoint: Setpoint) -> None:
+        """Take a commanded control, which may be passed on."""
+        self._command = setpoint
 
     def commanded(
-        self, time: float, control: Control, age: float, is_on_ground: bool
+        self,
+        time: float,
+        control: Control,
+        age: float,
+        in_flight: bool,
+        lands: bool = False,
+        learns: bool = True,
     ) -> Control | Setpoint:
         """Return what to pass on of the last commanded control, which is ``age`` s old.
 
-        On the ground nothing is learned from it.
+        ``learns`` is whether the thrust of hover is learned from it.
         """
-        allowed = self._allowed(self._commanded, MIN_THRUST if self.choice.in_flight else 0.0)
-        step = time - self._time
-        if 0.0 < step < LEARNING_STEP and not is_on_ground:
-            motion = self.measured.fresh
-            self._hover.update(step, allowed, None if motion is None else motion.velocity[2])
+        allowed = self._allowed(self._command, MIN_THRUST if in_flight else 0.0, lands)
+        if learns:
+            self._learn(time - self._time, allowed.lift)
         self._time = time
         self._passed = self._allowed_command = allowed
         if age > 0.5 * self._hold:
             return self._faded(allowed, age)
-        return control if allowed == self._commanded else allowed
+        return control if allowed == self._command else allowed
 
     def mixed(self, own: Setpoint, weight: float) -> Setpoint:
         """Return the last commanded control with a weight (0 ... 1), and ``own`` for the rest."""
         self._passed = own.mixed(self._allowed_command, weight)
         return self._passed
 
-    def repeated(self, control: Control, time: float) -> Control | Setpoint:
-        """Return the last takeoff control once more: thrust above hover is not kept for long."""
-        age = self.choice.takeoff_age(time)
-        if self._takeoff.thrust <= self.hover or age <= 0.5 * self._hold:
-            return control
-        return self._faded(self._takeoff, age)
+    def late(self, silence: float) -> Setpoint | None:
+        """Return what replaces a commanded control that is ``silence`` s old; None if nothing."""
+        is_late = silence > 0.5 * self._hold and math.isfinite(self._time)
+        return self._faded(self._passed, silence) if is_late else None
 
-    def late(self, time: float, silence: float, is_needed: bool) -> Setpoint | None:
-        """Return what replaces a control that is late, or None.
+    def late_takeoff(self, age: float) -> Setpoint | None:
+        """Return what replaces the last takeoff control, ``age`` s old; None if nothing.
 
-        It is that of the controller, ``silence`` s old, if it ``is_needed``, else the server's.
+        Thrust above hover is not kept for long. Less is that of a ramp, which goes on.
         """
-        if is_needed:
-            is_late = silence > 0.5 * self._hold and math.isfinite(self._time)
-            return self._faded(self._passed, silence) if is_late else None
-        age = self.choice.takeoff_age(time)
-        is_late = 0.5 * self._hold < age <= TAKEOFF_CONTROL_LIMIT and not self.choice.is_on_ground
-        if self.choice.in_flight or not is_late or self._takeoff.thrust <= self.hover:
-            return None
-        return self._faded(self._takeoff, age)
+        is_late = age > 0.5 * self._hold and self._takeoff.thrust > self.hover
+        return self._faded(self._takeoff, age) if is_late else None
 
-    def _allowed(self, setpoint, lowest, is_ramp=False):
-        watch, motion, hover = self.watch, self.measured.fresh, self.hover
+    def _learn(self, step, lift):
+        if 0.0 < step < LEARNING_STEP:
+            motion = self.measured.fresh
+            self._hover.update(step, lift, None if motion is None else motion.velocity[2])
+
+    def _allowed(self, setpoint, lowest, lands, is_ramp=False):
+        motion, hover = self.measured.fresh, self.hover
         control = in_range(setpoint, lowest)
-        highest = watch.walls.highest(self.ground.z)
-        thrust = watch.climb.apply(control.thrust, hover, motion, highest, self._is_landing)
+        highest = self.walls.highest(self.ground.z)
+        thrust = self._climb.apply(control.thrust, hover, motion, highest, lands)
         speed = 0.0 if motion is None else motion.velocity[2]
-        return watch.gaps.apply(control._replace(thrust=thrust), hover, speed, is_ramp)
+        return self.gaps.apply(control._replace(thrust=thrust), hover, speed, is_ramp)
 
     def _faded(self, setpoint, age):
         weight = min(max(age / (0.5 * self._hold) - 1.0, 0.0), 1.0)

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.ground import TOUCHDOWN_SPEED
-from crazyflie_takeoff.motion import Motion
+from crazyflie_takeoff.motion import TOUCHDOWN_SPEED, Motion
 
 #: More time than this never passes between two ticks, s: after a clock was set, or the process was
 #: stopped for a while, no silence is as long as it seems.
@@ -65,6 +64,11 @@ class Setpoint(NamedTuple):
     yaw_dot: float
     thrust: float
 
+    @property
+    def lift(self) -> float:
+        """Vertical part of the thrust, m/s^2."""
+        return self.thrust * math.cos(self.roll) * math.cos(self.pitch)
+
     def mixed(self, other: "Setpoint", weight: float) -> "Setpoint":
         """Return this one, with another that has a weight (0 ... 1)."""
         return Setpoint(*(a + weight * (b - a) for a, b in zip(self, other, strict=True)))
@@ -91,14 +95,13 @@ class HoverThrust:
         """m/s^2, within `HOVER_RANGE` of g."""
         return limited(self._thrust - self._acceleration, HOVER_RANGE * GRAVITY, GRAVITY)
 
-    def update(self, step: float, control: Setpoint, speed: float | None) -> None:
-        """Take a control that flies the vehicle, ``step`` s after the last one.
+    def update(self, step: float, lift: float, speed: float | None) -> None:
+        """Take the vertical thrust (m/s^2) that has flown the vehicle for ``step`` (s).
 
         ``speed`` is the measured z_dot, m/s, or None.
         """
         share = step / (AVERAGING + step)
-        vertical = control.thrust * math.cos(control.roll) * math.cos(control.pitch)
-        self._thrust += share * (vertical - self._thrust)
+        self._thrust += share * (lift - self._thrust)
         if speed is None:
             self._speed, self._acceleration = None, 0.0
             return

@@ -1,13 +1,105 @@
-"""What has to be there before a vehicle takes off."""
+"""What has to be there before a vehicle takes off: battery, driver, estimator, controller."""
 
+import enum
+import math
 from collections.abc import Callable
 
-from crazyflie_takeoff.battery import Charge
-from crazyflie_takeoff.driver_connection import DriverConnection
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_takeoff.limits import Box
 from crazyflie_takeoff.motion import MeasuredPosition
-from crazyflie_takeoff.server_states import Event, FilterReport
+from crazyflie_takeoff.server_table import Event, FilterReport
 from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters, hover_complaint
+
+MAX_VOLTAGE_AGE = 5.0  #: A voltage that is older does not count, s; the driver sends one a second.
+_LONGEST_STEP = 1.5  #: Voltages that are further apart count as this far, s.
+_NOT_LOWER = -math.inf  #: How long a voltage has been lower that is not, s.
+MAX_CONNECTION_AGE = 3.0  #: An older message does not count, s: the driver sends one every second.
+
+
+class Charge(enum.Enum):
+    """How much is left."""
+
+    UNKNOWN = enum.auto()
+    GOOD = enum.auto()
+    LOW = enum.auto()
+    CRITICAL = enum.auto()
+
+
+class Battery:
+    """The charge of a battery, by how long its voltage has been below two levels (V).
+
+    In flight a voltage sags with every burst of thrust; so it has to stay low for ``duration`` (s);
+    with 0 a single low voltage is enough.
+    """
+
+    def __init__(self, low: float, critical: float, duration: float):
+        self._levels = (critical, low)
+        self._duration = duration
+        self._lasted = [_NOT_LOWER, _NOT_LOWER]
+        self.voltage = math.nan
+        self._time = math.inf  # s; infinite before the first voltage.
+
+    def measure(self, time: float, voltage: float) -> None:
+        """Take a voltage (V) that was measured at ``time`` (s)."""
+        step = min(max(time - self._time, 0.0), _LONGEST_STEP)
+        self._lasted = [
+            max(lasted + step, 0.0) if voltage < level else _NOT_LOWER
+            for lasted, level in zip(self._lasted, self._levels, strict=True)
+        ]
+        self.voltage, self._time = voltage, time
+
+    def charge(self, time: float) -> Charge:
+        """Return what is left at ``time`` (s)."""
+        if not abs(time - self._time) < MAX_VOLTAGE_AGE:
+            return Charge.UNKNOWN
+        critical, low = (lasted >= self._duration for lasted in self._lasted)
+        if critical:
+            return Charge.CRITICAL
+        return Charge.LOW if low else Charge.GOOD
+
+
+class DriverConnection:
+    """What the driver has published last; times are s of one clock."""
+
+    def __init__(self) -> None:
+        self._is_connected = False
+        self._time: float | None = None
+        self._state, self._state_time = SupervisorState(0), -math.inf
+        self._is_emergency = False
+
+    def update(self, now: float, is_connected: bool) -> None:
+        """Take note of what the driver has published."""
+        self._time, self._is_connected = now, is_connected
+
+    def update_state(self, now: float, state: SupervisorState, is_emergency: bool) -> None:
+        """Take note of the vehicle's state, and whether the driver's emergency stop is latched."""
+        self._state_time, self._state, self._is_emergency = now, state, is_emergency
+
+    def cannot_fly(self, now: float) -> str:
+        """Return why the vehicle cannot take off; empty if it can, or nothing is known."""
+        if now - self._state_time > MAX_CONNECTION_AGE:
+            return ""
+        if self._is_emergency:
+            return "the vehicle was stopped by emergency; remove it, restart it and add it again"
+        if self._state.faults:
+            return f"the vehicle cannot fly, its state is: {self._state.words()}; restart it"
+        return ""
+
+    def refusal(self, now: float, topic: str) -> str:
+        """Return why nothing can be sent to the vehicle; empty if it can.
+
+        ``topic`` is its absolute name, below the vehicle's namespace.
+        """
+        is_recent = self._time is not None and now - self._time <= MAX_CONNECTION_AGE
+        if is_recent and self._is_connected:
+            return ""
+        prefix = topic.rpartition("/")[0].strip("/")
+        text = "false" if is_recent else "nothing"
+        return (
+            f"the driver is not connected to the vehicle, {text} on {topic}; is the vehicle on? "
+            "It is added by: roslaunch crazyflie_driver crazyflie_add.launch uri:=ADDRESS "
+            f"tf_prefix:={prefix}"
+        )
 
 
 class TakeoffChecks:
@@ -22,7 +114,9 @@ class TakeoffChecks:
         self.box = parameters.box
         self.position = MeasuredPosition()
         self.driver = DriverConnection()
-        self.battery = parameters.battery()
+        self.battery = Battery(
+            parameters.battery_low, parameters.battery_critical, parameters.battery_duration
+        )
         # Without a filter nothing publishes whether there is one.
         self.has_controller = True
         self._had_controller = False

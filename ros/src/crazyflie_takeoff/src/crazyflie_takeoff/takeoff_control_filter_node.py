@@ -1,6 +1,9 @@
 """ROS interface of the choice between takeoff control and commanded control."""
 
-from std_msgs.msg import Bool, Empty
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 from typing_extensions import override
@@ -8,16 +11,15 @@ from typing_extensions import override
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
+    FilterStatus,
     FlightStatus,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_takeoff import diagnostics
-from crazyflie_takeoff.fence_box import follow_box
-from crazyflie_takeoff.filter_status_publisher import FilterStatusPublisher
-from crazyflie_takeoff.flight_state import flight_state
+from crazyflie_takeoff import flight_topics
+from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, Status
+from crazyflie_takeoff.flight_state import FlightState, flight_state
 from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import Setpoint
-from crazyflie_takeoff.safe_filter import SafeFilter
 from crazyflie_takeoff.takeoff_control_filter_parameters import TakeoffControlFilterParameters
 from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
@@ -38,8 +40,58 @@ BUSY_GAP = 0.1  #: The computer of a filter that does not run for this long, s, 
 REPETITION = 10.0  #: Shortest time between two warnings of the same kind, s.
 
 
+class FilterStatusPublisher:
+    """Publishes the filter's status when it changes, and logs why."""
+
+    def __init__(self, handle: NodeHandle, parameters: TakeoffControlFilterParameters):
+        self._handle = handle
+        self._text_topic = handle.publisher(parameters.filter_state_topic, String, latch=True)
+        self._typed_topic = handle.publisher(
+            parameters.filter_status_topic, FilterStatus, latch=True
+        )
+        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
+        self._status: Status | None = None
+        self._text = ""
+        self._logged_explanation = ""
+
+    def publish(self, status: Status) -> None:
+        """Publish a status if it is another one."""
+        if status == self._status:
+            return
+        self._status = status
+        message = stamped(FilterStatus, self._handle.stamp(), **status._asdict())
+        message.flight_state = status.flight_state or FlightStatus.UNKNOWN
+        self._typed_topic.publish(message)
+        explanation = status.takeoff_refusal or status.reason
+        text = ": ".join(filter(None, (_words(status), explanation)))
+        if text == self._text:
+            return
+        self._text = text
+        self._text_topic.publish(String(text))
+        # Once, however the flight state in front of it changes.
+        if explanation not in ("", self._logged_explanation):
+            self._handle.warn(text)
+        self._logged_explanation = explanation
+
+    def publish_diagnostics(self, machine: FilterMachine[Any]) -> None:
+        """Publish diagnostics."""
+        is_down = machine.state is FilterState.DOWN
+        is_acknowledged = machine.remembered is FlightState.ON_GROUND
+        if machine.state is FilterState.PASSING or (is_down and is_acknowledged):
+            level = flight_topics.OK
+        else:
+            is_over = machine.state.passes_nothing
+            level = flight_topics.ERROR if is_over else flight_topics.WARN
+        figures = {
+            "takeovers": str(machine.takeovers),
+            "hover thrust (m/s^2)": f"{machine.relay.hover:.2f}",
+            "age of the commanded control (s)": f"{max(machine.silence, 0.0):.2f}",
+        }
+        self._diagnostics.publish(flight_topics.report(self._handle, level, self._text, figures))
+
+
 class TakeoffControlFilterNode(Node):
-    """Pass on takeoff control always, and commanded control in flight; see `SafeFilter`."""
+    """Pass on takeoff control always, and commanded control in flight; see `FilterMachine`."""
 
     needed_in_flight = True
 
@@ -47,12 +99,16 @@ class TakeoffControlFilterNode(Node):
         self._published_controller: bool | None = None
         self._is_fresh = True
         self._state_delay, self._control_delay = Delay(), Delay()
+        self._wall_offset = 0.0  # Wall clock minus `handle.time`, as of the last tick, s.
+        # Of the last commanded control; that of a message of this process is None.
+        self._connection: Any = self
+        self._is_settled = False  # Whether the status of a nominal flight has been published.
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         parameters = handle.load(TakeoffControlFilterParameters)
         self._parameters = parameters
-        self._filter: SafeFilter[ControlStamped] = SafeFilter(
+        self._filter: FilterMachine[ControlStamped] = FilterMachine(
             parameters.timeouts(), parameters.limits(), parameters.state_topic is not None
         )
 
@@ -112,7 +168,7 @@ class TakeoffControlFilterNode(Node):
         if parameters.tilted_topic is not None:
             handle.subscribe(parameters.tilted_topic, Bool, self._on_tilted)
         if parameters.box_topic is not None:
-            follow_box(handle, parameters.box_topic, self._on_box)
+            flight_topics.follow_box(handle, parameters.box_topic, self._on_box)
 
     def _register_timers(self, handle):
         self._timer = handle.varying_timer(TIME_STEP, self._on_timer)
@@ -121,7 +177,8 @@ class TakeoffControlFilterNode(Node):
         self._server_timer = handle.timer(SERVER_LIMIT, self._stop_waiting, steady=True)
         self._fresh_timer = handle.timer(FRESH_TIME, self._end_freshness, steady=True)
         handle.timer(CONTROLLER_POLL_PERIOD, self._publish_controller, steady=True, stagger=True)
-        handle.timer(diagnostics.PERIOD, self._publish_diagnostics, steady=True, stagger=True)
+        period = flight_topics.DIAGNOSTICS_PERIOD
+        handle.timer(period, self._publish_diagnostics, steady=True, stagger=True)
 
     # Inputs.
 
@@ -137,7 +194,7 @@ class TakeoffControlFilterNode(Node):
             )
             return
         if state is not None:
-            self._filter.choice.state = state
+            self._filter.flight_state = state
             self._follow_filter()
 
     def _on_toggle(self, _):
@@ -149,18 +206,19 @@ class TakeoffControlFilterNode(Node):
         motion = Motion(
             (state.x, state.y, state.z), (state.x_dot, state.y_dot, state.z_dot), state.yaw
         )
-        self._filter.relay.measure(motion, self._excess(self._state_delay, message))
-
-    def _excess(self, delay, message):
         time = self._handle.time()
-        now = self._handle.nanoseconds(time) * 1e-9
-        return delay.excess(message.header.stamp.to_sec(), now, time)
+        self._follow_clock(time)
+        stamp, now = message.header.stamp.to_sec(), time + self._wall_offset
+        self._filter.measure(motion, self._state_delay.excess(stamp, now, time))
+
+    def _follow_clock(self, time):
+        self._wall_offset = self._handle.nanoseconds(time) * 1e-9 - time
 
     def _on_box(self, box):
-        self._filter.watch.walls.change(box.without_floor())
+        self._filter.relay.walls.change(box.without_floor())
 
     def _on_tilted(self, message):
-        self._filter.watch.is_tilted = message.data
+        self._filter.set_tilted(message.data)
         self._set_pace()
 
     def _on_takeoff_control(self, message):
@@ -170,10 +228,18 @@ class TakeoffControlFilterNode(Node):
         self._follow_filter()
 
     def _on_commanded_control(self, message):
-        now, caller = self._handle.time(), self._commands.caller(message)
-        age = self._excess(self._control_delay, message)
-        chosen = self._filter.commanded(now, message, _setpoint(message), caller, age)
-        self._publish(chosen, message.header.stamp)
+        time, stamp = self._handle.time(), message.header.stamp
+        seconds, now = stamp.secs + 1e-9 * stamp.nsecs, time + self._wall_offset
+        age = self._control_delay.excess(seconds, now, time)
+        connection = getattr(message, "_connection_header", None)
+        is_same = connection is self._connection
+        if is_same and self._filter.pass_unchanged(time, message.control, age):
+            self._final.publish(message)
+            return
+        self._connection = connection
+        caller = self._commands.caller(message)
+        chosen = self._filter.commanded(time, message, _setpoint(message), caller, age)
+        self._publish(chosen, stamp)
         self._publish_state()
 
     # Emergencies.
@@ -201,8 +267,11 @@ class TakeoffControlFilterNode(Node):
     # Timers.
 
     def _on_timer(self):
-        self._publish(self._filter.tick(self._handle.time()), self._handle.stamp())
-        gap = self._filter.longest_gap
+        time = self._handle.time()
+        self._follow_clock(time)
+        if (control := self._filter.tick(time)) is not None:
+            self._publish(control, self._handle.stamp())
+        gap = self._filter.relay.gaps.longest
         if gap > BUSY_GAP:
             self._handle.warn(
                 f"this computer is too busy: the filter has not run for {gap:.2f} s; expected "
@@ -213,8 +282,10 @@ class TakeoffControlFilterNode(Node):
         self._follow_filter()
 
     def _follow_filter(self):
-        self._publish_state()
-        self._set_pace()
+        was_settled, self._is_settled = self._is_settled, self._filter.passes_unchanged
+        if not (was_settled and self._is_settled):
+            self._publish_state()
+            self._set_pace()
 
     def _set_pace(self):
         # With time enough to be quick again before the vehicle is taken over.
@@ -223,7 +294,7 @@ class TakeoffControlFilterNode(Node):
 
     def _stop_listening(self):
         # A server that recovers the state of the flight soon publishes it.
-        if self._filter.choice.remembered is not None or not self._server.has_publishers():
+        if self._filter.remembered is not None or not self._server.has_publishers():
             self._stop_waiting()
 
     def _stop_waiting(self):
@@ -245,12 +316,11 @@ class TakeoffControlFilterNode(Node):
             self._final.publish(control)
 
     def _publish_controller(self):
-        machine, is_there = self._filter.machine, self._commands.has_publishers()
+        machine, is_there = self._filter, self._commands.has_publishers()
         if not is_there:
-            # The next one is new.
-            machine.lacks_controller = False
+            machine.miss_controller()
         if not self._takeoffs.has_publishers():
-            machine.may_lack_reference = True
+            machine.miss_server()
         has_controller = is_there and not machine.lacks_controller
         if has_controller != self._published_controller:
             self._published_controller = has_controller
@@ -269,3 +339,15 @@ class TakeoffControlFilterNode(Node):
 def _setpoint(message):
     c = message.control
     return Setpoint(c.roll, c.pitch, c.yaw_dot, c.thrust)
+
+
+def _words(status):
+    """Return the words of the state, such as "sinking from flying"."""
+    words = []
+    if status.takeoff_refusal:
+        words.append("refusing")
+    elif status.state not in (FilterState.PASSING, FilterState.HOLDING):
+        words.append(status.state.name.lower())
+    if status.flight_state is not None:
+        words.append(status.flight_state.word)
+    return " from ".join(words) or ("commanded" if status.is_commanded else "unknown")

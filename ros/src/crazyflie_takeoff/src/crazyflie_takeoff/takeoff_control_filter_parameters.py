@@ -1,6 +1,6 @@
 """Parameters of the takeoff control filter."""
 
-from crazyflie_takeoff.filter_states import LossTimeouts
+from crazyflie_takeoff.filter_machine import LossTimeouts
 from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic
 from crazyflie_takeoff.limits import Limits
 from crazyflie_utils import parameter

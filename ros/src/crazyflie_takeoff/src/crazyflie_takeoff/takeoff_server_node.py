@@ -1,7 +1,9 @@
 """ROS interface of takeoff and landing."""
 
 from concurrent.futures import Future
+from typing import Generic, TypeVar
 
+from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Bool, Empty, Float32, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
@@ -12,21 +14,25 @@ from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
     FilterStatus,
+    FlightStatus,
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
     VehicleStatus,
 )
-from crazyflie_takeoff import diagnostics
-from crazyflie_takeoff.battery import Charge
-from crazyflie_takeoff.calls import Calls
-from crazyflie_takeoff.fence_box import follow_box
-from crazyflie_takeoff.flight import FlightStateMachine
-from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_takeoff.server_states import NO_FILTER, STOPS, TAKEOVERS, Event, ServerState
-from crazyflie_takeoff.status_messages import report_of
-from crazyflie_takeoff.status_publisher import StatusPublisher
-from crazyflie_takeoff.takeoff_checks import TakeoffChecks
+from crazyflie_takeoff import flight_topics
+from crazyflie_takeoff.flight_state import FlightState, flight_state
+from crazyflie_takeoff.server_table import (
+    NO_FILTER,
+    REFUSALS,
+    STOPS,
+    TAKEOVERS,
+    Event,
+    FilterReport,
+    FlightStateMachine,
+    ServerState,
+)
+from crazyflie_takeoff.takeoff_checks import Charge, TakeoffChecks
 from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters, hover_complaint
 from crazyflie_utils import Node, NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.refusal import RefusalError
@@ -45,6 +51,169 @@ LEAVE_LIMIT = 7.0
 #: How long after the server's start a takeoff waits for the first state and for a controller, s:
 #: nodes that are launched together need a while to find each other.
 START_LIMIT = 5.0
+
+_EVENTS = {
+    FilterStatus.PASSING: Event.FILTER_PASSES,
+    FilterStatus.HOLDING: Event.FILTER_HOLDS,
+    FilterStatus.SINKING: Event.FILTER_SINKS,
+    FilterStatus.DOWN: Event.FILTER_DOWN,
+    FilterStatus.EMERGENCY: Event.FILTER_EMERGENCY,
+}
+
+#: For an operator both parts of a landing are one.
+_LOG_WORDS = {
+    FlightState.ON_GROUND: "on the ground",
+    FlightState.TAKING_OFF: "taking off",
+    FlightState.FLYING: "flying",
+    FlightState.DESCENDING: "landing",
+    FlightState.LANDING: "landing",
+}
+
+Response = TypeVar("Response")
+
+
+class Calls(Generic[Response]):
+    """Callers of services whose work takes time.
+
+    At most one is under way. The others wait until it is known whether theirs can begin.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[Event, Future[Response]]] = []
+        self._under_way: Future[Response] | None = None
+
+    @property
+    def has_waiting(self) -> bool:
+        """Whether a call waits to begin."""
+        return bool(self._waiting)
+
+    def add(self, event: Event, future: "Future[Response]") -> None:
+        """Keep a call until it can begin."""
+        self._waiting.append((event, future))
+
+    def take_waiting(self) -> list[tuple[Event, "Future[Response]"]]:
+        """Return the calls that wait, in their order, and forget them."""
+        waiting, self._waiting = self._waiting, []
+        return waiting
+
+    def begin(self, future: "Future[Response]", reason: Exception) -> None:
+        """Start a call; one that is under way fails for a reason."""
+        self.fail(reason)
+        self._under_way = future
+
+    def finish(self, response: Response) -> None:
+        """Answer the call that is under way, if there is one."""
+        future, self._under_way = self._under_way, None
+        if future is not None:
+            future.set_result(response)
+
+    def fail(self, reason: Exception) -> None:
+        """Fail the call that is under way, if there is one."""
+        future, self._under_way = self._under_way, None
+        if future is not None:
+            future.set_exception(reason)
+
+    def fail_all(self, reason: Exception) -> None:
+        """Fail all calls."""
+        self.fail(reason)
+        for _, future in self.take_waiting():
+            future.set_exception(reason)
+
+
+class StatusPublisher:
+    """Publishes and logs the state of a flight when it changes."""
+
+    def __init__(
+        self,
+        handle: NodeHandle,
+        parameters: TakeoffServerParameters,
+        flight: FlightStateMachine,
+        checks: TakeoffChecks,
+    ):
+        self._handle, self._flight, self._checks = handle, flight, checks
+        self._state = handle.publisher(parameters.flight_state_topic, String, latch=True)
+        self._status = handle.publisher(parameters.flight_status_topic, FlightStatus, latch=True)
+        self._text = handle.publisher(parameters.status_topic, String, latch=True)
+        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
+        self._inhibit_shutdown = handle.inhibit_shutdown()
+        self.state: FlightState | None = None  # The one that was published last.
+        self.reason = ""  # Why the last landing or abort began.
+        self._published: tuple[object, ...] = ()
+        self._published_text = ""
+        self._logged_word = self._logged_reason = ""
+
+    def takeoff_refusal(self) -> str:
+        """Return why the vehicle must not take off from the ground; empty if it may."""
+        return self._checks.refusal(self._handle.time(), self._flight.filter)
+
+    def log_recovery(self, height: float | None) -> None:
+        """Log the state in which the server begins and the evidence; height above ground in m."""
+        report, state = self._flight.filter, self._flight.flight_state
+        if state is None:
+            return
+        if report.event is Event.FILTER_SINKS:
+            evidence = "the filter brings the vehicle down"
+        elif report.event in TAKEOVERS:
+            evidence = "the filter has stopped the motors"
+        else:
+            remembered = "nothing" if report.remembered is None else report.remembered.word
+            seen = "not known" if height is None else f"{height:.2f} m"
+            evidence = f"{remembered} is remembered, the height is {seen}"
+        self._handle.info(f"begins {state.word}: {evidence}")
+        self._logged_word = _LOG_WORDS[state]
+
+    def publish_state(self, state: FlightState) -> None:
+        """Publish another state; log it, with the reason if there is a new one."""
+        self.state = state
+        # The filter logs its own reasons.
+        reason = "" if self.reason == self._flight.filter.reason else self.reason
+        if (word := _LOG_WORDS[state]) != self._logged_word:
+            is_new = reason and reason != self._logged_reason
+            self._handle.info(f"{word}: {reason}" if is_new else word)
+            self._logged_word, self._logged_reason = word, reason
+        self._state.publish(String(state.word))
+        self._inhibit_shutdown(state is not FlightState.ON_GROUND)
+        self.publish()
+
+    def publish(self) -> None:
+        """Publish the status, typed and in words, if it has changed."""
+        status = self._flight_status()
+        content = (status.state, status.reason, status.takeoff_refusal)
+        # Not before the state's own topics, and nothing while it is not known.
+        if content != self._published and status.state == self.state:
+            self._published = content
+            self._status.publish(status)
+        if (text := _text(status)) != self._published_text:
+            self._published_text = text
+            self._text.publish(String(text))
+
+    def publish_diagnostics(self) -> None:
+        """Publish the status with figures."""
+        checks, event = self._checks, self._flight.filter.event
+        text = _text(self._flight_status())
+        level = flight_topics.WARN if ": " in text else flight_topics.OK
+        if event in (Event.FILTER_SINKS, Event.FILTER_EMERGENCY):
+            level = flight_topics.ERROR
+        figures = {
+            "state is fresh": str(checks.position.value(self._handle.time()) is not None),
+            "controller": str(checks.has_controller),
+            "battery (V)": f"{checks.battery.voltage:.2f}",
+        }
+        self._diagnostics.publish(flight_topics.report(self._handle, level, text, figures))
+
+    def _flight_status(self):
+        state, report = self._flight.flight_state, self._flight.filter
+        may_refuse = state is FlightState.ON_GROUND
+        is_held = report.event is Event.FILTER_HOLDS and state not in (None, FlightState.ON_GROUND)
+        reasons = (self.reason, report.reason if is_held else "")
+        return stamped(
+            FlightStatus,
+            self._handle.stamp(),
+            state=state or FlightStatus.UNKNOWN,
+            reason="; ".join(filter(None, reasons)),
+            takeoff_refusal=self.takeoff_refusal() if may_refuse else REFUSALS[state],
+            ground=self._flight.ground,
+        )
 
 
 class TakeoffServerNode(Node):
@@ -86,7 +255,7 @@ class TakeoffServerNode(Node):
             parameters.controller_topic, Bool, lambda message: checks.set_controller(message.data)
         )
         if parameters.box_topic is not None:
-            follow_box(handle, parameters.box_topic, checks.set_box)
+            flight_topics.follow_box(handle, parameters.box_topic, checks.set_box)
         if parameters.battery_topic is not None:
             handle.subscribe(parameters.battery_topic, Float32, self._on_battery)
         if parameters.connected_topic is not None:
@@ -110,7 +279,10 @@ class TakeoffServerNode(Node):
         self._start_timer = handle.timer(START_LIMIT, self._end_start, steady=True)
         handle.timer(STATUS_PERIOD, self._status.publish, steady=True, stagger=True)
         handle.timer(
-            diagnostics.PERIOD, self._status.publish_diagnostics, steady=True, stagger=True
+            flight_topics.DIAGNOSTICS_PERIOD,
+            self._status.publish_diagnostics,
+            steady=True,
+            stagger=True,
         )
 
     @override
@@ -290,3 +462,22 @@ class TakeoffServerNode(Node):
         is_flying = self._status.state is self._flight.flight_state is FlightState.FLYING
         cruises = is_flying and not self._calls.has_waiting
         self._timer.set_period(CRUISE_TIME_STEP if cruises else TIME_STEP)
+
+
+def report_of(message: FilterStatus) -> FilterReport:
+    """Return what a filter's message means to the server.
+
+    KeyError or ValueError: the message has a state that does not exist.
+    """
+    event, reason = _EVENTS[message.state], message.reason
+    if message.takeoff_refusal and event in (Event.FILTER_PASSES, Event.FILTER_DOWN):
+        event, reason = Event.FILTER_REFUSES, message.takeoff_refusal
+    return FilterReport(event, flight_state(message.flight_state), message.is_commanded, reason)
+
+
+def _text(status):
+    state, reasons = flight_state(status.state), [status.reason] if status.reason else []
+    words = "looking for the state of the flight" if state is None else state.word.replace("_", " ")
+    if state is FlightState.ON_GROUND and status.takeoff_refusal:
+        reasons.append(f"takeoff refused: {status.takeoff_refusal}")
+    return ": ".join(filter(None, (words, "; ".join(reasons))))

@@ -5,7 +5,6 @@ from typing import Any
 
 from typing_extensions import override
 
-from crazyflie_takeoff.battery import Battery
 from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic
 from crazyflie_takeoff.limits import Box
 from crazyflie_takeoff.server_table import Plan
@@ -157,10 +156,6 @@ class TakeoffServerParameters(FlightTopicParameters):
     def plan(self) -> Plan:
         """Return how to take off and land."""
         return Plan(self.hover, self.open_loop, self.settle, self.descent_speed)
-
-    def battery(self) -> Battery:
-        """Return the watch of the battery's voltage."""
-        return Battery(self.battery_low, self.battery_critical, self.battery_duration)
 
 
 def hover_complaint(hover: tuple[float, float, float], box: Box) -> str:

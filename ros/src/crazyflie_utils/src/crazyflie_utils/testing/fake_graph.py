@@ -36,6 +36,7 @@ class FakeGraph:
         self.unheard: set[tuple[str, str]] = set()
         self.log: list[tuple[str, str]] = []  #: Level and text of what nodes have logged.
         self._wall_offset = 0.0
+        self._headers: dict[tuple[str, str], dict[str, str]] = {}
         self._parameters = parameters
         self._processes: dict[str, _GraphProcess] = {}
         self._listeners: dict[str, list[Deliver]] = {}
@@ -161,9 +162,11 @@ class FakeGraph:
     def _route(self, sender, topic, message):
         for listener in self._listeners.get(topic, ()):
             listener(message)
+        # As in rospy, the messages of a connection share one.
+        header = self._headers.setdefault((sender, topic), {"callerid": sender, "topic": topic})
         fault = self.faults.get(topic)
         for arriving in [message] if fault is None else fault(message):
-            arriving._connection_header = {"callerid": sender, "topic": topic}
+            arriving._connection_header = header
             for name, process in list(self._processes.items()):
                 if name != sender and (name, topic) not in self.unheard:
                     for deliver in tuple(process.transport.subscribers.get(topic, ())):

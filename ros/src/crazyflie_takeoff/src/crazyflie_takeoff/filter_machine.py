@@ -1,0 +1,574 @@
+"""The last machine before the vehicle: chooses between controls, and flies when none comes."""
+
+import enum
+import math
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+
+from crazyflie_model.units import GRAVITY
+from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.limits import OVERLAP, Limits
+from crazyflie_takeoff.motion import Motion, is_sinking
+from crazyflie_takeoff.relay import Relay
+from crazyflie_takeoff.safe_control import (
+    LONGEST_STEP,
+    MAX_SUBSTITUTE,
+    MOTORS_OFF,
+    RETURN_TIME,
+    SafeControl,
+    Setpoint,
+    descent_time,
+)
+from crazyflie_takeoff.transition_table import Table, Transition, step
+from crazyflie_utils.refusal import RefusalError
+
+#: A takeoff control older than this no longer keeps the controller out, s.
+TAKEOFF_CONTROL_LIMIT = 0.5
+#: A control younger than this, s, is never late: three periods of a controller at 100 Hz.
+SHORTEST_HOLD = 0.03
+LAST_STATE = 0.7  #: The oldest state from which the filter reckons how the vehicle moves, s.
+#: How long after the motors were stopped they cannot be released, s: the vehicle may still fall.
+RESET_DELAY = 2.0
+
+Control = TypeVar("Control")
+
+
+class FilterState(enum.IntEnum):
+    """What the filter does; the values are those of crazyflie_msgs/FilterStatus."""
+
+    PASSING = 0  # Passes controls on.
+    HOLDING = 1  # Keeps the vehicle in place until a control comes back.
+    SINKING = 2  # Brings the vehicle down.
+    DOWN = 3  # Keeps the motors off until the next takeoff.
+    EMERGENCY = 4  # Keeps the motors off until a reset.
+
+    @property
+    def passes_nothing(self) -> bool:
+        """Whether a control that comes back is not passed on, either."""
+        return self >= FilterState.SINKING
+
+
+class Event(enum.Enum):
+    """What can change the state of the filter."""
+
+    TAKEOFF_CONTROL = enum.auto()  # From the takeoff server.
+    COMMANDED_CONTROL = enum.auto()  # From the controller, whose turn it is.
+    FIRST_STATE = enum.auto()  # The first state of a filter that starts in flight.
+    TICK = enum.auto()  # Time has passed.
+    OBJECTION = enum.auto()  # Controls must not be passed on any more.
+    CRASH = enum.auto()  # The vehicle is where or as it must not be.
+    STOP = enum.auto()  # /emergency was called.
+    RESET = enum.auto()  # /emergency_reset was called.
+
+
+@dataclass(frozen=True)
+class LossTimeouts:
+    """How long the filter waits after a loss, s."""
+
+    hold: float  # For a control in flight, until it holds the vehicle; at least `SHORTEST_HOLD`.
+    recovery: float  # Then until the descent: without a state, and in a takeoff or a landing.
+    descent: float  # Then until the motors stop; longer by the way down from the known height.
+    place: float  # The same as ``recovery`` for a vehicle in flight whose state is known.
+
+
+class Status(NamedTuple):
+    """What the filter publishes about itself; see crazyflie_msgs/FilterStatus."""
+
+    state: FilterState
+    reason: str
+    takeoff_refusal: str
+    flight_state: FlightState | None
+    is_commanded: bool
+
+
+_PASSING, _HOLDING, _SINKING, _DOWN, _EMERGENCY = FilterState
+
+
+class FilterMachine(Generic[Control]):
+    """Passes controls on within limits, or makes its own, as `TABLE` says.
+
+    Takeoff controls are passed always, commanded ones when the vehicle is the controller's: in
+    flight, or when the last takeoff control is older than `TAKEOFF_CONTROL_LIMIT`. Otherwise the
+    last takeoff control is repeated.
+
+    The toggle decides whether the vehicle is in flight until a flight state is known; then only
+    the flight state does, so that a toggle and a state of the same event cannot cancel each other.
+    A state of a vehicle on the ground also keeps the controller out when the server has died and
+    zero thrust is not repeated: the controller may have a reference high above. A filter that has
+    just started listens until a takeoff control comes or `stop_listening` is called; before that
+    only a flight state can select the controller.
+
+    Methods that return something to publish return a control as it has come, or a `Setpoint` of the
+    filter's own, or None. `tick` has to be called every 10 ms, or 40 ms while `is_nominal`.
+    ``sees`` is whether states can be expected.
+    """
+
+    def __init__(self, timeouts: LossTimeouts, limits: Limits, sees: bool = False):
+        self._timeouts = replace(timeouts, hold=max(timeouts.hold, SHORTEST_HOLD))
+        self.relay = Relay(limits, self._timeouts.hold)
+        self._measured, self._ground = self.relay.measured, self.relay.ground
+        self.state = FilterState.PASSING
+        self.reason = ""  # Why the state is not PASSING.
+        self.elapsed = 0.0  # Since the state began, s.
+        # Age of the last commanded control, s. As if one had just come: a filter that starts in
+        # flight is not connected at once.
+        self.silence = 0.0
+        self.is_needed = False  # Whether the vehicle would fall without the controller.
+        # Whether a flight was ended because no control came, and none has come since.
+        self.lacks_controller = False
+        # Whether there was no takeoff server for a while since the last control. If it has sent no
+        # reference, the controller is silent.
+        self.may_lack_reference = False
+        self.takeoff_thrust = 0.0  # Of the takeoff control that has just come, m/s^2.
+        self.takeovers = 0  # How often the filter has held the vehicle.
+        self.is_commanded = False  # Whether a commanded control has ever come.
+        # Whether a control that is on time and in its ranges is passed on, and changes nothing.
+        self.passes_unchanged = False
+        self._flight_state: FlightState | None = None  # As the server has published it last.
+        self._toggled = False
+        self._is_listening = True
+        self._waiting: Control | None = None  # A commanded control, while the filter listens.
+        # The last takeoff control that was passed on, its thrust, m/s^2, and when it came, s.
+        self._takeoff_control: Control | None = None
+        self._kept_thrust = 0.0
+        self._takeoff_time = math.inf
+        # The filter before this one was away for too long if the vehicle is on the ground:
+        # until that is known, nothing is passed on in flight.
+        self._ground_check_pending = sees
+        self._ticked = math.nan
+        self._safe = SafeControl(self.relay.hover, None)
+        self._own = MOTORS_OFF
+        # Since a control has come back, s; for `RETURN_TIME` the filter's own passes over to it.
+        self._return_age = math.inf
+        self._last_motion: Motion | None = None
+        self._event_reason = self._cause = ""
+        self._descent_limit = 0.0
+
+    # Whose the vehicle is.
+
+    @property
+    def flight_state(self) -> FlightState | None:
+        """The flight state that the server has published last; None if it is not known."""
+        return self._flight_state
+
+    @flight_state.setter
+    def flight_state(self, state: FlightState | None) -> None:
+        self._flight_state = state
+        self.passes_unchanged = False
+
+    def toggle(self) -> None:
+        """Take a toggle of in_flight; none of them brings back a flight that has ended."""
+        if not self.state.passes_nothing:
+            self._toggled = not self._toggled
+            self.passes_unchanged = False
+
+    @property
+    def in_flight(self) -> bool:
+        """Whether the vehicle is in flight, as far as is known."""
+        return self._toggled if self._flight_state is None else self._flight_state.in_flight
+
+    @property
+    def remembered(self) -> FlightState | None:
+        """The flight state for a server that has been restarted; None if unknown.
+
+        A toggle to the ground is not remembered: after a toggle that was missed it means flight.
+        """
+        if self._flight_state is None and self._toggled:
+            return FlightState.FLYING
+        return self._flight_state
+
+    @property
+    def server_reports_ground(self) -> bool:
+        """Whether the server sends the zero thrust of a vehicle on the ground."""
+        sends_zero = self._takeoff_control is not None and self._kept_thrust <= 0.0
+        is_there = self._flight_state in (None, FlightState.ON_GROUND)
+        return sends_zero and not self.in_flight and is_there
+
+    @property
+    def is_on_ground(self) -> bool:
+        """Whether the vehicle is on the ground, as far as is known, or its motors are off."""
+        is_off = self.state in (FilterState.DOWN, FilterState.EMERGENCY)
+        return is_off or (self.state is FilterState.PASSING and self._stands)
+
+    @property
+    def _stands(self):
+        if self.in_flight or self._kept_thrust > 0.0:
+            return False
+        # A landing that has come to zero thrust is one of a vehicle on the ground.
+        return self._flight_state is not FlightState.TAKING_OFF
+
+    @property
+    def _lands(self):
+        return self.remembered is FlightState.DESCENDING
+
+    def takeoff_age(self, time: float) -> float:
+        """Return how old the last takeoff control is at ``time``, s; infinite without one."""
+        return math.inf if self._takeoff_control is None else time - self._takeoff_time
+
+    def selects_controller(self, time: float) -> bool:
+        """Whether the vehicle would fall at ``time`` (s) without the controller.
+
+        So it is in flight, unless a takeoff control has just come; and between takeoff and flight,
+        or when the server has died above the ground, once the last takeoff control is older than
+        `TAKEOFF_CONTROL_LIMIT`.
+        """
+        if self.in_flight:
+            return self.takeoff_age(time) > self._timeouts.hold
+        return not self._stands and self.takeoff_age(time) > TAKEOFF_CONTROL_LIMIT
+
+    # What is published.
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether nothing can happen within half the time for which the filter holds on."""
+        is_heard = self.silence < 0.5 * self._timeouts.hold or self.is_on_ground
+        is_settled = self.state is FilterState.PASSING and self._return_age >= RETURN_TIME
+        return is_settled and is_heard and self.relay.is_nominal and not self._ground_check_pending
+
+    @property
+    def status(self) -> Status:
+        """What the filter does, and why."""
+        reason = "" if self.state is FilterState.PASSING else self.reason
+        return Status(self.state, reason, self._refusal, self.remembered, self.is_commanded)
+
+    @property
+    def _refusal(self):
+        stays = self.is_on_ground and self.state is not FilterState.EMERGENCY
+        return self.relay.contention if stays else ""
+
+    # Inputs.
+
+    def measure(self, motion: Motion, age: float = 0.0) -> None:
+        """Take a state that was measured ``age`` s ago."""
+        self.passes_unchanged = False
+        self.relay.flush()
+        self.relay.measure(motion, age, self.server_reports_ground, self.in_flight)
+
+    def set_tilted(self, is_tilted: bool) -> None:
+        """Take whether the vehicle is tilted as only one that crashes is."""
+        self.relay.is_tilted = is_tilted
+        self.passes_unchanged = False
+
+    def miss_controller(self) -> None:
+        """Note that nobody publishes commanded controls: the next controller is a new one."""
+        self.lacks_controller = False
+
+    def miss_server(self) -> None:
+        """Note that nobody publishes takeoff controls."""
+        self.may_lack_reference = True
+        self.passes_unchanged = False
+
+    # Controls.
+
+    def takeoff(
+        self, time: float, control: Control, setpoint: Setpoint, caller: str = ""
+    ) -> Control | Setpoint | None:
+        """Return what to pass on when a takeoff control has come from a node at ``time`` (s).
+
+        ``setpoint`` has the numbers of ``control``.
+        """
+        relay = self._interrupt(time)
+        overlap = OVERLAP if self.is_on_ground else math.inf
+        relay.takeoff_callers.note(time, caller, overlap)
+        self._land_if_contended()
+        if self._refusal and setpoint.thrust > 0.0:
+            return MOTORS_OFF
+        self.may_lack_reference = False
+        self.takeoff_thrust = setpoint.thrust
+        self.handle(Event.TAKEOFF_CONTROL)
+        if self.state is not FilterState.PASSING:
+            return None
+        self._ground_check_pending = False
+        self._return_age = math.inf
+        self._is_listening, self._waiting = False, None
+        self._takeoff_control, self._takeoff_time = control, time
+        self._kept_thrust = setpoint.thrust
+        return relay.takeoff(control, setpoint, self._lands)
+
+    def pass_unchanged(self, time: float, control: Any, age: float) -> bool:
+        """Take a commanded control of the last controller; return whether it passes unchanged.
+
+        So do nearly all. For any other one `commanded` has to be called. ``control`` has the fields
+        of a `Setpoint`; for ``age``, see there.
+        """
+        elapsed = time - self._ticked
+        is_nominal = self.passes_unchanged and age < 0.5 * self._timeouts.hold
+        if not (is_nominal and 0.0 <= elapsed <= LONGEST_STEP):
+            return False
+        if not self.relay.pass_unchanged(time, control):
+            return False
+        self.silence = min(self.silence, age - elapsed)
+        return True
+
+    def commanded(
+        self, time: float, control: Control, setpoint: Setpoint, caller: str = "", age: float = 0.0
+    ) -> Control | Setpoint | None:
+        """Return what to pass on when a commanded control has come; see `takeoff`.
+
+        One that is made from data that were measured ``age`` s earlier than usual is as one that
+        came so much earlier.
+        """
+        relay = self._interrupt(time)
+        relay.commanded_callers.note(time, caller)
+        # The next tick adds all of its step.
+        self.silence = min(self.silence, age - self._step_until(time))
+        self.lacks_controller = self.may_lack_reference = False
+        relay.command(setpoint)
+        chosen = self._choose(time, control)
+        is_unchecked = self._ground_check_pending and self.in_flight
+        if is_unchecked and self._measured.fresh is not None:
+            self._ground_check_pending = is_unchecked = False
+            self.handle(Event.FIRST_STATE)
+        if self.state.passes_nothing or is_unchecked or chosen is None:
+            return None
+        if chosen is not control:
+            return relay.late_takeoff(self.takeoff_age(time)) or chosen
+        return self._pass_on(time, control, age) if age < self._timeouts.hold else None
+
+    def _choose(self, time, control):
+        """Return the control that is selected when a commanded one has come, or None."""
+        self._takeoff_time = min(self._takeoff_time, time)
+        self.is_commanded = True
+        self._waiting = None
+        if self.in_flight:
+            return control
+        if self._takeoff_control is None and self._is_listening:
+            self._waiting = control
+            return None
+        # A thrust above zero came from a server that lifts the vehicle off without publishing a
+        # flight state; the state that is known is then old.
+        is_kept_down = self._flight_state is FlightState.ON_GROUND and self._kept_thrust <= 0.0
+        if is_kept_down or self.takeoff_age(time) <= TAKEOFF_CONTROL_LIMIT:
+            return self._takeoff_control
+        return control
+
+    def _pass_on(self, time, control, age=0.0):
+        if self.handle(Event.COMMANDED_CONTROL):
+            self._return_age = 0.0
+        learns = not self.is_on_ground
+        passed = self.relay.commanded(time, control, age, self.in_flight, self._lands, learns)
+        if self._return_age >= RETURN_TIME:
+            return passed
+        return self.relay.mixed(self._own, self._return_age / RETURN_TIME)
+
+    def stop_listening(self, time: float) -> Control | Setpoint | None:
+        """Return what to pass on of a commanded control that has waited until ``time`` (s)."""
+        self._ground_check_pending = self._is_listening = False
+        if self._waiting is None:
+            return None
+        chosen = self._choose(time, self._waiting)
+        return None if chosen is None or self.state.passes_nothing else self._pass_on(time, chosen)
+
+    def tick(self, time: float) -> Setpoint | None:
+        """Let time pass until ``time`` (s); return what to publish, or None."""
+        relay = self.relay
+        relay.flush()
+        step = self._step_until(time)
+        # Unlike a silence, a state is as old as it seems.
+        elapsed = max(time - self._ticked, 0.0) if self._ticked < math.inf else 0.0
+        self._ticked = time
+        self.elapsed += step
+        self.silence += step
+        self._return_age += step
+        lands = self._lands and self.state is FilterState.PASSING
+        crash, objection = relay.advance(time, step, elapsed, lands)
+        if crash:
+            self.handle(Event.CRASH, crash)
+        if objection:
+            self.handle(Event.OBJECTION, objection)
+        self._land_if_contended()
+        self._takeoff_time = min(self._takeoff_time, time)
+        self.is_needed = self.selects_controller(time)
+        self.handle(Event.TICK)
+        is_missed = self.lacks_controller or self.may_lack_reference or not self.is_commanded
+        is_flying = self._flight_state is FlightState.FLYING and not is_missed
+        self.passes_unchanged = is_flying and relay.is_free and self.is_nominal
+        return self._substitute(time, elapsed)
+
+    def _substitute(self, time, elapsed):
+        """Return the filter's own control, if there is to be one."""
+        if self.state in (FilterState.HOLDING, FilterState.SINKING):
+            return self._fly(elapsed)
+        if self.state is not FilterState.PASSING:
+            return MOTORS_OFF
+        is_busy = self.relay.gaps.longest > self._timeouts.hold
+        if self._return_age < RETURN_TIME and self.is_needed and is_busy:
+            # The control that has come back may stay the last one for a while.
+            return self.relay.mixed(self._fly(elapsed), self._return_age / RETURN_TIME)
+        if self.is_needed:
+            return self.relay.late(self.silence)
+        age = self.takeoff_age(time)
+        keeps_up = age <= TAKEOFF_CONTROL_LIMIT and not self._stands and not self.in_flight
+        return self.relay.late_takeoff(age) if keeps_up else None
+
+    def _interrupt(self, time):
+        """Return the relay, where more than a control that passes unchanged is to happen."""
+        self.passes_unchanged = False
+        self.relay.flush()
+        self.relay.gaps.run(time)
+        return self.relay
+
+    def _land_if_contended(self):
+        if contention := self.relay.contention:
+            self.handle(Event.OBJECTION, contention)
+
+    def _fly(self, elapsed):
+        # The step before it took over is reckoned then; after a longest one the clock was set.
+        step = min(elapsed, LAST_STATE) if self.elapsed > 0.0 else 0.0
+        relay, motion = self.relay, self._measured.fresh
+        own = self._safe.advance(step, motion, self.state is FilterState.SINKING)
+        own = relay.gaps.apply(own, relay.hover, self._safe.climb)
+        self._own = own._replace(thrust=min(own.thrust, MAX_SUBSTITUTE))
+        self._ground.advance(step, motion, self._own.thrust / relay.hover)
+        return self._own
+
+    def _step_until(self, time):
+        elapsed = time - self._ticked
+        return min(max(elapsed, 0.0), LONGEST_STEP) if math.isfinite(elapsed) else 0.0
+
+    # Emergencies.
+
+    def stop(self, reason: str) -> None:
+        """Stop the motors now and until `reset`, whatever comes."""
+        self.handle(Event.STOP, reason)
+
+    def reset(self) -> None:
+        """Let the next takeoff have the vehicle again.
+
+        `RefusalError`: nothing has stopped the motors, or the vehicle may not be on the ground yet.
+        """
+        if self.state is not FilterState.EMERGENCY:
+            raise RefusalError("there is no emergency")
+        if not self.handle(Event.RESET):
+            raise RefusalError(
+                f"the motors were stopped less than {RESET_DELAY:g} s ago; see that the vehicle "
+                "is at rest on the ground"
+            )
+
+    # The table.
+
+    def handle(self, event: Event, reason: str = "") -> bool:
+        """Step the table; return whether the state has changed.
+
+        An objection, a crash and a stop have a reason in words.
+        """
+        self._event_reason = reason
+        before, self.state = self.state, step(self.TABLE, self.state, event, self)
+        if self.state is before:
+            return False
+        self.elapsed = 0.0
+        self.passes_unchanged = False
+        if before is FilterState.PASSING:
+            # The state stops before the control does: the last one is what there is.
+            relay, motion = self.relay, self._measured.within(LAST_STATE)
+            self._safe = SafeControl(relay.hover, motion, self._measured.age, relay.passed)
+            self._ground.begin_descent()
+        return True
+
+    # Guards.
+
+    def _is_airborne(self):
+        return not self.is_on_ground
+
+    def _lifts_off(self):
+        return self.takeoff_thrust > GRAVITY
+
+    def _seen_on_ground(self):
+        return self._ground.is_below(self._measured.fresh)
+
+    def _control_is_lost(self):
+        return self.is_needed and self.silence > self._timeouts.hold
+
+    def _control_is_not_needed(self):
+        return not self.is_needed
+
+    def _control_stays_away(self):
+        is_flying = self.remembered is FlightState.FLYING
+        longest = self._timeouts.place if is_flying else self._timeouts.recovery
+        blind = min(self.elapsed, self._measured.age)
+        is_over = self.elapsed > longest or blind > self._timeouts.recovery
+        return self.is_needed and is_over
+
+    def _has_touched_down(self):
+        return self._ground.has_touched_down(self._measured.fresh)
+
+    def _descent_is_over(self):
+        motion = self._measured.fresh
+        return self.elapsed > self._descent_limit and (motion is None or not is_sinking(motion))
+
+    def _may_be_reset(self):
+        return self.elapsed >= RESET_DELAY
+
+    # Actions.
+
+    def _end_flight(self):
+        self._toggled = False
+        self._kept_thrust = 0.0
+
+    def _hold_place(self):
+        self.takeovers += 1
+        self._last_motion = self._measured.within(LAST_STATE)
+        self.reason = "no control comes, the filter keeps the vehicle in place"
+
+    def _give_up_waiting(self):
+        self.lacks_controller = not self.may_lack_reference
+        waited = self._timeouts.hold + self.elapsed
+        self._descend("no control came", f"no control came for {waited:.1f} s")
+
+    def _take_over_and_land(self):
+        self._last_motion = self._measured.within(LAST_STATE)
+        self._land()
+
+    def _land(self):
+        self._descend(self._event_reason, f"{self._event_reason}; the filter lands")
+
+    def _descend(self, cause, reason):
+        self._cause, self.reason = cause, reason
+        self._descent_limit = self._timeouts.descent
+        # Too late the motors stop on the ground, too early the vehicle falls.
+        if (motion := self._measured.fresh or self._last_motion) is not None:
+            self._descent_limit += descent_time(motion, self._ground.z)
+
+    def _end_descent(self):
+        self._stop_motors(f"brought down by the filter because {self._cause}")
+
+    def _end_long_descent(self):
+        limit = self._descent_limit
+        self._stop_motors(f"motors stopped after {limit:.1f} s of descent: {self._cause}")
+
+    def _stay_on_ground(self):
+        self._stop_motors("the vehicle was on the ground when the filter began")
+
+    def _stop_at_once(self):
+        self._stop_motors(self._event_reason)
+
+    def _release(self):
+        self.reason = "reset after an emergency"
+
+    def _stop_motors(self, reason):
+        self.reason = reason
+        self._end_flight()
+
+    #: The transitions; in any other case the state stays.
+    TABLE: ClassVar[Table[FilterState, "FilterMachine[Any]"]] = (
+        Transition(_PASSING, Event.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
+        Transition(_PASSING, Event.TICK, _control_is_lost, _HOLDING, _hold_place),
+        Transition(_PASSING, Event.OBJECTION, _is_airborne, _SINKING, _take_over_and_land),
+        Transition(_PASSING, Event.CRASH, _is_airborne, _EMERGENCY, _stop_at_once),
+        Transition(_PASSING, Event.STOP, None, _EMERGENCY, _stop_at_once),
+        Transition(_HOLDING, Event.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
+        Transition(_HOLDING, Event.COMMANDED_CONTROL, None, _PASSING),
+        Transition(_HOLDING, Event.TAKEOFF_CONTROL, None, _PASSING),
+        Transition(_HOLDING, Event.TICK, _control_is_not_needed, _PASSING),
+        Transition(_HOLDING, Event.TICK, _control_stays_away, _SINKING, _give_up_waiting),
+        Transition(_HOLDING, Event.OBJECTION, None, _SINKING, _land),
+        Transition(_HOLDING, Event.CRASH, None, _EMERGENCY, _stop_at_once),
+        Transition(_HOLDING, Event.STOP, None, _EMERGENCY, _stop_at_once),
+        Transition(_SINKING, Event.TICK, _has_touched_down, _DOWN, _end_descent),
+        Transition(_SINKING, Event.TICK, _descent_is_over, _DOWN, _end_long_descent),
+        Transition(_SINKING, Event.CRASH, None, _EMERGENCY, _stop_at_once),
+        Transition(_SINKING, Event.STOP, None, _EMERGENCY, _stop_at_once),
+        Transition(_DOWN, Event.TAKEOFF_CONTROL, _lifts_off, _PASSING, _end_flight),
+        Transition(_DOWN, Event.STOP, None, _EMERGENCY, _stop_at_once),
+        Transition(_EMERGENCY, Event.RESET, _may_be_reset, _DOWN, _release),
+    )

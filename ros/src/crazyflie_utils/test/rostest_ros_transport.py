@@ -2,13 +2,15 @@
 
 import math
 import queue
+import signal
 import subprocess
+import threading
 from concurrent.futures import Future
 
 import pytest
 import rosgraph
 import rospy
-from processes import composed
+from processes import composed, small_node
 from std_msgs.msg import Float64, Int64, String
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
@@ -16,6 +18,7 @@ from crazyflie_utils import ServiceError
 from crazyflie_utils.main import ros_process
 from crazyflie_utils.parameters.declaration import ParameterError
 from crazyflie_utils.parameters.types import BOOLEAN, FINITE, TEXT, Integer
+from crazyflie_utils.ros1.calls import ServiceCaller
 from crazyflie_utils.testing.peer import LIMIT, wait_until
 
 
@@ -198,6 +201,54 @@ def test_call_of_a_service_that_does_not_answer(handle):
     error = handle.call_service("~silent", Trigger, TriggerRequest(), 0.5).exception(LIMIT)
     assert isinstance(error, ServiceError)
     assert str(error) == f"{handle.name}/silent has not answered within 0.5 s"
+
+
+@pytest.mark.parametrize(
+    ("limits", "complaint"),
+    [
+        ((0.5,), "has not answered within 0.5 s"),
+        ((LIMIT, 0.5), "has not been reached within 0.5 s; nothing was done"),
+    ],
+)
+def test_a_stopped_node_does_not_carry_out_a_call_that_was_given_up(handle, limits, complaint):
+    with small_node("Ledger", "stopped", "_topics/in:=/to") as node:
+        rospy.wait_for_service("/stopped/add", LIMIT)
+        node.signal(signal.SIGSTOP)
+        answer = handle.call_service("/stopped/add", Trigger, TriggerRequest(), *limits)
+        error = answer.exception(LIMIT)
+        node.signal(signal.SIGCONT)
+        assert str(error) == f"/stopped/add {complaint}"
+        report = handle.call_service("/stopped/report", Trigger, TriggerRequest(), LIMIT)
+        assert report.result(LIMIT).message == "[]"
+
+
+@pytest.mark.parametrize("is_own", [True, False])
+def test_a_busy_node_does_not_carry_out_a_call_that_was_given_up(handle, is_own):
+    name, begun, free = f"~busy{is_own}", threading.Event(), threading.Event()
+    called = []
+
+    def work(request):
+        called.append(request)
+        begun.set()
+        free.wait(LIMIT)
+        return TriggerResponse()
+
+    handle.advertise_service(name, Trigger, work)
+    caller = ServiceCaller()
+    if is_own:
+        caller.own = handle._process.transport._caller.own
+    full = handle.resolve(name)
+
+    def call(limit):
+        return caller.call(full, full, Trigger, TriggerRequest(), limit, limit)
+
+    first = call(LIMIT)
+    begun.wait(LIMIT)
+    assert "has not answered within 0.3 s" in str(call(0.3).exception(LIMIT))
+    free.set()
+    assert first.result(LIMIT) == TriggerResponse()
+    assert call(LIMIT).result(LIMIT) == TriggerResponse()
+    assert len(called) == 2
 
 
 # Parts.

@@ -49,6 +49,7 @@ class Ledger(Node):
         self._numbers = []
         handle.advertise_service("~report", Trigger, self._report)
         handle.advertise_service("~refuse", Trigger, self._refuse)
+        handle.advertise_service("~add", Trigger, self._add)
         handle.subscribe(self._topic, Int64, lambda message: self._numbers.append(message.data))
 
     def _report(self, request):
@@ -56,6 +57,10 @@ class Ledger(Node):
 
     def _refuse(self, request):
         raise ServiceError("the ledger is closed")
+
+    def _add(self, request):
+        self._numbers.append(1)
+        return TriggerResponse(True, "")
 
 
 class Herald(Node):

@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import math
 import socket
 import subprocess
 import sys
@@ -55,20 +56,16 @@ def test_caller_is_not_left_waiting_by_a_clock_that_stands_still(monkeypatch):
 def test_unanswered_calls_do_not_pile_up(monkeypatch):
     answered = threading.Event()
 
-    class SlowProxy:
-        def __init__(self, name, service_type):
-            pass
-
-        def __call__(self, request):
-            answered.wait(20.0)
-            return EmptyResponse()
+    def exchange(connection, request):
+        answered.wait(20.0)
+        return EmptyResponse()
 
     monkeypatch.setattr("rospy.wait_for_service", lambda name, timeout: None)
-    monkeypatch.setattr("rospy.ServiceProxy", SlowProxy)
+    monkeypatch.setattr("crazyflie_utils.ros1.calls._Connection.exchange", exchange)
     transport = RosTransport()
 
-    def call(name="/slow"):
-        return transport.call_service(name, Empty, EmptyRequest(), 0.01)
+    def call(name="/slow", limit=0.01):
+        return transport.call_service(name, Empty, EmptyRequest(), limit, math.inf)
 
     before = threading.active_count()
     futures = [call() for _ in range(50)]
@@ -83,8 +80,7 @@ def test_unanswered_calls_do_not_pile_up(monkeypatch):
         if thread is not threading.current_thread() and thread.daemon:
             thread.join(5.0)
     assert other.done()
-    revived = transport.call_service("/slow", Empty, EmptyRequest(), 20.0)
-    assert revived.result(timeout=20.0) == EmptyResponse()
+    assert call(limit=20.0).result(timeout=20.0) == EmptyResponse()
 
 
 # Connections.

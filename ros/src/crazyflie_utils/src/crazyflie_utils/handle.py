@@ -1,5 +1,6 @@
 """The only door between a node and ROS: roscpp's NodeHandle for Python."""
 
+import math
 from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
@@ -18,6 +19,7 @@ from crazyflie_utils.services import Reply, forward, serve
 from crazyflie_utils.tf.poses import StampedPose
 from crazyflie_utils.timers import Timer, VaryingTimer
 from crazyflie_utils.topics import LatestMessage, Publisher, Subscriber, finite_only
+from crazyflie_utils.transport import ServiceError
 
 P = TypeVar("P", bound=Parameters)
 M = TypeVar("M", bound=genpy.Message)
@@ -149,28 +151,46 @@ class NodeHandle:
         `concurrent.futures.Future` of it; or raises `ServiceError` or `RefusalError`
         with a text for the caller.
         """
+        full_name = self.resolve(name)
 
-        def begin(request):
+        def begin(request, is_withdrawn):
             answer: Future[Any] = Future()
+
+            def work():
+                if is_withdrawn():
+                    self.warn(f"{full_name}: the caller has given up on this call; nothing is done")
+                    answer.set_exception(ServiceError(f"{full_name}: the call was withdrawn"))
+                else:
+                    serve(callback, request, answer, self)
+
             for latest in self._latest:
                 self._submit(latest.deliver)
-            self._submit(partial(serve, callback, request, answer, self))
+            self._submit(work)
             return answer
 
         advertise = self._process.transport.advertise_service
-        self._undo.append(advertise(self.resolve(name), service_type, begin, self.time))
+        self._undo.append(advertise(full_name, service_type, begin, self.time))
 
     def call_service(
-        self, name: str, service_type: type, request: Any, limit: float
+        self,
+        name: str,
+        service_type: type,
+        request: Any,
+        limit: float,
+        start_limit: float = math.inf,
     ) -> Future[Any]:
         """Call a service of any process, and return a future of the response at once.
 
-        Its exception is a `ServiceError` when the service refuses, is not there, or does not answer
-        within ``limit`` seconds of the machine's clock. What is added to it with
-        ``add_done_callback`` runs like any callback; none may wait for it.
+        Its exception is a `ServiceError` when the service refuses, is not there, is not reached
+        within ``start_limit`` seconds of the machine's clock, or does not answer within ``limit``
+        seconds. The call is withdrawn then: a process that was stopped does not carry it out when
+        it goes on. What is added to the future with ``add_done_callback`` runs like any callback;
+        none may wait for it.
         """
         transport, outcome = self._process.transport, Reply(self)
-        reply = transport.call_service(self.resolve(name), service_type, request, limit)
+        reply = transport.call_service(
+            self.resolve(name), service_type, request, limit, start_limit
+        )
         reply.add_done_callback(lambda reply: self._submit(partial(forward, reply, outcome, self)))
         return outcome
 

@@ -92,10 +92,12 @@ class Transport(ABC):
         self,
         name: str,
         service_type: type,
-        serve: Callable[[Any], Future[Any]],
+        serve: Callable[[Any, Callable[[], bool]], Future[Any]],
         time: Callable[[], float],
     ) -> Callable[[], None]:
-        """Answer calls of a service with the outcome of the future ``serve(request)``.
+        """Answer calls of a service with the outcome of ``serve(request, is_withdrawn)``, a future.
+
+        ``is_withdrawn()`` tells whether the caller has given up on the call.
 
         The caller gets a `ServiceError`, also when the process
         ends or when ``time()``, by which the service lives, stands still. Returns a
@@ -104,7 +106,7 @@ class Transport(ABC):
 
     @abstractmethod
     def call_service(
-        self, name: str, service_type: type, request: Any, limit: float
+        self, name: str, service_type: type, request: Any, limit: float, start_limit: float
     ) -> Future[Any]:
         """Call a service and return at once; see `NodeHandle.call_service`."""
 

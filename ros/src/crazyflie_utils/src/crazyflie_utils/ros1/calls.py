@@ -2,14 +2,17 @@
 
 import ast
 import contextlib
+import socket
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, InvalidStateError, wait
+from functools import partial
 from time import monotonic
 from typing import Any
 
 import rosgraph
 import rospy
+from rospy.impl.tcpros_base import TCPROSTransport
 
 from crazyflie_utils.transport import ServiceError
 
@@ -17,10 +20,9 @@ from crazyflie_utils.transport import ServiceError
 #: still.
 _STALL_LIMIT = 5.0
 
+_MAX_CALLS = 8  #: Calls of one service that may be without an answer.
 
-#: Calls of one service that may be without an answer. rospy waits for one without a limit, in a
-#: thread that nothing can end.
-_MAX_CALLS = 8
+_in_thread = threading.local()
 
 
 class ServiceCaller:
@@ -34,27 +36,113 @@ class ServiceCaller:
         self._calls: dict[str, threading.Semaphore] = {}
 
     def call(
-        self, name: str, rospy_name: str, service_type: type, request: Any, limit: float
+        self,
+        name: str,
+        rospy_name: str,
+        service_type: type,
+        request: Any,
+        limit: float,
+        start_limit: float,
     ) -> Future[Any]:
-        """Call a service that rospy knows by ``rospy_name``; give up on it after ``limit`` (s)."""
+        """Call a service that rospy knows by ``rospy_name``.
+
+        The call is withdrawn if the service has not been reached after ``start_limit`` (s), or has
+        not answered after ``limit`` (s): its connection ends, and a node that was stopped
+        meanwhile does not obey it when it goes on.
+        """
         own = self.own.get(name)
         future: Future[Any] = Future()
         calls = self._calls.setdefault(name, threading.Semaphore(_MAX_CALLS))
         if not calls.acquire(blocking=False):
             _fail(future, f"{name} has not answered {_MAX_CALLS} earlier calls")
             return future
+        connection = _Connection(rospy_name, service_type)
         threading.Thread(
-            target=_call,
-            args=(rospy_name, service_type, request, limit, future, calls, own),
-            daemon=True,
+            target=_call, args=(connection, request, limit, future, calls, own), daemon=True
         ).start()
-        timer = threading.Timer(
-            limit, _fail, (future, f"{name} has not answered within {limit:g} s")
-        )
-        timer.daemon = True
-        timer.start()
-        future.add_done_callback(lambda _: timer.cancel())
+
+        def give_up(text, unless_sent):
+            if connection.close(unless_sent):
+                _fail(future, text)
+
+        _after(limit, future, give_up, f"{name} has not answered within {limit:g} s", False)
+        if start_limit < limit and own is None:
+            text = f"{name} has not been reached within {start_limit:g} s; nothing was done"
+            _after(start_limit, future, give_up, text, True)
         return future
+
+
+class _Connection:
+    """The connection of one call."""
+
+    def __init__(self, name: str, service_type: type):
+        self.name, self._type = name, service_type
+        self._transport: TCPROSTransport | None = None
+        self._is_sent = self.is_closed = False
+        self._lock = threading.Lock()
+
+    def close(self, unless_sent: bool = False) -> bool:
+        """End the connection, for good; return whether that was done."""
+        with self._lock:
+            if unless_sent and self._is_sent:
+                return False
+            self.is_closed = True
+            if self._transport is not None:
+                self._transport.close()
+            return True
+
+    def exchange(self, request: Any) -> Any:
+        """Return the response; blocks."""
+        proxy = rospy.ServiceProxy(self.name, self._type)
+        address, port = rospy.core.parse_rosrpc_uri(proxy._get_service_uri(request))
+        with self._lock:
+            self._expect_open()
+            transport = self._transport = TCPROSTransport(proxy.protocol, proxy.resolved_name)
+        # The answer of the service's process to the header shows that it runs.
+        transport.connect(address, port, proxy.uri)
+        with self._lock:
+            self._expect_open()
+            self._is_sent = True
+        transport.send_message(request, 1)
+        (response,) = transport.receive_once()
+        return response
+
+    def _expect_open(self):
+        if self.is_closed:
+            raise ServiceError(f"{self.name}: the call was given up")
+
+
+class WithdrawableService(rospy.Service):
+    """A service whose handler can ask whether the caller is still there.
+
+    ``is_withdrawn()`` tells so while the handler runs; it may be called by other threads.
+    """
+
+    def handle(self, transport: TCPROSTransport, header: dict[str, str]) -> None:
+        """Answer the requests of a connection, in its own thread."""
+        _in_thread.is_withdrawn = partial(_has_closed, transport.socket)
+        super().handle(transport, header)
+
+
+def withdrawn() -> Callable[[], bool]:
+    """Return a function that tells whether the call that this thread answers was withdrawn."""
+    return getattr(_in_thread, "is_withdrawn", lambda: False)
+
+
+def _has_closed(connection: socket.socket) -> bool:
+    try:
+        return not connection.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+
+
+def _after(delay, future, act, *arguments):
+    timer = threading.Timer(delay, act, arguments)
+    timer.daemon = True
+    timer.start()
+    future.add_done_callback(lambda _: timer.cancel())
 
 
 def wait_for_answer(answer: Future[Any], name: str, time: Callable[[], float]) -> Any:
@@ -73,20 +161,23 @@ def wait_for_answer(answer: Future[Any], name: str, time: Callable[[], float]) -
     return answer.result()
 
 
-def _call(name, service_type, request, limit, future, calls, own):
+def _call(connection, request, limit, future, calls, own):
     try:
         if own is not None and _answers(own):
+            _in_thread.is_withdrawn = future.done
             response = own.handler(request)
         else:
-            rospy.wait_for_service(name, timeout=limit)
-            response = rospy.ServiceProxy(name, service_type)(request)
+            rospy.wait_for_service(connection.name, timeout=limit)
+            response = connection.exchange(request)
     except Exception as error:
-        # rospy has many, of which not all are its own.
-        _fail(future, _reason(error))
+        # rospy has many, of which not all are its own; one follows from giving up.
+        if not connection.is_closed:
+            _fail(future, _reason(error))
     else:
         with contextlib.suppress(InvalidStateError):
             future.set_result(response)
     finally:
+        connection.close()
         calls.release()
 
 

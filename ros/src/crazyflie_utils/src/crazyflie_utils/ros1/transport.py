@@ -17,7 +17,12 @@ from rosgraph_msgs.msg import Clock
 from crazyflie_utils.log import Throttle
 from crazyflie_utils.parameters.writer import ParameterWriter
 from crazyflie_utils.ros1 import patches
-from crazyflie_utils.ros1.calls import ServiceCaller, wait_for_answer
+from crazyflie_utils.ros1.calls import (
+    ServiceCaller,
+    WithdrawableService,
+    wait_for_answer,
+    withdrawn,
+)
 from crazyflie_utils.ros1.own_topics import OwnCallback, publish
 from crazyflie_utils.ros1.screen_log import shield_screen_log
 from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
@@ -151,19 +156,19 @@ class RosTransport(Transport):
         self,
         name: str,
         service_type: type,
-        serve: Callable[[Any], Future[Any]],
+        serve: Callable[[Any, Callable[[], bool]], Future[Any]],
         time: Callable[[], float],
     ) -> Callable[[], None]:
         """Register a service; `ServiceError` if this process offers one of that name already."""
 
         def answer(request):
             try:
-                return wait_for_answer(serve(request), name, time)
+                return wait_for_answer(serve(request, withdrawn()), name, time)
             except ServiceError as error:
                 raise rospy.ServiceException(str(error)) from None
 
         try:
-            service = rospy.Service(self._rospy_name(name), service_type, answer)
+            service = WithdrawableService(self._rospy_name(name), service_type, answer)
         except rospy.ServiceException as error:
             raise ServiceError(str(error)) from None
         self._caller.own[name] = service
@@ -175,10 +180,12 @@ class RosTransport(Transport):
         return end
 
     def call_service(
-        self, name: str, service_type: type, request: Any, limit: float
+        self, name: str, service_type: type, request: Any, limit: float, start_limit: float
     ) -> Future[Any]:
         """Call in a thread of its own; see `ServiceCaller.call`."""
-        return self._caller.call(name, self._rospy_name(name), service_type, request, limit)
+        return self._caller.call(
+            name, self._rospy_name(name), service_type, request, limit, start_limit
+        )
 
     def service_nodes(self) -> dict[str, str]:
         """Ask the master."""

@@ -109,11 +109,11 @@ class FakeTransport(Transport):
         self,
         name: str,
         service_type: type,
-        serve: Callable[[Any], Future[Any]],
+        serve: Callable[[Any, Callable[[], bool]], Future[Any]],
         time: Callable[[], float],
     ) -> Callable[[], None]:
         """Keep ``serve`` for `FakeProcess.call`."""
-        self.services[name] = serve
+        self.services[name] = lambda request: serve(request, lambda: False)
         self.service_types[name] = service_type
 
         def withdraw() -> None:
@@ -122,7 +122,7 @@ class FakeTransport(Transport):
         return withdraw
 
     def call_service(
-        self, name: str, service_type: type, request: Any, limit: float
+        self, name: str, service_type: type, request: Any, limit: float, start_limit: float
     ) -> Future[Any]:
         """Call a service; fail when there is none, or when it does not answer in time."""
         answer = self.find_service(name)(request)

@@ -10,9 +10,9 @@ from crazyflie_fleet.fleet_parameters import FlyParameters
 from crazyflie_fleet.fleet_services_node import FleetServicesNode
 from crazyflie_fleet.high_level_node import HighLevelNode
 from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
+from crazyflie_fleet.lander import SafeDescentsNode
 from crazyflie_fleet.placement_node import PlacementNode
 from crazyflie_fleet.references_node import ReferencesNode
-from crazyflie_fleet.safe_descents_node import SafeDescentsNode
 from crazyflie_fleet.vectorized_simulator_node import (
     ALL_STATES,
     MODELS,

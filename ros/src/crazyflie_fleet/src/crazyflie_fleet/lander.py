@@ -1,6 +1,6 @@
-"""Lands vehicles of a fleet in rounds, by the services of each."""
+"""Landings of a fleet by ROS: in rounds, and beside the vehicles beneath."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
 
@@ -9,25 +9,30 @@ import numpy as np
 from geometry_msgs.msg import Point
 from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyRequest
+from typing_extensions import override
 
 from crazyflie_driver.srv import GoTo, GoToRequest
-from crazyflie_fleet.fleet_config import FleetConfig
-from crazyflie_fleet.landing import SIDE_SPEED, next_round
+from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
+from crazyflie_fleet.landing import (
+    SIDE_SPEED,
+    LandingSide,
+    Place,
+    SafeDescents,
+    Situation,
+    land_in_rounds,
+)
 from crazyflie_fleet.separation import RELEASE_RATIO
 from crazyflie_fleet.straight_move import shortest_duration
+from crazyflie_fleet.vehicle_nodes import DESCENT, SAFE_DESCENT
 from crazyflie_fleet.vehicle_states import VehicleStates
-from crazyflie_msgs.msg import FlightStatus
-from crazyflie_utils import NodeHandle
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_utils import Node, NodeHandle
 
 SERVICE_TIMEOUT = 60.0  #: Of a takeoff or landing, s of the machine's clock.
 LANDING_TOPIC = "/fleet/landing"  #: Names of vehicles that only the fleet moves, until they land.
 _PERIOD = 0.1  #: Between two updates of a landing, s.
 #: A round begins when all vehicles are slower than this, m/s, or after this time, s.
 _SLOW, _BRAKING_TIMEOUT = 0.3, 3.0
-
-#: A vehicle lands within this distance of its free place, m; within the second one if it takes
-#: longer than the timeout beyond the planned duration, s.
-_ARRIVED, _NEAR, _ARRIVAL_TIMEOUT = 0.05, 0.1, 5.0
 
 _SHORTEST_MOVE = 2.0  #: s.
 
@@ -36,8 +41,55 @@ _UP = (FlightStatus.FLYING, FlightStatus.TAKING_OFF)
 Refusals = Mapping[str, str]
 
 
-class Lander:
+class SafeDescentsNode(Node):
+    """Pass on the references of descents, beside vehicles that are beneath.
+
+    ``vehicles`` are flown in this process; ``states`` and collision ``buffers`` (m) are those of
+    all vehicles, these first.
+    """
+
+    needed_in_flight = True
+
+    def __init__(
+        self, vehicles: tuple[VehicleConfig, ...], states: VehicleStates, buffers: list[float]
+    ):
+        self._vehicles = vehicles
+        self._states = states
+        self._descents = SafeDescents(buffers)
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        pass
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        for number, vehicle in enumerate(self._vehicles):
+            top, message_type = f"/{vehicle.name}/", PositionVelocityStateStamped
+            publisher = handle.publisher(top + SAFE_DESCENT, message_type)
+            on_descent = partial(self._on_descent, number, publisher)
+            handle.subscribe(top + DESCENT, message_type, on_descent)
+
+    def _on_descent(self, number, publisher, message):
+        now, states = self._handle.time(), self._states
+        if not self._descents.is_under_way(number, now):
+            is_descending = states.flight_states == FlightStatus.DESCENDING
+            is_landing = is_descending | ~states.are_in_flight()
+            distance = self._descents.begin(number, now, states.positions, is_landing)
+            if distance > 0.0:
+                self._handle.warn(
+                    f"{states.names[number]} lands {distance:.2f} m aside: another vehicle is "
+                    "beneath it"
+                )
+        aside = self._descents.reference(number, now, message.state.z, message.state.z_dot)
+        if aside is not None:
+            message = PositionVelocityStateStamped(message.header, PositionVelocityState(*aside))
+        publisher.publish(message)
+
+
+class Lander(LandingSide):
     """The landings of a fleet, see `landing`; ``states`` are those of all its vehicles."""
+
+    arrival_timeout = 5.0
 
     def __init__(self, handle: NodeHandle, fleet: FleetConfig, states: VehicleStates):
         self._handle = handle
@@ -47,21 +99,22 @@ class Lander:
         # At a smaller distance the collision avoidance would not release a vehicle.
         self._limits = RELEASE_RATIO * (radii[:, None] + radii)
         self._publisher = handle.publisher(LANDING_TOPIC, String, latch=True)
-        # Vehicles in the air that have still to land, and the free places that some fly to.
         self._left: list[str] = []
-        self._goals: dict[str, tuple[float, float, float]] = {}
-        self._deadline = 0.0
         self._begin = 0.0
+        # Vehicles whose landing service has not answered.
         self._calls: set[str] = set()
         self._refusals: dict[str, str] = {}
         self._answers: list[Future[Refusals]] = []
+        self._rounds: Iterator[None] = iter(())
         handle.timer(_PERIOD, self._on_timer)
 
     def land(self, names: Iterable[str]) -> "Future[Refusals]":
         """Land vehicles; return, when all are down, name to reason of those that did not land."""
         answer: Future[Refusals] = Future()
+        if not self._answers:
+            self._rounds = land_in_rounds(self)
         self._answers.append(answer)
-        self._begin = self._handle.time()
+        self._begin = self.time()
         for name in names:
             position = self._states.positions[self._numbers[name]]
             if self._is_up(name) and np.isfinite(position).all():
@@ -76,12 +129,86 @@ class Lander:
         """End all landings; vehicles that have not begun to land stay in the air."""
         waiting = {*self._left, *self._calls}
         self._refusals |= dict.fromkeys(waiting, "the landing of the fleet has failed; see the log")
-        self._left, self._goals = [], {}
+        self._left = []
         self._calls.clear()
         self._finish()
 
+    def _on_timer(self):
+        if self._answers and next(self._rounds, self) is self:
+            self._finish()
+
+    def _finish(self):
+        self._publish_left()
+        answers, self._answers = self._answers, []
+        refusals, self._refusals = self._refusals, {}
+        for answer in answers:
+            answer.set_result(refusals)
+
+    def _publish_left(self):
+        self._publisher.publish(String(" ".join(self._left)))
+
     def _is_up(self, name):
         return self._states.flight_states[self._numbers[name]] in _UP
+
+    # What `land_in_rounds` asks for.
+
+    @override
+    def time(self) -> float:
+        return self._handle.time()
+
+    @override
+    def left(self) -> list[str]:
+        # Another node may have landed one, or stopped its motors.
+        self._left = [name for name in self._left if self._is_up(name)]
+        return self._left
+
+    @override
+    def is_busy(self) -> bool:
+        numbers = [self._numbers[name] for name in self._left]
+        speeds = np.linalg.norm(self._states.velocities[numbers], axis=1)
+        is_late = not 0.0 <= self.time() - self._begin < _BRAKING_TIMEOUT
+        return bool(self._calls) or not (is_late or bool((speeds < _SLOW).all()))
+
+    @override
+    def situation(self, names: Sequence[str]) -> Situation:
+        positions = self._states.positions
+        known = np.flatnonzero(np.isfinite(positions).all(axis=1))
+        everyone = [self._states.names[number] for number in known]
+        everywhere = np.full((len(known), 2), np.inf)
+        return (
+            everyone,
+            positions[known],
+            np.array([name in names for name in everyone]),
+            # A vehicle that descends counts as on the ground.
+            np.array([not self._is_up(name) for name in everyone]),
+            self._limits[np.ix_(known, known)],
+            -everywhere,
+            everywhere,
+        )
+
+    @override
+    def distance(self, name: str, goal: Place) -> float:
+        return float(np.linalg.norm(self._states.positions[self._numbers[name]] - goal))
+
+    @override
+    def go_aside(self, goals: Mapping[str, Place]) -> float:
+        farthest = max(self.distance(name, goal) for name, goal in goals.items())
+        duration = max(_SHORTEST_MOVE, farthest / SIDE_SPEED, 1.1 * shortest_duration(farthest))
+        for name, goal in goals.items():
+            request = GoToRequest(0, False, Point(*goal), 0.0, genpy.Duration.from_sec(duration))
+            self._call(name, "go_to", GoTo, request, self._note_refusal)
+        return self.time() + duration
+
+    @override
+    def descend(self, names: Sequence[str]) -> None:
+        for name in names:
+            self._left.remove(name)
+            self._call_land(name)
+
+    @override
+    def refuse(self, name: str, reason: str) -> None:
+        self._refusals[name] = reason
+        self._left = [each for each in self._left if each != name]
 
     def _call_land(self, name):
         self._calls.add(name)
@@ -98,80 +225,4 @@ class Lander:
 
     def _note_refusal(self, name, done):
         if done.exception() is not None:
-            self._refusals[name] = str(done.exception())
-            self._goals.pop(name, None)
-            self._left = [each for each in self._left if each != name]
-
-    def _on_timer(self):
-        if not self._answers:
-            return
-        # Another node may have landed it, or stopped its motors.
-        self._left = [name for name in self._left if self._is_up(name)]
-        self._goals = {name: goal for name, goal in self._goals.items() if name in self._left}
-        if self._goals:
-            self._land_arrived()
-        elif not self._calls and not self._left:
-            self._finish()
-        elif not self._calls and self._are_slow():
-            self._begin_round()
-
-    def _are_slow(self):
-        numbers = [self._numbers[name] for name in self._left]
-        speeds = np.linalg.norm(self._states.velocities[numbers], axis=1)
-        is_late = not 0.0 <= self._handle.time() - self._begin < _BRAKING_TIMEOUT
-        return is_late or bool((speeds < _SLOW).all())
-
-    def _begin_round(self):
-        positions = self._states.positions
-        known = np.flatnonzero(np.isfinite(positions).all(axis=1))
-        names = [self._states.names[number] for number in known]
-        # A vehicle that descends counts as on the ground.
-        is_down = np.array([not self._is_up(name) for name in names])
-        lands = np.array([name in self._left for name in names])
-        everywhere = np.full((len(names), 2), np.inf)
-        limits = self._limits[np.ix_(known, known)]
-        chosen = next_round(positions[known], lands, is_down, limits, -everywhere, everywhere)
-        goals = {names[k]: (*place, float(positions[known[k], 2])) for k, place in chosen.items()}
-        farthest = max(self._distance(name, goal) for name, goal in goals.items())
-        if farthest > 0.0:
-            self._go_aside(goals, farthest)
-            return
-        for name in goals:
-            self._call_land(name)
-        self._left = [name for name in self._left if name not in goals]
-
-    def _distance(self, name, goal):
-        return float(np.linalg.norm(self._states.positions[self._numbers[name]] - goal))
-
-    def _go_aside(self, goals, distance):
-        duration = max(_SHORTEST_MOVE, distance / SIDE_SPEED, 1.1 * shortest_duration(distance))
-        self._goals = goals
-        self._deadline = self._handle.time() + duration + _ARRIVAL_TIMEOUT
-        for name, goal in goals.items():
-            request = GoToRequest(0, False, Point(*goal), 0.0, genpy.Duration.from_sec(duration))
-            self._call(name, "go_to", GoTo, request, self._note_refusal)
-
-    def _land_arrived(self):
-        away = {name: self._distance(name, goal) for name, goal in self._goals.items()}
-        if max(away.values()) > _ARRIVED and self._handle.time() <= self._deadline:
-            return
-        for name, (x, y, _) in self._goals.items():
-            self._left.remove(name)
-            if away[name] <= _NEAR:
-                self._call_land(name)
-            else:
-                self._refusals[name] = (
-                    f"stays in the air: it is {away[name]:.2f} m from the free place to land at "
-                    f"({x:.2f}, {y:.2f})"
-                )
-        self._goals = {}
-
-    def _finish(self):
-        self._publish_left()
-        answers, self._answers = self._answers, []
-        refusals, self._refusals = self._refusals, {}
-        for answer in answers:
-            answer.set_result(refusals)
-
-    def _publish_left(self):
-        self._publisher.publish(String(" ".join(self._left)))
+            self.refuse(name, str(done.exception()))

@@ -1,20 +1,30 @@
-"""Which vehicles land next, and where, so that none comes down on another.
+"""Landings in rounds: which vehicles land next, and where, so that none comes down on another.
 
 Vehicles land in rounds, from below. In each round those land straight down that have nothing
 beneath them. When only such are left that have others beneath them on the ground, the lowest of
-them first fly, at their height, to the nearest places that are free.
+them first fly, at their height, to the nearest places that are free. A vehicle that descends by
+itself is led beside those beneath it.
 """
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from crazyflie_fleet.fleet_config import DOWNWASH
+from crazyflie_fleet.straight_move import shortest_duration
+from crazyflie_model.trajectory import minimum_jerk
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Place = tuple[float, float, float]  #: x, y, z in m.
+
+#: Names of the vehicles whose positions are known, and the arguments of `next_round`.
+Situation = tuple[Sequence[str], Array, Flags, Flags, Array, Array, Array]
 
 SIDE_SPEED = 0.5  #: Mean speed at which vehicles fly to free places, m/s.
 MAX_DETOUR = 3.0  #: How far aside along x and y a vehicle lands that descends already, m.
@@ -23,9 +33,89 @@ MAX_DETOUR = 3.0  #: How far aside along x and y a vehicle lands that descends a
 #: their positions.
 _MARGIN = 1.05
 
+#: A vehicle lands within this distance of its free place, m; within the second one if it takes
+#: longer than the timeout of its side beyond the planned duration.
+_ARRIVED, _NEAR = 0.05, 0.1
+
 _PITCH = 0.5  #: Between two candidates for a free place, in distances that vehicles must keep.
 _MAX_CANDIDATES = 400  #: Candidates, the nearest first, that are checked for a free way.
 _ROUNDING = 1e-6  #: m.
+
+_SIDE_DURATION = 1.1  #: Duration of the move sideways, in the shortest possible ones.
+_MAX_GAP = 0.5  #: Between two references of one descent, s.
+
+
+class LandingSide(Protocol):
+    """What carries out landings: the process of a fleet, or a mission.
+
+    A vehicle that refuses a command is not `left` any more.
+    """
+
+    arrival_timeout: float  #: s.
+
+    def time(self) -> float:
+        """Return the time, s."""
+
+    def left(self) -> list[str]:
+        """Return the names of the vehicles in the air that have still to land."""
+
+    def is_busy(self) -> bool:
+        """Return whether vehicles descend, or are too fast for a round."""
+
+    def situation(self, names: Sequence[str]) -> Situation:
+        """Return where vehicles are; ``names`` are to land."""
+
+    def distance(self, name: str, goal: Place) -> float:
+        """Return how far a vehicle is from a goal (m), m; infinite if that is not known."""
+
+    def go_aside(self, goals: Mapping[str, Place]) -> float:
+        """Send vehicles to free places, m; return when they should be there, s."""
+
+    def descend(self, names: Sequence[str]) -> None:
+        """Land vehicles straight down."""
+
+    def refuse(self, name: str, reason: str) -> None:
+        """Leave a vehicle in the air."""
+
+
+def land_in_rounds(side: LandingSide) -> Iterator[None]:
+    """Land the vehicles that are left, also those added meanwhile; yield while there is to wait."""
+    while True:
+        while side.is_busy():
+            yield
+        if not (left := side.left()):
+            return
+        situation = side.situation(left)
+        names, places = situation[:2]
+        goals, aside = {}, {}
+        for k, (x, y) in next_round(*situation[1:]).items():
+            goal = goals[names[k]] = (x, y, float(places[k, 2]))
+            if (x, y) != _pair(places[k]):
+                aside[names[k]] = goal
+        if aside:
+            yield from _go_aside(side, aside)
+        if down := [name for name in side.left() if name in goals]:
+            side.descend(down)
+
+
+def _go_aside(side, goals):
+    """Wait until vehicles are at free places, m; those that do not get there are refused."""
+    end = side.go_aside(goals)
+    limit = end + side.arrival_timeout
+
+    def away():
+        return {name: side.distance(name, goals[name]) for name in side.left() if name in goals}
+
+    while (found := away()) and (
+        side.time() < end or (max(found.values()) > _ARRIVED and side.time() <= limit)
+    ):
+        yield
+    for name, distance in found.items():
+        if distance > _NEAR:
+            x, y, _ = goals[name]
+            far = "not known" if math.isinf(distance) else f"{distance:.2f} m"
+            place = f"the free place to land at ({x:.2f}, {y:.2f})"
+            side.refuse(name, f"stays in the air: its distance from {place} is {far}")
 
 
 def next_round(
@@ -158,3 +248,78 @@ class _Scene:
 
 def _pair(place):
     return float(place[0]), float(place[1])
+
+
+@dataclass
+class _Descent:
+    """A move from a start (x, y, z) to a landing place (x, y), m; times are in s."""
+
+    start: NDArray[np.float64]
+    place: NDArray[np.float64]
+    duration: float
+    begin: float
+    last: float
+
+
+class SafeDescents:
+    """Landing places of vehicles that descend.
+
+    A vehicle with another beneath it flies to the nearest free place while it sinks. ``buffers``
+    are the collision buffers of all vehicles, m.
+    """
+
+    def __init__(self, buffers: Sequence[float]):
+        radii = np.array(buffers, dtype=float)
+        self._limits = radii[:, None] + radii
+        self._descents: dict[int, _Descent] = {}
+
+    def is_under_way(self, number: int, time: float) -> bool:
+        """Return whether a reference at a time (s) belongs to the present descent of a vehicle."""
+        descent = self._descents.get(number)
+        return descent is not None and 0.0 <= time - descent.last < _MAX_GAP
+
+    def begin(
+        self,
+        number: int,
+        time: float,
+        positions: NDArray[np.float64],
+        is_landing: NDArray[np.bool_],
+    ) -> float:
+        """Choose the landing place of a vehicle at a time (s); return its distance, m.
+
+        Parameters
+        ----------
+        positions : (n, 3) array
+            Of all vehicles, m; NaN where they are not known.
+        is_landing : (n,) array of bool
+            Which of them descend, or are on the ground.
+        """
+        start, places = positions[number].copy(), positions.copy()
+        for other, descent in self._descents.items():
+            if self.is_under_way(other, time):
+                places[other, :2] = descent.place
+        known = np.asarray(np.isfinite(places).all(axis=1))
+        place = start[:2]
+        if known[number]:
+            index, limits = int(known[:number].sum()), self._limits[np.ix_(known, known)]
+            place = np.array(free_place(index, places[known], is_landing[known], limits))
+        distance = float(np.nan_to_num(np.linalg.norm(place - start[:2])))
+        duration = _SIDE_DURATION * shortest_duration(distance)
+        self._descents[number] = _Descent(start, place, duration, time, time)
+        return distance
+
+    def reference(self, number: int, time: float, z: float, z_dot: float) -> list[float] | None:
+        """Return x, y, z (m), x_dot, y_dot, z_dot (m/s); None if the vehicle lands where it is.
+
+        The descent straight down, z (m) and z_dot (m/s) at a time (s), takes effect as far as the
+        move sideways is done: at first the vehicle keeps its height.
+        """
+        descent = self._descents[number]
+        descent.last = time
+        if descent.duration == 0.0:
+            return None
+        s = min((time - descent.begin) / descent.duration, 1.0)
+        done, slope = minimum_jerk(s)
+        path = np.array([*descent.place, z]) - descent.start
+        velocity = slope / descent.duration * path + done * np.array([0.0, 0.0, z_dot])
+        return [*(descent.start + done * path).tolist(), *velocity.tolist()]

@@ -1,11 +1,13 @@
 """Landing of the vehicles of a group: in rounds, from below, none on another."""
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
-from crazyflie_fleet.landing import next_round
+from crazyflie_fleet.landing import LandingSide, Place, Situation, land_in_rounds
 from crazyflie_mission_api.group_state import GroupState, raise_failures
 from crazyflie_mission_api.limits import EVERYWHERE
 from crazyflie_mission_api.mission_vehicle import never
@@ -19,10 +21,7 @@ _SHORTEST_LANDING = 2.0  #: s.
 #: the speed that it has.
 _STOP_AHEAD, _STOP_DURATION = 1.0, 2.0
 
-#: Distances from a free place, m: arrived; and near enough to land there after the timeout.
-_ARRIVED, _NEAR = 0.05, 0.1
-
-Point = tuple[float, float, float]
+_PERIOD = 0.05  #: Between two looks at vehicles that land, s.
 
 
 class LandingGroup(GroupState):
@@ -58,10 +57,10 @@ class LandingGroup(GroupState):
         Without a check vehicles land even if two come too near.
         """
         self._stop_moving(is_checked)
-        failures: dict[str, str] = {}
-        while names := [name for name in self.flying if name not in failures]:
-            failures |= self._land_round(names, is_checked)
-        return failures
+        side = _Landing(self, is_checked)
+        for _ in land_in_rounds(side):
+            self._clock.wait_until(never, self.time() + _PERIOD)
+        return side.failures
 
     def _stop_moving(self, is_checked):
         now = self.time()
@@ -75,36 +74,9 @@ class LandingGroup(GroupState):
             self._move(stops, _STOP_DURATION, is_checked)
             self._clock.wait_until(never, now + _STOP_DURATION)
 
-    def _land_round(self, names, is_checked):
-        places = self._places()
-        obstacles = self.obstacles()
-        places |= {name: o.position for name, o in obstacles.items() if o.position is not None}
-        known = [*places]
-        fences = [
-            EVERYWHERE if name in obstacles else self._all_vehicles[name].bounds for name in known
-        ]
-        fences = [fence.within(self.rules.bounds) for fence in fences]
-        in_flight = {
-            *self._commanded,
-            *(name for name, obstacle in obstacles.items() if obstacle.is_flying),
-        }
-        chosen = next_round(
-            np.array([*places.values()]),
-            np.array([name in names for name in known]),
-            np.array([name not in in_flight for name in known]),
-            self.rules.clearance.limits(known),
-            np.array([fence.lower[:2] for fence in fences]),
-            np.array([fence.upper[:2] for fence in fences]),
-        )
-        goals = {known[k]: (*place, places[known[k]][2]) for k, place in chosen.items()}
-        aside = {name: goal for name, goal in goals.items() if goal != places[name]}
-        failures = self._go_aside(aside, is_checked)
-        landing = [name for name in goals if name not in failures]
-        return failures | self._touch_down(landing, is_checked)
-
-    def _places(self) -> dict[str, Point]:
+    def _places(self) -> dict[str, Place]:
         """Return the positions of all vehicles: name to m."""
-        places: dict[str, Point] = {}
+        places: dict[str, Place] = {}
         for name, vehicle in self._all_vehicles.items():
             measured = vehicle.position()
             if name in self._commanded:
@@ -115,37 +87,6 @@ class LandingGroup(GroupState):
             if measured is not None:
                 places[name] = measured
         return places
-
-    def _go_aside(self, goals, is_checked):
-        """Move vehicles to free places, m; return which do not get there, and why."""
-        if not goals:
-            return {}
-        yaws = {name: self._commanded[name].goal(self.time()).yaw for name in goals}
-        places = self._places()
-        moves = (straight(places[name], goal) for name, goal in goals.items())
-        duration = max(1.0, *map(self._shortest_duration, moves))
-        poses = {name: (goal, yaws[name]) for name, goal in goals.items()}
-        failures = self._move(poses, duration, is_checked)
-        moving = {name: goal for name, goal in goals.items() if name not in failures}
-        end = self.time() + duration
-        self._clock.wait_until(never, end)
-        self._clock.wait_until(
-            lambda: not self._away(moving, _ARRIVED), end + self.rules.arrival_timeout
-        )
-        away = self._away(moving, _NEAR)
-        places = self._places()
-        self._commanded.update({name: TimedTrajectory.hover(places[name]) for name in away})
-        return failures | away
-
-    def _away(self, goals, limit):
-        """Return the vehicles that are not within a limit (m) of goals (m): name to reason."""
-        away = {}
-        for name, goal in goals.items():
-            place = self._vehicles[name].position()
-            far = "not known" if place is None else f"{math.dist(place, goal):.2f} m"
-            if place is None or math.dist(place, goal) > limit:
-                away[name] = f"stays in the air: its distance from a free place to land is {far}"
-        return away
 
     def _move(self, poses, duration, is_checked):
         """Command positions (m) and yaws (rad); return the refusals, name to reason."""
@@ -165,32 +106,101 @@ class LandingGroup(GroupState):
         self._commanded.update({n: move for n, move in moves.items() if n not in failures})
         return failures
 
-    def _touch_down(self, names, is_checked):
-        """Land vehicles straight down; return which do not land, and why."""
-        if not names:
-            return {}
-        places = self._places()
+
+class _Landing(LandingSide):
+    """The landing of the vehicles of a group."""
+
+    def __init__(self, group: LandingGroup, is_checked: bool):
+        self.failures: dict[str, str] = {}  #: Name to reason.
+        self.arrival_timeout = group.rules.arrival_timeout
+        self._group = group
+        self._is_checked = is_checked
+        # Those that were told to land, and when they should be down, s.
+        self._descending: list[str] = []
+        self._end = 0.0
+
+    @override
+    def time(self) -> float:
+        return self._group.time()
+
+    @override
+    def left(self) -> list[str]:
+        done = {*self.failures, *self._descending}
+        return [name for name in self._group.flying if name not in done]
+
+    @override
+    def is_busy(self) -> bool:
+        is_late = self.time() >= self._end + self.arrival_timeout
+        for name in [*self._descending]:
+            vehicle = self._group._vehicles[name]
+            if vehicle.has_landed():
+                vehicle.stop_motors()
+                del self._group._commanded[name]
+            elif is_late:
+                late = f"{self.arrival_timeout:g} s after it should be"
+                self.failures[name] = f"not on the ground {late}"
+            else:
+                continue
+            self._descending.remove(name)
+        return bool(self._descending)
+
+    @override
+    def situation(self, names: Sequence[str]) -> Situation:
+        group = self._group
+        obstacles = group.obstacles()
+        places = group._places()
+        places |= {name: o.position for name, o in obstacles.items() if o.position is not None}
+        known = [*places]
+        in_flight = {*group._commanded, *(name for name, o in obstacles.items() if o.is_flying)}
+        fences = [
+            EVERYWHERE if name in obstacles else group._all_vehicles[name].bounds for name in known
+        ]
+        fences = [fence.within(group.rules.bounds) for fence in fences]
+        return (
+            known,
+            np.array([*places.values()]),
+            np.array([name in names for name in known]),
+            np.array([name not in in_flight for name in known]),
+            group.rules.clearance.limits(known),
+            np.array([fence.lower[:2] for fence in fences]),
+            np.array([fence.upper[:2] for fence in fences]),
+        )
+
+    @override
+    def distance(self, name: str, goal: Place) -> float:
+        place = self._group._vehicles[name].position()
+        return math.inf if place is None else math.dist(place, goal)
+
+    @override
+    def go_aside(self, goals: Mapping[str, Place]) -> float:
+        group, places = self._group, self._group._places()
+        yaws = {name: group._commanded[name].goal(self.time()).yaw for name in goals}
+        moves = (straight(places[name], goal) for name, goal in goals.items())
+        duration = max(1.0, *map(group._shortest_duration, moves))
+        poses = {name: (goal, yaws[name]) for name, goal in goals.items()}
+        self.failures |= group._move(poses, duration, self._is_checked)
+        return self.time() + duration
+
+    @override
+    def descend(self, names: Sequence[str]) -> None:
+        group, places = self._group, self._group._places()
         duration = max(_SHORTEST_LANDING, *(places[name][2] / _DESCENT_SPEED for name in names))
         descents = {}
         for name in names:
             x, y, _ = places[name]
             descent = straight(places[name], (x, y, 0.0), seconds=duration)
             descents[name] = TimedTrajectory(descent, self.time())
-        if is_checked:
-            self._check_apart(descents)
-        failures = self._answers(lambda name: self._vehicles[name].land(duration), names)
+        if self._is_checked:
+            group._check_apart(descents)
         # A vehicle that refuses does not keep the others in the air.
-        landing = [name for name in names if name not in failures]
-        self._commanded.update({name: descents[name] for name in landing})
-        limit = self.time() + duration + self.rules.arrival_timeout
-        self._clock.wait_until(
-            lambda: all(self._vehicles[name].has_landed() for name in landing), limit
-        )
-        for name in landing:
-            if self._vehicles[name].has_landed():
-                self._vehicles[name].stop_motors()
-                del self._commanded[name]
-            else:
-                late = f"{self.rules.arrival_timeout:g} s after it should be"
-                failures[name] = f"not on the ground {late}"
-        return failures
+        refusals = group._answers(lambda name: group._vehicles[name].land(duration), names)
+        self.failures |= refusals
+        self._descending = [name for name in names if name not in refusals]
+        group._commanded.update({name: descents[name] for name in self._descending})
+        self._end = self.time() + duration
+
+    @override
+    def refuse(self, name: str, reason: str) -> None:
+        self.failures[name] = reason
+        place = self._group._places()[name]
+        self._group._commanded[name] = TimedTrajectory.hover(place)

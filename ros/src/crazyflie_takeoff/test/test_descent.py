@@ -232,7 +232,7 @@ def test_a_descent_that_is_held_for_ever_ends():
 def test_a_descent_keeps_its_speed_when_the_plan_changes():
     flight = flying()
     flight.request(Event.LAND)
-    flight.set_plan(BARE)
+    flight.plan = BARE
     clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(1.0)
     assert clock.references()[-1][1] == pytest.approx((0.0, 0.0, 0.703, 0.0, 0.0, -0.3))
 

@@ -236,7 +236,7 @@ class TakeoffServerNode(Node):
         if complaint := hover_complaint(parameters.hover, self._checks.box):
             raise ParameterError(complaint)
         self._parameters = self._checks.parameters = parameters
-        self._flight.set_plan(parameters.plan())
+        self._flight.plan = parameters.plan()
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

@@ -1,4 +1,4 @@
-"""What has to be there before a vehicle takes off: battery, driver, estimator, controller."""
+"""Checks before a takeoff: battery, driver, estimator, controller and geofence."""
 
 import enum
 import math
@@ -10,14 +10,14 @@ from crazyflie_takeoff.motion import MeasuredPosition
 from crazyflie_takeoff.server_table import Event, FilterReport
 from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters, hover_complaint
 
-MAX_VOLTAGE_AGE = 5.0  #: A voltage that is older does not count, s; the driver sends one a second.
-_LONGEST_STEP = 1.5  #: Voltages that are further apart count as this far, s.
-_NOT_LOWER = -math.inf  #: How long a voltage has been lower that is not, s.
-MAX_CONNECTION_AGE = 3.0  #: An older message does not count, s: the driver sends one every second.
+MAX_VOLTAGE_AGE = 5.0  #: Age at which a voltage is unknown, s; the driver sends one a second.
+MAX_CONNECTION_AGE = 3.0  #: Age at which a status of the driver is unknown, s; one comes a second.
+_LONGEST_STEP = 1.5  #: Longest time between two voltages that counts, s.
+_NOT_LOWER = -math.inf  # Duration below a level of a voltage that is not below it, s.
 
 
 class Charge(enum.Enum):
-    """How much is left."""
+    """Charge of a battery."""
 
     UNKNOWN = enum.auto()
     GOOD = enum.auto()
@@ -26,10 +26,10 @@ class Charge(enum.Enum):
 
 
 class Battery:
-    """The charge of a battery, by how long its voltage has been below two levels (V).
+    """The charge of a battery, from the time for which its voltage has been below two levels (V).
 
-    In flight a voltage sags with every burst of thrust; so it has to stay low for ``duration`` (s);
-    with 0 a single low voltage is enough.
+    In flight the voltage sags with every burst of thrust. So it has to stay low for ``duration``
+    (s); if that is 0, a single low voltage is enough.
     """
 
     def __init__(self, low: float, critical: float, duration: float):
@@ -49,7 +49,7 @@ class Battery:
         self.voltage, self._time = voltage, time
 
     def charge(self, time: float) -> Charge:
-        """Return what is left at ``time`` (s)."""
+        """Return the charge at ``time`` (s)."""
         if not abs(time - self._time) < MAX_VOLTAGE_AGE:
             return Charge.UNKNOWN
         critical, low = (lasted >= self._duration for lasted in self._lasted)
@@ -59,7 +59,7 @@ class Battery:
 
 
 class DriverConnection:
-    """What the driver has published last; times are s of one clock."""
+    """The last status that the driver has published; times are s of one clock."""
 
     def __init__(self) -> None:
         self._is_connected = False
@@ -68,11 +68,11 @@ class DriverConnection:
         self._is_emergency = False
 
     def update(self, now: float, is_connected: bool) -> None:
-        """Take note of what the driver has published."""
+        """Take whether the driver is connected to the vehicle."""
         self._time, self._is_connected = now, is_connected
 
     def update_state(self, now: float, state: SupervisorState, is_emergency: bool) -> None:
-        """Take note of the vehicle's state, and whether the driver's emergency stop is latched."""
+        """Take the vehicle's state, and whether the driver's emergency stop is latched."""
         self._state_time, self._state, self._is_emergency = now, state, is_emergency
 
     def cannot_fly(self, now: float) -> str:
@@ -103,7 +103,7 @@ class DriverConnection:
 
 
 class TakeoffChecks:
-    """What is known of estimator, controller, driver, battery and geofence.
+    """Facts about estimator, controller, driver, battery and geofence, and refusals by them.
 
     ``resolve(topic)`` returns the absolute name of a topic. ``parameters`` may be replaced by
     others of the same topics.
@@ -117,16 +117,16 @@ class TakeoffChecks:
         self.battery = Battery(
             parameters.battery_low, parameters.battery_critical, parameters.battery_duration
         )
-        # Without a filter nothing publishes whether there is one.
+        # The filter publishes it, and there may be no filter.
         self.has_controller = True
         self._had_controller = False
         topic = parameters.inhibition_topic
-        # Why another node refuses takeoffs; empty if it does not.
+        # Reason for which another node refuses takeoffs; empty if it does not.
         self.inhibition = "" if topic is None else f"nothing has come on {resolve(topic)}"
         self._resolve = resolve
 
     def set_box(self, box: Box) -> None:
-        """Take the geofence's box."""
+        """Take the box of the geofence."""
         self.box = box
 
     def set_controller(self, has_controller: bool) -> None:
@@ -135,13 +135,13 @@ class TakeoffChecks:
         self._had_controller = self._had_controller or has_controller
 
     def may_become_complete(self, now: float) -> bool:
-        """Return whether something is missing that has never been there; ``now`` in s."""
+        """Return whether something is missing at ``now`` (s) that has never been there."""
         lacks_state = self.parameters.state_topic is not None and not self.position.is_measured
         lacks_controller = not self.has_controller and not self._had_controller
         return lacks_state or lacks_controller or bool(self._driver_refusal(now))
 
     def refusal(self, now: float, report: FilterReport) -> str:
-        """Return why the vehicle must not take off at a time (s); empty if it may."""
+        """Return why the vehicle must not take off at ``now`` (s); empty if it may."""
         if report.event is Event.FILTER_REFUSES:
             return report.reason
         if report.event is Event.FILTER_EMERGENCY:

@@ -1,7 +1,6 @@
 """ROS interface of takeoff and landing."""
 
 from concurrent.futures import Future
-from typing import Generic, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Bool, Empty, Float32, String
@@ -39,17 +38,16 @@ from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import from_vector, stamped
 
 TIME_STEP = 0.01  #: Period of the server, s.
-CRUISE_TIME_STEP = 0.1  #: The same in flight, when it only watches the battery, s.
+CRUISE_TIME_STEP = 0.1  #: Period in flight, where it only watches the battery, s.
 STATUS_PERIOD = 0.1  #: Period at which the status is compared with the published one, s.
-#: How long a server that has started waits for evidence of the state of the flight, s.
-RECOVERY_LIMIT = 1.0
+RECOVERY_LIMIT = 1.0  #: Time that a server waits for evidence of the flight when it starts, s.
 
-#: Limit of a descent when the process is to end, s: with the end of the landing it takes less than
-#: the 10 s for which a process with a flight goes on.
+#: Longest descent when the process is to end, s: together with the ramp that is less than the 10 s
+#: for which a process with a flight goes on.
 LEAVE_LIMIT = 7.0
 
-#: How long after the server's start a takeoff waits for the first state and for a controller, s:
-#: nodes that are launched together need a while to find each other.
+#: Time after the start of the server during which a takeoff waits for the first state and for a
+#: controller, s: nodes that are launched together need a while to find each other.
 START_LIMIT = 5.0
 
 _EVENTS = {
@@ -60,7 +58,7 @@ _EVENTS = {
     FilterStatus.EMERGENCY: Event.FILTER_EMERGENCY,
 }
 
-#: For an operator both parts of a landing are one.
+# For an operator, both parts of a landing are one.
 _LOG_WORDS = {
     FlightState.ON_GROUND: "on the ground",
     FlightState.TAKING_OFF: "taking off",
@@ -69,43 +67,28 @@ _LOG_WORDS = {
     FlightState.LANDING: "landing",
 }
 
-Response = TypeVar("Response")
 
+class Calls:
+    """Callers of services that answer at the end of a takeoff or a landing.
 
-class Calls(Generic[Response]):
-    """Callers of services whose work takes time.
-
-    At most one is under way. The others wait until it is known whether theirs can begin.
+    At most one call is under way. ``waiting`` are those of which it is not known yet whether they
+    may begin, in their order.
     """
 
     def __init__(self) -> None:
-        self._waiting: list[tuple[Event, Future[Response]]] = []
-        self._under_way: Future[Response] | None = None
+        self.waiting: list[tuple[Event, Future[EmptyResponse]]] = []
+        self._under_way: Future[EmptyResponse] | None = None
 
-    @property
-    def has_waiting(self) -> bool:
-        """Whether a call waits to begin."""
-        return bool(self._waiting)
-
-    def add(self, event: Event, future: "Future[Response]") -> None:
-        """Keep a call until it can begin."""
-        self._waiting.append((event, future))
-
-    def take_waiting(self) -> list[tuple[Event, "Future[Response]"]]:
-        """Return the calls that wait, in their order, and forget them."""
-        waiting, self._waiting = self._waiting, []
-        return waiting
-
-    def begin(self, future: "Future[Response]", reason: Exception) -> None:
-        """Start a call; one that is under way fails for a reason."""
+    def begin(self, future: "Future[EmptyResponse]", reason: Exception) -> None:
+        """Start a call; one that is under way fails with a reason."""
         self.fail(reason)
         self._under_way = future
 
-    def finish(self, response: Response) -> None:
+    def finish(self) -> None:
         """Answer the call that is under way, if there is one."""
         future, self._under_way = self._under_way, None
         if future is not None:
-            future.set_result(response)
+            future.set_result(EmptyResponse())
 
     def fail(self, reason: Exception) -> None:
         """Fail the call that is under way, if there is one."""
@@ -116,12 +99,13 @@ class Calls(Generic[Response]):
     def fail_all(self, reason: Exception) -> None:
         """Fail all calls."""
         self.fail(reason)
-        for _, future in self.take_waiting():
+        waiting, self.waiting = self.waiting, []
+        for _, future in waiting:
             future.set_exception(reason)
 
 
 class StatusPublisher:
-    """Publishes and logs the state of a flight when it changes."""
+    """Publishes and logs the status of a flight when it changes."""
 
     def __init__(
         self,
@@ -136,9 +120,9 @@ class StatusPublisher:
         self._text = handle.publisher(parameters.status_topic, String, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._inhibit_shutdown = handle.inhibit_shutdown()
-        self.state: FlightState | None = None  # The one that was published last.
+        self.state: FlightState | None = None  # Published last.
         self.reason = ""  # Why the last landing or abort began.
-        self._published: tuple[object, ...] = ()
+        self._published: tuple[object, ...] | None = None
         self._published_text = ""
         self._logged_word = self._logged_reason = ""
 
@@ -147,7 +131,7 @@ class StatusPublisher:
         return self._checks.refusal(self._handle.time(), self._flight.filter)
 
     def log_recovery(self, height: float | None) -> None:
-        """Log the state in which the server begins and the evidence; height above ground in m."""
+        """Log the state in which the server begins, and the evidence; ``height`` in m or None."""
         report, state = self._flight.filter, self._flight.flight_state
         if state is None:
             return
@@ -163,7 +147,7 @@ class StatusPublisher:
         self._logged_word = _LOG_WORDS[state]
 
     def publish_state(self, state: FlightState) -> None:
-        """Publish another state; log it, with the reason if there is a new one."""
+        """Publish a new state; log it, with its reason if that is new."""
         self.state = state
         # The filter logs its own reasons.
         reason = "" if self.reason == self._flight.filter.reason else self.reason
@@ -176,21 +160,25 @@ class StatusPublisher:
         self.publish()
 
     def publish(self) -> None:
-        """Publish the status, typed and in words, if it has changed."""
-        status = self._flight_status()
-        content = (status.state, status.reason, status.takeoff_refusal)
+        """Publish the status, typed and as text, if it has changed."""
+        content = self._content()
+        if content == self._published:
+            return
+        state, reason, refusal = content
         # Not before the state's own topics, and nothing while it is not known.
-        if content != self._published and status.state == self.state:
+        if state is not None and state is self.state:
             self._published = content
+            status = stamped(FlightStatus, self._handle.stamp(), state=state, reason=reason)
+            status.takeoff_refusal, status.ground = refusal, self._flight.ground
             self._status.publish(status)
-        if (text := _text(status)) != self._published_text:
+        if (text := _text(*content)) != self._published_text:
             self._published_text = text
             self._text.publish(String(text))
 
     def publish_diagnostics(self) -> None:
-        """Publish the status with figures."""
+        """Publish diagnostics."""
         checks, event = self._checks, self._flight.filter.event
-        text = _text(self._flight_status())
+        text = _text(*self._content())
         level = flight_topics.WARN if ": " in text else flight_topics.OK
         if event in (Event.FILTER_SINKS, Event.FILTER_EMERGENCY):
             level = flight_topics.ERROR
@@ -201,30 +189,25 @@ class StatusPublisher:
         }
         self._diagnostics.publish(flight_topics.report(self._handle, level, text, figures))
 
-    def _flight_status(self):
+    def _content(self):
+        """Return flight state, reason, and why a takeoff is refused."""
         state, report = self._flight.flight_state, self._flight.filter
-        may_refuse = state is FlightState.ON_GROUND
-        is_held = report.event is Event.FILTER_HOLDS and state not in (None, FlightState.ON_GROUND)
-        reasons = (self.reason, report.reason if is_held else "")
-        return stamped(
-            FlightStatus,
-            self._handle.stamp(),
-            state=state or FlightStatus.UNKNOWN,
-            reason="; ".join(filter(None, reasons)),
-            takeoff_refusal=self.takeoff_refusal() if may_refuse else REFUSALS[state],
-            ground=self._flight.ground,
-        )
+        if state is not FlightState.ON_GROUND:
+            is_held = report.event is Event.FILTER_HOLDS and state is not None
+            reasons = (self.reason, report.reason if is_held else "")
+            return state, "; ".join(filter(None, reasons)), REFUSALS[state]
+        return state, self.reason, self.takeoff_refusal()
 
 
 class TakeoffServerNode(Node):
-    """Services by which the vehicle takes off and lands."""
+    """Node with the services for takeoff and landing."""
 
     needed_in_flight = True
 
     def __init__(self) -> None:
-        # Whether nodes that were launched together may not have found each other yet.
+        # Whether nodes that were launched together may not be connected yet.
         self._is_starting = True
-        self._calls: Calls[EmptyResponse] = Calls()
+        self._calls = Calls()
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -274,7 +257,7 @@ class TakeoffServerNode(Node):
             )
             handle.subscribe(f"{parameters.state_topic}_missing", String, self._on_missing_state)
         self._timer = handle.varying_timer(TIME_STEP, self._on_timer)
-        # Whether connections come about has nothing to do with simulated time.
+        # Connections are made in real time, also where time is simulated.
         self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover, steady=True)
         self._start_timer = handle.timer(START_LIMIT, self._end_start, steady=True)
         handle.timer(STATUS_PERIOD, self._status.publish, steady=True, stagger=True)
@@ -287,7 +270,7 @@ class TakeoffServerNode(Node):
 
     @override
     def prepare_shutdown(self) -> None:
-        """Land, within `LEAVE_LIMIT`."""
+        """Begin a landing, with a descent of at most `LEAVE_LIMIT`."""
         reason = "the launch is to end"
         self._land(reason, f"takeoff aborted: {self._handle.name} is to end")
         self._flight.limit_descent(LEAVE_LIMIT)
@@ -295,7 +278,7 @@ class TakeoffServerNode(Node):
 
     @override
     def enter_safe_state(self) -> None:
-        """End a takeoff with a landing, go on with a landing, and answer the callers."""
+        """Abort a takeoff with a landing, continue a landing, and fail the calls."""
         if self._flight.flight_state is FlightState.TAKING_OFF:
             self._flight.handle(Event.LAND)
         name = self._handle.name
@@ -311,7 +294,7 @@ class TakeoffServerNode(Node):
 
     def _serve(self, event):
         future: Future[EmptyResponse] = Future()
-        self._calls.add(event, future)
+        self._calls.waiting.append((event, future))
         self._serve_waiting()
         return future.result() if future.done() else future
 
@@ -319,9 +302,10 @@ class TakeoffServerNode(Node):
         if self._flight.state is ServerState.RECOVERING:
             return
         may_wait = self._is_starting and self._checks.may_become_complete(self._handle.time())
-        for event, future in self._calls.take_waiting():
+        waiting, self._calls.waiting = self._calls.waiting, []
+        for event, future in waiting:
             if event is Event.TAKEOFF and may_wait:
-                self._calls.add(event, future)
+                self._calls.waiting.append((event, future))
             else:
                 self._begin(event, future)
         self._set_pace()
@@ -402,7 +386,7 @@ class TakeoffServerNode(Node):
     def _on_timer(self):
         if self._flight.state is ServerState.RECOVERING and self._has_all_evidence():
             self._recover()
-        if self._calls.has_waiting:
+        if self._calls.waiting:
             self._serve_waiting()
         if self._flight.flight_state is not None:
             self._watch_battery()
@@ -455,17 +439,17 @@ class TakeoffServerNode(Node):
             control = Control(thrust=output.thrust)
             self._control.publish(stamped(ControlStamped, self._handle.stamp(), control=control))
         if state in (FlightState.ON_GROUND, FlightState.FLYING):
-            self._calls.finish(EmptyResponse())
+            self._calls.finish()
 
     def _set_pace(self):
-        # Only when the state has been published.
+        # Not before the state has been published.
         is_flying = self._status.state is self._flight.flight_state is FlightState.FLYING
-        cruises = is_flying and not self._calls.has_waiting
+        cruises = is_flying and not self._calls.waiting
         self._timer.set_period(CRUISE_TIME_STEP if cruises else TIME_STEP)
 
 
 def report_of(message: FilterStatus) -> FilterReport:
-    """Return what a filter's message means to the server.
+    """Return the report in a status message of the filter.
 
     KeyError or ValueError: the message has a state that does not exist.
     """
@@ -475,9 +459,8 @@ def report_of(message: FilterStatus) -> FilterReport:
     return FilterReport(event, flight_state(message.flight_state), message.is_commanded, reason)
 
 
-def _text(status):
-    state, reasons = flight_state(status.state), [status.reason] if status.reason else []
+def _text(state, reason, refusal):
     words = "looking for the state of the flight" if state is None else state.word.replace("_", " ")
-    if state is FlightState.ON_GROUND and status.takeoff_refusal:
-        reasons.append(f"takeoff refused: {status.takeoff_refusal}")
-    return ": ".join(filter(None, (words, "; ".join(reasons))))
+    if state is FlightState.ON_GROUND and refusal:
+        reason = "; ".join(filter(None, (reason, f"takeoff refused: {refusal}")))
+    return ": ".join(filter(None, (words, reason)))

@@ -1,4 +1,4 @@
-"""The last machine before the vehicle: chooses between controls, and flies when none comes."""
+"""The filter's states, and the machine that selects controls and flies when none comes."""
 
 import enum
 import math
@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_takeoff.limits import OVERLAP, Limits
+from crazyflie_takeoff.limits import OVERLAP, Box, Limits
 from crazyflie_takeoff.motion import Motion, is_sinking
 from crazyflie_takeoff.relay import Relay
 from crazyflie_takeoff.safe_control import (
@@ -22,19 +22,17 @@ from crazyflie_takeoff.safe_control import (
 from crazyflie_takeoff.transition_table import Table, Transition, step
 from crazyflie_utils.refusal import RefusalError
 
-#: A takeoff control older than this no longer keeps the controller out, s.
-TAKEOFF_CONTROL_LIMIT = 0.5
-#: A control younger than this, s, is never late: three periods of a controller at 100 Hz.
+TAKEOFF_CONTROL_LIMIT = 0.5  #: Age of a takeoff control up to which it excludes commanded ones, s.
+#: Age up to which no control is late: three periods of a controller at 100 Hz, s.
 SHORTEST_HOLD = 0.03
-LAST_STATE = 0.7  #: The oldest state from which the filter reckons how the vehicle moves, s.
-#: How long after the motors were stopped they cannot be released, s: the vehicle may still fall.
-RESET_DELAY = 2.0
+LAST_STATE = 0.7  #: Age of the oldest state from which the filter predicts the motion, s.
+RESET_DELAY = 2.0  #: Time after an emergency in which a vehicle may still fall, s.
 
 Control = TypeVar("Control")
 
 
 class FilterState(enum.IntEnum):
-    """What the filter does; the values are those of crazyflie_msgs/FilterStatus."""
+    """State of the filter; the values are those of crazyflie_msgs/FilterStatus."""
 
     PASSING = 0  # Passes controls on.
     HOLDING = 1  # Keeps the vehicle in place until a control comes back.
@@ -44,35 +42,35 @@ class FilterState(enum.IntEnum):
 
     @property
     def passes_nothing(self) -> bool:
-        """Whether a control that comes back is not passed on, either."""
+        """Whether no control is passed on, not even one that comes back."""
         return self >= FilterState.SINKING
 
 
 class Event(enum.Enum):
-    """What can change the state of the filter."""
+    """Event that can change the state of the filter."""
 
     TAKEOFF_CONTROL = enum.auto()  # From the takeoff server.
-    COMMANDED_CONTROL = enum.auto()  # From the controller, whose turn it is.
+    COMMANDED_CONTROL = enum.auto()  # From the controller, while it is selected.
     FIRST_STATE = enum.auto()  # The first state of a filter that starts in flight.
     TICK = enum.auto()  # Time has passed.
     OBJECTION = enum.auto()  # Controls must not be passed on any more.
-    CRASH = enum.auto()  # The vehicle is where or as it must not be.
+    CRASH = enum.auto()  # The vehicle is outside of its limits, or tilted over.
     STOP = enum.auto()  # /emergency was called.
     RESET = enum.auto()  # /emergency_reset was called.
 
 
 @dataclass(frozen=True)
 class LossTimeouts:
-    """How long the filter waits after a loss, s."""
+    """Timeouts after a loss, s."""
 
-    hold: float  # For a control in flight, until it holds the vehicle; at least `SHORTEST_HOLD`.
+    hold: float  # From the last control until the filter holds; at least `SHORTEST_HOLD`.
     recovery: float  # Then until the descent: without a state, and in a takeoff or a landing.
-    descent: float  # Then until the motors stop; longer by the way down from the known height.
+    descent: float  # Then until the motors stop; plus the duration of the descent if it is known.
     place: float  # The same as ``recovery`` for a vehicle in flight whose state is known.
 
 
 class Status(NamedTuple):
-    """What the filter publishes about itself; see crazyflie_msgs/FilterStatus."""
+    """Status that the filter publishes; see crazyflie_msgs/FilterStatus."""
 
     state: FilterState
     reason: str
@@ -85,20 +83,20 @@ _PASSING, _HOLDING, _SINKING, _DOWN, _EMERGENCY = FilterState
 
 
 class FilterMachine(Generic[Control]):
-    """Passes controls on within limits, or makes its own, as `TABLE` says.
+    """Passes controls on within limits, or makes its own; `TABLE` has its transitions.
 
-    Takeoff controls are passed always, commanded ones when the vehicle is the controller's: in
-    flight, or when the last takeoff control is older than `TAKEOFF_CONTROL_LIMIT`. Otherwise the
-    last takeoff control is repeated.
+    Takeoff controls are always selected. Commanded controls are selected in flight, and when the
+    last takeoff control is older than `TAKEOFF_CONTROL_LIMIT`; otherwise the last takeoff control
+    is repeated.
 
-    The toggle decides whether the vehicle is in flight until a flight state is known; then only
-    the flight state does, so that a toggle and a state of the same event cannot cancel each other.
-    A state of a vehicle on the ground also keeps the controller out when the server has died and
-    zero thrust is not repeated: the controller may have a reference high above. A filter that has
-    just started listens until a takeoff control comes or `stop_listening` is called; before that
-    only a flight state can select the controller.
+    Toggles decide whether the vehicle is in flight until a flight state is known. Then only the
+    flight state does, so that a toggle and a state of the same event cannot cancel each other. On
+    the ground, the flight state also excludes commanded controls if the server has died and does
+    not repeat zero thrust: the controller may have a reference high above. A filter that has just
+    started listens until a takeoff control comes or `stop_listening` is called; before that, only a
+    flight state can select the controller.
 
-    Methods that return something to publish return a control as it has come, or a `Setpoint` of the
+    Methods that return a control to publish return it as it has come, or a `Setpoint` of the
     filter's own, or None. `tick` has to be called every 10 ms, or 40 ms while `is_nominal`.
     ``sees`` is whether states can be expected.
     """
@@ -109,22 +107,22 @@ class FilterMachine(Generic[Control]):
         self._measured, self._ground = self.relay.measured, self.relay.ground
         self.state = FilterState.PASSING
         self.reason = ""  # Why the state is not PASSING.
-        self.elapsed = 0.0  # Since the state began, s.
-        # Age of the last commanded control, s. As if one had just come: a filter that starts in
-        # flight is not connected at once.
+        self.elapsed = 0.0  # Time since the state began, s.
+        # Age of the last commanded control, s. It begins at 0, since a filter that starts in flight
+        # is not connected at once.
         self.silence = 0.0
         self.is_needed = False  # Whether the vehicle would fall without the controller.
         # Whether a flight was ended because no control came, and none has come since.
         self.lacks_controller = False
-        # Whether there was no takeoff server for a while since the last control. If it has sent no
-        # reference, the controller is silent.
+        # Whether there was no takeoff server for a while since the last control. Without a
+        # reference of the server, the controller is silent.
         self.may_lack_reference = False
         self.takeoff_thrust = 0.0  # Of the takeoff control that has just come, m/s^2.
-        self.takeovers = 0  # How often the filter has held the vehicle.
+        self.takeovers = 0  # Number of times that the filter has held the vehicle.
         self.is_commanded = False  # Whether a commanded control has ever come.
-        # Whether a control that is on time and in its ranges is passed on, and changes nothing.
+        # Whether a control that is on time and in its ranges passes unchanged.
         self.passes_unchanged = False
-        self._flight_state: FlightState | None = None  # As the server has published it last.
+        self._flight_state: FlightState | None = None
         self._toggled = False
         self._is_listening = True
         self._waiting: Control | None = None  # A commanded control, while the filter listens.
@@ -132,23 +130,22 @@ class FilterMachine(Generic[Control]):
         self._takeoff_control: Control | None = None
         self._kept_thrust = 0.0
         self._takeoff_time = math.inf
-        # The filter before this one was away for too long if the vehicle is on the ground:
-        # until that is known, nothing is passed on in flight.
+        # Whether a filter that has started in flight passes nothing on until it sees the vehicle:
+        # if that is on the ground, there was no filter for too long.
         self._ground_check_pending = sees
         self._ticked = math.nan
         self._safe = SafeControl(self.relay.hover, None)
         self._own = MOTORS_OFF
-        # Since a control has come back, s; for `RETURN_TIME` the filter's own passes over to it.
-        self._return_age = math.inf
+        self._return_age = math.inf  # Time since a control has come back, s; see `RETURN_TIME`.
         self._last_motion: Motion | None = None
         self._event_reason = self._cause = ""
         self._descent_limit = 0.0
 
-    # Whose the vehicle is.
+    # Flight state.
 
     @property
     def flight_state(self) -> FlightState | None:
-        """The flight state that the server has published last; None if it is not known."""
+        """The last flight state of the server; None if it is not known."""
         return self._flight_state
 
     @flight_state.setter
@@ -157,21 +154,21 @@ class FilterMachine(Generic[Control]):
         self.passes_unchanged = False
 
     def toggle(self) -> None:
-        """Take a toggle of in_flight; none of them brings back a flight that has ended."""
+        """Take a toggle of in_flight; none restores a flight that has ended."""
         if not self.state.passes_nothing:
             self._toggled = not self._toggled
             self.passes_unchanged = False
 
     @property
     def in_flight(self) -> bool:
-        """Whether the vehicle is in flight, as far as is known."""
+        """Whether the vehicle is in flight, by the flight state or else by the toggles."""
         return self._toggled if self._flight_state is None else self._flight_state.in_flight
 
     @property
     def remembered(self) -> FlightState | None:
         """The flight state for a server that has been restarted; None if unknown.
 
-        A toggle to the ground is not remembered: after a toggle that was missed it means flight.
+        A toggle to the ground is not remembered: if one toggle was missed, it means flight.
         """
         if self._flight_state is None and self._toggled:
             return FlightState.FLYING
@@ -179,14 +176,14 @@ class FilterMachine(Generic[Control]):
 
     @property
     def server_reports_ground(self) -> bool:
-        """Whether the server sends the zero thrust of a vehicle on the ground."""
+        """Whether the server sends zero thrust to a vehicle on the ground."""
         sends_zero = self._takeoff_control is not None and self._kept_thrust <= 0.0
         is_there = self._flight_state in (None, FlightState.ON_GROUND)
         return sends_zero and not self.in_flight and is_there
 
     @property
     def is_on_ground(self) -> bool:
-        """Whether the vehicle is on the ground, as far as is known, or its motors are off."""
+        """Whether nothing shows that the vehicle is off the ground, or its motors are off."""
         is_off = self.state in (FilterState.DOWN, FilterState.EMERGENCY)
         return is_off or (self.state is FilterState.PASSING and self._stands)
 
@@ -194,7 +191,7 @@ class FilterMachine(Generic[Control]):
     def _stands(self):
         if self.in_flight or self._kept_thrust > 0.0:
             return False
-        # A landing that has come to zero thrust is one of a vehicle on the ground.
+        # At the end of a landing, zero thrust means that the vehicle is on the ground.
         return self._flight_state is not FlightState.TAKING_OFF
 
     @property
@@ -202,32 +199,32 @@ class FilterMachine(Generic[Control]):
         return self.remembered is FlightState.DESCENDING
 
     def takeoff_age(self, time: float) -> float:
-        """Return how old the last takeoff control is at ``time``, s; infinite without one."""
+        """Return the age of the last takeoff control at ``time``, s; infinite without one."""
         return math.inf if self._takeoff_control is None else time - self._takeoff_time
 
     def selects_controller(self, time: float) -> bool:
-        """Whether the vehicle would fall at ``time`` (s) without the controller.
+        """Return whether the vehicle would fall at ``time`` (s) without the controller.
 
-        So it is in flight, unless a takeoff control has just come; and between takeoff and flight,
-        or when the server has died above the ground, once the last takeoff control is older than
-        `TAKEOFF_CONTROL_LIMIT`.
+        That is the case in flight, unless a takeoff control has just come. It is also the case
+        between takeoff and flight, and if the server has died above the ground, once the last
+        takeoff control is older than `TAKEOFF_CONTROL_LIMIT`.
         """
         if self.in_flight:
             return self.takeoff_age(time) > self._timeouts.hold
         return not self._stands and self.takeoff_age(time) > TAKEOFF_CONTROL_LIMIT
 
-    # What is published.
+    # Status.
 
     @property
     def is_nominal(self) -> bool:
-        """Whether nothing can happen within half the time for which the filter holds on."""
+        """Whether no transition is possible within half of the timeout ``hold``."""
         is_heard = self.silence < 0.5 * self._timeouts.hold or self.is_on_ground
         is_settled = self.state is FilterState.PASSING and self._return_age >= RETURN_TIME
         return is_settled and is_heard and self.relay.is_nominal and not self._ground_check_pending
 
     @property
     def status(self) -> Status:
-        """What the filter does, and why."""
+        """The state, its reason, and what the filter knows of the flight."""
         reason = "" if self.state is FilterState.PASSING else self.reason
         return Status(self.state, reason, self._refusal, self.remembered, self.is_commanded)
 
@@ -245,16 +242,21 @@ class FilterMachine(Generic[Control]):
         self.relay.measure(motion, age, self.server_reports_ground, self.in_flight)
 
     def set_tilted(self, is_tilted: bool) -> None:
-        """Take whether the vehicle is tilted as only one that crashes is."""
+        """Take whether the vehicle has tilted over."""
         self.relay.is_tilted = is_tilted
         self.passes_unchanged = False
 
+    def set_box(self, box: Box) -> None:
+        """Take a new box of the geofence."""
+        self.relay.walls.change(box.without_floor())
+        self.passes_unchanged = False
+
     def miss_controller(self) -> None:
-        """Note that nobody publishes commanded controls: the next controller is a new one."""
+        """Take that no node publishes commanded controls: the next controller is a new one."""
         self.lacks_controller = False
 
     def miss_server(self) -> None:
-        """Note that nobody publishes takeoff controls."""
+        """Take that no node publishes takeoff controls."""
         self.may_lack_reference = True
         self.passes_unchanged = False
 
@@ -263,7 +265,7 @@ class FilterMachine(Generic[Control]):
     def takeoff(
         self, time: float, control: Control, setpoint: Setpoint, caller: str = ""
     ) -> Control | Setpoint | None:
-        """Return what to pass on when a takeoff control has come from a node at ``time`` (s).
+        """Return the control to publish after a takeoff control of a node at ``time`` (s).
 
         ``setpoint`` has the numbers of ``control``.
         """
@@ -286,10 +288,11 @@ class FilterMachine(Generic[Control]):
         return relay.takeoff(control, setpoint, self._lands)
 
     def pass_unchanged(self, time: float, control: Any, age: float) -> bool:
-        """Take a commanded control of the last controller; return whether it passes unchanged.
+        """Take a commanded control if it passes unchanged, and return whether it does.
 
-        So do nearly all. For any other one `commanded` has to be called. ``control`` has the fields
-        of a `Setpoint`; for ``age``, see there.
+        In a nominal flight nearly all controls do; for the others, call `commanded`. The control
+        comes from the node that sent the last one, and has the fields of a `Setpoint`; for ``age``
+        see `commanded`.
         """
         elapsed = time - self._ticked
         is_nominal = self.passes_unchanged and age < 0.5 * self._timeouts.hold
@@ -303,14 +306,14 @@ class FilterMachine(Generic[Control]):
     def commanded(
         self, time: float, control: Control, setpoint: Setpoint, caller: str = "", age: float = 0.0
     ) -> Control | Setpoint | None:
-        """Return what to pass on when a commanded control has come; see `takeoff`.
+        """Return the control to publish after a commanded control; see `takeoff`.
 
-        One that is made from data that were measured ``age`` s earlier than usual is as one that
-        came so much earlier.
+        A control whose data were measured ``age`` s earlier than usual counts as if it had come
+        that much earlier.
         """
         relay = self._interrupt(time)
         relay.commanded_callers.note(time, caller)
-        # The next tick adds all of its step.
+        # The next tick adds its whole step.
         self.silence = min(self.silence, age - self._step_until(time))
         self.lacks_controller = self.may_lack_reference = False
         relay.command(setpoint)
@@ -326,7 +329,7 @@ class FilterMachine(Generic[Control]):
         return self._pass_on(time, control, age) if age < self._timeouts.hold else None
 
     def _choose(self, time, control):
-        """Return the control that is selected when a commanded one has come, or None."""
+        """Return the control that is selected after a commanded one, or None."""
         self._takeoff_time = min(self._takeoff_time, time)
         self.is_commanded = True
         self._waiting = None
@@ -335,8 +338,8 @@ class FilterMachine(Generic[Control]):
         if self._takeoff_control is None and self._is_listening:
             self._waiting = control
             return None
-        # A thrust above zero came from a server that lifts the vehicle off without publishing a
-        # flight state; the state that is known is then old.
+        # Thrust above zero comes from a server that takes off without a flight state; the known
+        # flight state is outdated then.
         is_kept_down = self._flight_state is FlightState.ON_GROUND and self._kept_thrust <= 0.0
         if is_kept_down or self.takeoff_age(time) <= TAKEOFF_CONTROL_LIMIT:
             return self._takeoff_control
@@ -352,7 +355,7 @@ class FilterMachine(Generic[Control]):
         return self.relay.mixed(self._own, self._return_age / RETURN_TIME)
 
     def stop_listening(self, time: float) -> Control | Setpoint | None:
-        """Return what to pass on of a commanded control that has waited until ``time`` (s)."""
+        """Return the commanded control that has waited until ``time`` (s), or None."""
         self._ground_check_pending = self._is_listening = False
         if self._waiting is None:
             return None
@@ -360,11 +363,11 @@ class FilterMachine(Generic[Control]):
         return None if chosen is None or self.state.passes_nothing else self._pass_on(time, chosen)
 
     def tick(self, time: float) -> Setpoint | None:
-        """Let time pass until ``time`` (s); return what to publish, or None."""
+        """Advance to ``time`` (s); return a control to publish, or None."""
         relay = self.relay
         relay.flush()
         step = self._step_until(time)
-        # Unlike a silence, a state is as old as it seems.
+        # In contrast to a silence, a state ages by the whole time.
         elapsed = max(time - self._ticked, 0.0) if self._ticked < math.inf else 0.0
         self._ticked = time
         self.elapsed += step
@@ -386,14 +389,14 @@ class FilterMachine(Generic[Control]):
         return self._substitute(time, elapsed)
 
     def _substitute(self, time, elapsed):
-        """Return the filter's own control, if there is to be one."""
+        """Return a control of the filter's own, or None."""
         if self.state in (FilterState.HOLDING, FilterState.SINKING):
             return self._fly(elapsed)
         if self.state is not FilterState.PASSING:
             return MOTORS_OFF
         is_busy = self.relay.gaps.longest > self._timeouts.hold
         if self._return_age < RETURN_TIME and self.is_needed and is_busy:
-            # The control that has come back may stay the last one for a while.
+            # A filter that seldom runs cannot rely on the next control to complete the change.
             return self.relay.mixed(self._fly(elapsed), self._return_age / RETURN_TIME)
         if self.is_needed:
             return self.relay.late(self.silence)
@@ -402,7 +405,7 @@ class FilterMachine(Generic[Control]):
         return self.relay.late_takeoff(age) if keeps_up else None
 
     def _interrupt(self, time):
-        """Return the relay, where more than a control that passes unchanged is to happen."""
+        """End the passing of unchanged controls, and return the relay."""
         self.passes_unchanged = False
         self.relay.flush()
         self.relay.gaps.run(time)
@@ -413,7 +416,7 @@ class FilterMachine(Generic[Control]):
             self.handle(Event.OBJECTION, contention)
 
     def _fly(self, elapsed):
-        # The step before it took over is reckoned then; after a longest one the clock was set.
+        # `SafeControl` has integrated the step before the takeover.
         step = min(elapsed, LAST_STATE) if self.elapsed > 0.0 else 0.0
         relay, motion = self.relay, self._measured.fresh
         own = self._safe.advance(step, motion, self.state is FilterState.SINKING)
@@ -429,13 +432,13 @@ class FilterMachine(Generic[Control]):
     # Emergencies.
 
     def stop(self, reason: str) -> None:
-        """Stop the motors now and until `reset`, whatever comes."""
+        """Stop the motors until `reset`, whatever controls come."""
         self.handle(Event.STOP, reason)
 
     def reset(self) -> None:
-        """Let the next takeoff have the vehicle again.
+        """Allow the next takeoff after an emergency.
 
-        `RefusalError`: nothing has stopped the motors, or the vehicle may not be on the ground yet.
+        `RefusalError`: there is no emergency, or the vehicle may not be on the ground yet.
         """
         if self.state is not FilterState.EMERGENCY:
             raise RefusalError("there is no emergency")
@@ -450,7 +453,7 @@ class FilterMachine(Generic[Control]):
     def handle(self, event: Event, reason: str = "") -> bool:
         """Step the table; return whether the state has changed.
 
-        An objection, a crash and a stop have a reason in words.
+        ``reason`` is that of an objection, a crash or a stop.
         """
         self._event_reason = reason
         before, self.state = self.state, step(self.TABLE, self.state, event, self)
@@ -459,7 +462,7 @@ class FilterMachine(Generic[Control]):
         self.elapsed = 0.0
         self.passes_unchanged = False
         if before is FilterState.PASSING:
-            # The state stops before the control does: the last one is what there is.
+            # States stop before controls do, so the last state is used.
             relay, motion = self.relay, self._measured.within(LAST_STATE)
             self._safe = SafeControl(relay.hover, motion, self._measured.age, relay.passed)
             self._ground.begin_descent()
@@ -525,7 +528,7 @@ class FilterMachine(Generic[Control]):
     def _descend(self, cause, reason):
         self._cause, self.reason = cause, reason
         self._descent_limit = self._timeouts.descent
-        # Too late the motors stop on the ground, too early the vehicle falls.
+        # If the motors stop too early, the vehicle falls; too late does no harm.
         if (motion := self._measured.fresh or self._last_motion) is not None:
             self._descent_limit += descent_time(motion, self._ground.z)
 

@@ -1,4 +1,4 @@
-"""What server and filter share: parameters of topics and box, the geofence, and diagnostics."""
+"""Parts of server and filter: parameters of topics and geofence, its box, and diagnostics."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from crazyflie_utils import NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import METRES, TOPIC
 
-DIAGNOSTICS_PERIOD = 1.0  #: REP 107 recommends one report a second, s.
+DIAGNOSTICS_PERIOD = 1.0  #: As REP 107 recommends, s.
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -30,7 +30,7 @@ class CornerParameters(Parameters):
 
 
 def derived_topic(own: str, base: str, suffix: str) -> Any:
-    """Return a property: a topic of its own, else that of ``base`` with a suffix, or None."""
+    """Return a property: the topic in ``own``, or else that in ``base`` with a suffix, or None."""
 
     def topic(parameters: Parameters) -> str | None:
         name = getattr(parameters, base)
@@ -103,7 +103,7 @@ def follow_box(handle: NodeHandle, topic: str, callback: Callable[[Box], None]) 
 def report(
     handle: NodeHandle, level: int, message: str, figures: Mapping[str, str]
 ) -> DiagnosticArray:
-    """Return a report of a node; the units are in the keys of the figures."""
+    """Return diagnostics of a node; the keys of the figures contain the units."""
     status = DiagnosticStatus(
         level=level,
         name=handle.name.lstrip("/"),

@@ -1,4 +1,4 @@
-"""Limits of a flight: of places, of controls, of the filter's pauses, and of publishers."""
+"""Limits of a flight: of positions, controls, pauses of the filter, and publishers."""
 
 import math
 from collections import deque
@@ -15,39 +15,35 @@ from crazyflie_takeoff.safe_control import (
     limited,
 )
 
-CLIMB_RESPONSE = 0.1  #: Time constant at which a climb approaches its limit, s.
-CLIMB_BRAKING = 4.0  #: Deceleration below the highest place, m/s^2.
-RETURN_RATE = 0.5  #: At which a vehicle above the highest place comes back, 1/s.
-LANDING_CLIMB = 0.5  #: Climb of a vehicle that is to land, m/s.
-CLIMB_TIMEOUT = 2.0  #: Controls that ask for too much climb for longer than this end the flight, s.
-#: By which a control may change the speed while the filter does not run, m/s.
-MAX_SPEED_CHANGE = 0.5
+CLIMB_RESPONSE = 0.1  #: Time constant with which a climb approaches its limit, s.
+CLIMB_BRAKING = 4.0  #: Deceleration of a climb below the highest position, m/s^2.
+RETURN_RATE = 0.5  #: Rate at which a vehicle above the highest position returns to it, 1/s.
+LANDING_CLIMB = 0.5  #: Fastest climb of a vehicle that is to land, m/s.
+CLIMB_TIMEOUT = 2.0  #: Time of controls that climb too fast after which the flight is ended, s.
+MAX_SPEED_CHANGE = 0.5  #: Change of the speed by a control while the filter does not run, m/s.
 
-#: Largest thrust of a control above any thrust of hover, m/s^2.
+#: Largest difference between the thrust of a control and that of hover, m/s^2.
 _MAX_EXCESS = MAX_THRUST - (1.0 - HOVER_RANGE) * GRAVITY
 
-#: A filter that has not run for longer than this, s, keeps the vehicle's z_dot itself within
-#: `MAX_SPEED_CHANGE`: controls that are made of states from before the gap add up.
+#: Gap after which the vehicle's z_dot itself is kept within `MAX_SPEED_CHANGE`, since controls that
+#: are calculated from states before the gap add up, s.
 BUSY_GAP = 0.2
-
-#: A filter that has not run in so much of its time, in gaps longer than `BUSY_GAP`, cannot see a
-#: vehicle fly; averaged over the latter, s.
+LONGEST_GAP = 1.0  #: Longest gap that counts, s: a clock that steps further was set.
+GAP_MEMORY = 2.0  #: Time constant with which a gap is forgotten, s.
+#: Fraction of the time, averaged over `STARVATION_MEMORY` (s), which a filter that can control a
+#: flight may spend in gaps longer than `BUSY_GAP`.
 STARVED_SHARE, STARVATION_MEMORY = 0.5, 3.0
 
-LONGEST_GAP = 1.0  #: Of a filter that runs, s; a clock that steps further was set.
-GAP_MEMORY = 2.0  #: Time constant with which a gap is forgotten, s.
+OVERLAP = 0.5  #: Time after a message of one node in which one of another node is contention, s.
+MEMORY = 5.0  #: Time after which that is forgotten, s.
 
-#: A node that takes the place of one that sent less than this before, s, overlaps with it.
-OVERLAP = 0.5
-MEMORY = 5.0  #: An overlap is forgotten after this, s.
-
-DESCENT_TIMEOUT = 1.5  #: How long a vehicle that is to land may stay up, s.
-PROGRESS = 0.02  #: Less than this below where it was highest is no descent, m.
+DESCENT_TIMEOUT = 1.5  #: Longest time that a vehicle which is to land may stay up, s.
+PROGRESS = 0.02  #: Least decrease of the height that counts as a descent, m.
 
 
 @dataclass(frozen=True)
 class Box:
-    """The geofence's box: corners, m, fixed frame; infinite where there is no wall."""
+    """The box of the geofence: corners, m, fixed frame; infinite where there is no wall."""
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
@@ -59,7 +55,7 @@ class Box:
         return max(x_low - x, x - x_high, y_low - y, y - y_high, z_low - z, z - z_high)
 
     def without_floor(self) -> "Box":
-        """Return the box open below: a takeoff begins below many a fence."""
+        """Return the box without a floor: a takeoff may begin below it."""
         return Box((*self.lower[:2], -math.inf), self.upper)
 
 
@@ -70,7 +66,7 @@ NO_BOX = Box((-math.inf,) * 3, (math.inf,) * 3)
 class Limits:
     """Limits of a vehicle in flight."""
 
-    box: Box  # Of the geofence at the start.
+    box: Box  # The geofence at the start.
     outside: float  # Largest distance outside the box, m.
     floor: float  # Lowest z, m, fixed frame.
     climb: float  # Largest z_dot that controls may reach, m/s.
@@ -78,9 +74,9 @@ class Limits:
 
 
 class Walls:
-    """The box, which may change in flight, and what lies outside of it.
+    """The geofence's box, which may change in flight.
 
-    A vehicle that new walls leave outside may come back: as far outside as it was is not too far.
+    A vehicle that is outside of a new box may come back: it may be as far outside as it was.
     """
 
     def __init__(self, limits: Limits):
@@ -90,13 +86,13 @@ class Walls:
         self._position: tuple[float, ...] | None = None
 
     def change(self, box: Box) -> None:
-        """Take another box."""
+        """Take a new box."""
         self._box = box
         if self._position is not None:
             self._granted = max(box.excess(self._position), 0.0)
 
     def complaint(self, position: tuple[float, ...]) -> str:
-        """Return in words what is wrong with a measured position (m); nothing if nothing is."""
+        """Return what is wrong with a measured position (m); empty if nothing is."""
         self._position = position
         if position[2] < self._limits.floor:
             return f"{-position[2]:.2f} m below the ground"
@@ -106,27 +102,27 @@ class Walls:
         return f"{excess:.2f} m outside the geofence" if too_far else ""
 
     def highest(self, ground: float) -> float:
-        """Return the z that controls may climb to, m, above a ground at z = ``ground`` (m)."""
-        # The fence, which leaves the vehicle a little room above the wall, comes first.
+        """Return the largest z for a climb, m, with the ground at z = ``ground`` (m)."""
+        # The geofence, which leaves the vehicle a little room above the wall, acts first.
         ceiling = self._box.upper[2] + 0.5 * self._limits.outside
         return min(ground + self._limits.height, ceiling)
 
 
 class Debounce:
-    """Lets a complaint through that lasts longer than ``duration``, s."""
+    """Passes on a complaint that lasts longer than ``duration`` (s)."""
 
     def __init__(self, duration: float):
         self._duration = duration
         self._lasted = 0.0
 
     def advance(self, step: float, complaint: str) -> str:
-        """Let time pass (s); return the complaint if it has lasted long enough, else no text."""
+        """Advance by ``step`` (s); return the complaint if it has lasted, else an empty text."""
         self._lasted = self._lasted + step if complaint else 0.0
         return complaint if self._lasted > self._duration else ""
 
 
 def in_range(control: Setpoint, lowest: float) -> Setpoint:
-    """Return a finite control with roll, pitch, yaw rate and thrust within their ranges.
+    """Return a finite control with roll, pitch, yaw rate and thrust limited to their ranges.
 
     ``lowest`` is the least thrust, m/s^2: `MIN_THRUST` in flight.
     """
@@ -139,10 +135,10 @@ def in_range(control: Setpoint, lowest: float) -> Setpoint:
 
 
 class ClimbLimit:
-    """Lowers the thrust of a vehicle that would climb too fast, or too high.
+    """Limits the thrust of a vehicle that would climb too fast, or too high.
 
-    The allowed speed depends on the height: at most the limit, and such that the vehicle can stop
-    below the highest place with `CLIMB_BRAKING`. ``climb`` is the most z_dot, m/s.
+    z_dot is at most ``climb`` (m/s), and such that the vehicle can stop below the highest position
+    with `CLIMB_BRAKING`.
     """
 
     def __init__(self, climb: float):
@@ -153,10 +149,10 @@ class ClimbLimit:
     def apply(
         self, thrust: float, hover: float, motion: Motion | None, highest: float, is_landing: bool
     ) -> float:
-        """Return the thrust that is passed on, m/s^2.
+        """Return the limited ``thrust``, m/s^2.
 
-        ``thrust`` is asked for, ``hover`` carries the weight, m/s^2; z is not to exceed ``highest``
-        (m); without a known motion nothing is limited.
+        ``hover`` is the thrust of hover, m/s^2, and ``highest`` the largest z, m. Without a known
+        motion the thrust is not limited.
         """
         self._complaint = ""
         if motion is None:
@@ -176,7 +172,7 @@ class ClimbLimit:
         return max(most, MIN_THRUST)
 
     def is_free(self, motion: Motion | None, highest: float) -> bool:
-        """Return whether any thrust is passed on to a vehicle that is not to land."""
+        """Return whether `apply` changes no thrust of a vehicle that is not to land."""
         if self._complaint:
             return False
         if motion is None:
@@ -185,16 +181,16 @@ class ClimbLimit:
         return is_slow and highest - motion.position[2] > self._climb**2 / CLIMB_BRAKING / 2.0
 
     def advance(self, step: float) -> str:
-        """Let time pass (s); return what has been asked for too long, or an empty text."""
+        """Advance by ``step`` (s); return which limit was exceeded too long, or an empty text."""
         return self._debounce.advance(step, self._complaint)
 
 
 class RunGaps:
-    """How long the filter does not run, as on a computer that is too busy.
+    """Gaps in which the filter does not run, as on a computer that is too busy.
 
-    The vehicle keeps its last control meanwhile. So the longer the gaps, the less may a control
-    differ from hover: `MAX_SPEED_CHANGE` divided by the longest gap of the last seconds; less by
-    the speed that there is, once that has been longer than `BUSY_GAP`.
+    Meanwhile the vehicle keeps its last control. So a control may differ from hover by an
+    acceleration of `MAX_SPEED_CHANGE` over the longest gap of the last seconds. If this is longer
+    than `BUSY_GAP`, the present z_dot counts as a part of `MAX_SPEED_CHANGE`.
     """
 
     def __init__(self) -> None:
@@ -204,22 +200,22 @@ class RunGaps:
 
     @property
     def complaint(self) -> str:
-        """In words, that the filter runs too seldom for a flight; empty if it does not."""
+        """Message that the filter runs too seldom for a flight; empty if it does not."""
         is_starved = self._lost > STARVED_SHARE
         return "this computer is too busy for a flight" if is_starved else ""
 
     @property
     def longest(self) -> float:
-        """Of the last seconds, s."""
+        """Longest gap of the last seconds, s."""
         return self._longest
 
     @property
     def is_free(self) -> bool:
-        """Whether a control in its ranges is passed on unchanged."""
+        """Whether `apply` changes no control that is in its ranges."""
         return self._longest * _MAX_EXCESS < MAX_SPEED_CHANGE
 
     def run(self, time: float) -> None:
-        """Update the gaps: the filter runs at ``time`` (s)."""
+        """Take that the filter runs at ``time`` (s)."""
         gap = time - self._time
         self._time = time
         if gap > 0.0:
@@ -232,12 +228,12 @@ class RunGaps:
     def apply(
         self, control: Setpoint, hover: float, climb: float = 0.0, is_ramp: bool = False
     ) -> Setpoint:
-        """Return what is passed on of a control.
+        """Return the limited control.
 
-        ``hover`` is the thrust that carries the weight, m/s^2; ``climb`` is z_dot, m/s, which may
-        be ended within a gap; 0 if it is not known. A fall is ended with `MAX_SUBSTITUTE` and a
-        climb with `MAX_BRAKING` at most. Of a control that may be of a landing's ramp
-        (``is_ramp``), only what is above hover is limited.
+        ``hover`` is the thrust of hover, m/s^2. ``climb`` is z_dot, m/s, or 0 if it is not known: a
+        fall is ended with `MAX_SUBSTITUTE` at most, and a climb with `MAX_BRAKING`. Of a takeoff
+        control (``is_ramp``), which may be of the ramp of a landing, only thrust above hover is
+        limited.
         """
         if self._longest <= 0.0:
             return control
@@ -263,7 +259,7 @@ class DescentWatch:
         self._debounce = Debounce(DESCENT_TIMEOUT)
 
     def advance(self, step: float, height: float | None) -> str:
-        """Let time pass (s); return in words what is wrong, or an empty text.
+        """Advance by ``step`` (s); return a message if the vehicle has not come down, else "".
 
         ``height`` is in m; None while the vehicle is not to land, or its height is not known.
         """
@@ -276,7 +272,7 @@ class DescentWatch:
 
 
 class Callers:
-    """The nodes that publish on one topic: ``what``, in plural.
+    """The nodes that publish on one topic, whose messages are called ``what``.
 
     A node that takes the place of another one, or is started again, is not a second publisher: a
     change counts only if the former node has sent less than `OVERLAP` before. Up to ``tolerance``
@@ -292,9 +288,9 @@ class Callers:
         self._changes: deque[float] = deque(maxlen=tolerance + 1)
 
     def note(self, time: float, caller: str, overlap: float = OVERLAP) -> None:
-        """Take a message that a node has sent at ``time`` (s); without a name, one of this process.
+        """Take a message of the node ``caller`` (empty: of this process) at ``time`` (s).
 
-        For ``overlap``, s, see `OVERLAP`.
+        For ``overlap`` (s) see `OVERLAP`.
         """
         self.advance(time)
         if self._last is not None and caller != self._last[0]:
@@ -304,12 +300,12 @@ class Callers:
         self._last = (caller, time)
 
     def renew(self, time: float) -> None:
-        """Take another message of the last node, sent at ``time`` (s)."""
+        """Take another message of the last node at ``time`` (s)."""
         if self._last is not None:
             self._last = (self._last[0], time)
 
     def advance(self, time: float) -> None:
-        """Let time pass until ``time`` (s)."""
+        """Advance to ``time`` (s)."""
         if time < self._now:
             # The clock was reset.
             self._changes.clear()
@@ -320,7 +316,7 @@ class Callers:
 
     @property
     def complaint(self) -> str:
-        """In words, that there are two; empty if there are not."""
+        """Message that two nodes publish; empty if they do not."""
         if self._last is None or len(self._changes) <= self._tolerance:
             return ""
         names = sorted(each or "one of this process" for each in (self._former, self._last[0]))

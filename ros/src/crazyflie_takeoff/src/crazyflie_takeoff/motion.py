@@ -1,22 +1,20 @@
-"""Where a vehicle is and how it moves, as measured; and the ground below it."""
+"""Measured motion of a vehicle, the age of measurements, and the ground below the vehicle."""
 
 import math
 from typing import NamedTuple
 
-#: A state that is older is not used to control the vehicle, and to watch its limits, s.
-MAX_FEEDBACK_AGE = 0.2
-MAX_POSITION_AGE = 0.5  #: A position that is older is not where the vehicle is, s.
-DRIFT = 0.1  #: How fast the age that is taken for usual may grow, s/s.
-MIN_AGE = -0.05  #: A message that is stamped further ahead of now has no usual age, s.
-CLOCK_STEP = 0.02  #: A larger change of wall clock minus monotonic clock is a step, s.
-TOUCHDOWN_HEIGHT = 0.05  #: A vehicle less than this above where it took off may be down, m.
-ON_GROUND_HEIGHT = 0.1  #: A vehicle less than this above the ground has not been flown, m.
-TOUCHDOWN_SPEED = 0.1  #: A vehicle that sinks slower than this although it is to sink is down, m/s.
-
-#: No vehicle stays in the air with less thrust than this, as a fraction of that of hover: it
-#: passes through speeds below `TOUCHDOWN_SPEED` within 0.1 s.
+MAX_FEEDBACK_AGE = 0.2  #: Oldest state that controls the vehicle and its limits, s.
+MAX_POSITION_AGE = 0.5  #: Oldest position that counts as that of the vehicle, s.
+DRIFT = 0.1  #: Rate at which the usual age of messages may grow, s/s.
+MIN_AGE = -0.05  #: Least age of a message that is on time, by its stamp, s.
+CLOCK_STEP = 0.02  #: Change of wall clock minus monotonic clock that is a step, s.
+TOUCHDOWN_HEIGHT = 0.05  #: Largest height of a vehicle that is down where it took off, m.
+ON_GROUND_HEIGHT = 0.1  #: Largest height of a vehicle that has not been flown, m.
+TOUCHDOWN_SPEED = 0.1  #: Largest speed of a vehicle that is down, m/s.
+#: Thrust with which no vehicle stays in the air, as a fraction of that of hover: it passes through
+#: speeds below `TOUCHDOWN_SPEED` within 0.1 s.
 SINKING_THRUST = 0.75
-REST_TIME = 0.3  #: How long a vehicle has to stay where it is with so little thrust, s.
+REST_TIME = 0.3  #: Time for which a vehicle that is down rests with so little thrust, s.
 
 Position = tuple[float, float, float]  #: x, y, z in m, fixed frame, z up.
 
@@ -42,7 +40,7 @@ class Measurement:
         self._motion, self.age = motion, age
 
     def advance(self, step: float) -> None:
-        """Let time pass, s."""
+        """Advance by ``step`` (s)."""
         self.age += step
 
     def within(self, age: float) -> Motion | None:
@@ -56,9 +54,9 @@ class Measurement:
 
 
 class MeasuredPosition:
-    """The latest measured position, and how old it is.
+    """The last measured position, and its age.
 
-    Times are s of any clock; after it has been reset, ages count from there.
+    Times are s of any clock. If the clock is reset, the age goes on from there.
     """
 
     def __init__(self) -> None:
@@ -69,11 +67,11 @@ class MeasuredPosition:
 
     @property
     def is_measured(self) -> bool:
-        """Whether there has been any position."""
+        """Whether a position has ever been measured."""
         return self._position is not None
 
     def measure(self, time: float, position: Position, age: float) -> None:
-        """Take a position (m) that was received at ``time`` and had an age (s) then."""
+        """Take a position (m) that was received at ``time`` with an age (s)."""
         self._position, self._received, self._age = position, time, age
 
     def value(self, time: float) -> Position | None:
@@ -82,7 +80,7 @@ class MeasuredPosition:
         return self._position if is_known else None
 
     def explanation(self, time: float, topic: str) -> str:
-        """Return why the position, which comes as states on a topic, is not known; or nothing."""
+        """Return why the position, from states on ``topic``, is not known; empty if it is."""
         if self.value(time) is not None:
             return ""
         if self._position is not None and self._silence(time) < MAX_POSITION_AGE:
@@ -99,12 +97,12 @@ class MeasuredPosition:
 
 
 class Delay:
-    """How much later than usual messages arrive, by the stamps of their data.
+    """Delay of messages relative to their usual age, from the stamps of their data.
 
-    The usual age is the smallest one, which is taken to grow at `DRIFT`: so a clock of another
-    machine that is a little off, or a source that needs its time, makes nothing late. Where the
-    wall clock was set, the measurement starts over; a message that was stamped before the clock
-    was set back does not make its negative age the usual one.
+    The usual age is the smallest age, which may grow at `DRIFT`. So neither a small offset of
+    another machine's clock nor the latency of a source counts as a delay. After a step of the wall
+    clock the measurement starts over; the negative age of a message that was stamped before the
+    clock was set back is not a usual one.
     """
 
     def __init__(self) -> None:
@@ -114,10 +112,10 @@ class Delay:
         self._offset = 0.0
 
     def excess(self, stamp: float, now: float, time: float) -> float:
-        """Return how much older than usual the data of a message are, s; at least 0.
+        """Return the age of a message beyond the usual one, s; at least 0.
 
-        ``stamp`` and ``now`` are wall-clock time (s), ``time`` is the same moment by a clock that
-        is never set (s). A stamp of zero, or the same again, has no age.
+        ``stamp`` and ``now`` are wall-clock time, s; ``time`` is now by a clock that is never set,
+        s. A stamp that is zero, or repeats, has no age.
         """
         if stamp == 0.0 or stamp == self._stamp:
             return 0.0
@@ -133,46 +131,47 @@ class Delay:
 
 
 class Ground:
-    """The ground from which the vehicle took off, and the one on which it comes to rest.
+    """The ground where the vehicle took off, and a touchdown at any height.
 
-    The former is where it was when the server last sent zero thrust. The latter may be lower, as
-    beside a table, or higher; so what has flown is down where it stays without enough thrust.
+    The vehicle took off where it was when the server last sent zero thrust. It may land lower, as
+    beside a table, or higher. So a vehicle that has flown is down where it rests although its
+    thrust does not carry it.
     """
 
     def __init__(self) -> None:
-        self.z = 0.0  # Of the place of the takeoff, m, fixed frame.
+        self.z = 0.0  # Where the vehicle took off, m, fixed frame.
         self._has_flown = False
         self._rest = 0.0
 
     def measure(self, motion: Motion, is_on_ground: bool, in_flight: bool) -> None:
-        """Take a measured state, with what the server says of the vehicle."""
+        """Take a measured state, and whether the server reports ground or flight."""
         if is_on_ground:
             self.z, self._has_flown = motion.position[2], False
         elif in_flight or not self.is_below(motion):
             self._has_flown = True
 
     def begin_descent(self) -> None:
-        """Forget where the vehicle rested before."""
+        """Start the measurement of rest."""
         self._rest = 0.0
 
     def height(self, motion: Motion) -> float:
-        """Return the height of a vehicle above the place of the takeoff, m."""
+        """Return the height above the ground where the vehicle took off, m."""
         return motion.position[2] - self.z
 
     def advance(self, step: float, motion: Motion | None, thrust: float) -> None:
-        """Let time pass (s) with a thrust, as a fraction of that of hover."""
+        """Advance by ``step`` (s) with a thrust, as a fraction of that of hover."""
         rests = motion is not None and abs(motion.velocity[2]) < TOUCHDOWN_SPEED
         self._rest = self._rest + step if rests and thrust < SINKING_THRUST else 0.0
 
     def has_touched_down(self, motion: Motion | None) -> bool:
-        """Whether a vehicle that is to sink is down; not if its state is not known."""
+        """Return whether a vehicle that is to sink is down; False if its state is not known."""
         if motion is None or is_sinking(motion):
             return False
         is_low = self.height(motion) < TOUCHDOWN_HEIGHT
         return self._rest > REST_TIME or (is_low and not self._has_flown)
 
     def is_below(self, motion: Motion | None) -> bool:
-        """Whether a vehicle is on the ground; not if its state is not known."""
+        """Return whether a vehicle has not been flown; False if its state is not known."""
         return motion is not None and self.height(motion) < ON_GROUND_HEIGHT
 
 

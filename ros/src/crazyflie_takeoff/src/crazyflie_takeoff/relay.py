@@ -1,4 +1,4 @@
-"""What is passed on of the controls that come, and within which limits."""
+"""The controls that the filter passes on, and their limits."""
 
 import math
 from typing import Any, TypeVar
@@ -17,10 +17,9 @@ from crazyflie_takeoff.limits import (
 from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Ground, Measurement, Motion
 from crazyflie_takeoff.safe_control import MOTORS_OFF, HoverThrust, Setpoint
 
-LEARNING_STEP = 0.2  #: Nothing is learned from controls that are further apart, s.
-HANDOVER = 3  #: A handover from one controller to another makes at most this many changes.
-#: How long a limit has to be exceeded, s: a single measurement that is wrong is no crash.
-CRASH_DURATION = 0.1
+LEARNING_STEP = 0.2  #: Longest time between controls from which hover is learned, s.
+HANDOVER = 3  #: Most changes between publishers in a handover from one controller to another.
+CRASH_DURATION = 0.1  #: Time for which a position is wrong in a crash, s.
 
 Control = TypeVar("Control")
 
@@ -50,14 +49,14 @@ class Relay:
         self._time = math.nan
         self._command = self._allowed_command = self._passed = MOTORS_OFF
         self._takeoff = MOTORS_OFF
-        # The latest of the controls that have passed unchanged since the last `flush`, for how long
-        # they have flown the vehicle, s, and the integral of their vertical thrust, m/s.
+        # Of the controls that have passed unchanged since the last `flush`: the last one, the time
+        # for which they have flown the vehicle, s, and the integral of their vertical thrust, m/s.
         self._unchanged: Any = None
         self._duration = self._impulse = 0.0
 
     @property
     def hover(self) -> float:
-        """Thrust of hover, as learned in flight, m/s^2."""
+        """Thrust of hover that was learned in flight, m/s^2."""
         return self._hover.value
 
     @property
@@ -76,28 +75,29 @@ class Relay:
 
     @property
     def is_free(self) -> bool:
-        """Whether a control of flight that is in its ranges is passed on unchanged."""
+        """Whether a commanded control in its ranges is passed on unchanged in flight."""
         is_clear = self.is_nominal and self.gaps.is_free and not self.contention
         motion = self.measured.fresh
         return is_clear and self._climb.is_free(motion, self.walls.highest(self.ground.z))
 
     @property
     def contention(self) -> str:
-        """In words, that two nodes publish the same controls; empty if they do not."""
+        """Message that two nodes publish the same controls; empty if they do not."""
         return self.takeoff_callers.complaint or self.commanded_callers.complaint
 
     def measure(self, motion: Motion, age: float, is_on_ground: bool, in_flight: bool) -> None:
-        """Take a state that was measured ``age`` s ago, and what the server says of the vehicle."""
+        """Take a state that was measured ``age`` s ago, and whether the server reports ground."""
         self.measured.update(motion, age)
         self.ground.measure(motion, is_on_ground, in_flight)
         self._position_complaint = self.walls.complaint(motion.position)
 
     def advance(self, time: float, step: float, elapsed: float, lands: bool) -> tuple[str, str]:
-        """Let time pass until ``time``, by ``elapsed``, s; return crash and objection.
+        """Advance to ``time`` (s); return a crash and an objection.
 
-        ``step`` is what counts of it for durations, s. Crash and objection are in words why the
-        motors are stopped in the air, and why the vehicle is landed; or empty. ``lands`` is whether
-        the controller is to bring the vehicle down.
+        ``elapsed`` is the time since the last call, s, and ``step`` the part of it that counts for
+        durations. ``lands`` is whether the controller is to bring the vehicle down. A crash is the
+        reason for which the motors are stopped in the air, an objection that for which the vehicle
+        is landed; both may be empty.
         """
         self.measured.advance(elapsed)
         self.gaps.run(time)
@@ -117,7 +117,7 @@ class Relay:
     # Controls.
 
     def pass_unchanged(self, time: float, control: Any) -> bool:
-        """Take a commanded control if it `is_free`; return whether it is in its ranges.
+        """Take a commanded control while `is_free` holds; return False if it is out of range.
 
         ``control`` has the fields of a `Setpoint`.
         """
@@ -136,7 +136,7 @@ class Relay:
         return True
 
     def flush(self) -> None:
-        """Take the controls that have passed unchanged since the last time for passed ones."""
+        """Learn from the controls that have passed unchanged since the last call."""
         if (control := self._unchanged) is None:
             return
         setpoint = Setpoint(control.roll, control.pitch, control.yaw_dot, control.thrust)
@@ -148,12 +148,12 @@ class Relay:
         self._unchanged, self._duration, self._impulse = None, 0.0, 0.0
 
     def takeoff(self, control: Control, setpoint: Setpoint, lands: bool) -> Control | Setpoint:
-        """Return what to pass on of a takeoff control."""
+        """Return a takeoff control as it is passed on."""
         self._takeoff = self._allowed(setpoint, 0.0, lands, is_ramp=True)
         return control if self._takeoff == setpoint else self._takeoff
 
     def command(self, setpoint: Setpoint) -> None:
-        """Take a commanded control, which may be passed on."""
+        """Take the numbers of a commanded control."""
         self._command = setpoint
 
     def commanded(
@@ -165,7 +165,7 @@ class Relay:
         lands: bool = False,
         learns: bool = True,
     ) -> Control | Setpoint:
-        """Return what to pass on of the last commanded control, which is ``age`` s old.
+        """Return the last commanded control, whose data are ``age`` s late, as it is passed on.
 
         ``learns`` is whether the thrust of hover is learned from it.
         """
@@ -179,19 +179,20 @@ class Relay:
         return control if allowed == self._command else allowed
 
     def mixed(self, own: Setpoint, weight: float) -> Setpoint:
-        """Return the last commanded control with a weight (0 ... 1), and ``own`` for the rest."""
+        """Return the mean of ``own`` and the last commanded control, which has a weight (0-1)."""
         self._passed = own.mixed(self._allowed_command, weight)
         return self._passed
 
     def late(self, silence: float) -> Setpoint | None:
-        """Return what replaces a commanded control that is ``silence`` s old; None if nothing."""
+        """Return the control that replaces one ``silence`` s ago; None if it is not late."""
         is_late = silence > 0.5 * self._hold and math.isfinite(self._time)
         return self._faded(self._passed, silence) if is_late else None
 
     def late_takeoff(self, age: float) -> Setpoint | None:
-        """Return what replaces the last takeoff control, ``age`` s old; None if nothing.
+        """Return the control that replaces the last takeoff control; None if it is not late.
 
-        Thrust above hover is not kept for long. Less is that of a ramp, which goes on.
+        ``age`` is that of the takeoff control, s. Less thrust than that of hover belongs to a ramp,
+        which goes on.
         """
         is_late = age > 0.5 * self._hold and self._takeoff.thrust > self.hover
         return self._faded(self._takeoff, age) if is_late else None

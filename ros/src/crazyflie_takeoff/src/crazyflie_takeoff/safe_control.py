@@ -1,11 +1,11 @@
-"""What the control filter flies by itself when no control comes.
+"""The control by which the filter flies the vehicle when no control comes.
 
-The thrust is that of hover, as learned in flight, plus a correction by which the vertical speed
-follows a target: first back to the height at which the filter took over, in a descent more and
-more downwards. Roll and pitch keep the vehicle at its place; the yaw rate is zero. Without a
-state the velocity is dead-reckoned from the last one, by z'' = thrust - hover thrust and by the
-tilt, and controlled to zero: a vehicle that was moving stops first, and one whose hover thrust is
-off by less than `SINK_RATE` comes down all the same.
+The thrust is that of hover, as learned in flight, plus a correction by which z_dot follows a
+target. The target returns the vehicle to the height at which the filter took over, or, in a
+descent, decreases from zero. Roll and pitch keep the vehicle at its position; the yaw rate is zero.
+Without a state, the velocity is integrated from the last one by z'' = thrust - hover thrust and by
+the tilt, and controlled to zero horizontally. So a moving vehicle stops first, and a vehicle whose
+thrust of hover is known to within `SINK_RATE` comes down in any case.
 """
 
 import math
@@ -15,45 +15,34 @@ from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.motion import TOUCHDOWN_SPEED, Motion
 
-#: More time than this never passes between two ticks, s: after a clock was set, or the process was
-#: stopped for a while, no silence is as long as it seems.
+#: Longest time between two ticks that counts, s: if a clock was set, or the process was stopped for
+#: a while, a silence is not as long as it seems.
 LONGEST_STEP = 0.05
 
-HOVER_RANGE = 0.25  #: How far the hover thrust may be from g, as a fraction.
+HOVER_RANGE = 0.25  #: Largest deviation of the thrust of hover from g, as a fraction.
 AVERAGING = 2.0  #: Time constant of the mean of the commanded thrust, s.
 
-#: How fast the target speed goes down in a descent, and from the beginning while no state comes,
-#: m/s^2: the thrust is then as much below hover, which may have been learned 2 % too high. From 1 m
-#: a vehicle without a state meets the ground at 0.7 m/s, from 2 m at 1.0 m/s.
+#: Decrease of the target of z_dot in a descent, and from the beginning while no state comes, m/s^2.
+#: Without a state, the thrust is this much below hover, which may have been learned 2 % too high;
+#: then a vehicle meets the ground at 0.7 m/s from 1 m, and at 1.0 m/s from 2 m.
 SINK_RATE = 0.3
+SINK_SPEED = 0.4  #: Speed of a descent while z_dot is measured, m/s.
+PRESS_RATE = 4.0  #: Decrease of the thrust of a vehicle that does not sink, m/s^2 per s.
+SETTLING = 0.3  #: Time constant with which z_dot follows its target, s.
+MAX_CORRECTION = 0.2 * GRAVITY  #: Largest thrust above hover, m/s^2.
+MAX_BRAKING = 0.4 * GRAVITY  #: Largest thrust below hover, which ends a climb, m/s^2.
 
-#: How fast the thrust of a vehicle that is to sink and does not goes down, m/s^2 per s.
-PRESS_RATE = 4.0
-
-SINK_SPEED = 0.4  #: The target speed goes down to this while the speed is measured, m/s.
-SETTLING = 0.3  #: Time constant at which the speed follows its target, s.
-MAX_CORRECTION = 0.2 * GRAVITY  #: Most that the thrust exceeds hover, m/s^2.
-MAX_BRAKING = 0.4 * GRAVITY  #: The same below hover, which ends a climb, m/s^2.
-#: Of the place, 1/s^2: 0.25 rad/m, as the softer gains (K_manual.txt) have it.
-POSITION_GAIN = 0.25 * GRAVITY
-
-#: Of the velocity, 1/s: 0.3 rad/(m/s), which damps `POSITION_GAIN` critically. The softer gains
-#: have more, which a noisy velocity would turn into tilt.
+POSITION_GAIN = 0.25 * GRAVITY  #: 0.25 rad/m, as in the softer gains (K_manual.txt), 1/s^2.
+#: 0.3 rad/(m/s), which damps `POSITION_GAIN` critically, 1/s. The softer gains have more, by which
+#: noise of the velocity becomes tilt.
 VELOCITY_GAIN = 0.3 * GRAVITY
-
-#: The place is no further away than this for the purpose of the control, m: so the vehicle moves
-#: towards it at 0.4 m/s at most.
-MAX_DISTANCE = 0.5
-
-MAX_SAFE_TILT = 0.15  #: Most roll and pitch of the filter's own, rad.
-#: The place to keep is where a vehicle gets horizontally in this time with its speed, s.
-STOPPING_TIME = 0.5
-HEIGHT_GAIN = 1.0  #: Target speed over height error, 1/s,
-MAX_HEIGHT_SPEED = 0.3  #: which is at most this, m/s.
-#: Most thrust that the filter gives by itself, m/s^2.
-MAX_SUBSTITUTE = (1.0 + HOVER_RANGE) * GRAVITY
-#: How long the change from the filter's control back to the controller's takes, s.
-RETURN_TIME = 0.2
+MAX_DISTANCE = 0.5  #: Largest position error, m: the vehicle returns at 0.4 m/s at most.
+MAX_SAFE_TILT = 0.15  #: Largest roll and pitch, rad.
+STOPPING_TIME = 0.5  #: Time in which the vehicle is to stop horizontally, s.
+HEIGHT_GAIN = 1.0  #: Target of z_dot over height error, 1/s.
+MAX_HEIGHT_SPEED = 0.3  #: Largest such target, m/s.
+MAX_SUBSTITUTE = (1.0 + HOVER_RANGE) * GRAVITY  #: Largest thrust of the filter's own, m/s^2.
+RETURN_TIME = 0.2  #: Time in which the control changes over from the filter's own, s.
 
 
 class Setpoint(NamedTuple):
@@ -70,7 +59,7 @@ class Setpoint(NamedTuple):
         return self.thrust * math.cos(self.roll) * math.cos(self.pitch)
 
     def mixed(self, other: "Setpoint", weight: float) -> "Setpoint":
-        """Return this one, with another that has a weight (0 ... 1)."""
+        """Return a mean with another one, which has a weight (0 ... 1)."""
         return Setpoint(*(a + weight * (b - a) for a, b in zip(self, other, strict=True)))
 
 
@@ -110,10 +99,10 @@ class HoverThrust:
 
 
 class SafeControl:
-    """Hover at a place, and descent, without a controller.
+    """Hover at a position, and descent, without a controller.
 
-    ``hover`` is the thrust of hover, m/s^2; ``motion``, if known, is that ``age`` s before the
-    beginning, and ``control`` was flown since.
+    ``hover`` is the thrust of hover, m/s^2; ``motion``, if it is known, was measured ``age`` s ago,
+    and ``control`` has been flown since.
     """
 
     def __init__(
@@ -125,21 +114,21 @@ class SafeControl:
         self._yaw = 0.0 if motion is None else motion.yaw
         self._place: tuple[float, float, float] | None = None
         self._target = 0.0
-        self._pressure = 0.0  # Thrust that is taken off because the vehicle does not sink, m/s^2.
+        self._pressure = 0.0  # Reduction of the thrust while the vehicle does not sink, m/s^2.
         self._seen = motion
         if motion is not None:
             self._reckon(age)
 
     @property
     def climb(self) -> float:
-        """z_dot, measured or reckoned, m/s."""
+        """z_dot, measured or integrated, m/s."""
         return self._velocity[2]
 
     def advance(self, step: float, measured: Motion | None, sinks: bool) -> Setpoint:
         """Return the next control, ``step`` s after the last one.
 
-        ``measured`` is the latest motion; the same object again is one that has been taken already.
-        ``sinks`` is whether the vehicle is to come down.
+        ``measured`` is the latest motion; the same object again is no new measurement. ``sinks`` is
+        whether the vehicle is to come down.
         """
         self._reckon(step)
         offset = self._offset(measured)
@@ -163,9 +152,9 @@ class SafeControl:
         return self._control
 
     def _press(self, step, sinks):
-        """Let the thrust go down further while the vehicle does not sink as it is told to.
+        """Reduce the thrust further while the vehicle does not sink although it is to.
 
-        On the ground that shows that it is down; in the air it sinks where hover was overestimated.
+        On the ground, that shows a touchdown. In the air, it corrects the thrust of hover.
         """
         stays = (
             sinks and self._target < -0.5 * SINK_SPEED and abs(self._velocity[2]) < TOUCHDOWN_SPEED
@@ -174,7 +163,7 @@ class SafeControl:
         self._pressure = min(max(self._pressure, 0.0), MAX_BRAKING)
 
     def _offset(self, measured):
-        """Return where the place is, seen from the vehicle, m; zero while that is not known."""
+        """Return the vector from the vehicle to its position to keep, m; zero if not known."""
         if measured is None:
             self._place = None
             return 0.0, 0.0, 0.0
@@ -202,17 +191,17 @@ class SafeControl:
 
 
 def braking_time(z_dot: float) -> float:
-    """Return how long ending a vertical speed (m/s) takes, s."""
+    """Return the time in which a vertical speed (m/s) ends, s."""
     return z_dot / MAX_BRAKING if z_dot > 0.0 else -z_dot / MAX_CORRECTION
 
 
 def descent_time(motion: Motion, ground: float) -> float:
-    """Return how long a descent to z = ``ground`` (m) takes, s; a climb is ended first."""
+    """Return the duration of a descent to z = ``ground`` (m), s; a climb is ended first."""
     climb = max(motion.velocity[2], 0.0)
     height = motion.position[2] - ground + 0.5 * climb**2 / MAX_BRAKING
     return climb / MAX_BRAKING + max(height, 0.0) / SINK_SPEED
 
 
 def limited(value: float, limit: float, centre: float = 0.0) -> float:
-    """Return a value within ``limit`` of ``centre``."""
+    """Return a value, limited to ``centre`` +- ``limit``."""
     return min(max(value, centre - limit), centre + limit)

@@ -1,4 +1,4 @@
-"""ROS interface of the choice between takeoff control and commanded control."""
+"""ROS interface of the filter between takeoff control and commanded control."""
 
 from typing import Any
 
@@ -16,28 +16,98 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_takeoff import flight_topics
-from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, Status
+from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, LossTimeouts, Status
 from crazyflie_takeoff.flight_state import FlightState, flight_state
+from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic
+from crazyflie_takeoff.limits import Limits
 from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import Setpoint
-from crazyflie_takeoff.takeoff_control_filter_parameters import TakeoffControlFilterParameters
-from crazyflie_utils import Node, NodeHandle, ServiceError
+from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
+from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import stamped
 
-TIME_STEP = 0.01  #: Period of the controls that the filter makes itself, s.
-NOMINAL_TIME_STEP = 0.04  #: The same while nothing is wrong, s.
+TIME_STEP = 0.01  #: Period of the filter's own controls, s.
+NOMINAL_TIME_STEP = 0.04  #: Period of the ticks in a nominal flight, s.
 
-#: How long a filter that has started listens before it passes a controller, s: some periods of the
-#: zero thrust on the ground, and less than a vehicle flies on without controls.
+#: Time that a filter listens when it starts, before it passes commanded controls, s: some periods
+#: of the zero thrust on the ground, and less than a vehicle flies on without controls.
 LISTENING_TIME = 0.4
+SERVER_LIMIT = 2.0  #: Longest time that it waits for a server that recovers the flight state, s.
+FRESH_TIME = 5.0  #: Time after the start in which commanded controls do not prove a flight, s.
+CONTROLLER_POLL_PERIOD = 0.1  #: Period of the search for publishers of controls, s.
+BUSY_GAP = 0.1  #: Gap after which the log says that the computer is too busy, s.
+REPETITION = 10.0  #: Shortest time between two such messages, s.
 
-SERVER_LIMIT = 2.0  #: How long it waits for the flight state of a server that still recovers it, s.
-#: How long after its start a filter does not take commands for a sign of flight, s.
-FRESH_TIME = 5.0
-CONTROLLER_POLL_PERIOD = 0.1  #: Between two looks for publishers of commanded controls, s.
-BUSY_GAP = 0.1  #: The computer of a filter that does not run for this long, s, is too busy.
-REPETITION = 10.0  #: Shortest time between two warnings of the same kind, s.
+
+class TakeoffControlFilterParameters(FlightTopicParameters):
+    """Parameters of `TakeoffControlFilterNode`."""
+
+    takeoff_control_topic: str = parameter(
+        TOPIC, "the takeoff server's control", name="topics/takeoff_control"
+    )
+    commanded_control_topic: str = parameter(
+        TOPIC, "the controller's control", name="topics/commanded_control"
+    )
+    final_control_topic: str = parameter(
+        TOPIC, "the one that is passed on", name="topics/final_control"
+    )
+    state_topic: str | None = parameter(
+        TOPIC, "where the vehicle is; without it the limits are not watched", None, "topics/state"
+    )
+    own_tilted_topic: str | None = parameter(
+        TOPIC, "by default the name of state + `_tilted`", None, "topics/tilted"
+    )
+    all_emergency_topic: str = parameter(
+        TOPIC, "stops the motors of all vehicles", "/all/emergency", "topics/all_emergency"
+    )
+    emergency_service: str = parameter(SERVICE, "stops the motors", "/emergency", "srv/emergency")
+    reset_service: str = parameter(
+        SERVICE, "ends an emergency", "/emergency_reset", "srv/emergency_reset"
+    )
+    hold: float = parameter(
+        DURATION, "control that is older in flight is replaced", 0.1, "loss/hold_after"
+    )
+    recovery: float = parameter(
+        DURATION,
+        "how long it may then stay away before the descent, while no state comes, either",
+        1.5,
+        "loss/return_limit",
+    )
+    place: float = parameter(
+        DURATION, "the same in flight while states come", 3.0, "loss/place_limit"
+    )
+    descent: float = parameter(
+        DURATION,
+        "the motors are stopped this long after the descent has begun; later by the time to "
+        "sink when the height is known",
+        5.0,
+        "loss/descent_limit",
+    )
+    floor: float = parameter(METRES, "lower is below the ground", -0.5, "limits/floor")
+    outside: float = parameter(
+        Number("m", minimum=0.0), "further outside the geofence is too far", 0.5, "limits/outside"
+    )
+    climb: float = parameter(
+        Number("m/s", above=0.0), "controls do not climb faster", 3.0, "limits/climb"
+    )
+    height: float = parameter(
+        Number("m", above=0.0),
+        "controls do not climb higher above the ground",
+        10.0,
+        "limits/height",
+    )
+
+    tilted_topic = derived_topic("own_tilted_topic", "state_topic", "_tilted")
+
+    def timeouts(self) -> LossTimeouts:
+        """Return how long the filter waits after a loss."""
+        return LossTimeouts(self.hold, self.recovery, self.descent, self.place)
+
+    def limits(self) -> Limits:
+        """Return the limits of a flight."""
+        box = self.box.without_floor()
+        return Limits(box, self.outside, self.floor, self.climb, self.height)
 
 
 class FilterStatusPublisher:
@@ -55,7 +125,7 @@ class FilterStatusPublisher:
         self._logged_explanation = ""
 
     def publish(self, status: Status) -> None:
-        """Publish a status if it is another one."""
+        """Publish a status if it has changed."""
         if status == self._status:
             return
         self._status = status
@@ -68,7 +138,7 @@ class FilterStatusPublisher:
             return
         self._text = text
         self._text_topic.publish(String(text))
-        # Once, however the flight state in front of it changes.
+        # Only once, however the flight state changes meanwhile.
         if explanation not in ("", self._logged_explanation):
             self._handle.warn(text)
         self._logged_explanation = explanation
@@ -100,7 +170,7 @@ class TakeoffControlFilterNode(Node):
         self._is_fresh = True
         self._state_delay, self._control_delay = Delay(), Delay()
         self._wall_offset = 0.0  # Wall clock minus `handle.time`, as of the last tick, s.
-        # Of the last commanded control; that of a message of this process is None.
+        # Connection of the last commanded control; None if this process has sent it.
         self._connection: Any = self
         self._is_settled = False  # Whether the status of a nominal flight has been published.
 
@@ -152,7 +222,7 @@ class TakeoffControlFilterNode(Node):
         try:
             handle.advertise_service(service, EmptyService, callback)
         except ServiceError:
-            # Two vehicles in one process. What stops all of them still works.
+            # There are two vehicles in this process; /all/emergency stops both.
             handle.warn(f"{name} stops another vehicle, not this one")
 
     def _subscribe_measurements(self, handle):
@@ -168,11 +238,11 @@ class TakeoffControlFilterNode(Node):
         if parameters.tilted_topic is not None:
             handle.subscribe(parameters.tilted_topic, Bool, self._on_tilted)
         if parameters.box_topic is not None:
-            flight_topics.follow_box(handle, parameters.box_topic, self._on_box)
+            flight_topics.follow_box(handle, parameters.box_topic, self._filter.set_box)
 
     def _register_timers(self, handle):
         self._timer = handle.varying_timer(TIME_STEP, self._on_timer)
-        # Whether connections come about has nothing to do with simulated time.
+        # Connections are made in real time, also where time is simulated.
         self._listening_timer = handle.timer(LISTENING_TIME, self._stop_listening, steady=True)
         self._server_timer = handle.timer(SERVER_LIMIT, self._stop_waiting, steady=True)
         self._fresh_timer = handle.timer(FRESH_TIME, self._end_freshness, steady=True)
@@ -213,9 +283,6 @@ class TakeoffControlFilterNode(Node):
 
     def _follow_clock(self, time):
         self._wall_offset = self._handle.nanoseconds(time) * 1e-9 - time
-
-    def _on_box(self, box):
-        self._filter.relay.walls.change(box.without_floor())
 
     def _on_tilted(self, message):
         self._filter.set_tilted(message.data)
@@ -288,12 +355,12 @@ class TakeoffControlFilterNode(Node):
             self._set_pace()
 
     def _set_pace(self):
-        # With time enough to be quick again before the vehicle is taken over.
+        # A nominal tick leaves time for quick ones before the takeover.
         nominal = max(TIME_STEP, min(NOMINAL_TIME_STEP, 0.4 * self._parameters.hold))
         self._timer.set_period(nominal if self._filter.is_nominal else TIME_STEP)
 
     def _stop_listening(self):
-        # A server that recovers the state of the flight soon publishes it.
+        # A server that recovers the flight state publishes it soon.
         if self._filter.remembered is not None or not self._server.has_publishers():
             self._stop_waiting()
 
@@ -328,7 +395,7 @@ class TakeoffControlFilterNode(Node):
 
     def _publish_state(self):
         status = self._filter.status
-        # Commands that come right after a launch are no sign of a flight.
+        # Commanded controls right after a launch do not prove a flight.
         is_commanded = status.is_commanded and not self._is_fresh
         self._status.publish(status._replace(is_commanded=is_commanded))
 
@@ -342,7 +409,7 @@ def _setpoint(message):
 
 
 def _words(status):
-    """Return the words of the state, such as "sinking from flying"."""
+    """Return the state as text, such as "sinking from flying"."""
     words = []
     if status.takeoff_refusal:
         words.append("refusing")

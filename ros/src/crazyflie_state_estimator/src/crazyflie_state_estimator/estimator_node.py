@@ -141,8 +141,8 @@ class StateEstimatorNode(Node):
             return None
         self._stamp = pose.stamp
         self._publish_tilt(pose.rotation)
-        stamp, wall_time = pose.stamp * 1e-9, self._handle.nanoseconds(now) * 1e-9
-        if self._clock_steps.update(stamp, wall_time, now):
+        stamp = pose.stamp * 1e-9
+        if self._clock_steps.update(stamp, now, self._handle.nanoseconds):
             self._restart()
         attitude = rpy_from_quaternion(*pose.rotation)
         acceleration = self._control.acceleration(attitude[2], now)

@@ -1,6 +1,7 @@
 """The motion of a vehicle from its stamped poses."""
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 from crazyflie_model.angles import wrap_to_pi
@@ -31,17 +32,22 @@ class ClockStepMonitor:
         self._stepped_at = -math.inf
         self._stamp = self._time = 0.0
 
-    def update(self, stamp: float, now: float, time: float) -> bool:
+    def update(self, stamp: float, time: float, wall_clock: Callable[[float], int]) -> bool:
         """Return whether the clock was set between the last pose and this one.
 
-        ``stamp`` of the pose and ``now`` are wall-clock time (s), ``time`` is the same moment by a
-        clock that is never set (s).
+        ``stamp`` is that of the pose, s; ``time`` is now by a clock that is never set, s, for which
+        ``wall_clock(time)`` returns wall-clock time, ns.
         """
-        if abs(now - time - self._offset) > CLOCK_STEP:
-            self._stepped_at = time
         step = (stamp - self._stamp) - (time - self._time)
-        self._offset, self._stamp, self._time = now - time, stamp, time
-        return time - self._stepped_at < STEP_TIMEOUT and abs(step) > CLOCK_STEP
+        self._stamp, self._time = stamp, time
+        if abs(step) <= CLOCK_STEP:
+            return False
+        # The pose may also have been delayed.
+        offset = wall_clock(time) * 1e-9 - time
+        if abs(offset - self._offset) > CLOCK_STEP:
+            self._stepped_at = time
+        self._offset = offset
+        return time - self._stepped_at < STEP_TIMEOUT
 
 
 class MotionEstimator:

@@ -1,7 +1,6 @@
 """Rejection of poses that the vehicle cannot have flown to, and detection of tilt."""
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from enum import Enum
 
@@ -20,7 +19,8 @@ ACCELERATION_ERROR, MAX_PREDICTION_TIME = 1.0, 0.5
 
 MAX_PREDICTION_STEP = 0.1  #: After a longer pause between poses, s, the clock may have been set.
 
-#: The velocity before an outlier is the mean of this time, s; over less than the latter it is 0.
+#: The velocity before an outlier is the mean over up to twice this time, s; it is 0 if that is
+#: shorter than the latter.
 VELOCITY_WINDOW, MIN_VELOCITY_WINDOW = 0.1, 0.02
 
 #: Longest time for which a vehicle that was not measured is assumed to have flown on, s.
@@ -82,8 +82,9 @@ class PoseGate:
         self._previous: Pose | None = None
         self._since = 0.0
         self._count = 0
-        self._is_doubtful = False
-        self._recent: deque[Pose] = deque()  # Good poses of the last `VELOCITY_WINDOW`.
+        # Two accepted poses, `VELOCITY_WINDOW` or more apart: the older one begins a velocity.
+        self._older: Pose = (0.0, (0.0, 0.0, 0.0))
+        self._newer: Pose = self._older
         self._prediction: _Prediction | None = None  # Since the last good pose.
         # First pose at the present place, and where the prediction was then.
         self._first: tuple[tuple[float, ...], tuple[float, ...]] | None = None
@@ -97,41 +98,40 @@ class PoseGate:
         the thrust is not that of flight.
         """
         pose = (time, tuple(position))
-        if self._last is None or time < self._last[0]:
+        last = self._last
+        if last is None or time < last[0]:
             self.reset()
-            self._previous = pose
-            self._accept(pose)
-            return Classification.GOOD
+            self._older = self._newer = pose
+            return self._accept(pose, Classification.GOOD)
+        # Nearly all poses follow a good one, and are good.
+        if self._previous is last and self._is_reachable(last, pose):
+            return self._accept(pose, Classification.GOOD)
         if self._previous is None or not self._is_reachable(self._previous, pose):
             self._since = time
             self._count = 0
             self._first = None
         self._previous = pose
         self._count += 1
-        is_recent = not self._is_doubtful or time - self._last[0] < TRUST_WINDOW
-        if is_recent and self._is_reachable(self._last, pose):
-            self._accept(pose)
-            return Classification.GOOD
+        is_recent = time - last[0] < TRUST_WINDOW
+        if is_recent and self._is_reachable(last, pose):
+            return self._accept(pose, Classification.GOOD)
         leads_here = responds = True
         if acceleration is not None:
-            leads_here, responds = self._compare_with_control(pose, acceleration)
+            leads_here, responds = self._compare_with_control(last, pose, acceleration)
         is_steady = leads_here and self._count >= CONFIRMATION
-        if is_steady and self._is_reachable(self._last, pose):
-            self._accept(pose)
-            return Classification.GOOD
+        if is_steady and self._is_reachable(last, pose):
+            return self._accept(pose, Classification.GOOD)
         if responds and time - self._since >= PERSISTENCE - 1e-6:
-            self._recent.clear()
-            self._accept(pose)
-            return Classification.MOVED
-        self._is_doubtful = True
+            self._older = self._newer = pose
+            return self._accept(pose, Classification.MOVED)
         self.rejected += 1
         return Classification.BAD
 
-    def _compare_with_control(self, pose, acceleration):
+    def _compare_with_control(self, last, pose, acceleration):
         """Return whether the control leads to a pose, and whether poses move as it demands."""
         time, position = pose
         if self._prediction is None:
-            self._prediction = _Prediction(self._recent[-1], self._velocity())
+            self._prediction = _Prediction(last, self._velocity(last))
         prediction = self._prediction
         prediction.advance(time, acceleration)
         if self._first is None:
@@ -147,20 +147,19 @@ class PoseGate:
         responds = way > MIN_RESPONSE and math.dist(moved, led) < MAX_RESPONSE_ERROR * way
         return leads_here, responds
 
-    def _velocity(self):
-        (begin, start), (end, position) = self._recent[0], self._recent[-1]
+    def _velocity(self, last):
+        (begin, start), (end, position) = self._older, last
         duration = end - begin
         if duration < MIN_VELOCITY_WINDOW:
             return [0.0] * len(start)
         return [(b - a) / duration for a, b in zip(start, position, strict=True)]
 
-    def _accept(self, pose):
-        self._last = pose
-        self._is_doubtful = False
+    def _accept(self, pose, classification):
+        self._last = self._previous = pose
         self._prediction = None
-        self._recent.append(pose)
-        while pose[0] - self._recent[0][0] > VELOCITY_WINDOW:
-            self._recent.popleft()
+        if pose[0] - self._newer[0] > VELOCITY_WINDOW:
+            self._older, self._newer = self._newer, pose
+        return classification
 
     def _is_reachable(self, start, end):
         way = self.max_speed * min(end[0] - start[0], MAX_COAST_TIME) + NOISE_MARGIN
@@ -176,14 +175,14 @@ class TiltMonitor:
     _POSES = 5
 
     def __init__(self, max_tilt: float):
-        self.max_tilt = max_tilt
+        # The cosine of the angle between the vehicle's z axis and that of the fixed frame.
+        self._least_cosine = math.cos(max_tilt)
         self._count = 0
         self._is_tilted = False
 
     def update(self, x: float, y: float) -> bool:
         """Return whether it has, after the next pose; x, y are of its unit quaternion."""
-        # The cosine of the angle between the vehicle's z axis and that of the fixed frame.
-        is_tilted = 1.0 - 2.0 * (x * x + y * y) < math.cos(self.max_tilt)
+        is_tilted = 1.0 - 2.0 * (x * x + y * y) < self._least_cosine
         self._count = 0 if is_tilted == self._is_tilted else self._count + 1
         if self._count >= self._POSES:
             self._is_tilted = is_tilted

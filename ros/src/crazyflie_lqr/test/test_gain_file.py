@@ -1,7 +1,5 @@
 """Gain files: what can be read, and the messages about what cannot."""
 
-import copy
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,8 +8,6 @@ from hypothesis.extra.numpy import arrays
 
 from crazyflie_lqr.gain_file import (
     GainFileError,
-    MatrixFile,
-    VectorFile,
     load_matrix,
     load_vector,
     save_matrix,
@@ -132,40 +128,6 @@ def test_what_is_saved_is_read_back(tmp_path_factory, matrix):
 
 
 # As parameters.
-
-
-def test_gains_are_an_array_to_who_calculates_with_them(write):
-    K = MatrixFile(2, 2)(write("1 2\n3 4\n"))
-    array = np.array([[1.0, 2.0], [3.0, 4.0]])
-    for each in (
-        K,
-        np.asarray(K),
-        K.copy(),
-        (0.5 * K) * 2.0,
-        -(-1.0 * K),
-        array + K - array,
-        abs(K),
-    ):
-        np.testing.assert_array_equal(each, array)
-    np.testing.assert_array_equal(K @ np.ones(2), [3.0, 7.0])
-    np.testing.assert_array_equal(np.ones(2) @ K, [4.0, 6.0])
-    assert (len(K), K.shape, K[1, 0], K[:, 1].tolist()) == (2, (2, 2), 3.0, [2.0, 4.0])
-    assert (K == array).all()
-    assert not (K != array).any()
-    assert (K < 5.0).all()
-    assert (K**2 >= array).all()
-    np.testing.assert_array_equal(2.0**K, 2.0**array)
-    assert list(K) == [[1.0, 2.0], [3.0, 4.0]]
-    assert np.asarray(K, dtype=int).dtype == int
-    assert VectorFile(3)(write("1\n2\n3\n")).sum() == 6.0
-
-
-def test_gains_have_no_more_than_arrays(write):
-    gains = VectorFile(1)(write("1\n"))
-    with pytest.raises(AttributeError, match="gain"):
-        gains.gain  # noqa: B018
-    assert not hasattr(gains, "__fspath__")
-    assert list(copy.deepcopy(gains)) == [1.0]
 
 
 def test_a_zero_is_written_without_a_sign(tmp_path):

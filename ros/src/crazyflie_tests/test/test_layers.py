@@ -92,3 +92,42 @@ def test_only_the_node_handle_speaks_to_rospy(package):
 def test_the_model_knows_nothing_of_ros():
     ros = {"rospy", "genpy", "rosgraph", "std_msgs", "geometry_msgs", "crazyflie_msgs", "tf2_ros"}
     assert imported("crazyflie_model") & ros == set()
+
+
+IN_FUNCTIONS = {
+    # Chosen at the first use of a name, so that what needs no ROS, or no cflib, does without.
+    "crazyflie_mission_api/__init__.py",
+    # Chosen by the command line: a node, or a program that does without ROS.
+    "crazyflie_py/crazyswarm_py.py",
+    "crazyflie_virtual/main.py",
+    # Optional: pictures, pages, schedulers and motion capture that may not be installed.
+    "crazyflie_batch/monte_carlo_command.py",
+    "crazyflie_dashboard/dashboard_node.py",
+    "crazyflie_lqr/design_command.py",
+    "crazyflie_py/visualizer.py",
+    "mocap_optitrack/library_worker.py",
+    # Programs without ROS have parameters, but no names of topics.
+    "crazyflie_utils/parameters/types.py",
+    # cflib takes half a second, and the arguments may be wrong.
+    "crazyflie_tools/tools.py",
+}
+"""Modules in which functions import. None of these functions runs in a flight."""
+
+
+def test_imports_stand_at_the_top():
+    """A function that imports stops a vehicle's streams for as long as it takes."""
+    found = set()
+    for package in PACKAGES.values():
+        for path in package.rglob("*.py"):
+            functions = (
+                node
+                for node in ast.walk(ast.parse(path.read_text()))
+                if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+            )
+            if any(
+                isinstance(node, ast.Import | ast.ImportFrom)
+                for function in functions
+                for node in ast.walk(function)
+            ):
+                found.add(str(path.relative_to(package.parent)))
+    assert found == IN_FUNCTIONS

@@ -1,6 +1,7 @@
 """Full state; a reference of the same type."""
 
-from typing import TYPE_CHECKING
+import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_lqr.gain_file import MatrixFile
 from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode, LinearFeedbackParameters
@@ -8,16 +9,12 @@ from crazyflie_msgs.msg import FullStateStamped
 from crazyflie_utils import parameter
 from crazyflie_utils.parameters.types import Integer
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
 
 class FullStateLqrParameters(LinearFeedbackParameters):
     """Parameters of `FullStateLqrNode`."""
 
     x_dim: int = parameter(Integer(12, 12), "length of the state")
-    K: "NDArray[np.float64]" = parameter(
+    K: NDArray[np.float64] = parameter(
         MatrixFile(4, 12), "gain file, `u_dim` rows of `x_dim` numbers", name="K_file", live=True
     )
 

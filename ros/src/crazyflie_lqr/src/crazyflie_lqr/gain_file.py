@@ -7,75 +7,24 @@ the reader of the C++ workspace knows no comments, and stops at the first.
 
 import math
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 
 from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameters.types import TEXT, ParameterType
 from crazyflie_utils.text_input import number_from_text
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
-
 
 class GainFileError(ValueError):
     """A gain file is unusable; the text names the file, the line and the expected shape."""
 
 
-class Gains:
-    """A vector or matrix as a parameter, which numpy and Python's operators take as an array.
-
-    It is made into one only then: a node that takes the numbers as they are starts without numpy.
-    """
-
-    def __init__(self, numbers: list[Any]):
-        self._numbers = numbers
-
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-    def __iter__(self) -> Iterator[Any]:
-        return iter(self._numbers)
-
-    def __repr__(self) -> str:
-        return f"Gains({self._numbers})"
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> "NDArray[np.float64]":
-        import numpy as np
-
-        return np.array(self._numbers, dtype)
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        return getattr(self.__array__(), name)
-
-
-def _as_array(name):
-    def operate(self, *others):
-        return getattr(self.__array__(), name)(*others)
-
-    return operate
-
-
-# Python looks these up in the class only.
-for _name in ("add", "sub", "mul", "truediv", "pow", "matmul"):
-    for _side in ("", "r"):
-        setattr(Gains, f"__{_side}{_name}__", _as_array(f"__{_side}{_name}__"))
-for _name in ("neg", "abs", "eq", "ne", "lt", "le", "gt", "ge", "getitem"):
-    setattr(Gains, f"__{_name}__", _as_array(f"__{_name}__"))
-
-
-def load_matrix(path: str, rows: int, columns: int) -> "NDArray[np.float64]":
+def load_matrix(path: str, rows: int, columns: int) -> NDArray[np.float64]:
     """Return the matrix of finite numbers in a file, shape (rows, columns), or `GainFileError`."""
-    return _matrix(path, rows, columns).__array__()
-
-
-def _matrix(path, rows, columns):
     expected = f"expected {rows} rows of {columns} numbers"
     matrix: list[list[float]] = []
     for number, row in _rows(path, expected):
@@ -87,15 +36,11 @@ def _matrix(path, rows, columns):
     if len(matrix) != rows:
         last = number if matrix else 0
         raise GainFileError(f"{path}: ends after {len(matrix)} rows (line {last}), {expected}")
-    return Gains(matrix)
+    return np.array(matrix)
 
 
-def load_vector(path: str, length: int) -> "NDArray[np.float64]":
+def load_vector(path: str, length: int) -> NDArray[np.float64]:
     """Return the vector in a file, shape (length,): one row or one column; see `load_matrix`."""
-    return _vector(path, length).__array__()
-
-
-def _vector(path, length):
     expected = f"expected {length} numbers in one row or one column"
     vector: list[float] = []
     width = 0
@@ -107,13 +52,11 @@ def _vector(path, length):
     if len(vector) != length:
         last = number if vector else 0
         raise GainFileError(f"{path}: ends after {_count(vector)} (line {last}), {expected}")
-    return Gains(vector)
+    return np.array(vector)
 
 
-def save_matrix(path: str, matrix: "ArrayLike", comment: str = "") -> None:
+def save_matrix(path: str, matrix: ArrayLike, comment: str = "") -> None:
     """Write a matrix, shape (rows, columns), with 12 digits, and a comment at the end."""
-    import numpy as np
-
     with open(path, "w", encoding="utf-8") as file:
         # Adding 0 turns -0, which would read like a sign that matters, into 0.
         for row in np.asarray(matrix) + 0.0:
@@ -124,15 +67,15 @@ def save_matrix(path: str, matrix: "ArrayLike", comment: str = "") -> None:
 
 @dataclass(frozen=True)
 class MatrixFile(ParameterType):
-    """The path of a gain file; the value is its matrix, of this shape, as `Gains`."""
+    """The path of a gain file; the value is its matrix, of this shape."""
 
     rows: int
     columns: int
     label = "path"
 
     @override
-    def __call__(self, value: Any) -> Gains:
-        return _matrix(TEXT(value), self.rows, self.columns)
+    def __call__(self, value: Any) -> NDArray[np.float64]:
+        return load_matrix(TEXT(value), self.rows, self.columns)
 
     def __str__(self) -> str:
         return f"the path of a text file with {self.rows} rows of {self.columns} numbers"
@@ -140,14 +83,14 @@ class MatrixFile(ParameterType):
 
 @dataclass(frozen=True)
 class VectorFile(ParameterType):
-    """The path of a gain file; the value is its vector, of this length, as `Gains`."""
+    """The path of a gain file; the value is its vector, of this length."""
 
     length: int
     label = "path"
 
     @override
-    def __call__(self, value: Any) -> Gains:
-        return _vector(TEXT(value), self.length)
+    def __call__(self, value: Any) -> NDArray[np.float64]:
+        return load_vector(TEXT(value), self.length)
 
     def __str__(self) -> str:
         return f"the path of a text file with {self.length} numbers in one row or one column"

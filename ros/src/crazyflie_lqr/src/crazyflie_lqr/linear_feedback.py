@@ -9,8 +9,10 @@ accelerates to the right of the heading, positive pitch along it. The formulas a
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
+import numpy as np
+from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_lqr.climb import Climb
@@ -26,10 +28,6 @@ from crazyflie_lqr.control_law import (
     linear_control,
     with_integrals,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 __all__ = [
     "PITCH",
@@ -57,9 +55,8 @@ class LinearFeedback:
     """The control law u = u_ref + K e, with e of `heading_error`.
 
     A subclass overrides `control`; or `law`, which is the same in plain floats and what `control`
-    calls. A process that uses `law` only does without numpy. K has the shape (u_dim, x_dim), with
-    the sign that belongs to the plus; u_ref is the control at the reference, hover; ``yaw_index``
-    is where the yaw is in the state.
+    calls. K has the shape (u_dim, x_dim), with the sign that belongs to the plus; u_ref is the
+    control at the reference, hover; ``yaw_index`` is where the yaw is in the state.
     """
 
     def __init__(self, K: Iterable[Iterable[float]], u_ref: Iterable[float], yaw_index: int):
@@ -68,31 +65,31 @@ class LinearFeedback:
         self.yaw_index = yaw_index
 
     @property
-    def K(self) -> "NDArray[np.float64]":  # noqa: N802
+    def K(self) -> NDArray[np.float64]:  # noqa: N802
         """Gains, shape (u_dim, x_dim); they may be set, though not changed in place."""
-        return _array(self._rows)
+        return np.array(self._rows)
 
     @K.setter
     def K(self, K: Iterable[Iterable[float]]) -> None:  # noqa: N802
         self._rows = [_floats(row) for row in K]
 
     @property
-    def u_ref(self) -> "NDArray[np.float64]":
+    def u_ref(self) -> NDArray[np.float64]:
         """Control at the reference, shape (u_dim,); it may be set, too."""
-        return _array(self._u_ref)
+        return np.array(self._u_ref)
 
     @u_ref.setter
     def u_ref(self, u_ref: Iterable[float]) -> None:
         self._u_ref = _floats(u_ref)
 
     def control(
-        self, x: "NDArray[np.float64]", x_ref: "NDArray[np.float64]", time: float
-    ) -> "NDArray[np.float64]":
+        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
+    ) -> NDArray[np.float64]:
         """Return the control, shape (u_dim,), for a state and a reference, both of shape (x_dim,).
 
         ``time`` is the state's stamp, s.
         """
-        return _array(self.law(_floats(x), _floats(x_ref), time))
+        return np.array(self.law(_floats(x), _floats(x_ref), time))
 
     def law(self, x: Components, x_ref: Components, time: float) -> list[float]:
         """Return the same as `control`, from floats and in floats."""
@@ -242,10 +239,3 @@ class IntegralStateFeedback(LinearFeedback):
 
 def _floats(vector):
     return [float(each) for each in vector]
-
-
-def _array(numbers):
-    # Here, since most processes do without.
-    import numpy as np
-
-    return np.array(numbers)

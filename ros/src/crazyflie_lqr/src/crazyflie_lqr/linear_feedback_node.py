@@ -3,8 +3,10 @@
 import math
 from collections.abc import Iterator
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_lqr.flight_phase import GroundGuess
@@ -19,11 +21,6 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters.types import TOPIC, Integer, Number
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple, to_vector
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-
 MAX_GAIN = 1e6  #: Largest number of a gain file: larger ones make controls that are not finite.
 
 
@@ -32,10 +29,10 @@ class LinearFeedbackParameters(Parameters):
 
     x_dim: int = parameter(Integer(7, 7), "length of the state")
     u_dim: int = parameter(Integer(4, 4), "length of the control")
-    K: "NDArray[np.float64]" = parameter(
+    K: NDArray[np.float64] = parameter(
         MatrixFile(4, 7), "gain file, `u_dim` rows of `x_dim` numbers", name="K_file", live=True
     )
-    u_ref: "NDArray[np.float64]" = parameter(
+    u_ref: NDArray[np.float64] = parameter(
         VectorFile(4),
         "control at the reference, `u_dim` numbers in one row or one column",
         name="u_ref_file",
@@ -115,10 +112,8 @@ class LinearFeedbackNode(Node):
         self._ground_guess = GroundGuess()
         self._age = StateAge()
 
-    def complete_reference(self, reference: "NDArray[np.float64]") -> "NDArray[np.float64]":
+    def complete_reference(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the reference state, shape (x_dim,), of the fields of a reference message."""
-        import numpy as np
-
         return np.append(reference, self.reference_tail)
 
     def make_controller(self, parameters: Any) -> LinearFeedback:
@@ -166,15 +161,10 @@ class LinearFeedbackNode(Node):
 
     def _set_controller(self, controller):
         uses_arrays = _overrides(controller, LinearFeedback, "control")
-        if uses_arrays or self._completes_itself:
-            # Now, since it takes a tenth of a second.
-            import numpy  # noqa: F401
         self._controller = controller
         self._law = self._control_by_arrays if uses_arrays else controller.law
 
     def _control_by_arrays(self, x, x_ref, time):
-        import numpy as np
-
         return self._controller.control(np.array(x), np.array(x_ref), time).tolist()
 
     def _on_reference(self, message):

@@ -11,6 +11,8 @@ import math
 from collections.abc import Sequence
 from typing import overload
 
+import numpy as np
+
 from crazyflie_model.elementwise import Many, Number, clip, functions
 
 Triple = tuple[float, float, float]
@@ -32,8 +34,6 @@ def wrap_to_pi(angle: Many) -> Many:
     turned = angle + math.pi
     if isinstance(turned, float):
         return turned % (2.0 * math.pi) - math.pi
-    import numpy as np
-
     # The remainder, by what anything else that takes part in numpy's functions knows, too.
     return turned - 2.0 * math.pi * np.floor(turned / (2.0 * math.pi)) - math.pi
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from crazyflie_model.angles import Triple
 
@@ -147,8 +148,6 @@ class _Cell:
         excess = self._normals @ point - self._limits
         if np.all(excess <= 0.0):
             return point
-        from scipy.optimize import nnls
-
         bounded = np.isfinite(excess)
         normals, excess = -self._normals[bounded], excess[bounded]
         target = np.array([0.0, 0.0, 0.0, 1.0])

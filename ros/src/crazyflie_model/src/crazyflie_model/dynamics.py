@@ -9,16 +9,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
 from crazyflie_model.elementwise import Number, Vector, functions, join, nowhere, split, where
 from crazyflie_model.integrators import rk4_step
 from crazyflie_model.units import GRAVITY
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
 
 STEP = 0.001  #: Integration step of every model, s.
 

@@ -5,64 +5,52 @@ for one vehicle, on which Python is several times quicker than numpy; arrays of
 shape (n,), or of any shape that broadcasts, for many. What differs between the
 two is in this module. Anything else that takes part in numpy's ``sin``, ``where``
 and ``clip`` (NEP 13, NEP 18) is taken as well.
-
-numpy is imported where arrays are: a process that flies one vehicle does without its 12 MiB.
 """
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from types import ModuleType, SimpleNamespace
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
+from typing import TypeAlias, TypeVar, overload
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 #: A component of many vehicles: an array, or a float that holds for all of them.
-Many: TypeAlias = "float | NDArray[np.float64]"
+Many: TypeAlias = float | NDArray[np.float64]
 #: A component of one vehicle or of many: what is made of floats only is a float.
-Number = TypeVar("Number", float, "Many")
+Number = TypeVar("Number", float, Many)
 #: The components of a state, a control or a vector: ``Vector[float]`` is one vehicle's.
 Vector = list[Number]
 
 
 def split(vectors: ArrayLike) -> Vector[Many]:
     """Return the m components, float or shape (...), of vectors of shape (m,) or (..., m)."""
-    import numpy as np
-
     vectors = np.asarray(vectors, dtype=float)
     return vectors.tolist() if vectors.ndim == 1 else list(np.moveaxis(vectors, -1, 0))
 
 
 def join(components: Sequence[Many]) -> NDArray[np.float64]:
     """Return components as one array, shape (m,) or (..., m); inverse of `split`."""
-    import numpy as np
-
     return np.stack(np.broadcast_arrays(*components), axis=-1)
 
 
-@functools.cache
-def _numpy() -> Any:
-    # The statement alone takes as long as some operations.
-    import numpy
-
-    return numpy
-
-
-@functools.cache
-def _numpy_functions() -> SimpleNamespace:
-    """Return numpy by math's names, which numpy itself knows since version 2 only."""
-    np = _numpy()
-    same = {name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "hypot")}
-    return SimpleNamespace(**same, asin=np.arcsin, atan2=np.arctan2)
+#: numpy's functions by math's names, which numpy itself knows since version 2 only.
+_NUMPY_FUNCTIONS = SimpleNamespace(
+    sin=np.sin,
+    cos=np.cos,
+    tan=np.tan,
+    sqrt=np.sqrt,
+    hypot=np.hypot,
+    asin=np.arcsin,
+    atan2=np.arctan2,
+)
 
 
 def functions(value: Many) -> ModuleType | SimpleNamespace:
     """Return math, or numpy under the same names, whose sin, cos, ... take ``value``."""
-    return math if isinstance(value, float) else _numpy_functions()
+    return math if isinstance(value, float) else _NUMPY_FUNCTIONS
 
 
 @overload
@@ -77,7 +65,6 @@ def where(condition: bool | NDArray[np.bool_], value: Many, other: Many) -> Many
     """Return ``value`` where a condition, bool or array of bool, holds, else ``other``."""
     if isinstance(condition, bool):
         return value if condition else other
-    np = _numpy()
     if isinstance(condition, np.bool_):
         return value if condition else other
     return np.where(condition, value, other)
@@ -87,7 +74,7 @@ def nowhere(condition: bool | NDArray[np.bool_]) -> bool:
     """Tell whether a condition surely holds for no vehicle: then there is nothing to compute."""
     if isinstance(condition, bool):
         return not condition
-    return isinstance(condition, _numpy().ndarray) and not condition.any()
+    return isinstance(condition, np.ndarray) and not condition.any()
 
 
 @overload
@@ -102,4 +89,4 @@ def clip(value: Many, low: Many, high: Many) -> Many:
     """Return ``value`` limited to [low, high]."""
     if isinstance(value, float):
         return low if value < low else high if value > high else value
-    return _numpy().clip(value, low, high)
+    return np.clip(value, low, high)

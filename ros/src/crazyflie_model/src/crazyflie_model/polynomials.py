@@ -1,7 +1,4 @@
-"""Polynomials of time: evaluation, interpolation, and the pieces that trajectories are made of.
-
-numpy and scipy are imported where a polynomial is interpolated: they take 40 MiB.
-"""
+"""Polynomials of time: evaluation, interpolation, and the pieces that trajectories are made of."""
 
 from __future__ import annotations
 
@@ -9,13 +6,13 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic, NamedTuple, Self
+from itertools import pairwise
+from typing import Generic, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_model.elementwise import Number
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
 
 COEFFICIENTS = 8  #: Most coefficients of a polynomial, the constant first.
 #: Bytes of a piece in the vehicle's memory: 4 times 8 coefficients and the duration, float32.
@@ -39,31 +36,51 @@ def evaluate(
     return [math.factorial(k) * term for k, term in enumerate(terms)]
 
 
-def hermite(start: ArrayLike, end: ArrayLike, duration: float) -> tuple[float, ...]:
+def hermite(start: Sequence[float], end: Sequence[float], duration: float) -> tuple[float, ...]:
     """Return the coefficients, the constant first, of the polynomial between two ends.
 
     An end is value and derivatives by time; four at both make a polynomial of the 7th degree.
     ``duration`` is the time between them, s, > 0.
     """
-    from scipy.interpolate import BPoly
+    degree = len(start) + len(end) - 1
+    # Seen from the end, time runs backwards.
+    first = _control_points(start, duration, degree)
+    last = _control_points(end, -duration, degree)
+    return bezier([*first, *reversed(last)], duration)
 
-    return _power_basis(BPoly.from_derivatives([0.0, duration], [start, end]))
+
+def _control_points(derivatives, duration, degree):
+    """Return the first control points of the Bezier curve of a degree with these derivatives.
+
+    The k-th derivative at the beginning is degree! / (degree - k)! / duration^k times the k-th
+    difference of the control points (Farin, Curves and Surfaces for CAGD, section 5.3).
+    """
+    differences, scale = [], 1.0
+    for k, derivative in enumerate(derivatives):
+        differences.append(derivative * scale / math.perm(degree, k))
+        scale *= duration
+    return [
+        sum(math.comb(j, k) * differences[k] for k in range(j + 1)) for j in range(len(differences))
+    ]
 
 
 def bezier(points: Sequence[float], duration: float) -> tuple[float, ...]:
     """Return the coefficients, the constant first, of the Bezier curve of n control points.
 
-    It has degree n - 1; ``duration`` (s, > 0) is the time from the first to the last point.
+    It has degree n - 1; ``duration`` (s, > 0) is the time from the first to the last point. The
+    coefficient of (t / duration)^k is C(n - 1, k) times the k-th difference of the points.
     """
-    from scipy.interpolate import BPoly
-
-    return _power_basis(BPoly([[point] for point in points], [0.0, duration]))
-
-
-def _power_basis(bernstein):
-    from scipy.interpolate import PPoly
-
-    return tuple(PPoly.from_bernstein_basis(bernstein).c[::-1, 0].tolist())
+    degree = len(points) - 1
+    coefficients = []
+    differences = list(points)
+    for k in range(degree + 1):
+        coefficient = math.comb(degree, k) * differences[0]
+        # One after the other: a power of the duration may be 0 or infinite.
+        for _ in range(k):
+            coefficient /= duration
+        coefficients.append(coefficient)
+        differences = [b - a for a, b in pairwise(differences)]
+    return tuple(coefficients)
 
 
 class Goal(NamedTuple, Generic[Number]):

@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from crazyflie_model.angles import Triple
 from crazyflie_model.elementwise import Number, clip, where
 from crazyflie_model.polynomials import Goal, PolynomialPiece
@@ -118,8 +120,6 @@ class Trajectory:
             else:
                 piece = self.pieces[-1]
             return piece, min(time, piece.duration)
-        import numpy as np
-
         durations = np.array([piece.duration for piece in self.pieces])
         begins = np.concatenate([[0.0], np.cumsum(durations)[:-1]])
         index = np.searchsorted(begins[1:], time)

@@ -8,6 +8,12 @@ from typing import Protocol
 
 from crazyflie_model.angles import Triple
 from crazyflie_py.backend import DEFAULT_COLOR
+from crazyflie_virtual.body.physics import Physics
+from crazyflie_virtual.faults import FaultSwitches
+from crazyflie_virtual.firmware.firmware import Firmware
+from crazyflie_virtual.ports.parameters import Parameter
+from crazyflie_virtual.settings import VehicleSettings
+from crazyflie_virtual.tables.parameter_table import parameter_specs
 
 _log = logging.getLogger(__name__)
 
@@ -101,22 +107,11 @@ class SimulatedParameters:
 
 @functools.cache
 def _specs():
-    # Here, as they take as long to import as all else.
-    from crazyflie_virtual.tables.parameter_table import parameter_specs
-
     return {f"{spec.group}.{spec.name}": spec for spec in parameter_specs()}
 
 
 @functools.cache
 def _defaults():
-    # Here, as they take as long to import as all else.
-    from crazyflie_virtual.body.physics import Physics
-    from crazyflie_virtual.faults import FaultSwitches
-    from crazyflie_virtual.firmware.firmware import Firmware
-    from crazyflie_virtual.ports.parameters import Parameter
-    from crazyflie_virtual.settings import VehicleSettings
-    from crazyflie_virtual.tables.parameter_table import parameter_specs
-
     firmware = Firmware(Physics(), FaultSwitches(), VehicleSettings.from_mapping({}))
     parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
     return {parameter.full_name: parameter.default for parameter in parameters}

@@ -6,13 +6,12 @@ import functools
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.random import Generator, default_rng
+from numpy.typing import NDArray
 
 from crazyflie_model.angles import Quaternion, Triple
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 #: Time of a measurement (s), position (m), quaternion (x, y, z, w).
 Pose = tuple[float, Triple, Quaternion]
@@ -42,11 +41,8 @@ class MotionCapture:
         self._in_transit: deque[Pose] = deque()
 
     @functools.cached_property
-    def _random(self) -> np.random.Generator:
-        # Here, since most vehicles are seen as they are, and do without numpy's 12 MiB.
-        import numpy as np
-
-        return np.random.default_rng(self._seed)
+    def _random(self) -> Generator:
+        return default_rng(self._seed)
 
     @property
     def is_perfect(self) -> bool:

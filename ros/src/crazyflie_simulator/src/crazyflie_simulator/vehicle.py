@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Vector
 from crazyflie_model.watchdog import watchdog_control
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 _OFF: Vector[float] = [0.0, 0.0, 0.0, 0.0]
 
@@ -49,8 +47,6 @@ class SimulatedVehicle:
     @property
     def state(self) -> NDArray[np.float64]:
         """State of the dynamics, shape (x_dim,)."""
-        import numpy as np
-
         return np.array(self._x)
 
     @property

@@ -51,8 +51,8 @@ def figure8() -> list[PolynomialPiece]:
     pieces = []
     for begin, end in zip(knots, knots[1:], strict=False):
         x, y = (
-            hermite(sine(amplitude, multiple, begin), sine(amplitude, multiple, end), PIECE)
-            for amplitude, multiple in ((WIDTH, 1), (HEIGHT, 2))
+            hermite(sine(*axis, begin).tolist(), sine(*axis, end).tolist(), PIECE)
+            for axis in ((WIDTH, 1), (HEIGHT, 2))
         )
         zero = (0.0,) * COEFFICIENTS
         pieces.append(PolynomialPiece(PIECE, x, y, zero, zero))

@@ -33,8 +33,8 @@ def fly(group: DryRun, mission, gain_file: str) -> Flight:
     for name, vehicle in group._vehicles.items():
         begin = vehicle._fly
 
-        def note(pieces, name=name, vehicle=vehicle, begin=begin):
-            answer = begin(pieces)
+        def note(*plan, name=name, vehicle=vehicle, begin=begin):
+            answer = begin(*plan)
             trajectories[name].append(vehicle.trajectory)
             return answer
 

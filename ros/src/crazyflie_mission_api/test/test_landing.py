@@ -157,9 +157,9 @@ def test_the_way_aside_takes_as_long_as_the_limits_demand(tower, monkeypatch):
 def test_a_vehicle_that_is_late_at_a_free_place_is_waited_for(tower, monkeypatch):
     vehicle, clock = tower._vehicles["cf1"], tower.clock
 
-    def land(duration):
+    def land(height, duration):
         monkeypatch.undo()
-        return vehicle.land(duration)
+        return vehicle.land(height, duration)
 
     monkeypatch.setattr(vehicle, "land", land)
     monkeypatch.setattr(

@@ -1,19 +1,16 @@
 """Dry runs: missions of ideal vehicles, with the checks of a flight, in no time."""
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
-from dataclasses import dataclass
 from typing import Any
 
 from typing_extensions import override
 
 from crazyflie_mission_api.group_state import Rules
+from crazyflie_mission_api.ideal_vehicle import IdealVehicle
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, MissionError
-from crazyflie_mission_api.mission_vehicle import Clock, MissionVehicle, done
-from crazyflie_mission_api.trajectories import TimedTrajectory, straight
+from crazyflie_mission_api.mission_vehicle import Clock
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_model.angles import Triple
-from crazyflie_model.trajectory import Pieces
 
 _STEP = 0.05  #: Of time, s.
 
@@ -35,79 +32,6 @@ class DryRunClock(Clock):
             self._on_step()
             self._time = min(self._time + _STEP, deadline)
         return is_met
-
-
-@dataclass(eq=False)
-class IdealVehicle(MissionVehicle):
-    """A vehicle that is always at its commanded position; `start_skew` is the real one's."""
-
-    name: str
-    bounds: Bounds
-    start_skew: float
-    clock: Clock
-    trajectory: TimedTrajectory
-    _prepared: Pieces = ()
-    _flies: bool = False
-
-    def _goal(self):
-        return self.trajectory.goal(self.clock.time())
-
-    @override
-    def position(self) -> Triple:
-        return self._goal().position
-
-    @override
-    def heading(self) -> float:
-        return self._goal().yaw
-
-    @override
-    def fault(self) -> str:
-        return ""
-
-    @override
-    def has_landed(self) -> bool:
-        return not self._flies and self.clock.time() >= self.trajectory.end
-
-    @override
-    def take_off(self, height: float, duration: float) -> "Future[Any]":
-        self._flies = True
-        x, y, _ = self.position()
-        return self.go_to((x, y, height), self.heading(), duration)
-
-    @override
-    def land(self, duration: float) -> "Future[Any]":
-        self._flies = False
-        x, y, _ = self.position()
-        return self.go_to((x, y, 0.0), self.heading(), duration)
-
-    @override
-    def stop_motors(self) -> None:
-        pass
-
-    @override
-    def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
-        start = self._goal()
-        return self._fly(straight(start.position, goal, start.yaw, yaw, duration))
-
-    @override
-    def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
-        self._prepared = pieces
-        return done(None)
-
-    @override
-    def start(self) -> "Future[Any]":
-        return self._fly(self._prepared)
-
-    @override
-    def emergency(self) -> "Future[Any]":
-        x, y, _ = self.position()
-        self._flies = False
-        self.trajectory = TimedTrajectory.hover((x, y, 0.0))
-        return done(None)
-
-    def _fly(self, pieces):
-        self.trajectory = TimedTrajectory(pieces, self.clock.time())
-        return done(None)
 
 
 class DryRun(VehicleGroup):
@@ -133,8 +57,7 @@ class DryRun(VehicleGroup):
         for name, position in starts.items():
             fence = fences.get(name, EVERYWHERE)
             yaw, skew = yaws.get(name, 0.0), skews.get(name, 0.0)
-            hover = TimedTrajectory.hover(position, yaw)
-            vehicles.append(IdealVehicle(name, fence, skew, clock, hover))
+            vehicles.append(IdealVehicle(name, clock.time, position, yaw, fence, skew))
         super().__init__(vehicles, clock, rules)
 
 

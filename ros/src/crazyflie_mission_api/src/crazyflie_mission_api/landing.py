@@ -134,7 +134,7 @@ class _Landing(LandingSide):
         for name in [*self._descending]:
             vehicle = self._group._vehicles[name]
             if vehicle.has_landed():
-                vehicle.stop_motors()
+                vehicle.stop()
                 del self._group._commanded[name]
             elif is_late:
                 late = f"{self.arrival_timeout:g} s after it should be"
@@ -193,7 +193,7 @@ class _Landing(LandingSide):
         if self._is_checked:
             group._check_apart(descents)
         # A vehicle that refuses does not keep the others in the air.
-        refusals = group._answers(lambda name: group._vehicles[name].land(duration), names)
+        refusals = group._answers(lambda name: group._vehicles[name].land(None, duration), names)
         self.failures |= refusals
         self._descending = [name for name in names if name not in refusals]
         group._commanded.update({name: descents[name] for name in self._descending})

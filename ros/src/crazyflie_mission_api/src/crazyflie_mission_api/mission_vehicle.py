@@ -8,12 +8,15 @@ from crazyflie_mission_api.limits import Bounds
 from crazyflie_model.angles import Triple
 from crazyflie_model.trajectory import Pieces
 
+MEMORY = 31  #: Pieces that the memory of a vehicle holds.
+
 
 class MissionVehicle(Protocol):
-    """A vehicle that takes high-level commands.
+    """A vehicle that takes high-level commands, of missions and of Crazyswarm's scripts.
 
     A command returns a future, which is done when the vehicle has accepted it, not when it has
-    carried it out; its exception says why it was refused.
+    carried it out; its exception says why it was refused. A ``group_mask`` other than 0 restricts
+    it to members of these groups.
     """
 
     name: str
@@ -33,17 +36,24 @@ class MissionVehicle(Protocol):
     def has_landed(self) -> bool:
         """Return whether the vehicle is on the ground, with its motors off."""
 
-    def take_off(self, height: float, duration: float) -> "Future[Any]":
+    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
         """Climb straight up to a height (m) in about a duration (s)."""
 
-    def land(self, duration: float) -> "Future[Any]":
-        """Sink straight down to the ground in about a duration (s)."""
+    def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":
+        """Sink straight down to a height (m), None is the ground, in about a duration (s)."""
 
-    def stop_motors(self) -> None:
+    def stop(self, group_mask: int = 0) -> "Future[Any]":
         """Stop the motors of a vehicle that has landed: those of the firmware idle on."""
 
-    def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
-        """Fly to a point (m) and heading (rad) in a duration (s)."""
+    def go_to(
+        self,
+        goal: Triple,
+        yaw: float,
+        duration: float,
+        relative: bool = False,
+        group_mask: int = 0,
+    ) -> "Future[Any]":
+        """Fly to a point (m) and heading (rad), or by them, in a duration (s)."""
 
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
         """Take a trajectory, to be uploaded or streamed."""

@@ -16,7 +16,7 @@ from crazyflie_driver import srv
 from crazyflie_fleet.conversions import heading, to_message
 from crazyflie_fleet.high_level_parameters import HIGH_LEVEL, START_TOPIC
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
-from crazyflie_mission_api.mission_vehicle import MissionVehicle, done, forward, in_turn
+from crazyflie_mission_api.mission_vehicle import MEMORY, MissionVehicle, done, forward, in_turn
 from crazyflie_mission_api.stream import SetpointStream
 from crazyflie_mission_api.trajectories import START_SKEW
 from crazyflie_model.angles import Triple, quaternion_from_rpy
@@ -36,7 +36,6 @@ _ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
 _STEP = 0.02  #: Vehicles that are to start within this time, s, are named in one message.
 ALL_OF_FLEET = f"/all/{HIGH_LEVEL}"  #: Namespace of a fleet's services for all.
 CALL_TIMEOUT = 60.0  #: Of a service, s of the machine's clock.
-MEMORY = 31  #: Pieces that the memory of a vehicle holds.
 _SETTLING_TIME = 0.5  #: After the planned end of a landing, s.
 _HIGH_LEVEL = "commander/enHighLevel"  #: The firmware parameter that enables high-level commands.
 _HOLD_DURATION = 0.5  #: Of the go_to at the end of a stream, to where the vehicle is, s.
@@ -321,21 +320,28 @@ class RosVehicle(RosVehicleState, MissionVehicle):
         )
 
     @override
-    def land(self, duration: float) -> "Future[Any]":
+    def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":
         self._landing_end = self._handle.time() + duration + _SETTLING_TIME
+        end = self._ground if height is None else height
         return self._hand_over(
-            lambda: self.call("land", srv.Land, 0, self._ground, seconds(duration)),
+            lambda: self.call("land", srv.Land, group_mask, end, seconds(duration)),
             _LANDING_RETRY_TIME,
         )
 
     @override
-    def stop_motors(self) -> None:
-        if self.uses_driver:
-            self.call("stop", srv.Stop, 0)
+    def stop(self, group_mask: int = 0) -> "Future[Any]":
+        return self.call("stop", srv.Stop, group_mask)
 
     @override
-    def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
-        request = (0, False, Point(*goal), yaw, seconds(duration))
+    def go_to(
+        self,
+        goal: Triple,
+        yaw: float,
+        duration: float,
+        relative: bool = False,
+        group_mask: int = 0,
+    ) -> "Future[Any]":
+        request = (group_mask, relative, Point(*goal), yaw, seconds(duration))
         return self._hand_over(lambda: self.call("go_to", srv.GoTo, *request))
 
     @override

@@ -166,8 +166,8 @@ class TimedTrajectory:
     ``start_skew`` is how much later the vehicle may begin, s.
     """
 
-    def __init__(self, pieces: Pieces, begin: float, start_skew: float = 0.0):
-        self._trajectory = Trajectory(pieces)
+    def __init__(self, plan: Pieces | Trajectory, begin: float, start_skew: float = 0.0):
+        self._trajectory = plan if isinstance(plan, Trajectory) else Trajectory(plan)
         self.begin = begin
         self.start_skew = start_skew
 
@@ -192,7 +192,7 @@ class TimedTrajectory:
 
     def later(self, delay: float) -> "TimedTrajectory":
         """Return the trajectory of a vehicle that begins later, s."""
-        return TimedTrajectory(self._trajectory.pieces, self.begin + delay, self.start_skew)
+        return TimedTrajectory(self._trajectory, self.begin + delay, self.start_skew)
 
     def positions(self, times: Array) -> Array:
         """Return the positions at n times (s), shape (n, 3), m."""

@@ -35,18 +35,18 @@ class Commands(Protocol):
     ``group_mask`` other than 0 restricts it to vehicles in one of these groups.
     """
 
-    def take_off(self, height: float, duration: float, group_mask: int) -> None:
+    def take_off(self, height: float, duration: float, group_mask: int) -> object:
         """Climb to a height (m, world frame) in a duration (s), keeping the heading."""
 
-    def land(self, height: float, duration: float, group_mask: int) -> None:
+    def land(self, height: float, duration: float, group_mask: int) -> object:
         """Descend to a height (m, world frame) in a duration (s), then stop the motors."""
 
-    def stop(self, group_mask: int) -> None:
+    def stop(self, group_mask: int) -> object:
         """Stop the motors; a later command starts them again."""
 
     def go_to(
         self, goal: Triple, yaw: float, duration: float, relative: bool, group_mask: int
-    ) -> None:
+    ) -> object:
         """Fly to a position (m) and yaw (rad), or by them from the planned state."""
 
     def start_trajectory(
@@ -57,7 +57,7 @@ class Commands(Protocol):
     def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
         """Return to high-level commands when the last setpoint is this old (ms)."""
 
-    def emergency(self) -> None:
+    def emergency(self) -> object:
         """Stop the motors at once; commands have no effect any more."""
 
     def arm(self, arm: bool) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from typing import Any
 
-from geometry_msgs.msg import Point, Twist, Vector3
+from geometry_msgs.msg import Twist, Vector3
 from std_msgs.msg import Empty
 from std_srvs.srv import SetBool
 from typing_extensions import override
@@ -19,7 +19,7 @@ from crazyflie_driver.msg import VelocityWorld as VelocityWorldMessage
 from crazyflie_fleet.conversions import full_state_message, to_message
 from crazyflie_fleet.settings import FirmwareNumber
 from crazyflie_mission_api.mission_vehicle import Clock
-from crazyflie_mission_api.ros_vehicle import Pose, RosVehicle, seconds, velocity_between
+from crazyflie_mission_api.ros_vehicle import Pose, RosVehicle, velocity_between
 from crazyflie_model.angles import Triple, rpy_from_quaternion
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import Goal, PolynomialPiece
@@ -241,12 +241,12 @@ class RosVehicleBackend(VehicleBackend):
     @override
     def land(self, height: float, duration: float, group_mask: int) -> None:
         self.held.free(duration)
-        self._command("land", srv.Land, group_mask, height, seconds(duration))
+        self._command("land", self._vehicle.land(height, duration, group_mask))
         self.note_landing(group_mask)
 
     @override
     def stop(self, group_mask: int) -> None:
-        self._command("stop", srv.Stop, group_mask)
+        self._command("stop", self._vehicle.stop(group_mask))
 
     @override
     def go_to(
@@ -256,8 +256,8 @@ class RosVehicleBackend(VehicleBackend):
             self._check("goTo", goal)
         self.note_flight()
         yaw = self.checked_yaw(yaw)
-        arguments = (group_mask, relative, Point(*goal), yaw, seconds(duration))
-        self._command("go_to", srv.GoTo, *arguments)
+        call = self._vehicle.go_to(goal, yaw, duration, relative, group_mask)
+        self._command("go_to", call)
 
     @override
     def start_trajectory(
@@ -265,11 +265,18 @@ class RosVehicleBackend(VehicleBackend):
     ) -> None:
         self.note_flight()
         arguments = (group_mask, trajectory_id, time_scale, reverse, relative)
-        self._command("start_trajectory", srv.StartTrajectory, *arguments)
+        self._command(
+            "start_trajectory", self.call("start_trajectory", srv.StartTrajectory, *arguments)
+        )
 
     @override
     def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
-        self._command("notify_setpoints_stop", srv.NotifySetpointsStop, group_mask, remain_valid_ms)
+        self._command(
+            "notify_setpoints_stop",
+            self.call(
+                "notify_setpoints_stop", srv.NotifySetpointsStop, group_mask, remain_valid_ms
+            ),
+        )
 
     @override
     def emergency(self) -> None:
@@ -282,7 +289,7 @@ class RosVehicleBackend(VehicleBackend):
     @override
     def arm(self, arm: bool) -> None:
         if self.uses_driver:
-            self._command("arm", SetBool, arm)
+            self._serve("arm", SetBool, arm)
 
     @override
     def set_group_mask(self, group_mask: int) -> None:
@@ -295,7 +302,7 @@ class RosVehicleBackend(VehicleBackend):
 
     @groups.setter
     def groups(self, mask: int) -> None:
-        self._command("set_group_mask", srv.SetGroupMask, mask)
+        self._serve("set_group_mask", srv.SetGroupMask, mask)
         self._groups = mask
 
     @override
@@ -307,7 +314,9 @@ class RosVehicleBackend(VehicleBackend):
             if any(message.poly_yaw):
                 message.poly_yaw = [self.checked_yaw(value) for value in message.poly_yaw]
         arguments = (trajectory_id, piece_offset, messages)
-        self._command("upload_trajectory", srv.UploadTrajectory, *arguments)
+        self._command(
+            "upload_trajectory", self.call("upload_trajectory", srv.UploadTrajectory, *arguments)
+        )
 
     @override
     def send(self, setpoint: Setpoint) -> None:
@@ -327,10 +336,12 @@ class RosVehicleBackend(VehicleBackend):
         )
         return 0.0
 
-    def _command(self, service, service_type, *arguments):
+    def _serve(self, service, service_type, *arguments):
+        self._command(service, self.call(service, service_type, *arguments))
+
+    def _command(self, what, call):
         self.held.end_setpoints()
-        call = self.call(service, service_type, *arguments)
-        self._connection.finish(service, {self.name: call})
+        self._connection.finish(what, {self.name: call})
 
     def _check(self, what, goal):
         """Refuse a goal (m) that is out of the fence of the vehicle, or below the ground."""

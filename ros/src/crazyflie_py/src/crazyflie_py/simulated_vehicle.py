@@ -3,14 +3,19 @@
 import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import override
 
+from crazyflie_mission_api.ideal_vehicle import IdealVehicle
+from crazyflie_mission_api.mission_vehicle import MEMORY, done
 from crazyflie_model.angles import Triple
 from crazyflie_model.collision_avoidance import AvoidanceSettings, CollisionAvoidance
-from crazyflie_model.polynomials import PIECE_SIZE, Goal, PolynomialPiece
+from crazyflie_model.polynomials import Goal, PolynomialPiece
+from crazyflie_model.trajectory import Trajectory
 from crazyflie_model.units import GRAVITY
 from crazyflie_py.backend import VehicleBackend, VehicleState
 from crazyflie_py.fleet import FleetVehicle
@@ -25,19 +30,10 @@ from crazyflie_py.setpoints import (
     VelocityWorld,
 )
 from crazyflie_py.simulated_parameters import SimulatedParameters
-from crazyflie_virtual.firmware.planner import (
-    ACTIVE,
-    DEFINITIONS,
-    IN_MEMORY,
-    MEMORY_SIZE,
-    POLYNOMIALS,
-    Planner,
-)
-from crazyflie_virtual.firmware.states import Estimate
 
 Array = NDArray[np.float64]
 
-_ROOM = MEMORY_SIZE // PIECE_SIZE  #: Pieces that the memory holds.
+_DEFINITIONS = 31  #: Trajectories that can be defined at one time.
 
 _log = logging.getLogger(__name__)
 
@@ -160,22 +156,23 @@ def _clamped(vector, limit):
 
 
 class TrajectoryMemory:
-    """Trajectories by the ids of scripts, which go to 255; those of the firmware go to 30.
+    """The trajectory memory of an ideal vehicle: that of the firmware, with messages.
+
+    Trajectories have the ids of scripts, which go to 255; those of the firmware go to 30.
 
     Parameters
     ----------
     name : str
         Of the vehicle.
-    planner : Planner
     warn : callable
         Gets a text.
     """
 
-    def __init__(self, name: str, planner: Planner, warn: Callable[[str], None]):
+    def __init__(self, name: str, warn: Callable[[str], None]):
         self._name = name
-        self._planner = planner
         self._warn = warn
-        self._slots: dict[int, tuple[int, range]] = {}
+        self._pieces: dict[int, PolynomialPiece] = {}
+        self._rooms: dict[int, range] = {}
 
     def upload(
         self, trajectory_id: int, piece_offset: int, pieces: Sequence[PolynomialPiece]
@@ -183,49 +180,45 @@ class TrajectoryMemory:
         """Write pieces; ValueError when there is no room."""
         where = f"{self._name}.uploadTrajectory"
         room = range(piece_offset, piece_offset + len(pieces))
-        if room.stop > _ROOM:
+        if room.stop > MEMORY:
             raise ValueError(
                 f"{where}: {len(pieces)} pieces from pieceOffset {piece_offset} on; expected no "
-                f"more than {_ROOM} in all, the room in the memory"
+                f"more than {MEMORY} in all, the room in the memory"
             )
-        slot = self._slots.get(trajectory_id, (len(self._slots), room))[0]
-        if slot >= DEFINITIONS:
+        if trajectory_id not in self._rooms and len(self._rooms) >= _DEFINITIONS:
             raise ValueError(
-                f"{where}: trajectoryId is {trajectory_id}; expected one of the {DEFINITIONS} that "
-                f"are in use: {sorted(self._slots)}"
+                f"{where}: trajectoryId is {trajectory_id}; expected one of the {_DEFINITIONS} "
+                f"that are in use: {sorted(self._rooms)}"
             )
-        if trajectory_id >= DEFINITIONS:
+        if trajectory_id >= _DEFINITIONS:
             self._warn(
                 f"{where}: trajectoryId is {trajectory_id}; a real vehicle refuses it, the "
-                f"firmware expects 0 to {DEFINITIONS - 1}"
+                f"firmware expects 0 to {_DEFINITIONS - 1}"
             )
-        for other, (_, taken) in self._slots.items():
+        for other, taken in self._rooms.items():
             if other != trajectory_id and set(taken) & set(room):
                 self._warn(
                     f"{where}: pieces {room.start} to {room.stop - 1} overwrite trajectory "
                     f"{other}; another pieceOffset keeps both"
                 )
-        self._slots[trajectory_id] = slot, room
-        begin = piece_offset * PIECE_SIZE
-        data = b"".join(piece.pack() for piece in pieces)
-        self._planner.memory[begin : begin + len(data)] = data
-        self._planner.define(slot, IN_MEMORY, POLYNOMIALS, begin, len(pieces))
+        self._rooms[trajectory_id] = room
+        self._pieces |= dict(zip(room, pieces, strict=True))
 
-    def slot(self, trajectory_id: int) -> int:
-        """Return the planner's number of a trajectory; ValueError for one that is not there."""
-        if trajectory_id not in self._slots:
+    def __getitem__(self, trajectory_id: int) -> list[PolynomialPiece]:
+        """Return the pieces of a trajectory; ValueError for one that is not there."""
+        if trajectory_id not in self._rooms:
             raise ValueError(
                 f"{self._name}.startTrajectory: trajectoryId is {trajectory_id}; expected one that "
-                f"uploadTrajectory has written: {sorted(self._slots) or 'there is none'}"
+                f"uploadTrajectory has written: {sorted(self._rooms) or 'there is none'}"
             )
-        return self._slots[trajectory_id][0]
+        return [self._pieces[number] for number in self._rooms[trajectory_id]]
 
 
-class SimulatedVehicle:
+class SimulatedVehicle(IdealVehicle):
     """A vehicle of `crazyflie_py.backend.VehicleBackend`.
 
-    The firmware's planner flies it, or the last setpoint. Where an ideal vehicle does more than a
-    real one would, a warning says so, once.
+    It follows its plan, or the last setpoint, as far as speed and avoidance permit. Where it does
+    more than a real one would, a warning says so, once.
 
     Parameters
     ----------
@@ -246,12 +239,12 @@ class SimulatedVehicle:
         disturbance: float,
         said: set[str],
     ):
-        self.name, self.id, self.initial_position, _ = vehicle
-        self._time = time
+        super().__init__(vehicle.name, time, vehicle.position)
+        self.id, self.initial_position = vehicle.id, vehicle.position
+        self.groups = 0  #: Mask of the groups that it belongs to.
         self._motion = IdealMotion(self.initial_position, max_speed, disturbance)
-        self._planner = Planner()
-        self._memory = TrajectoryMemory(self.name, self._planner, self._warn)
-        self._parameters = SimulatedParameters(self.name, self._planner, said)
+        self._memory = TrajectoryMemory(self.name, self._warn)
+        self._parameters = SimulatedParameters(self.name, self, said)
         self._setpoint: Setpoint | None = None
         self._sent = 0.0
         self._expiry = math.inf
@@ -263,7 +256,7 @@ class SimulatedVehicle:
 
     def _may_plan(self, method: str, group_mask: int) -> bool:
         """Prepare for a high-level command; return whether it concerns this vehicle."""
-        if self._locked or (group_mask and not group_mask & self._planner.groups):
+        if self._locked or (group_mask and not group_mask & self.groups):
             return False
         if self._setpoint is not None and math.isinf(self._expiry):
             self._warn(
@@ -271,29 +264,49 @@ class SimulatedVehicle:
                 "a real vehicle ignores the command"
             )
         self._setpoint = None
-        if self._planner.state not in ACTIVE:
-            self._planner.tell_state(self._estimate())
         return True
 
-    def take_off(self, height: float, duration: float, group_mask: int) -> None:
-        if self._may_plan("takeoff", group_mask) and self._planner.take_off(
-            self._time(), height, None, duration
-        ):
+    @override
+    def planned(self) -> Goal[float]:
+        if self.is_active:
+            return super().planned()
+        *vectors, yaw = self.motion
+        position, velocity, _ = (vector.tolist() for vector in vectors)
+        return Goal(tuple(position), tuple(velocity), (0.0, 0.0, 0.0), yaw, 0.0)
+
+    @override
+    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
+        if self._may_plan("takeoff", group_mask):
+            if not self.is_active:
+                return super().take_off(height, duration)
             self._warn(f"{self.name}.takeoff: it flies; a real vehicle ignores the command")
+        return done(None)
 
-    def land(self, height: float, duration: float, group_mask: int) -> None:
-        if self._may_plan("land", group_mask):
-            self._planner.land(self._time(), height, None, duration)
+    @override
+    def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":
+        is_landing = self.is_active and not self._flies
+        if self._may_plan("land", group_mask) and not is_landing:
+            return super().land(height, duration)
+        return done(None)
 
-    def stop(self, group_mask: int) -> None:
+    @override
+    def stop(self, group_mask: int = 0) -> "Future[Any]":
         if self._may_plan("stop", group_mask):
             self._stop_motors("stop")
+        return done(None)
 
+    @override
     def go_to(
-        self, goal: Triple, yaw: float, duration: float, relative: bool, group_mask: int
-    ) -> None:
+        self,
+        goal: Triple,
+        yaw: float,
+        duration: float,
+        relative: bool = False,
+        group_mask: int = 0,
+    ) -> "Future[Any]":
         if self._may_plan("goTo", group_mask):
-            self._planner.go_to(self._time(), goal, yaw, duration, relative, linear=False)
+            return super().go_to(goal, yaw, duration, relative)
+        return done(None)
 
     def upload_trajectory(
         self, trajectory_id: int, piece_offset: int, pieces: Sequence[PolynomialPiece]
@@ -304,22 +317,25 @@ class SimulatedVehicle:
         self, trajectory_id: int, time_scale: float, reverse: bool, relative: bool, group_mask: int
     ) -> None:
         if self._may_plan("startTrajectory", group_mask):
-            slot = self._memory.slot(trajectory_id)
-            self._planner.start(self._time(), slot, time_scale, reverse, relative, False)
+            trajectory = Trajectory(self._memory[trajectory_id], time_scale, reverse)
+            start = self.planned().position
+            self._fly(trajectory.moved_to(start, None) if relative else trajectory)
 
     def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
         self._expiry = self._time() + remain_valid_ms / 1000.0
 
-    def emergency(self) -> None:
+    @override
+    def emergency(self) -> "Future[Any]":
         self._warn(f"{self.name}.emergency: it does not react to commands any more")
         self._stop_motors("emergency")
         self._locked = True
+        return done(None)
 
     def arm(self, arm: bool) -> None:
         self._armed = arm
 
     def set_group_mask(self, group_mask: int) -> None:
-        self._planner.groups = group_mask
+        self.groups = group_mask
 
     def set_parameters(self, values: Mapping[str, float]) -> None:
         self._parameters.update(values)
@@ -331,7 +347,7 @@ class SimulatedVehicle:
         if self._locked:
             return
         # The firmware's commander makes the planner forget its plan (commander.c).
-        self._planner.stop()
+        super().stop()
         self._setpoint, self._expiry, self._sent = setpoint, math.inf, self._time()
         if isinstance(setpoint, MotorsOff):
             self._stop_motors("cmdStop")
@@ -345,7 +361,7 @@ class SimulatedVehicle:
                 f"{self.name}.{method}: the motors stop {height:.2f} m above the start; a real "
                 "vehicle falls, this one stays in place"
             )
-        self._planner.stop()
+        super().stop()
         self._setpoint = None
 
     def enable_avoidance(
@@ -371,7 +387,7 @@ class SimulatedVehicle:
     @property
     def is_flying(self) -> bool:
         """Whether motors would run."""
-        return self._setpoint is not None or self._planner.state in ACTIVE
+        return self._setpoint is not None or self.is_active
 
     @property
     def led_color(self) -> Triple:
@@ -413,15 +429,10 @@ class SimulatedVehicle:
                     "out and stops its motors 2 s after the last one"
                 )
             return self._motion.at_setpoint(self._setpoint, dt)
-        goal = self._planner.goal(now) if self._planner.state in ACTIVE else None
-        # Ends a landing.
-        self._planner.setpoint(now, self._estimate())
-        return self._motion.held() if goal is None else self._motion.tracked(goal, dt)
-
-    def _estimate(self) -> Estimate:
-        (x, y, z), (vx, vy, vz) = self.motion.position.tolist(), self.motion.velocity.tolist()
-        yaw = math.degrees(self.motion.yaw)
-        return Estimate(x=x, y=y, z=z, vx=vx, vy=vy, vz=vz, yaw=yaw)
+        # Also at the end of a landing.
+        if self._flies or now - dt < self.trajectory.end:
+            return self._motion.tracked(self.trajectory.goal(now), dt)
+        return self._motion.held()
 
     def _warn(self, text: str) -> None:
         # A loop must not flood the terminal.

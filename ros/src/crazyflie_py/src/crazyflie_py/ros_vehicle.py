@@ -265,18 +265,11 @@ class RosVehicleBackend(VehicleBackend):
     ) -> None:
         self.note_flight()
         arguments = (group_mask, trajectory_id, time_scale, reverse, relative)
-        self._command(
-            "start_trajectory", self.call("start_trajectory", srv.StartTrajectory, *arguments)
-        )
+        self._serve("start_trajectory", srv.StartTrajectory, *arguments)
 
     @override
     def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
-        self._command(
-            "notify_setpoints_stop",
-            self.call(
-                "notify_setpoints_stop", srv.NotifySetpointsStop, group_mask, remain_valid_ms
-            ),
-        )
+        self._serve("notify_setpoints_stop", srv.NotifySetpointsStop, group_mask, remain_valid_ms)
 
     @override
     def emergency(self) -> None:
@@ -314,9 +307,7 @@ class RosVehicleBackend(VehicleBackend):
             if any(message.poly_yaw):
                 message.poly_yaw = [self.checked_yaw(value) for value in message.poly_yaw]
         arguments = (trajectory_id, piece_offset, messages)
-        self._command(
-            "upload_trajectory", self.call("upload_trajectory", srv.UploadTrajectory, *arguments)
-        )
+        self._serve("upload_trajectory", srv.UploadTrajectory, *arguments)
 
     @override
     def send(self, setpoint: Setpoint) -> None:

@@ -1,22 +1,65 @@
-"""References of a controller that follow from commands and setpoints."""
+"""References of a vehicle that flies by high-level commands, and the marker of its way."""
 
 import copy
 from collections.abc import Callable
 from typing import Any
 
+from geometry_msgs.msg import Point
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
 from crazyflie_fleet.conversions import reference_message
 from crazyflie_fleet.follower import Follower, Velocity
 from crazyflie_fleet.high_level_parameters import HighLevelParameters
-from crazyflie_fleet.plan_marker import PlanMarker
 from crazyflie_model.polynomials import Goal, at_rest
+from crazyflie_model.trajectory import Trajectory
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.timers import Timer
 
+_COLOUR = ColorRGBA(0.95, 0.55, 0.05, 0.8)
+_WIDTH = 0.01  #: m.
+_POINTS = 20  #: Per piece of a trajectory,
+_MAX_POINTS = 200  #: and in all.
+
 SETPOINT_TIMEOUT = 0.5  #: A stream without a setpoint for this long has stopped, s.
 _HOLD_DURATION = 0.5  #: Of the move to the goal of the last setpoint, s.
+
+
+class PlanMarker:
+    """Publishes a trajectory, in the fixed frame ``frame``, from its beginning to its end.
+
+    The topic is latched, so that it is also seen by those who look later.
+    """
+
+    def __init__(self, handle: NodeHandle, topic: str, frame: str):
+        self._frame = frame
+        self._namespace = handle.name
+        self._publisher = handle.publisher(topic, MarkerArray, latch=True)
+        self._is_shown = False
+
+    def show(self, trajectory: Trajectory) -> None:
+        """Publish a trajectory; it replaces the last one."""
+        count = min(_POINTS * len(trajectory.pieces), _MAX_POINTS)
+        times = (trajectory.duration * k / count for k in range(count + 1))
+        points = [Point(*trajectory.evaluate(time).position) for time in times]
+        self._publish(Marker.ADD, points)
+        self._is_shown = True
+
+    def clear(self) -> None:
+        """Take the trajectory away, if there is one."""
+        if self._is_shown:
+            self._publish(Marker.DELETE, [])
+            self._is_shown = False
+
+    def _publish(self, action, points):
+        marker = Marker(ns=self._namespace, type=Marker.LINE_STRIP, action=action, points=points)
+        marker.header.frame_id = self._frame
+        marker.pose.orientation.w = 1.0
+        marker.scale.x, marker.color = _WIDTH, _COLOUR
+        self._publisher.publish(MarkerArray([marker]))
 
 
 class CommandedReferences:

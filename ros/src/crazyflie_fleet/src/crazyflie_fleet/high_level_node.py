@@ -14,10 +14,8 @@ from crazyflie_driver import srv
 from crazyflie_fleet.commanded_references import CommandedReferences
 from crazyflie_fleet.conversions import from_message
 from crazyflie_fleet.follower import Follower
-from crazyflie_fleet.groups import Groups
 from crazyflie_fleet.high_level_parameters import HighLevelParameters
-from crazyflie_fleet.service_relay import relay
-from crazyflie_fleet.setpoint_subscribers import SetpointSubscribers
+from crazyflie_fleet.high_level_services import Groups, SetpointSubscribers, relay
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, ServiceError, flight_status

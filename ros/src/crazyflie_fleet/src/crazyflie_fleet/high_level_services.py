@@ -1,15 +1,69 @@
-"""Setpoints of a vehicle that the workspace's controller flies, by the driver's topics."""
+"""Parts of the driver's interface for a vehicle that a controller flies: groups, setpoints."""
 
 import math
 from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
 
-from std_msgs.msg import Empty
+from std_msgs.msg import Empty as EmptyMessage
+from std_srvs.srv import Empty, EmptyRequest
 
+from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
 from crazyflie_fleet.conversions import setpoint_goal
 from crazyflie_fleet.follower import Velocity
 from crazyflie_model.polynomials import Goal
 from crazyflie_utils import NodeHandle
+
+_ALL = 0  #: Mask of a command to all vehicles.
+
+_CALL_TIMEOUT = 58.0  #: Of a takeoff or landing of the takeoff server, s of the machine's clock.
+
+
+class Groups:
+    """The groups that a vehicle belongs to: none at first."""
+
+    def __init__(self) -> None:
+        self._mask = 0
+
+    def on_set_group_mask(self, request: srv.SetGroupMaskRequest) -> srv.SetGroupMaskResponse:
+        """Answer a service call."""
+        self._mask = request.groupMask
+        return srv.SetGroupMaskResponse()
+
+    def for_members(
+        self, service_type: Any, callback: Callable[[Any], Any]
+    ) -> Callable[[Any], Any]:
+        """Return a callback that ignores requests to other groups, as the firmware does."""
+
+        def on_request(request):
+            if request.groupMask == _ALL or request.groupMask & self._mask:
+                return callback(request)
+            return service_type._response_class()
+
+        return on_request
+
+
+def relay(handle: NodeHandle, service: str, response_type: type) -> "Future[Any]":
+    """Call a service of type Empty; return the future of a response of another type.
+
+    An error after the future was set otherwise is logged.
+    """
+    answer: Future[Any] = Future()
+
+    def on_done(done):
+        error = done.exception()
+        if answer.done():
+            if error is not None:
+                handle.error(str(error))
+        elif error is None:
+            answer.set_result(response_type())
+        else:
+            answer.set_exception(error)
+
+    call = handle.call_service(service, Empty, EmptyRequest(), _CALL_TIMEOUT)
+    call.add_done_callback(on_done)
+    return answer
 
 
 class SetpointSubscribers:
@@ -31,7 +85,7 @@ class SetpointSubscribers:
         handle.subscribe("~cmd_position", Position, self._on_position)
         handle.subscribe("~cmd_velocity_world", VelocityWorld, self._on_velocity)
         handle.subscribe("~cmd_hover", Hover, self._on_hover)
-        handle.subscribe("~cmd_stop", Empty, self._on_stop)
+        handle.subscribe("~cmd_stop", EmptyMessage, self._on_stop)
 
     def _on_position(self, message):
         goal = setpoint_goal(message)

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import LogTopic
-from crazyflie_fleet.settings import same_vehicle
 from crazyflie_utils import ParameterError
 
 EXAMPLE = Path(rospkg.RosPack().get_path("crazyflie_fleet")) / "config" / "example.yaml"
@@ -289,10 +288,27 @@ def test_disabled_vehicles_may_be_anywhere(load):
     assert load(TWO.replace("[0, 1, 0]", "[0, 0, 0]\n    enabled: false")).names == ("cf1",)
 
 
-def test_addresses_are_of_vehicles_and_not_of_dongles():
-    assert same_vehicle("radio://0/80/2M/E7E7E7E701") == same_vehicle("radio://1/80/2M/e7e7e7e701")
-    assert same_vehicle("radio://0/80/2M/E7E7E7E701") != same_vehicle("radio://0/81/2M/E7E7E7E701")
-    assert same_vehicle("radio://0/80/2M") == same_vehicle("radio://0/80/2M/E7E7E7E7E7")
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("radio://0/80/2M/E7E7E7E701", "radio://1/80/2M/e7e7e7e701"),
+        ("radio://*/80/2M/E7E7E7E701", "radio://0/080/2M/E7E7E7E701?safelink=0"),
+        ("radio://0/80/2M", "radio://0/80/2M/E7E7E7E7E7"),
+        ("udp://127.0.0.1:19850", "udp://localhost:19850"),
+    ],
+)
+def test_two_spellings_of_one_address_are_one_vehicle(load, first, second):
+    text = TWO.replace("radio://0/80/2M/E7E7E7E701", first)
+    (found,) = complaints_of(load, text.replace("radio://0/80/2M/E7E7E7E702", second))
+    assert found.startswith(f":6: robots/cf2/uri is {second}, as that of cf1 in line 3")
+
+
+@pytest.mark.parametrize(
+    "uri", ["radio://0/126/2M/E7E7E7E701", "udp://127.0.0.1:65536", "radio://0/80/3M", "usb://x"]
+)
+def test_an_address_that_the_driver_would_refuse_is_refused(load, uri):
+    (found,) = complaints_of(load, TWO.replace("radio://0/80/2M/E7E7E7E702", uri))
+    assert f":6) is '{uri}'; expected radio://DONGLE/CHANNEL" in found
 
 
 @given(st.integers(1, 120))

@@ -21,7 +21,7 @@ from crazyflie_fleet.settings import (
     MachineSettings,
     PartialSettings,
     RobotSettings,
-    same_vehicle,
+    vehicle_key,
 )
 from crazyflie_utils import ParameterError
 from crazyflie_utils.messages import shortened, shown
@@ -222,7 +222,7 @@ class FleetParser:
         for vehicle in vehicles:
             if vehicle.uri is None:
                 continue
-            other = seen.setdefault(same_vehicle(vehicle.uri), vehicle.name)
+            other = seen.setdefault(vehicle_key(vehicle.uri), vehicle.name)
             if other != vehicle.name:
                 line = (_inner(robots[other], "uri") or robots[other]).line
                 self._error(

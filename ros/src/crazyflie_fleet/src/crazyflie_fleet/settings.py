@@ -5,6 +5,8 @@ from typing import Any
 
 from typing_extensions import override
 
+from crazyflie_link.address import EXPECTED, Address
+from crazyflie_link.errors import AddressError
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.types import (
     BOOLEAN,
@@ -69,20 +71,30 @@ VEHICLE_NAME = _Pattern(
     "letters, digits and underscores, the first a letter, and not 'all'",
 )
 
-_URI = re.compile(
-    r"radio://(?P<dongle>[0-9A-Fa-f*]+)/(?P<channel>\d+)/(?P<rate>250K|1M|2M)"
-    r"(/(?P<address>[0-9A-Fa-f]{1,10}))?(\?.*)?|udp://[^/:\s]+:\d+|usb://\d+"
-)
-URI = _Pattern(_URI, "radio://DONGLE/CHANNEL/RATE/ADDRESS, udp://HOST:PORT or usb://NUMBER")
+
+class VehicleUri(ParameterType):
+    """A vehicle's address as `crazyflie_link` takes it; crazyswarm2's ``*`` is any dongle."""
+
+    label = "string"
+
+    @override
+    def __call__(self, value: Any) -> str:
+        if not isinstance(value, str):
+            raise ValueError
+        vehicle_key(value)
+        return value
+
+    @override
+    def __str__(self) -> str:
+        return EXPECTED
 
 
-def same_vehicle(uri: str) -> str:
-    """Return a key that two addresses of the same vehicle share, whatever the dongle."""
-    match = _URI.fullmatch(uri)
-    if match is None or match["channel"] is None:
-        return uri
-    address = int(match["address"] or "E7E7E7E7E7", 16)
-    return f"radio {int(match['channel'])} {match['rate']} {address:010X}"
+def vehicle_key(uri: str) -> str:
+    """Return what addresses of one vehicle have in common; `ValueError` if it is malformed."""
+    try:
+        return Address.parse(uri.replace("radio://*/", "radio://0/")).key
+    except AddressError:
+        raise ValueError from None
 
 
 class StartPosition(ParameterType):
@@ -209,7 +221,7 @@ class PartialSettings(Settings):
     """Settings in one place, of a vehicle, its type or ``all``, before they are merged."""
 
     enabled: bool = parameter(BOOLEAN, "whether it takes part", True)
-    uri: str | None = parameter(URI, "its address; not needed in simulation", None)
+    uri: str | None = parameter(VehicleUri(), "its address; not needed in simulation", None)
     position: tuple[float, float, float] | None = parameter(
         StartPosition(), "its position before takeoff", None, "initial_position"
     )

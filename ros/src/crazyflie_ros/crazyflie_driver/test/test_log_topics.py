@@ -1,5 +1,7 @@
 """What the vehicle sends by itself, as messages."""
 
+import time
+
 import pytest
 
 from crazyflie_driver.vehicle_parameters import STANDARD_TOPICS
@@ -53,6 +55,22 @@ def test_standard_topics_need_four_log_blocks(logging):
     started = [data[2] for data in logging.packets(5, 1) if data[0] == 3]
     assert len(created) == 4
     assert sorted(started) == [1, 1, 10, 10]
+
+
+def test_stamps_of_the_vehicle_s_time_go_on_when_its_24_bits_are_full(server):
+    vehicle = server.make_vehicle()
+    # 0.7 s before its clock begins anew, after 4.66 h.
+    vehicle.clock_ahead_ms = (1 << 24) - 700 - int(time.monotonic() * 1000)
+    server.add(vehicle.uri, use_ros_time=False, enable_logging=True, enable_logging_imu=True)
+    full = (1 << 24) / 1000.0
+
+    def stamps():
+        return [message.header.stamp.to_sec() for message in server.process.published("/cf1/imu")]
+
+    wait_until(lambda: len(stamps()) > 3 and not full - 2.0 < stamps()[-1] < full + 0.1)
+    assert min(stamps()) < full
+    assert stamps() == sorted(stamps())
+    assert stamps()[-1] < full + 60.0
 
 
 def test_packets_of_others(server, logging):

@@ -117,6 +117,45 @@ def test_nothing_is_added_twice(server, vehicle):
         server.add("udp://127.0.0.1:1", "/cf1/")
 
 
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("udp://127.0.0.1:{}", "udp://localhost:{}"),
+        ("udp://localhost:{}", "udp://127.0.0.1:{}"),
+        ("udp://127.0.0.1:{}", "udp://127.1:{}"),
+    ],
+)
+def test_no_vehicle_is_added_twice_under_two_spellings(server, first, second):
+    """Two links would displace each other, and nobody would feed its watchdog."""
+    vehicle = server.make_vehicle()
+    first, second = first.format(vehicle.port), second.format(vehicle.port)
+    server.add(first)
+    with pytest.raises(ServiceError, match=f"{second} has been added already, as cf1 .{first}.$"):
+        server.add(second, "cf2")
+    # Any spelling removes it.
+    server.remove(second)
+    server.add(second, "cf2")
+
+
+@pytest.mark.parametrize(
+    "second",
+    [
+        "radio://0/80/2M/e7e7e7e7e7",
+        "radio://0/80/2M/E7E7E7E7E7?safelink=0",
+        "radio://1/80/2M/E7E7E7E7E7",
+        "radio://0/80/2M",
+        "radio://0/080/2M/E7E7E7E7E7",
+    ],
+)
+def test_no_radio_is_added_twice_under_two_spellings(server, second):
+    # There is no dongle: the first one is tried until the end of the test.
+    adding = server.begin_adding("radio://0/80/2M/E7E7E7E7E7")
+    with pytest.raises(ServiceError, match="has been added already, as cf1"):
+        server.add(second, "cf2")
+    with pytest.raises(ServiceError, match="no Crazyradio dongle found"):
+        adding.result(timeout=LIMIT)
+
+
 def test_without_a_prefix_everything_is_at_the_root(server):
     vehicle = server.make_vehicle()
     server.add(vehicle.uri, "", enable_logging=True, enable_logging_imu=True)

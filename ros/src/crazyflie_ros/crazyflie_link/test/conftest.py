@@ -6,9 +6,9 @@ import pytest
 import usb
 from cflib.crtp.radiodriver import RadioManager
 from cflib.drivers import crazyradio
-from fake_dongle import PLACES, Bus
 
 from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.testing.fake_dongle import PLACES, Bus
 from crazyflie_link.testing.fake_vehicle import EXTENDED, READ_ONLY, FakeVehicle
 from crazyflie_utils.testing.fixtures import own_cache  # noqa: F401
 

@@ -1,6 +1,7 @@
 """Bounds, bytes and moments that are calculated by hand, on both sides."""
 
 import math
+import re
 import struct
 
 import pytest
@@ -58,6 +59,29 @@ def test_the_largest_and_the_smallest_numbers_are_sent():
 def test_the_next_ones_are_refused(check, value):
     with pytest.raises(ValueRangeError, match="^x"):
         check("x", value)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        lambda high_level, value: high_level.take_off(1.0, value),
+        lambda high_level, value: high_level.land(0.0, value),
+        lambda high_level, value: high_level.go_to((0.0, 0.0, 1.0), 0.0, value),
+        lambda high_level, value: high_level.spiral(1.0, (0.0, 0.5), 0.0, value),
+        lambda high_level, value: high_level.start_trajectory(1, value),
+    ],
+)
+def test_durations_and_time_scales_are_at_least_0_01(target, flying, command):
+    flying.high_level.define_trajectory(1, range(132), 1)
+    target.received.clear()
+    for value in (1e-30, 0.0099, 0.0, -1.0, float("nan"), float("inf"), 3.5e38):
+        with pytest.raises(
+            ValueRangeError, match=f"is {re.escape(f'{value:g}')}; expected .* at least 0.01"
+        ):
+            command(flying.high_level, value)
+    assert target.packets(8, 0) == []
+    command(flying.high_level, 0.01)
+    assert len(target.wait_for_packets(8, 0)) == 1
 
 
 # The vehicle's clock: it has restarted if it is more than 60 s ahead.

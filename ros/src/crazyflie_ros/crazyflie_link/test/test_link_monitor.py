@@ -188,3 +188,30 @@ def test_late_packets_and_slow_clocks_are_no_restart(clock, steps):
         clock, sent = clock + step_ms, sent + step_ms / 1000.0
         arrived = max(arrived, sent + late)
         assert not uptime.has_restarted(clock % WRAP_MS, arrived)
+
+
+@given(
+    st.integers(100, WRAP_MS - 1),
+    st.lists(
+        st.tuples(st.integers(0, 10 * HOUR_MS), st.integers(0, 100), st.floats(0.0, 20.0)),
+        max_size=20,
+    ),
+)
+def test_times_are_unwrapped_however_long_no_packet_came(first, steps):
+    """A packet may be up to 100 ms older than the one before it."""
+    uptime, clock = Uptime(), first
+    for step_ms, older_ms, late in [(0, 0, 0.0), *steps]:
+        clock += step_ms
+        sent = clock - older_ms
+        assert not uptime.has_restarted(sent % WRAP_MS, clock / 1000.0 + late)
+        assert uptime.unwrapped(sent % WRAP_MS) == sent
+
+
+def test_times_after_a_restart_begin_anew():
+    uptime = Uptime()
+    uptime.has_restarted(WRAP_MS - 16, 0.0)
+    uptime.has_restarted(5, 0.1)
+    assert uptime.unwrapped(5) == WRAP_MS + 5
+    assert uptime.has_restarted(900, 0.2) is False
+    assert uptime.has_restarted(300, 2.0) is True
+    assert uptime.unwrapped(300) == 300

@@ -1,4 +1,4 @@
-"""The vehicles of the server that share a radio's channel."""
+"""The vehicles of the server that a broadcast reaches: those on one radio channel and rate."""
 
 import contextlib
 from collections import Counter
@@ -15,13 +15,16 @@ from crazyflie_link.packed_poses import PackedPoses
 
 
 class Channel:
-    """Broadcasts to vehicles on one channel; the address is that of any of them.
+    """Broadcasts to vehicles on one channel, by the dongle of the address that it is made with.
 
-    External poses of vehicles on a radio are packed, if they are as many as the parameters say.
+    A vehicle that is spoken to by another dongle is reached, too. External poses of vehicles on a
+    radio are packed, if they are as many as the parameters say; nobody acknowledges them, so those
+    of another dongle, which may be out of reach of this one, get their own.
     """
 
     def __init__(self, address: Address, parameters: BroadcastParameters):
         self.vehicles: list[DriverVehicle] = []
+        self._dongle = address.dongle
         self.broadcaster = Broadcaster(
             address, self._links, parameters.repeats, parameters.repeat_period
         )
@@ -61,12 +64,18 @@ class Channel:
     def _share_poses(self):
         addresses = [vehicle.crazyflie.address for vehicle in self.vehicles]
         users = Counter(address.vehicle_id for address in addresses)
+        # Each vehicle on the channel takes the poses with its id, whatever dongle speaks to it.
+        packed = {
+            vehicle: address.vehicle_id
+            for vehicle, address in zip(self.vehicles, addresses, strict=True)
+            if address.dongle == self._dongle and users[address.vehicle_id] == 1
+        }
         shares = 0 < self._least_poses <= len(addresses)
-        self._poses.vehicles = sum(1 for count in users.values() if count == 1)
-        for vehicle, address in zip(self.vehicles, addresses, strict=True):
-            vehicle_id = address.vehicle_id
+        self._poses.vehicles = len(packed)
+        for vehicle in self.vehicles:
+            vehicle_id = packed.get(vehicle)
             localization = vehicle.crazyflie.localization
-            if shares and vehicle_id is not None and users[vehicle_id] == 1:
+            if shares and vehicle_id is not None:
                 localization.broadcast_by(self._poses, vehicle_id)
             else:
                 localization.broadcast_by(None)

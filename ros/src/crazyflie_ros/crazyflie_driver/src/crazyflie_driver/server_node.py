@@ -1,5 +1,6 @@
 """The driver: a server that vehicles are added to and removed from."""
 
+import contextlib
 from concurrent.futures import Future, wait
 from typing import Any
 
@@ -21,8 +22,9 @@ from crazyflie_driver.srv import (
 from crazyflie_driver.status import diagnostics
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_driver.vehicle_parameters import VehicleParameters
+from crazyflie_link.address import Address
 from crazyflie_link.emergency import BROADCAST_STOP
-from crazyflie_link.errors import CrazyflieError
+from crazyflie_link.errors import AddressError, CrazyflieError
 from crazyflie_utils import Node, NodeHandle, ServiceError
 
 ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"  #: Services of the server.
@@ -40,7 +42,7 @@ class CrazyflieServerNode(Node):
     needed_in_flight = True
 
     def __init__(self) -> None:
-        # By URI.
+        # By the key of the address, and by its channel.
         self._vehicles: dict[str, DriverVehicle] = {}
         self._channels: dict[str, Channel] = {}
         self._in_flight = False
@@ -89,20 +91,23 @@ class CrazyflieServerNode(Node):
 
     def _on_add(self, request):
         requested = VehicleParameters.from_request(request)
+        try:
+            address = Address.parse(requested.uri)
+        except CrazyflieError as error:
+            self._handle.error(f"{requested.name}: {error}")
+            raise ServiceError(str(error)) from None
+        # Two links to one vehicle would displace each other.
+        if (known := self._vehicles.get(address.key)) is not None:
+            other = known.parameters
+            spelled = "" if other.uri == requested.uri else f" ({other.uri})"
+            raise ServiceError(f"{requested.uri} has been added already, as {other.name}{spelled}")
         for other in (vehicle.parameters for vehicle in self._vehicles.values()):
-            if other.uri == requested.uri:
-                raise ServiceError(f"{other.uri} has been added already, as {other.name}")
             if other.tf_prefix == requested.tf_prefix:
                 raise ServiceError(
                     f"tf_prefix {other.tf_prefix!r} is in use by {other.uri}; choose another"
                 )
-        try:
-            vehicle = DriverVehicle(self._handle, requested, self._parameters)
-        except CrazyflieError as error:
-            self._handle.error(f"{requested.name}: {error}")
-            raise ServiceError(str(error)) from None
-        self._vehicles[requested.uri] = vehicle
-        address = vehicle.crazyflie.address
+        vehicle = DriverVehicle(self._handle, requested, self._parameters)
+        self._vehicles[address.key] = vehicle
         if address.channel not in self._channels:
             self._channels[address.channel] = Channel(address, self._parameters.broadcast)
         self._channels[address.channel].add(vehicle)
@@ -115,9 +120,11 @@ class CrazyflieServerNode(Node):
         return AddCrazyflieResponse()
 
     def _on_remove(self, request):
-        vehicle = self._vehicles.get(request.uri.strip())
+        vehicle = None
+        with contextlib.suppress(AddressError):
+            vehicle = self._vehicles.get(Address.parse(request.uri).key)
         if vehicle is None:
-            known = ", ".join(self._vehicles) or "none"
+            known = ", ".join(each.parameters.uri for each in self._vehicles.values()) or "none"
             raise ServiceError(f"no vehicle {request.uri!r} has been added; known: {known}")
         if vehicle.is_closing:
             raise ServiceError(f"{request.uri} is being removed already")
@@ -146,9 +153,10 @@ class CrazyflieServerNode(Node):
         return std_srvs.EmptyResponse()
 
     def _forget(self, vehicle: DriverVehicle) -> None:
-        if self._vehicles.get(vehicle.parameters.uri) is vehicle:
-            del self._vehicles[vehicle.parameters.uri]
-            name = vehicle.crazyflie.address.channel
+        address = vehicle.crazyflie.address
+        if self._vehicles.get(address.key) is vehicle:
+            del self._vehicles[address.key]
+            name = address.channel
             self._channels[name].remove(vehicle)
             if not self._channels[name].vehicles:
                 self._channels.pop(name).close()

@@ -1,6 +1,7 @@
 """Parameters of the driver."""
 
 from crazyflie_link.broadcast import REPEAT_PERIOD, REPEATS
+from crazyflie_link.checks import MIN_DURATION
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TOPIC, Integer, Number
@@ -33,7 +34,7 @@ class SafetyParameters(Parameters):
         _SECONDS, "after so long, since the voltage sinks under load", 5.0, "battery/critical_time"
     )
     landing_duration: float = parameter(
-        Number("s", above=0.0, maximum=30.0),
+        Number("s", minimum=MIN_DURATION, maximum=30.0),
         "of landings that the driver itself begins, at least; longer where 0.5 m/s need more",
         3.0,
         "landing/duration",

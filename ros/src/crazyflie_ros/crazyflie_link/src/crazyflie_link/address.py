@@ -1,6 +1,8 @@
 """Addresses of vehicles."""
 
+import ipaddress
 import re
+import socket
 from dataclasses import dataclass
 
 from crazyflie_link.errors import AddressError
@@ -12,18 +14,21 @@ _FORMS = {
     ),
     "udp": re.compile(r"udp://(?P<host>[^\s/:?]+):(?P<port>\d{1,5})"),
     "tcp": re.compile(r"tcp://(?P<host>[^\s/:?]+):(?P<port>\d{1,5})"),
-    "usb": re.compile(r"usb://\d+"),
+    "usb": re.compile(r"usb://(?P<number>\d+)"),
 }
 
-_EXPECTED = (
-    "expected radio://DONGLE/CHANNEL/RATE/ADDRESS such as radio://0/25/2M/E7E7E7E701 (channel 0 to "
+#: The forms of an address, for errors.
+EXPECTED = (
+    "radio://DONGLE/CHANNEL/RATE/ADDRESS such as radio://0/25/2M/E7E7E7E701 (channel 0 to "
     "125, rate 250K, 1M or 2M, address at most 10 hexadecimal digits), udp://HOST:PORT, "
     "tcp://HOST:PORT or usb://NUMBER"
 )
 
 _HIGHEST_CHANNEL = 125
-_DEFAULT_ID = 0xE7
+_DEFAULT_ADDRESS = "E7E7E7E7E7"  #: That of a vehicle when it is new, which cflib takes for none.
 _HIGHEST_PORT = 65535
+_SERIAL_LENGTH = 10  #: cflib takes so many digits for a serial number, fewer for a dongle's number.
+_THIS_MACHINE = "127.0.0.1"
 
 
 @dataclass(frozen=True)
@@ -40,21 +45,49 @@ class Address:
 
     @property
     def channel(self) -> str:
-        """What vehicles share that a broadcast reaches: dongle, channel and rate of a radio.
+        """Name of what vehicles share that a broadcast reaches: channel and rate, whatever dongle.
 
         Vehicles on UDP are on one channel; any other is alone on its own.
         """
-        if self.is_radio:
-            return "/".join(self.uri.partition("?")[0].split("/")[:5])
-        return self.scheme if self.scheme == "udp" else self.uri
+        parts = self._parts
+        if self.scheme == "radio":
+            return f"{int(parts['channel'])}/{parts['rate']}"
+        return self.scheme if self.scheme == "udp" else self.key
+
+    @property
+    def dongle(self) -> str:
+        """The Crazyradio of a radio's address, by number or serial number; empty for none."""
+        dongle = self._parts.get("dongle", "").upper()
+        return str(int(dongle)) if dongle.isdigit() and len(dongle) < _SERIAL_LENGTH else dongle
+
+    @property
+    def key(self) -> str:
+        """An address that is the same for all spellings of addresses that lead to one vehicle.
+
+        The dongle and what follows a question mark do not count. Names of hosts are not looked up:
+        one other than localhost differs from its number.
+        """
+        parts = self._parts
+        if self.scheme == "radio":
+            return f"radio://*/{self.channel}/{self._radio_address:010X}"
+        if self.scheme == "usb":
+            return f"usb://{int(parts['number'])}"
+        return f"{self.scheme}://{_host_key(parts['host'])}:{int(parts['port'])}"
 
     @property
     def vehicle_id(self) -> int | None:
         """Last byte of the radio's address, by which packed poses name it; None if unknown."""
-        if not self.is_radio:
-            return None
-        address = self.uri.partition("?")[0].split("/")[5:]
-        return int(address[0], 16) & 0xFF if address else _DEFAULT_ID
+        return self._radio_address & 0xFF if self.scheme == "radio" else None
+
+    @property
+    def _radio_address(self):
+        return int(self._parts["address"] or _DEFAULT_ADDRESS, 16)
+
+    @property
+    def _parts(self):
+        match = _FORMS[self.scheme].fullmatch(self.uri)
+        assert match is not None, f"{self.uri} was not parsed"
+        return match.groupdict("")
 
     @classmethod
     def parse(cls, uri: str) -> "Address":
@@ -63,10 +96,24 @@ class Address:
         scheme = text.partition("://")[0]
         match = _FORMS[scheme].fullmatch(text) if scheme in _FORMS else None
         if match is None:
-            raise AddressError(f"{text!r} is no address of a vehicle: {_EXPECTED}")
+            raise AddressError(f"{text!r} is no address of a vehicle: expected {EXPECTED}")
         parts = match.groupdict()
         if int(parts.get("channel") or 0) > _HIGHEST_CHANNEL:
-            raise AddressError(f"{text!r}: no radio channel {parts['channel']}; {_EXPECTED}")
+            raise AddressError(
+                f"{text!r}: no radio channel {parts['channel']}; expected {EXPECTED}"
+            )
         if not 0 < int(parts.get("port") or 1) <= _HIGHEST_PORT:
-            raise AddressError(f"{text!r}: no port {parts['port']}; {_EXPECTED}")
+            raise AddressError(f"{text!r}: no port {parts['port']}; expected {EXPECTED}")
         return cls(text, scheme)
+
+
+def _host_key(host: str) -> str:
+    if host.lower() in ("localhost", "localhost.localdomain"):
+        return _THIS_MACHINE
+    try:
+        # Also short forms such as 127.1; this asks no name server.
+        number = ipaddress.ip_address(socket.inet_aton(host))
+    except OSError:
+        return host.lower().rstrip(".")
+    # Every loopback address, and 0.0.0.0, leads to this machine.
+    return _THIS_MACHINE if number.is_loopback or number.is_unspecified else str(number)

@@ -89,10 +89,10 @@ class Crazyflie:
         self.localization = Localization(link)
         self.lighthouse = Lighthouse(link)
         self.parameters = FirmwareParameters(link)
-        self.log = Log(link)
+        self._uptime = Uptime()
+        self.log = Log(link, self._uptime)
         self.supervisor = Supervisor(link, self._emergency)
         self.restarts = self.sent = 0  #: Packets that were sent to this vehicle alone.
-        self._uptime = Uptime()
         self._on_packet = on_packet
         self._blocks: list[LogBlock] = []
         self._blocks_lock = threading.Lock()

@@ -11,7 +11,7 @@ from cflib.crazyflie.high_level_commander import HighLevelCommander
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.broadcast import SharedCommand, recorded
-from crazyflie_link.checks import check_byte, check_finite, check_positive
+from crazyflie_link.checks import check_byte, check_duration, check_finite
 from crazyflie_link.errors import AlreadyLandingError, RefusedError, ValueRangeError
 from crazyflie_link.high_level_replies import is_carried_out, request_after_broadcast
 from crazyflie_link.link import Link
@@ -44,7 +44,8 @@ class HighLevel(Subsystem):
     """High-level commands; each blocks until the vehicle has replied.
 
     All raise `CrazyflieError`: `RefusedError` with the vehicle's reason,
-    `NoReplyError`, `LinkLostError`, or `ValueRangeError` before anything is sent.
+    `NoReplyError`, `LinkLostError`, or `ValueRangeError` before anything is sent. Durations and
+    time scales are at least `crazyflie_link.checks.MIN_DURATION`.
     """
 
     def __init__(self, current_link: Callable[[], Link]):
@@ -217,7 +218,7 @@ class HighLevel(Subsystem):
         here. A relative one is shifted so that it begins at the present setpoint.
         """
         check_byte("trajectory number", trajectory_id)
-        check_positive("time scale", time_scale)
+        check_duration("time scale", time_scale)
         check_byte("group mask", group_mask)
         is_new = self._current_link().protocol >= _START_2_PROTOCOL
         defined = self._knowledge.defined
@@ -303,5 +304,5 @@ class HighLevel(Subsystem):
 
 def _check(what: str, duration: float, group_mask: int, *values: float) -> None:
     check_finite(what, *values)
-    check_positive(f"{what}: duration", duration)
+    check_duration(f"{what}: duration", duration)
     check_byte("group mask", group_mask)

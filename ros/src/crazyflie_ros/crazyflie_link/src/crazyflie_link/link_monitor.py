@@ -41,6 +41,7 @@ class Uptime:
     """
 
     def __init__(self) -> None:
+        # The second last one was received, and its time with all bits.
         self._latest: tuple[int, float] | None = None
         self._late_ms = 0.0
 
@@ -50,13 +51,29 @@ class Uptime:
             self._latest = time_ms, now
             return False
         before_ms, before = self._latest
-        if (before_ms - time_ms) % _TICKS <= _REORDERED_MS:
+        elapsed_ms = 1000.0 * (now - before)
+        if (before_ms - time_ms) % _TICKS <= _REORDERED_MS and elapsed_ms < _TICKS / 2:
             return False
-        self._latest = time_ms, now
+        step_ms = (time_ms - before_ms) % _TICKS
+        # After hours without a packet.
+        step_ms += _TICKS * max(0, round((elapsed_ms - step_ms) / _TICKS))
         # How much later than the quickest packet this one came.
-        late = self._late_ms + 1000.0 * (now - before) - (time_ms - before_ms) % _TICKS
+        late = self._late_ms + elapsed_ms - step_ms
         self._late_ms = max(0.0, late)
-        return late < -_LATEST_FIRST_MS
+        has_restarted = late < -_LATEST_FIRST_MS
+        self._latest = (time_ms if has_restarted else before_ms + step_ms), now
+        return has_restarted
+
+    def unwrapped(self, time_ms: int) -> int:
+        """Return a time (ms, 24 bits) near the latest one with all its bits.
+
+        It never jumps back while the vehicle is on; bits that it had before the first call are
+        not known.
+        """
+        if self._latest is None:
+            return time_ms
+        ahead = (time_ms - self._latest[0] + _TICKS // 2) % _TICKS - _TICKS // 2
+        return max(0, self._latest[0] + ahead)
 
 
 class LinkMonitor:

@@ -14,6 +14,8 @@ from crazyflie_link.errors import (
     ValueRangeError,
     unknown_name,
 )
+from crazyflie_link.link import Link
+from crazyflie_link.link_monitor import Uptime
 from crazyflie_link.request_reply import REPLY_LIMIT
 from crazyflie_link.subsystem import Subsystem, elements
 
@@ -35,7 +37,9 @@ class LogBlock:
 
     The period is 10 to 2540 ms, in steps of 10. Variables, such as "stateEstimate.x", come in the
     vehicle's own types, together at most 26 bytes. ``callback(time_ms, values)`` is called in
-    cflib's thread with the vehicle's time (ms, 24 bits) and numbers in the order of the variables.
+    cflib's thread with the vehicle's time (ms since it was switched on; it comes with 24 bits, and
+    what it had above these when it was connected is not known) and numbers in the order of the
+    variables.
     """
 
     name: str
@@ -45,7 +49,11 @@ class LogBlock:
 
 
 class Log(Subsystem):
-    """The log variables of a vehicle."""
+    """The log variables of a vehicle, whose clock is followed by an uptime."""
+
+    def __init__(self, current_link: Callable[[], Link], uptime: Uptime):
+        super().__init__(current_link)
+        self._uptime = uptime
 
     def variables(self) -> dict[str, str]:
         """Return the vehicle's variables: "group.name" -> C type, sorted by name."""
@@ -102,7 +110,10 @@ class Log(Subsystem):
             decided.set()
 
         def deliver(time_ms, values, _):
-            block.callback(time_ms, tuple(values[variable] for variable in block.variables))
+            block.callback(
+                self._uptime.unwrapped(time_ms),
+                tuple(values[variable] for variable in block.variables),
+            )
 
         config.error_cb.add_callback(refuse)
         config.started_cb.add_callback(note_start)

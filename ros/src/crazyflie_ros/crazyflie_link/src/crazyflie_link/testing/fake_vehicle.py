@@ -57,6 +57,11 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         self.answers: dict[tuple[int, int, int | None], bytes] = {}
         #: ``lose(count)`` returns whether the reply with this number is lost.
         self.lose: Callable[[int], bool] = lambda count: False
+        #: What begins like this has the vehicle stop, before it is read, until `resume`.
+        self.stalls_at: tuple[int, int, bytes] | None = None
+        #: How far the clock of its log data is ahead of this machine's, ms.
+        self.clock_ahead_ms = 0
+        self._resumed = threading.Event()
         self._is_frozen = False
         self._thawed = threading.Event()
         self._changed = threading.Condition()
@@ -87,6 +92,11 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         self._socket.sendto(_THAW, self._socket.getsockname())
         assert self._thawed.wait(_THAW_LIMIT), "the thread of the vehicle hangs"
 
+    def resume(self) -> None:
+        """Have a vehicle that has stopped, see `stalls_at`, read what has come meanwhile."""
+        self.stalls_at = None
+        self._resumed.set()
+
     @property
     def uri(self) -> str:
         """Address of the vehicle."""
@@ -99,6 +109,7 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
     def close(self) -> None:
         """Close the port: the vehicle is gone."""
         self._stopped.set()
+        self.resume()
         self._thread.join(timeout=2.0)
         self._socket.close()
 
@@ -143,20 +154,20 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
                 continue
             if self._is_frozen or not datagram:
                 continue
-            self._peer = peer
             port, channel, data = datagram[0] >> 4, datagram[0] & 3, datagram[1:]
+            if self.stalls_at is not None and _begins((port, channel, data), self.stalls_at):
+                self._resumed.wait(_THAW_LIMIT)
             is_broadcast = not datagram[0] & _LINK_BITS
             if is_broadcast and not self.hears_broadcasts:
                 continue
+            if not is_broadcast:
+                self._peer = peer
             with self._changed:
                 self.received.append((port, channel, data))
                 if is_broadcast:
                     self.broadcasts.append((port, channel, data))
                 self._changed.notify_all()
-            is_deaf = any(
-                (p, c) == (port, channel) and data.startswith(prefix) for p, c, prefix in self.deaf
-            )
-            if not is_deaf:
+            if not any(_begins((port, channel, data), each) for each in self.deaf):
                 self._reply(port, channel, data)
 
     def _reply(self, port, channel, data):
@@ -218,7 +229,7 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
             started[block] = (period, max(due + period, now))
             values = [self._log_value(name) for name in self._blocks[block]]
             packed = struct.pack("<" + "".join(code for code, _ in values), *(v for _, v in values))
-            stamp = (int(now * 1000) & 0xFFFFFF).to_bytes(3, "little")
+            stamp = (int(now * 1000) + self.clock_ahead_ms & 0xFFFFFF).to_bytes(3, "little")
             self.send(5, 2, bytes([block]) + stamp + packed)
 
     def _log_value(self, name):
@@ -284,6 +295,10 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         if data[0] == _EMERGENCY_STOP:
             self.flight.lock()
         return bytes([0x80 | data[0], 1, data[1] if len(data) > 1 else 1])
+
+
+def _begins(received, beginning):
+    return received[:2] == beginning[:2] and received[2].startswith(beginning[2])
 
 
 def _table(data, items, seed, tail):

@@ -1,18 +1,22 @@
-"""A fake of the USB device below cflib's radio driver, and of the bus that it is plugged into."""
+"""A Crazyradio for tests: a USB device below cflib's radio driver, and its bus."""
 
 import socket
 import time
+from collections.abc import Mapping, Sequence
 
 import usb
 from cflib.drivers import crazyradio
 
 from crazyflie_link.cflib_internals import BROADCAST_ADDRESS
+from crazyflie_link.testing.fake_vehicle import FakeVehicle
+
+Place = tuple[int, int]  #: Channel, and last byte of the address, of a vehicle.
 
 NULL = 0xF3
 LINK_BITS = 3 << 2
 
-PLACES = ((10, 0xE7), (20, 0xE7), (30, 0x01), (30, 0x02))
-"""Channel and last byte of the address of each vehicle."""
+#: Of the vehicles of `crazyflie_link`'s own tests.
+PLACES: tuple[Place, ...] = ((10, 0xE7), (20, 0xE7), (30, 0x01), (30, 0x02))
 
 
 class Dongle:
@@ -24,20 +28,31 @@ class Dongle:
 
     bcdDevice = 0x0053  # noqa: N815
 
-    def __init__(self, vehicles):
+    def __init__(self, vehicles: Mapping[Place, FakeVehicle]):
         self._peers = {place: vehicle.port for place, vehicle in vehicles.items()}
-        self._sockets = {}
-        self._channel, self._address, self._acknowledges = 2, (0xE7,) * 5, True
-        self._answer = None
+        self._sockets: dict[Place, socket.socket] = {}
+        self._channel, self._acknowledges = 2, True
+        self._address: tuple[int, ...] = (0xE7,) * 5
+        self._answer: bytes | None = None
         self.is_broken = False
 
-    def set_configuration(self, number):
+    def set_configuration(self, number: int) -> None:
+        """Do nothing, unless it is broken."""
         self._check()
 
-    def reset(self):
+    def reset(self) -> None:
+        """Do nothing, unless it is broken."""
         self._check()
 
-    def ctrl_transfer(self, kind, request, wValue, wIndex, timeout, data_or_wLength):  # noqa: N803
+    def ctrl_transfer(  # noqa: D102
+        self,
+        kind: int,
+        request: int,
+        wValue: int,  # noqa: N803
+        wIndex: int,  # noqa: N803
+        timeout: float,
+        data_or_wLength: Sequence[int],  # noqa: N803
+    ) -> None:
         self._check()
         if request == crazyradio.SET_RADIO_CHANNEL:
             self._channel = wValue
@@ -46,7 +61,8 @@ class Dongle:
         elif request == crazyradio.ACK_ENABLE:
             self._acknowledges = bool(wValue)
 
-    def write(self, endpoint, data, timeout):
+    def write(self, endpoint: int, data: Sequence[int], timeout: float) -> None:
+        """Pass a packet on, and keep the answer for `read`."""
         assert endpoint == 1
         self._check()
         if not self._acknowledges:
@@ -77,7 +93,8 @@ class Dongle:
             link.setblocking(False)
         return self._sockets[place]
 
-    def read(self, endpoint, size, timeout):
+    def read(self, endpoint: int, size: int, timeout: float) -> bytes:
+        """Return the answer to the last packet."""
         self._check()
         answer, self._answer = self._answer, None
         if answer is None:
@@ -92,18 +109,21 @@ class Dongle:
 class Bus:
     """A USB bus with one socket for a dongle."""
 
-    def __init__(self, vehicles):
+    def __init__(self, vehicles: Mapping[Place, FakeVehicle]):
         self._vehicles = vehicles
-        self.dongle = None
+        self.dongle: Dongle | None = None
         self.failed_attempts = 0
 
-    def plug_in(self):
+    def plug_in(self) -> None:
+        """Plug in a new dongle."""
         self.dongle = Dongle(self._vehicles)
 
-    def break_it(self):
+    def break_it(self) -> None:
         """Have the dongle answer no request any more; it stays plugged in."""
+        assert self.dongle is not None
         self.dongle.is_broken = True
 
-    def devices(self, serial=None):
+    def devices(self, serial: str | None = None) -> list[Dongle]:
+        """Return the dongle, as cflib looks for devices."""
         self.failed_attempts += self.dongle is None
         return [self.dongle] if self.dongle is not None else []

@@ -1,12 +1,19 @@
 """Services for all vehicles: one packet for those of a channel, and what each needs instead."""
 
+import struct
+import threading
+
 import pytest
+import usb
+from cflib.crtp.radiodriver import RadioManager
+from cflib.drivers import crazyradio
 from genpy import Duration
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from safety_helpers import HIGH_LEVEL, LAND, LOCKED, TAKEOFF, is_, stream_position
 from std_msgs.msg import Empty
-from std_srvs.srv import EmptyRequest
+from std_srvs.srv import EmptyRequest, SetBoolRequest
 
+from crazyflie_driver import all_vehicles
 from crazyflie_driver.msg import TrajectoryPolynomialPiece
 from crazyflie_driver.srv import (
     GoToRequest,
@@ -18,6 +25,7 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_link.address import Address
 from crazyflie_link.broadcast import REPEATS
+from crazyflie_link.testing.fake_dongle import Dongle
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.waiting import wait_until
 
@@ -80,6 +88,27 @@ def test_a_vehicle_that_misses_the_landing_is_landed_by_itself(swarm):
     assert commands(vehicles[2])[1] == [8]
 
 
+def test_a_takeoff_that_was_too_late_is_not_sent_after_its_refusal(swarm, monkeypatch):
+    server, vehicles = swarm
+    monkeypatch.setattr(all_vehicles, "LIMIT", 2.0)
+    driven, free = server.node._vehicles[vehicles[0].uri], threading.Event()
+    check = driven.commands.check
+
+    def check_and_upload(command):
+        checked = check(command)
+        driven.jobs.submit("an upload", lambda _: free.wait(60.0))
+        return checked
+
+    monkeypatch.setattr(driven.commands, "check", check_and_upload)
+    with pytest.raises(ServiceError, match="takeoff: 1 of 3 vehicles: cf1: no answer within 2 s"):
+        server.call(ALL + "takeoff", TAKEOFF)
+    free.set()
+    # A later call, which is answered after those before it.
+    server.call("/cf1/arm", SetBoolRequest(True))
+    assert [vehicle.flight.starts for vehicle in vehicles] == [0, 1, 1]
+    assert commands(vehicles[0]) == ([], [])
+
+
 def test_a_vehicle_that_cannot_be_landed_is_named(swarm):
     server, vehicles = swarm
     server.call(ALL + "takeoff", TAKEOFF)
@@ -99,6 +128,82 @@ def test_a_landing_does_not_start_a_vehicle_on_the_ground(swarm):
     server.call(ALL + "land", LAND)
     assert [vehicle.flight.starts for vehicle in vehicles] == [1, 1, 0]
     assert [commands(vehicle) for vehicle in vehicles] == [([], [7, 8])] * 2 + [([], [])]
+
+
+@pytest.fixture
+def add_radios(monkeypatch):
+    """Return a function that adds vehicles on channel 30, cf1 and so on, by dongles 0 and 1."""
+
+    def add(server, *uris):
+        vehicles = [server.make_vehicle() for _ in uris]
+        dongles = []
+        for name in ("0", "1"):
+            # A dongle speaks to its own vehicles, and its broadcasts reach all.
+            ids = [int(uri[-2:], 16) + 0x80 * (uri.split("/")[2] != name) for uri in uris]
+            dongles.append(Dongle({(30, i): v for i, v in zip(ids, vehicles, strict=True)}))
+        monkeypatch.setattr(crazyradio, "_find_devices", lambda serial=None: dongles)
+        for number, (uri, vehicle) in enumerate(zip(uris, vehicles, strict=True), start=1):
+            server.add(uri, f"cf{number}")
+            vehicle.wait_for_packets(7, 1)
+            vehicle.received.clear()
+        return vehicles
+
+    monkeypatch.setattr(usb.util, "dispose_resources", lambda device: None)
+    monkeypatch.setattr(RadioManager, "_radios", [])
+    return add
+
+
+FIRST_TWO = ("radio://0/30/2M/E7E7E7E701", "radio://0/30/2M/E7E7E7E702")
+ELSEWHERE = pytest.mark.parametrize(
+    "third", ["radio://1/30/2M/E7E7E7E703", "radio://0/030/2M/E7E7E7E703"]
+)
+"""Addresses on the channel of ``radio://0/30/2M`` that look as if they were on another one."""
+
+
+@ELSEWHERE
+def test_a_landing_does_not_start_a_vehicle_of_another_dongle(server, add_radios, third):
+    """It would land a third time, on the ground: in a hand, or with its link lost."""
+    vehicles = add_radios(server, *FIRST_TWO, third)
+    for number in (1, 2):
+        server.call(f"/cf{number}/takeoff", TAKEOFF)
+    server.process.advance(0.5)
+    server.call(ALL + "land", LAND)
+    assert [commands(vehicle) for vehicle in vehicles] == [([], [7, 8])] * 2 + [([], [])]
+    assert [vehicle.flight.starts for vehicle in vehicles] == [1, 1, 0]
+
+
+@ELSEWHERE
+def test_one_broadcast_is_for_the_vehicles_of_all_dongles(server, add_radios, third):
+    vehicles = add_radios(server, *FIRST_TWO, third)
+    server.call(ALL + "takeoff", TAKEOFF)
+    wait_for_broadcasts(vehicles)
+    assert [commands(vehicle) for vehicle in vehicles] == [([7] * REPEATS, [])] * 3
+
+
+def test_poses_with_an_id_of_two_vehicles_are_not_packed(make_server, add_radios):
+    server = make_server({"broadcast/poses": 2})
+    vehicles = add_radios(server, *FIRST_TWO, "radio://1/30/2M/E7E7E7E802")
+    for number in (1, 2, 3):
+        pose = Pose(Point(1.0 * number, 2.0, 0.5), Quaternion(0, 0, 0, 1))
+        server.process.publish(f"/cf{number}/external_pose", PoseStamped(pose=pose))
+    for number, vehicle in zip((2, 3), vehicles[1:], strict=True):
+        # Its own, and that of cf1, packed alone.
+        poses = vehicle.wait_for_packets(6, 1, 2)
+        (own,) = [struct.unpack_from("<f", data, 1)[0] for data in poses if data[0] == 8]
+        assert own == 1.0 * number
+        assert [(data[1], len(data)) for data in poses if data[0] == 9] == [(1, 12)]
+
+
+def test_poses_of_another_dongle_are_its_own(make_server, add_radios):
+    server = make_server({"broadcast/poses": 2})
+    vehicles = add_radios(server, *FIRST_TWO, "radio://1/30/2M/E7E7E7E703")
+    for number in (1, 2, 3):
+        pose = Pose(Point(1.0 * number, 2.0, 0.5), Quaternion(0, 0, 0, 1))
+        server.process.publish(f"/cf{number}/external_pose", PoseStamped(pose=pose))
+    (packed,) = vehicles[0].wait_for_packets(6, 1)
+    assert (packed[0], packed[1], packed[12], len(packed)) == (9, 1, 2, 23)
+    own = vehicles[2].wait_for_packets(6, 1, 2)
+    assert sorted(data[0] for data in own) == [8, 9]
 
 
 def test_one_that_flies_on_setpoints_is_told_that_they_stop(swarm):

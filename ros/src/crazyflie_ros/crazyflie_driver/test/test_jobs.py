@@ -69,6 +69,18 @@ def test_an_urgent_job_goes_beside_one_that_cannot_be_given_up(jobs, slow):
     assert writing.result(LIMIT) == "done"
 
 
+def test_what_nobody_waits_for_is_not_begun_and_what_runs_is_told(jobs, slow):
+    running, begun = jobs.submit("test", slow), []
+    waiting = jobs.submit("test", lambda _: begun.append(1))
+    assert slow.has_begun.wait(LIMIT)
+    assert waiting.cancel()
+    assert running.cancel()
+    # The job has given up by itself.
+    assert jobs.submit("test", lambda _: "next").result(LIMIT) == "next"
+    assert not slow.free.is_set()
+    assert begun == []
+
+
 def test_an_error_is_the_callers(jobs):
     def fail(_):
         raise ServiceError("no")

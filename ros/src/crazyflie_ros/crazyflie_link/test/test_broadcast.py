@@ -1,18 +1,20 @@
 """Packets to all vehicles of a channel, down to a fake of the radio's USB device."""
 
 import struct
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from cflib.utils.encoding import decompress_quaternion
-from fake_dongle import PLACES
 
+from crazyflie_link import cflib_internals
 from crazyflie_link.address import Address
 from crazyflie_link.broadcast import REPEATS, Broadcaster, SharedCommand
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.emergency import BROADCAST_STOP
 from crazyflie_link.packed_poses import PackedPoses, pack
 from crazyflie_link.safe_crazyflie import packet
+from crazyflie_link.testing.fake_dongle import PLACES
 from crazyflie_link.testing.fake_vehicle import FakeVehicle
 from crazyflie_utils.testing.waiting import wait_until
 
@@ -132,6 +134,44 @@ def test_a_go_to_that_may_be_on_its_way_is_not_repeated(by_udp):
     assert vehicles[1].packets(8, 0) == []
 
 
+def test_a_broadcast_that_would_come_too_late_is_not_sent(by_udp, caplog):
+    """Each vehicle has been sent its own command by then, and would obey twice."""
+    vehicles, links, broadcaster = by_udp
+    free = threading.Event()
+    # As a dongle that hangs for a moment.
+    broadcaster.put_latest("poses", lambda: free.wait(60.0) and [])
+    errors = begin_together(
+        broadcaster, links, 3, lambda h: h.go_to((1.0, 0.0, 0.0), 0.0, 2.0, relative=True)
+    )
+    free.set()
+    wait_until(lambda: "a broadcast came too late, 0 of 5 sent" in caplog.text)
+    assert errors == [None] * 3
+    assert [len(vehicle.packets(8, 0)) for vehicle in vehicles] == [1, 1, 1]
+
+
+def test_a_broadcast_that_a_dongle_has_not_taken_is_withdrawn(bus, by_radio, monkeypatch):
+    vehicles, links = by_radio
+    monkeypatch.setattr(cflib_internals, "_DONGLE_LIMIT", 0.05)
+    begun, free = threading.Event(), threading.Event()
+    write = bus.dongle.write
+
+    def hang(*arguments, **named):
+        begun.set()
+        free.wait(60.0)
+        return write(*arguments, **named)
+
+    bus.dongle.write = hang
+    assert begun.wait(60.0)
+    radio = cflib_internals.RadioBroadcast(links[0].address.uri)
+    with pytest.raises(OSError, match="does not react"):
+        radio.transmit([bytes([7 << 4, 0])])
+    free.set()
+    for vehicle in vehicles:
+        # What is sent after it has come.
+        vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 2)
+        assert vehicle.broadcasts == []
+
+
 def test_without_one_of_them_each_is_sent_its_own(by_udp):
     vehicles, links, broadcaster = by_udp
     assert begin_together(broadcaster, links[:2], 3, lambda h: h.take_off(1.0, 2.0)) == [None] * 2
@@ -179,9 +219,10 @@ def test_poses_of_a_frame_go_out_together(by_radio, broadcaster):
 @pytest.mark.parametrize(
     ("uri", "channel", "vehicle_id"),
     [
-        ("radio://0/25/2M/E7E7E7E701", "radio://0/25/2M", 1),
-        ("radio://0/25/2M/E7E7E7E701?rate_limit=100", "radio://0/25/2M", 1),
-        ("radio://0/25/2M", "radio://0/25/2M", 0xE7),
+        ("radio://0/25/2M/E7E7E7E701", "25/2M", 1),
+        ("radio://1/025/2M/E7E7E7E701?rate_limit=100", "25/2M", 1),
+        ("radio://0/25/1M/E7E7E7E701", "25/1M", 1),
+        ("radio://0/25/2M", "25/2M", 0xE7),
         ("udp://127.0.0.1:19850", "udp", None),
         ("usb://0", "usb://0", None),
     ],

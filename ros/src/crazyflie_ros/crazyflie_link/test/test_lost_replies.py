@@ -1,5 +1,7 @@
 """The reply to a command is lost, and the firmware refuses its repetition."""
 
+import threading
+
 import pytest
 
 from crazyflie_link import high_level_replies
@@ -97,6 +99,24 @@ def test_a_landing_that_may_have_ended_is_not_repeated(flying, duration):
     with pytest.raises(NoReplyError):
         high_level.land(0.0, duration)
     assert numbers(vehicle) == [LAND]
+
+
+def test_a_command_whose_time_is_over_is_not_sent_any_more(vehicle, link):
+    """The radio may block the thread that sends for 2 s."""
+    begun, free = threading.Event(), threading.Event()
+
+    def block():
+        begun.set()
+        free.wait(60.0)
+
+    link.link().put(block)
+    assert begun.wait(60.0)
+    with pytest.raises(NoReplyError, match="takeoff command"):
+        link.high_level.take_off(1.0, 2.0)
+    free.set()
+    assert link.supervisor.read() is not None
+    assert numbers(vehicle) == []
+    assert vehicle.flight.starts == 0
 
 
 def test_a_relative_way_is_not_repeated(flying):

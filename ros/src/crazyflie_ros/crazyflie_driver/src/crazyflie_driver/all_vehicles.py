@@ -68,7 +68,7 @@ class AllVehicles:
         channels: list[Channel],
         checks: Mapping[DriverVehicle, Future[Need]],
     ) -> None:
-        needs, refusals = _results(checks)
+        needs, refusals = _results(checks, not command.ends_flight)
         if refusals and not command.ends_flight:
             raise ServiceError(
                 f"{command.name} was sent to no vehicle: {_text(refusals, len(checks))}"
@@ -81,20 +81,21 @@ class AllVehicles:
                     is_shared = shared is not None and needs[vehicle] is Need.COMMAND
                     own = command.by(shared if is_shared else None)
                     sent[vehicle] = vehicle.commands.send(own, None)
-        refusals.update(_results(sent)[1])
+        refusals.update(_results(sent, not command.ends_flight)[1])
         if refusals:
             raise ServiceError(f"{command.name}: {_text(refusals, len(checks))}")
 
 
 def _results(
-    futures: Mapping[DriverVehicle, Future[Any]],
+    futures: Mapping[DriverVehicle, Future[Any]], may_withdraw: bool
 ) -> tuple[dict[DriverVehicle, Any], dict[DriverVehicle, str]]:
     # Results and errors.
     wait(futures.values(), LIMIT)
     results: dict[DriverVehicle, Any] = {}
     errors: dict[DriverVehicle, str] = {}
     for vehicle, future in futures.items():
-        if not future.done():
+        # What is refused must not be carried out later.
+        if future.cancel() if may_withdraw else not future.done():
             errors[vehicle] = f"no answer within {LIMIT:g} s"
         elif (error := future.exception()) is not None:
             errors[vehicle] = str(error)

@@ -10,13 +10,18 @@ from typing import TypeVar
 from crazyflie_driver.battery import Battery, Charge
 from crazyflie_driver.command import LAND, STOP, TAKEOFF, Command
 from crazyflie_driver.emergency import Emergency
-from crazyflie_driver.flight_state import FlightState
+from crazyflie_driver.flight_state import REPORT_LAG, FlightState
 from crazyflie_driver.jobs import Job, Jobs
 from crazyflie_driver.server_parameters import SafetyParameters
 from crazyflie_driver.setpoint_gate import Event
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.errors import AlreadyLandingError, CrazyflieError, LinkLostError
+from crazyflie_link.errors import (
+    AlreadyLandingError,
+    CrazyflieError,
+    LinkLostError,
+    NoReplyError,
+)
 from crazyflie_link.high_level import HighLevel
 from crazyflie_link.supervisor import Supervisor
 from crazyflie_model.supervisor import SupervisorState
@@ -32,6 +37,10 @@ _WATCHDOG_PERIOD = 0.2  #: The firmware gives up after 1 s without being fed.
 #: Time in which a vehicle arms itself, s. Firmware 2026.08 disarms and arms itself 3 s after a
 #: landing (0.16 s) and every 30 s on the ground (0.08 s).
 _REARMING = 0.5
+
+#: How long a vehicle that has not answered a command is looked up before its caller is told, s; and
+#: how often. It is heard again within 1 s, or gets a new link.
+_LOOK_UP_LIMIT, _LOOK_UP_PERIOD = 1.5, 0.05
 
 
 class Need(enum.Enum):
@@ -49,6 +58,10 @@ class FlightCommands:
 
     In flight the firmware stops its motors at the notice that setpoints stop, unless a command
     follows at once: so the notice is sent together with the command, which was checked before.
+
+    A command that has a vehicle move and is not answered is looked up: the vehicle's state decides
+    whether it is a success. If the vehicle is not heard, it is a failure, and the vehicle is landed
+    should it obey when it is heard again.
     """
 
     _handle: NodeHandle
@@ -65,6 +78,9 @@ class FlightCommands:
     _notify_timer: Timer | None = None
     _feeds_watchdog: bool = False
     refusal: str = ""  #: Why the vehicle is given no command that moves it; empty if it is.
+    # Not answered, and refused to its caller; it may be carried out yet.
+    _unanswered: Command | None = None
+    _look_up: Future[bool] | None = None
 
     @property
     def is_high_level_flight_active(self) -> bool:
@@ -108,6 +124,21 @@ class FlightCommands:
 
         what = f"checking {command.name}"
         return self._jobs.submit(what, work, is_flight=True, urgent=command.ends_flight)
+
+    def check_unanswered(self) -> bool:
+        """Return whether a vehicle carries out a command that was refused as not answered, once.
+
+        The vehicle is looked up for that: to be called whenever it has logged its state.
+        """
+        look_up = self._look_up
+        if look_up is None:
+            if self._unanswered is not None:
+                self._look_up = self._jobs.submit("looking up a command", self._obeys)
+            return False
+        if not look_up.done():
+            return False
+        self._look_up = None
+        return look_up.exception() is None and look_up.result()
 
     def notify(self, remain_valid_ms: int) -> None:
         """Announce that setpoints stop: at once on the ground, in flight with the next command."""
@@ -212,13 +243,15 @@ class FlightCommands:
     def _execute(self, command, job):
         job.check()
         number = self._setpoints.gate.high_level(self._handle.time())
-        high_level = self._crazyflie.high_level
         try:
-            _send(command, high_level.guarded(lambda: self._prepare_sending(command, job)))
+            self._send_and_look_up(command, job)
         except CrazyflieError:
             self._setpoints.gate.resume(number)
             job.check()
             raise
+        # One that nobody waits for any more was refused as well.
+        is_refused = job.done.cancelled() and not command.ends_flight
+        self._unanswered = command if is_refused else None
         self._setpoints.high_level_until(self._handle.time() + command.duration)
         if command.ends_flight:
             self._flight.end_accepted(command.duration)
@@ -239,6 +272,69 @@ class FlightCommands:
         if not command.ends_flight:
             self._flight.motion_sent()
         return True
+
+    def _send_and_look_up(self, command, job):
+        was_at_rest = self._flight.is_at_rest()
+        is_sent = False
+
+        def may_send():
+            nonlocal is_sent
+            may = self._prepare_sending(command, job)
+            is_sent = is_sent or may
+            return may
+
+        try:
+            _send(command, self._crazyflie.high_level.guarded(may_send))
+        except (NoReplyError, LinkLostError) as error:
+            if command.ends_flight or not is_sent:
+                raise
+            self._unanswered = command
+            state = self._state_after(command, job, was_at_rest)
+            if state is None:
+                raise NoReplyError(
+                    f"{error}; when the vehicle is heard again, it is landed if it obeys"
+                ) from None
+            self._unanswered = None
+            if not self._shows(state, command, was_at_rest):
+                raise NoReplyError(f"{error}; the vehicle's state is: {state.words()}") from None
+            self._handle.warn(f"{self._name}: {error}: the vehicle's state shows that it obeys")
+
+    def _state_after(self, command, job, was_at_rest):
+        # The vehicle answers in the order in which it receives. It shows a command a little later.
+        end = time.monotonic() + _LOOK_UP_LIMIT
+        answered = None
+        while True:
+            job.check()
+            try:
+                state = self._flight.read()
+            except LinkLostError:
+                state = None
+            now = time.monotonic()
+            if state is not None:
+                answered = now if answered is None else answered
+                if self._shows(state, command, was_at_rest) or now - answered > REPORT_LAG:
+                    return state
+            elif now > end:
+                return None
+            time.sleep(_LOOK_UP_PERIOD)
+
+    def _shows(self, state, command, was_at_rest):
+        # Whether a state is that of a vehicle that obeys.
+        if command.name == TAKEOFF:
+            return self._flight.has_taken_off(state)
+        return was_at_rest and self._flight.is_moving(state)
+
+    def _obeys(self, job):
+        # Whether it carries out what was refused. If it is not heard, it is looked up again.
+        command = self._unanswered
+        if command is None or self._emergency.is_latched or self._setpoints.is_streaming:
+            self._unanswered = None
+            return False
+        state = self._state_after(command, job, True)
+        if state is None:
+            return False
+        self._unanswered = None
+        return self._shows(state, command, True)
 
     def _feed(self):
         # Also when the reply to the first command was lost.

@@ -13,7 +13,7 @@ from crazyflie_utils import NodeHandle
 #: Parameter of the firmware, and its value for the extended Kalman filter.
 _ESTIMATOR, _KALMAN = "stabilizer.estimator", 2
 #: How old a state may be, s: the firmware's supervisor runs at 25 Hz, and is logged at 10 Hz.
-_REPORT_LAG = 0.2
+REPORT_LAG = 0.2
 _LOGGED_STATE_LIMIT = 1.0  #: Time limit of log data with the state, s; they come every 0.1 s.
 
 
@@ -72,6 +72,28 @@ class FlightState:
         """Take note that the planner holds the motors off after a duration (s)."""
         self._plan_end = self._handle.time() + duration
 
+    def is_at_rest(self) -> bool:
+        """Return whether the planner is known to have no motion that has not ended."""
+        state = self.supervisor
+        if state is None or not state.reports_planner:
+            return False
+        is_old = self._handle.time() - self._planned >= REPORT_LAG
+        return is_old and not self.is_moving(state)
+
+    def is_moving(self, state: SupervisorState) -> bool:
+        """Return whether a state shows a motion of the planner that has not ended."""
+        if not state.reports_planner:
+            return SupervisorState.FLYING in state
+        is_active = SupervisorState.HIGH_LEVEL_ACTIVE in state
+        return is_active and SupervisorState.TRAJECTORY_FINISHED not in state
+
+    def has_taken_off(self, state: SupervisorState) -> bool:
+        """Return whether a state shows a takeoff of the planner, also one that has ended."""
+        is_reported = state.reports_planner
+        return (
+            SupervisorState.HIGH_LEVEL_ACTIVE if is_reported else SupervisorState.FLYING
+        ) in state
+
     def is_high_level(self, state: SupervisorState | None) -> bool:
         """Return whether a state, None if unknown, is a flight by the high-level commander."""
         return state is not None and SupervisorState.FLYING in state and self._may_move(state)
@@ -81,7 +103,7 @@ class FlightState:
         state = self.read()
         is_streamed = self._setpoints.runs_motors
         latest = max(self._planned, self._setpoints.last_time if is_streamed else -math.inf)
-        if state is None or self._handle.time() - latest < _REPORT_LAG:
+        if state is None or self._handle.time() - latest < REPORT_LAG:
             return False
         return not (self._may_move(state) or (is_streamed and SupervisorState.FLYING in state))
 

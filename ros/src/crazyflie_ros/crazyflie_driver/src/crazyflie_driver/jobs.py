@@ -1,9 +1,10 @@
 """A vehicle's jobs, one after the other, and urgent ones beside them."""
 
+import contextlib
 import threading
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, InvalidStateError
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -17,7 +18,10 @@ MOST_JOBS = 64  #: Jobs that may be queued.
 
 @dataclass(eq=False)
 class Job:
-    """A call ``work(job)``, which takes time; an urgent job supersedes one that is for a flight."""
+    """A call ``work(job)``, which takes time; an urgent job supersedes one that is for a flight.
+
+    Who waits no longer cancels `done`: the job is not begun any more, or told that it is not valid.
+    """
 
     work: Callable[["Job"], Any]
     is_flight: bool = False
@@ -26,13 +30,14 @@ class Job:
 
     @property
     def is_valid(self) -> bool:
-        """Whether nothing has superseded it."""
-        return not self.superseded_by
+        """Whether nothing has superseded it, and its result is awaited."""
+        return not (self.superseded_by or self.done.cancelled())
 
     def check(self) -> None:
-        """Raise `ServiceError` if something has superseded it."""
-        if self.superseded_by:
-            raise ServiceError(f"given up for {self.superseded_by}")
+        """Raise `ServiceError` if it is not valid."""
+        if not self.is_valid:
+            reason = self.superseded_by or "its caller, who waits no longer"
+            raise ServiceError(f"given up for {reason}")
 
     def run(self) -> None:
         """Call `work`; result or error go to `done`."""
@@ -40,9 +45,12 @@ class Job:
             self.check()
             result = self.work(self)
         except BaseException as error:
-            self.done.set_exception(error)
+            # It may have been cancelled meanwhile.
+            with contextlib.suppress(InvalidStateError):
+                self.done.set_exception(error)
         else:
-            self.done.set_result(result)
+            with contextlib.suppress(InvalidStateError):
+                self.done.set_result(result)
 
 
 class Jobs:

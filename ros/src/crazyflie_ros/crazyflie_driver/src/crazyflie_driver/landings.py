@@ -27,6 +27,8 @@ class Reason(enum.Enum):
     #: A process waits 10 s for a flight, and the last metre takes its time.
     SHUTDOWN = "the driver is to end", 7.0
     REMOVAL = "the vehicle is being removed", 7.0
+    #: Whoever sent the command believes that it failed.
+    NO_ANSWER = "a command that was refused as not answered is carried out", 7.0
 
     @property
     def words(self) -> str:
@@ -94,8 +96,11 @@ class Landings:
             return
         is_critical = self._battery.charge is Charge.CRITICAL
         is_active = self._is_active(state)
+        is_unasked = self._commands.check_unanswered()
         if is_active and is_critical:
             self.begin(Reason.BATTERY)
+        elif is_unasked:
+            self.begin(Reason.NO_ANSWER)
         elif is_active and self._reason is not None:
             self.begin(self._reason)
         elif not is_active and self._is_logged():

@@ -1,6 +1,7 @@
 """Packets to all vehicles of one radio channel at once; no vehicle acknowledges them."""
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -53,13 +54,15 @@ class Broadcaster:
         self._queue = TransmitQueue()
         self.sent = 0  #: Packets that were broadcast.
 
-    def send(self, packets: Sequence[CRTPPacket], urgent: bool = False) -> None:
-        """Have packets sent again and again; does not block.
+    def send(
+        self, packets: Sequence[CRTPPacket], urgent: bool = False, end: float = math.inf
+    ) -> None:
+        """Have packets sent again and again, none after a time (s, monotonic); does not block.
 
         Urgent ones go before all others. What cannot be sent is logged: every vehicle has to be
         looked at afterwards in any case.
         """
-        self._queue.put(partial(self._repeat, packets), urgent)
+        self._queue.put(partial(self._repeat, packets, end), urgent)
 
     def put_latest(self, stream: str, make: Callable[[], Sequence[CRTPPacket]]) -> None:
         """Have the packets that ``make()`` returns sent once; see `TransmitQueue.put_latest`."""
@@ -71,10 +74,13 @@ class Broadcaster:
         if self._radio is not None:
             self._radio.close()
 
-    def _repeat(self, packets):
+    def _repeat(self, packets, end):
         for number in range(self._repeats):
             if number:
                 time.sleep(self._period)
+            if time.monotonic() > end:
+                _log.warning("a broadcast came too late, %d of %d sent", number, self._repeats)
+                return
             self._transmit(packets)
 
     def _transmit(self, packets):
@@ -113,7 +119,8 @@ class SharedCommand:
                 self._end = now + READY_TIME
             self._awaited -= 1
             if self._awaited == 0 and now < self._end:
-                self._broadcaster.send([command])
+                # Later each vehicle has been sent its own, and would obey twice.
+                self._broadcaster.send([command], end=self._end)
 
 
 class CommandRecorder:

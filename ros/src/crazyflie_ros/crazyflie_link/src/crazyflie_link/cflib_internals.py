@@ -162,11 +162,15 @@ class RadioBroadcast:
             instance, commands = self._instance, self._instance._cmd_queue
             where = (self._channel, BROADCAST_ADDRESS, self._rate)
             send = radiodriver._RadioCommands.SEND_PACKET
+            command = (instance._instance_id, send, (*where, packets))
             with commands.mutex:
-                commands.queue.appendleft((instance._instance_id, send, (*where, packets)))
+                commands.queue.appendleft(command)
                 commands.not_empty.notify()
             instance._rsp_queue.get(timeout=_DONGLE_LIMIT)
         except queue.Empty:
+            # A dongle that goes on later must not send it then.
+            with commands.mutex, contextlib.suppress(ValueError):
+                commands.queue.remove(command)
             self.close()
             raise OSError("the Crazyradio does not react") from None
         except Exception as error:

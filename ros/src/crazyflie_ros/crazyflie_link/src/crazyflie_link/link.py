@@ -171,11 +171,24 @@ class Link:
     ) -> bytes:
         """Send a request and return the data of its answer; see `RequestReply.request`.
 
-        What is sent is a call, or data for the port and channel of the answer.
+        What is sent is a call, or data for the port and channel of the answer. It is withdrawn
+        when this returns or raises: what still waits for the link then is not sent.
         """
-        if isinstance(send, bytes):
-            send = partial(self.cflib.send_packet, packet(request.port, request.channel, send))
-        return self._request_reply.request(partial(put or self.put, send), request)
+        transmit = (
+            partial(self.cflib.send_packet, packet(request.port, request.channel, send))
+            if isinstance(send, bytes)
+            else send
+        )
+        is_over = False
+
+        def send_until_over() -> None:
+            if not is_over:
+                transmit()
+
+        try:
+            return self._request_reply.request(partial(put or self.put, send_until_over), request)
+        finally:
+            is_over = True
 
     # End.
 

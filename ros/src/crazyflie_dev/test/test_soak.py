@@ -8,9 +8,8 @@ from geometry_msgs.msg import TransformStamped
 from std_srvs.srv import EmptyRequest
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_dev.soak import FAULTS, Soak, soak
-from crazyflie_dev.soak_faults import NODES, Flight
-from crazyflie_dev.soak_operator import LIVE_VALUES, live_parameters
+from crazyflie_dev.soak import Soak, soak
+from crazyflie_dev.soak_faults import FAULTS, LIVE_VALUES, NODES, Flight, live_parameters
 from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
@@ -24,7 +23,7 @@ POSE_PERIOD = 0.01
 @pytest.fixture(scope="module")
 def result():
     """Return what was seen in a soak with every fault."""
-    return soak(700.0, seed=7, simulator_dt=POSE_PERIOD)
+    return soak(1000.0, seed=7, simulator_dt=POSE_PERIOD)
 
 
 # For minutes of simulated time: a quadrotor flies a shorter soak below.
@@ -63,7 +62,8 @@ def test_faults_of_poses_arrive():
         if fault.name in names:
             names.remove(fault.name)
             graph = FakeGraph({})
-            fault.begin(Flight(graph, Random(1), print))
+            steps = fault.run(Flight(graph, Random(1), print))
+            next(steps)
             (arrived,) = graph.faults["/tf"](message)
             assert str(arrived.transforms) != str(message.transforms), fault.name
     assert not names

@@ -111,6 +111,26 @@ def test_frozen_timers_skip_what_they_missed(graph, listener):
     assert [number for _, number in listener.heard[1:]] == [1.0, 2.0]
 
 
+def test_calls_wait_for_a_frozen_process_unless_they_are_given_up(graph, listener):
+    graph.freeze("/talker")
+    patient, impatient = (graph.call("/count", TriggerRequest()) for _ in range(2))
+    assert not patient.done()
+    assert impatient.cancel()
+    graph.thaw("/talker")
+    assert patient.result().message == "0"
+    assert impatient.cancelled()
+
+
+def test_an_interrupted_process_goes_on_until_its_end(graph, listener):
+    graph.interrupt("/talker")
+    graph.advance(0.1)
+    assert [number for _, number in listener.heard[1:]] == [1.0]
+    graph.end("/talker")
+    graph.advance(0.2)
+    assert [number for _, number in listener.heard[1:]] == [1.0]
+    assert not graph.is_alive("/talker")
+
+
 def test_faults_change_what_arrives(graph, listener):
     overheard = []
     graph.listen("/numbers", lambda message: overheard.append(message.data))

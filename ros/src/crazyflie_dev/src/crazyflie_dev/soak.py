@@ -12,6 +12,7 @@ import json
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
 from random import Random
@@ -21,8 +22,13 @@ import rospkg
 from std_srvs.srv import EmptyRequest
 from tqdm import tqdm
 
-from crazyflie_dev import soak_faults, soak_intruders, soak_operator
-from crazyflie_dev.soak_faults import EMERGENCY, STARVATION, Fault, Flight, Undo
+from crazyflie_dev.soak_faults import (
+    FAULTS,
+    MISSION_PARAMETERS,
+    MISSIONS,
+    Fault,
+    Flight,
+)
 from crazyflie_dev.soak_watch import Watch
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.main import NodeClasses
@@ -32,9 +38,6 @@ from crazyflie_utils.testing.launch_files import composed_nodes, expand
 HOVER_HEIGHT = 1.0  #: Of the launch file, m.
 _STEP = 0.05  #: Between two looks of the operator at the flight, s.
 _TIMEOUT = 30.0  #: Longest wait for the reply to a call, or for the vehicle to come to rest, s.
-
-
-FAULTS = (*soak_faults.FAULTS, *soak_operator.FAULTS, *soak_intruders.FAULTS)
 
 _SIMULATOR = "/simulator"
 
@@ -50,22 +53,24 @@ class Soak:
     """
 
     def __init__(self, seed: int, **arguments: object):
-        launch_file = (
-            Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch/sw_hover.launch"
-        )
+        package = Path(rospkg.RosPack().get_path("crazyflie_examples"))
         given = {"composed": True, "rviz": False, "simulator_dt": 0.005, **arguments}
-        _, parameters = expand(launch_file, **given)
-        nodes = {**composed_nodes(parameters), **soak_operator.MISSION_NODE}
+        _, parameters = expand(package / "launch/sw_hover.launch", **given)
+        nodes = composed_nodes(parameters)
+        for mission in MISSIONS:
+            nodes[mission.strip("/")] = "crazyflie_fleet.high_level_node:HighLevelNode"
+            parameters |= {f"{mission}/{key}": name for key, name in MISSION_PARAMETERS.items()}
         self._classes = {f"/{name}": node for name, node in NodeClasses()(nodes).items()}
-        self.graph = FakeGraph(
-            {**parameters, **soak_operator.MISSION_PARAMETERS, "/simulator/seed": seed}
-        )
+        # Far from the beginning of time: the wall clock is set back, too.
+        self.graph = FakeGraph({**parameters, "/simulator/seed": seed}, start=1e6)
         self.random = Random(seed)
         self.watch = Watch(self.graph)
         self.faults: Counter[str] = Counter()  #: Fault -> how often.
         #: Number of takeoffs that were refused, and of those that were not.
         self.refused = self.answered = 0
         self._flight = Flight(self.graph, self.random, self.start)
+        self._fault_steps: Iterator[None] = iter(())
+        self._is_over = True
         self.watch.begin()
         for name in self._classes:
             self.start(name)
@@ -80,17 +85,39 @@ class Soak:
         """Take off, refer, land; let ``fault`` happen at some moment of it."""
         self.watch.renew()
         self.faults[fault.name] += 1
-        begin = self.graph.time + self.random.uniform(0.0, 18.0)
-        timeline = _Fault(fault, begin, self.random, self._flight, self.watch)
-        self._call("/takeoff", timeline, allow=HOVER_HEIGHT)
+        self._fault_steps, self._is_over = self._happen(fault), False
+        self.watch.may_fly = True
+        self.watch.allow(HOVER_HEIGHT)
+        takeoff = self._call("/takeoff")
+        if takeoff.done():
+            self.refused += takeoff.exception() is not None
+            self.answered += takeoff.exception() is None
         for _ in range(self.random.randint(0, 3)):
             self._refer(self.random.uniform(-1, 1), self.random.uniform(-1, 1))
-            self._wait(self.random.uniform(0.5, 2.5), timeline)
-        self._call("/land", timeline)
+            self._wait(self.random.uniform(0.5, 2.5))
+        self._call("/land")
         # What has not happened yet happens on the ground.
-        while not timeline.is_over:
-            self._wait(_STEP, timeline)
-        self._come_to_rest(timeline)
+        while not self._is_over:
+            self._wait(_STEP)
+        self._come_to_rest()
+
+    def _happen(self, fault):
+        """Wait for the moment of a fault, and let it last, a step at a time."""
+        begin = self.graph.time + self.random.uniform(0.0, 18.0)
+        while self.graph.time < begin:
+            yield
+        watch = self.watch
+        watch.is_blind, watch.may_fall, watch.is_starved = fault.blinds, fault.drops, fault.starves
+        watch.allow(fault.height)
+        steps = fault.run(self._flight)
+        end = self.graph.time + self.random.uniform(fault.shortest, fault.longest)
+        while self.graph.time < end:
+            next(steps)
+            watch.is_emergency = fault.is_emergency
+            yield
+        watch.is_blind = watch.is_emergency = False
+        steps.close()
+        self._is_over = True
 
     def _refer(self, x, y):
         height = self.random.uniform(0.6, 1.4)
@@ -100,86 +127,43 @@ class Soak:
         message.state.x, message.state.y, message.state.z = x, y, height
         self.graph.publish("/ref", message)
 
-    def _call(self, service, timeline, allow=None):
-        if allow is not None:
-            self.watch.may_fly = True
-            self.watch.allow(allow)
+    def _call(self, service):
         outcome: Future[Any] = self.graph.call(service, EmptyRequest())
         end = self.graph.time + _TIMEOUT
         # A server that is killed never answers.
         while (
             not outcome.done() and self.graph.time < end and self.graph.is_alive("/takeoff_server")
         ):
-            self._wait(_STEP, timeline)
-        if allow is not None and outcome.done():
-            if outcome.exception() is None:
-                self.answered += 1
-            else:
-                self.refused += 1
+            self._wait(_STEP)
+        return outcome
 
-    def _come_to_rest(self, timeline):
-        end = self.graph.time + _TIMEOUT
-        while self.watch.height > 0.01 or self.watch.state != "on_ground":
-            self._wait(0.5, timeline)
-            if self.watch.state == "flying":
-                self._call("/land", timeline)
+    def _come_to_rest(self):
+        watch, end = self.watch, self.graph.time + _TIMEOUT
+        while watch.height > 0.01 or watch.state != "on_ground":
+            self._wait(0.5)
+            if watch.state == "flying":
+                self._call("/land")
             if self.graph.time > end:
-                self.watch.say(f"not at rest: {self.watch.state}, {self.watch.height:.2f} m")
+                watch.check(False, f"not at rest: {watch.state}, {watch.height:.2f} m")
                 break
         # Refused where there was no emergency, or it has been reset.
         self.graph.call("/emergency_reset", EmptyRequest())
-        self._wait(1.0, timeline)
-        self.watch.may_fly = self.watch.may_fall = False
+        self._wait(1.0)
+        watch.may_fly = watch.may_fall = False
         # Nothing may begin by itself now.
-        self._wait(2.0, timeline)
-        if self.watch.distance > _STRAY:
-            self._carry_back(timeline)
+        self._wait(2.0)
+        if watch.distance > _STRAY:
+            # A simulator that starts again has its vehicle where the launch file puts it.
+            self.graph.kill(_SIMULATOR)
+            watch.carried()
+            self.start(_SIMULATOR)
+            self._wait(2.0)
 
-    def _carry_back(self, timeline):
-        # A simulator that is started anew has its vehicle where the launch file puts it.
-        self.graph.kill(_SIMULATOR)
-        self.watch.carried()
-        self.start(_SIMULATOR)
-        self._wait(2.0, timeline)
-
-    def _wait(self, duration, timeline):
+    def _wait(self, duration):
         end = self.graph.time + duration
         while self.graph.time < end - 1e-9:
-            timeline.update()
+            next(self._fault_steps, None)
             self.graph.advance(min(_STEP, end - self.graph.time))
-
-
-class _Fault:
-    """One fault on its way: not yet, now, over."""
-
-    def __init__(
-        self, fault: Fault, begin: float, random: Random, flight: Flight, watch: Watch
-    ) -> None:
-        self._fault = fault
-        self._begin = begin
-        self._end = begin + random.uniform(fault.shortest, fault.longest)
-        self._flight = flight
-        self._watch = watch
-        self._undo: Undo | None = None
-        self.is_over = False
-
-    def update(self):
-        now = self._flight.graph.time
-        if self._undo is None and not self.is_over and now >= self._begin:
-            self._watch.is_blind = self._fault.blinds
-            self._watch.may_fall = self._fault.drops
-            self._watch.allow(self._fault.height)
-            self._undo = self._fault.begin(self._flight)
-            self._watch.is_emergency = self._fault.name == EMERGENCY
-            self._watch.is_starved = self._fault.name == STARVATION
-        if self._undo is None or self.is_over:
-            return
-        self._fault.again(self._flight)
-        if now >= self._end:
-            self._watch.is_blind = self._watch.is_emergency = False
-            self._undo()
-            self._undo = None
-            self.is_over = True
 
 
 def soak(duration: float, seed: int, progress: bool = False, **arguments: object) -> dict[str, Any]:

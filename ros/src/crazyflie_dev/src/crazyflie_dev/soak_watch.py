@@ -39,7 +39,7 @@ HARD_LANDING = 2.0
 _AIRBORNE = 0.05  #: Height from which on a vehicle is in the air, m.
 
 _LEGAL = {
-    # A takeoff that is aborted at once is never told.
+    # A takeoff that is aborted at once is never published.
     "on_ground": {"taking_off", "landing"},
     "taking_off": {"flying", "descending", "landing", "on_ground"},
     "flying": {"descending", "landing", "on_ground"},
@@ -55,26 +55,22 @@ class Watch:
 
     graph: FakeGraph
     violations: list[str] = field(default_factory=list)  #: With the time of each.
-    #: highest, hardest, farthest: Largest height above the highest reference, m; speed at which the
-    #: ground was met with motors on, m/s; distance from the start, m.
-    highest: float = -math.inf
-    hardest: float = 0.0
-    farthest: float = 0.0
+    highest: float = -math.inf  #: Above the highest reference, m.
+    hardest: float = 0.0  #: Speed at which the ground was met with motors on, m/s.
+    farthest: float = 0.0  #: From the middle, in the air, m.
     is_blind: bool = False  #: Whether a fault keeps good poses away.
-    #: Whether a takeoff has been asked for since the vehicle was last on the ground.
-    may_fly: bool = False
+    may_fly: bool = False  #: Whether a takeoff has been asked for since the last landing.
     may_fall: bool = False  #: Whether the vehicle may meet the ground at any speed.
     is_emergency: bool = False  #: Whether motors have to stand still.
     is_starved: bool = False  #: Whether all nodes have stopped again and again in this flight.
-    #: height, distance: Of the vehicle now from the ground and from the middle, m.
-    height: float = 0.0
-    distance: float = 0.0
-    state: str = ""  #: Of the flight, as the server tells it.
+    height: float = 0.0  #: Of the vehicle now, m.
+    distance: float = 0.0  #: From the middle now, m.
+    state: str = ""  #: Of the flight, as the server publishes it.
     _reference: float = 0.0
     _blind_since: float = math.inf
     _last: tuple[float, tuple[float, ...]] | None = None
     _climb: float = 0.0
-    _told: set[str] = field(default_factory=set)
+    _said: set[str] = field(default_factory=set)
 
     def begin(self) -> None:
         """Begin to listen."""
@@ -82,21 +78,25 @@ class Watch:
         self.graph.listen("/control/final", self._on_control)
         self.graph.listen("/in_flight_flight_status", self._on_status)
 
-    def allow(self, height: float) -> None:
-        """Take note of a reference at ``height`` (m)."""
-        self._reference = max(self._reference, height)
-
     def renew(self) -> None:
         """Begin another flight."""
-        self._told.clear()
+        self._said.clear()
         self._reference = 0.0
         self.is_starved = False
 
-    def say(self, text: str) -> None:
-        """Note a violation; the same one once in a flight."""
+    def allow(self, height: float) -> None:
+        """Allow the vehicle to be at a reference's height (m)."""
+        self._reference = max(self._reference, height)
+
+    def carried(self) -> None:
+        """Forget the last position: the vehicle has been put elsewhere."""
+        self._last = None
+
+    def check(self, is_good: bool, text: str) -> None:
+        """Record a violation unless something is good; the same one once in a flight."""
         kind = text.split(":")[0]
-        if kind not in self._told:
-            self._told.add(kind)
+        if not is_good and kind not in self._said:
+            self._said.add(kind)
             self.violations.append(f"{self.graph.time:.2f} s: {text}")
 
     def _on_tf(self, message):
@@ -108,64 +108,45 @@ class Watch:
             return
         height = self.height = position[2]
         self.distance = math.hypot(*position[:2])
+        is_airborne = height > _AIRBORNE
         speed = math.dist(position, before[1]) / (time - before[0])
         self.highest = max(self.highest, height - self._reference)
-        if height > _AIRBORNE:
+        if is_airborne:
             # The ground of the models of 7 states has no friction.
             self.farthest = max(self.farthest, self.distance)
-        if height <= 0.001 < before[1][2]:
-            self._touch_down(-self._climb)
+        if height <= 0.001 < before[1][2] and not self.may_fall:
+            self.hardest = max(self.hardest, -self._climb)
+            self.check(-self._climb <= HARD_LANDING, f"hard landing: {-self._climb:.2f} m/s")
         self._climb = (height - before[1][2]) / (time - before[0])
-        most = self._reference + self._overshoot
-        if height > most and self.may_fly:
-            self.say(f"too high: {height:.2f} m, reference {self._reference:.2f} m")
-        if height > 0.1 and not self.may_fly:
-            self.say(f"in the air unasked: {height:.2f} m")
-        if self.distance > FLY_AWAY and height > _AIRBORNE:
-            self.say(f"flown away: {self.distance:.2f} m")
-        if speed > MOST_SPEED and not self.may_fall:
-            self.say(f"too fast: {speed:.2f} m/s")
-        self._watch_blindness(time, height)
-
-    @property
-    def _overshoot(self):
-        if self.is_starved:
-            return STARVED_OVERSHOOT
-        return DEAF_OVERSHOOT if self.may_fall else OVERSHOOT
-
-    def carried(self) -> None:
-        """Take note that the vehicle has been put elsewhere."""
-        self._last = None
-
-    def _touch_down(self, speed):
-        if self.may_fall:
-            return
-        self.hardest = max(self.hardest, speed)
-        if speed > HARD_LANDING:
-            self.say(f"hard landing: {speed:.2f} m/s")
-
-    def _watch_blindness(self, time, height):
-        if not (self.is_blind and height > _AIRBORNE):
+        most = self._reference + (
+            STARVED_OVERSHOOT if self.is_starved else DEAF_OVERSHOOT if self.may_fall else OVERSHOOT
+        )
+        limits = f"{height:.2f} m, reference {self._reference:.2f} m"
+        self.check(height <= most or not self.may_fly, f"too high: {limits}")
+        self.check(height <= 0.1 or self.may_fly, f"in the air unasked: {height:.2f} m")
+        far = self.distance > FLY_AWAY and is_airborne
+        self.check(not far, f"flown away: {self.distance:.2f} m")
+        self.check(speed <= MOST_SPEED or self.may_fall, f"too fast: {speed:.2f} m/s")
+        if not (self.is_blind and is_airborne):
             self._blind_since = time
-        elif time - self._blind_since > BLIND_LIMIT + self._reference / SINK_SPEED:
-            self.say(f"in the air without a pose: for {time - self._blind_since:.1f} s")
+        blind = time - self._blind_since
+        limit = BLIND_LIMIT + self._reference / SINK_SPEED
+        self.check(blind <= limit, f"in the air without a pose: for {blind:.1f} s")
 
     def _on_control(self, message):
         control = message.control
-        numbers = (control.roll, control.pitch, control.yaw_dot, control.thrust)
-        if not all(map(math.isfinite, numbers)):
-            self.say(f"control is not finite: {numbers}")
-        if not 0.0 <= control.thrust <= MOST_THRUST:
-            self.say(f"thrust out of limits: {control.thrust:.2f} m/s^2")
-        if max(abs(control.roll), abs(control.pitch)) > MOST_TILT:
-            self.say(f"tilt out of limits: {control.roll:.2f}, {control.pitch:.2f} rad")
-        if self.is_emergency and control.thrust > 0.0:
-            self.say(f"thrust in emergency: {control.thrust:.2f} m/s^2")
-        if control.thrust > 1.2 * GRAVITY and not self.may_fly:
-            self.say(f"thrust without a takeoff: {control.thrust:.2f} m/s^2")
+        thrust, tilt = control.thrust, max(abs(control.roll), abs(control.pitch))
+        numbers = (control.roll, control.pitch, control.yaw_dot, thrust)
+        self.check(all(map(math.isfinite, numbers)), f"control is not finite: {numbers}")
+        self.check(0.0 <= thrust <= MOST_THRUST, f"thrust out of limits: {thrust:.2f} m/s^2")
+        self.check(tilt <= MOST_TILT, f"tilt out of limits: {tilt:.2f} rad")
+        is_still = thrust <= 0.0 or not self.is_emergency
+        self.check(is_still, f"thrust in emergency: {thrust:.2f} m/s^2")
+        is_asked = thrust <= 1.2 * GRAVITY or self.may_fly
+        self.check(is_asked, f"thrust without a takeoff: {thrust:.2f} m/s^2")
 
     def _on_status(self, message):
         state = flight_state(message.state)
         before, self.state = self.state, "" if state is None else state.word
-        if before and self.state != before and self.state not in _LEGAL.get(before, ()):
-            self.say(f"flight state went from {before} to {self.state}")
+        is_legal = not before or self.state == before or self.state in _LEGAL.get(before, ())
+        self.check(is_legal, f"flight state went from {before} to {self.state}")

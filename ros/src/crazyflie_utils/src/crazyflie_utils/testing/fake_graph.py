@@ -5,13 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from typing import Any
 
 import genpy
 
 from crazyflie_utils.node import Node
 from crazyflie_utils.testing.fake_process import FakeProcess, pass_time
-from crazyflie_utils.testing.fake_transport import FakeSubscriber, FakeTransport, refuse
+from crazyflie_utils.testing.fake_transport import (
+    FakeSubscriber,
+    FakeTransport,
+    copy_outcome,
+    refuse,
+)
 from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber
 
 Deliver = Callable[[Any], None]
@@ -46,7 +52,7 @@ class FakeGraph:
 
     def start(self, name: str, node: Node) -> None:
         """Start a process with one node; RuntimeError if the node could not be initialized."""
-        process = self._processes[name] = _GraphProcess(name, self, self._parameters)
+        process = self._processes[name] = _GraphProcess(name, self, self._parameters, node)
         process.clock.wall_offset = self._wall_offset
         if not process.launch(node, name):
             raise RuntimeError(f"{name} was not initialized: {self.log[-1:]}")
@@ -57,12 +63,23 @@ class FakeGraph:
         for publication in [each for each in self._latched if each[0] == name]:
             del self._latched[publication]
 
+    def interrupt(self, name: str) -> None:
+        """Have a process prepare its end, as SIGINT and ``rosnode kill`` do; it goes on."""
+        process = self._processes[name]
+        process.prepare_shutdown({name: process.node})
+
+    def end(self, name: str) -> None:
+        """Shut a process down, as at the end of its flight."""
+        process = self._processes[name]
+        process.shut_down({name: process.node})
+        self.kill(name)
+
     def freeze(self, name: str) -> None:
-        """Stop a process as SIGSTOP does: messages wait for it."""
+        """Stop a process as SIGSTOP does: messages and calls wait for it."""
         self._processes[name].is_frozen = True
 
     def thaw(self, name: str) -> None:
-        """Let a frozen process go on, with the messages that have waited."""
+        """Let a frozen process go on, with what has waited."""
         process = self._processes[name]
         process.is_frozen = False
         process.move_to(self.time)
@@ -103,10 +120,11 @@ class FakeGraph:
         }
 
     def find_service(self, service: str) -> Callable[[Any], Future[Any]]:
-        """Return what serves calls of a service, of any process that is not frozen."""
+        """Return what serves calls of a service, of any process; those of a frozen one wait."""
         for process in self._processes.values():
-            if service in process.transport.services and not process.is_frozen:
-                return process.transport.services[service]
+            serve = process.transport.services.get(service)
+            if serve is not None:
+                return partial(process.keep_call, serve) if process.is_frozen else serve
         return refuse(service)
 
     def call(self, service: str, request: genpy.Message) -> Future[Any]:
@@ -178,11 +196,23 @@ class _GraphProcess(FakeProcess):
 
     transport: _GraphTransport
 
-    def __init__(self, name: str, graph: FakeGraph, parameters: dict[str, object]):
+    def __init__(self, name: str, graph: FakeGraph, parameters: dict[str, object], node: Node):
         super().__init__(transport=_GraphTransport(name, graph, parameters), start=graph.time)
         self.name = name
+        self.node = node
         self.is_frozen = False
         self.waiting: list[tuple[Deliver, Any]] = []
+
+    def keep_call(self, serve: Callable[[Any], Future[Any]], request: Any) -> Future[Any]:
+        """Serve a call once the process goes on, unless its future is cancelled before."""
+        answer: Future[Any] = Future()
+
+        def begin(request):
+            if not answer.cancelled():
+                serve(request).add_done_callback(lambda served: copy_outcome(served, answer))
+
+        self.waiting.append((begin, request))
+        return answer
 
     def receive(self, deliver: Deliver, message: Any) -> None:
         """Deliver a message, or keep it until the process goes on."""

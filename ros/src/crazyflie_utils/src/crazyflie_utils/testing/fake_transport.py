@@ -130,9 +130,9 @@ class FakeTransport(Transport):
             return answer
         reply: Future[Any] = Future()
         text = f"{name} has not answered within {limit:g} s"
-        timer = self.machine_timers.add(limit, lambda: _fail(reply, text))
+        timer = self.machine_timers.add(limit, lambda: _give_up(answer, reply, text))
         reply.add_done_callback(lambda _: timer.stop())
-        answer.add_done_callback(lambda _: _copy(answer, reply))
+        answer.add_done_callback(lambda _: copy_outcome(answer, reply))
         return reply
 
     def find_service(self, name: str) -> Callable[[Any], Future[Any]]:
@@ -158,13 +158,15 @@ def refuse(service: str) -> Callable[[Any], Future[Any]]:
     return lambda request: refusal
 
 
-def _fail(reply, text):
+def _give_up(answer, reply, text):
+    answer.cancel()
     with suppress(InvalidStateError):
         reply.set_exception(ServiceError(text))
 
 
-def _copy(answer, reply):
-    if reply.done():
+def copy_outcome(answer: Future[Any], reply: Future[Any]) -> None:
+    """Give a reply the outcome of an answer, unless it has one, or the call was given up."""
+    if reply.done() or answer.cancelled():
         return
     if answer.exception() is None:
         reply.set_result(answer.result())

@@ -1,97 +1,111 @@
 """Dependencies between the packages point one way, and ROS stays behind the node handle."""
 
 import ast
+import graphlib
+import sys
 
+import grimp
 import pytest
+from catkin_pkg.packages import find_packages
+from importlinter.api import read_configuration
+from importlinter.cli import lint_imports
 from workspaces import TOP
 
 SOURCES = TOP / "ros" / "src"
-PACKAGES = {
-    path.name: path
-    for pattern in (
-        "*/src/*/__init__.py",
-        "crazyflie_ros/*/src/*/__init__.py",
-        "crazyflie_tutorials/*/src/*/__init__.py",
-    )
-    for path in (init.parent for init in SOURCES.glob(pattern))
+CONTRACTS = TOP / "importlinter.ini"
+FOLDERS = {
+    package.name: SOURCES / path / "src"
+    for path, package in find_packages(str(SOURCES)).items()
+    if (SOURCES / path / "src").is_dir()
 }
+#: Python package -> the catkin package that has it.
+OWNERS = {init.parent.name: name for name, f in FOLDERS.items() for init in f.glob("*/__init__.py")}
 
-LAYERS = [
-    {"crazyflie_msgs", "crazyflie_model", "crazyflie_tutorial_msgs"},
-    {"crazyflie_utils"},
-    {
-        "crazyflie_simulator",
-        "crazyflie_state_estimator",
-        "crazyflie_lqr",
-        "crazyflie_control_merger",
-        "crazyflie_geofence",
-        "crazyflie_takeoff",
-        "crazyflie_description",
-        "crazyflie_controller",
-        "crazyflie_link",
-        "crazyflie_references",
-        "crazyflie_reports",
-        "crazyflie_sweep",
-        "crazyflie_package_generator",
-        "crazyflie_spawner",
-        "crazyflie_world",
-        "mocap_optitrack",
-    },
-    {
-        "crazyflie_batch",
-        "crazyflie_doctor",
-        "crazyflie_driver",
-        "crazyflie_teleop",
-        "crazyflie_tools",
-        "crazyflie_virtual",
-    },
-    {"crazyflie_dashboard", "crazyflie_fleet"},
-    {"crazyflie_demo", "crazyflie_examples", "crazyflie_ranging", "crazyflie_vision"},
-    {"crazyflie_mission_api", "uav_trajectory"},
-    {"crazyflie", "crazyflie_dev", "crazyflie_py"},
-    {"pycrazyswarm"},
-]
-"""From the bottom: a package imports from lower layers only."""
-
+#: Beside the node handle, the module with which users' own nodes command a vehicle.
 SPEAK_TO_ROSPY = {"crazyflie_utils", "crazyflie"}
-"""Beside the node handle, the module with which users' own nodes command a vehicle."""
 
 
-def imported(package):
-    """Return the top-level modules that the files of a package import."""
-    names = set()
-    for path in PACKAGES[package].rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Import):
-                names |= {name.name.partition(".")[0] for name in node.names}
-            elif isinstance(node, ast.ImportFrom):
-                names.add(node.module.partition(".")[0])
-    return names
+@pytest.fixture
+def sources(monkeypatch):
+    """Have packages found in the sources, where the devel space has stubs."""
+    monkeypatch.setattr(sys, "path", [*map(str, FOLDERS.values()), *sys.path])
 
 
-def layer_of(package):
-    """Return the number of a package's layer, from the bottom."""
-    return next(k for k, layer in enumerate(LAYERS) if package in layer)
+@pytest.fixture
+def graph(sources):
+    return grimp.build_graph(*OWNERS, include_external_packages=True, cache_dir=None)
 
 
-def test_every_package_has_a_layer():
-    assert set(PACKAGES) <= set().union(*LAYERS)
+def importers(graph, module):
+    """Return the packages that import a module of others, or none if nothing does."""
+    if module not in graph.modules:
+        return set()
+    return {name.partition(".")[0] for name in graph.find_modules_that_directly_import(module)}
 
 
-@pytest.mark.parametrize("package", sorted(PACKAGES))
-def test_imports_come_from_lower_layers(package):
-    own = imported(package) & set().union(*LAYERS) - {package}
-    assert {name for name in own if layer_of(name) >= layer_of(package)} == set()
+def circle(graph):
+    """Return a circle of modules, each of which is imported by the next; () without one."""
+    imports = {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
+    try:
+        graphlib.TopologicalSorter(imports).prepare()
+    except graphlib.CycleError as error:
+        return tuple(error.args[1])
+    return ()
 
 
-@pytest.mark.parametrize("package", sorted(set(PACKAGES) - SPEAK_TO_ROSPY))
-def test_only_the_node_handle_speaks_to_rospy(package):
-    assert "rospy" not in imported(package)
+def floors(config):
+    (contract,) = config["contracts_options"]
+    return {name.strip() for floor in contract["layers"] for name in floor.split("|")}
 
 
-def test_the_model_knows_nothing_of_ros():
-    ros = {"rospy", "genpy", "rosgraph", "std_msgs", "geometry_msgs", "crazyflie_msgs", "tf2_ros"}
-    assert imported("crazyflie_model") & ros == set()
+def test_every_package_has_a_floor():
+    config = read_configuration(str(CONTRACTS))
+    assert set(config["session_options"]["root_packages"]) == set(OWNERS) == floors(config)
+
+
+def test_imports_come_from_lower_floors(sources, capsys):
+    status = lint_imports(str(CONTRACTS), no_cache=True, is_debug_mode=False)
+    assert status == 0, capsys.readouterr().out
+
+
+def test_no_circle_of_modules_even_for_types_or_within_a_function(graph):
+    assert len(graph.modules) > 200
+    assert circle(graph) == ()
+
+
+def test_imports_are_declared(graph):
+    packages = {each.name: each for each in find_packages(str(SOURCES)).values()}
+    undeclared = {
+        (OWNERS[module], needed)
+        for module in OWNERS
+        for name in graph.find_descendants(module) | {module}
+        for imported in graph.find_modules_directly_imported_by(name)
+        if (needed := OWNERS.get(imported.split(".")[0], imported)) in packages
+        and needed not in {each.name for each in packages[OWNERS[module]].exec_depends}
+        and needed != OWNERS[module]
+    }
+    assert undeclared == set()
+
+
+def test_no_package_needs_what_is_not_installed():
+    needed = {
+        each.name
+        for package in find_packages(str(SOURCES)).values()
+        for each in package.exec_depends
+    }
+    assert needed & {"crazyflie_dev", "crazyflie_tests"} == set()
+
+
+def test_only_the_node_handle_speaks_to_rospy(graph):
+    assert importers(graph, "rospy") <= SPEAK_TO_ROSPY
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["rospy", "genpy", "rosgraph", "std_msgs", "geometry_msgs", "crazyflie_msgs", "tf2_ros"],
+)
+def test_the_model_knows_nothing_of_ros(graph, module):
+    assert "crazyflie_model" not in importers(graph, module)
 
 
 IN_FUNCTIONS = {
@@ -117,8 +131,8 @@ IN_FUNCTIONS = {
 def test_imports_stand_at_the_top():
     """A function that imports stops a vehicle's streams for as long as it takes."""
     found = set()
-    for package in PACKAGES.values():
-        for path in package.rglob("*.py"):
+    for folder in FOLDERS.values():
+        for path in folder.rglob("*.py"):
             functions = (
                 node
                 for node in ast.walk(ast.parse(path.read_text()))
@@ -129,5 +143,48 @@ def test_imports_stand_at_the_top():
                 for function in functions
                 for node in ast.walk(function)
             ):
-                found.add(str(path.relative_to(package.parent)))
+                found.add(str(path.relative_to(folder)))
     assert found == IN_FUNCTIONS
+
+
+def package(folder, name, **modules):
+    (folder / name).mkdir()
+    for module, code in {"__init__": "", **modules}.items():
+        (folder / name / f"{module}.py").write_text(code)
+
+
+@pytest.fixture
+def two_floors(tmp_path, monkeypatch):
+    """Return what checks two packages, upper and lower, of which the lower has two modules."""
+
+    def check(**lower):
+        monkeypatch.syspath_prepend(tmp_path)
+        package(tmp_path, "upper_floor", module="from lower_floor import first")
+        package(tmp_path, "lower_floor", **{"first": "", "second": "", **lower})
+        contracts = tmp_path / "contracts.ini"
+        contracts.write_text(
+            "[importlinter]\nroot_packages =\n  upper_floor\n  lower_floor\n"
+            "[importlinter:contract:floors]\nname = floors\ntype = layers\n"
+            "layers =\n  upper_floor\n  lower_floor\n"
+        )
+        graph = grimp.build_graph("upper_floor", "lower_floor", cache_dir=None)
+        return lint_imports(str(contracts), no_cache=True), sorted(circle(graph)[:-1])
+
+    return check
+
+
+def test_floors_are_kept(two_floors):
+    assert two_floors() == (0, [])
+
+
+def test_an_import_from_an_upper_floor_is_found(two_floors):
+    status, found = two_floors(second="def f():\n    from upper_floor import module")
+    assert (status, found) == (1, [])
+
+
+def test_a_circle_of_modules_is_found_even_for_types(two_floors):
+    status, found = two_floors(
+        first="from lower_floor import second",
+        second="if TYPE_CHECKING:\n    from lower_floor.first import X",
+    )
+    assert (status, found) == (0, ["lower_floor.first", "lower_floor.second"])

@@ -11,12 +11,40 @@ from crazyflie_model.trajectory import Pieces
 MEMORY = 31  #: Pieces that the memory of a vehicle holds.
 
 
-class MissionVehicle(Protocol):
-    """A vehicle that takes high-level commands, of missions and of Crazyswarm's scripts.
+class HighLevelCommands(Protocol):
+    """What missions and Crazyswarm's scripts command; see `crazyflie_py.backend`.
+
+    A ``group_mask`` other than 0 restricts a command to members of these groups.
+    """
+
+    def take_off(self, height: float, duration: float, group_mask: int = 0) -> Any:
+        """Climb straight up to a height (m) in about a duration (s), keeping the heading."""
+
+    def land(self, height: float | None, duration: float, group_mask: int = 0) -> Any:
+        """Sink straight down to a height (m), None is the ground, in about a duration (s)."""
+
+    def stop(self, group_mask: int = 0) -> Any:
+        """Stop the motors of a vehicle that has landed: those of the firmware idle on."""
+
+    def go_to(
+        self,
+        goal: Triple,
+        yaw: float,
+        duration: float,
+        relative: bool = False,
+        group_mask: int = 0,
+    ) -> Any:
+        """Fly to a point (m) and heading (rad), or by them from the plan, in a duration (s)."""
+
+    def emergency(self) -> Any:
+        """Stop the motors at once."""
+
+
+class MissionVehicle(HighLevelCommands, Protocol):
+    """A vehicle of a mission.
 
     A command returns a future, which is done when the vehicle has accepted it, not when it has
-    carried it out; its exception says why it was refused. A ``group_mask`` other than 0 restricts
-    it to members of these groups.
+    carried it out; its exception says why it was refused.
     """
 
     name: str
@@ -36,33 +64,11 @@ class MissionVehicle(Protocol):
     def has_landed(self) -> bool:
         """Return whether the vehicle is on the ground, with its motors off."""
 
-    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
-        """Climb straight up to a height (m) in about a duration (s)."""
-
-    def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":
-        """Sink straight down to a height (m), None is the ground, in about a duration (s)."""
-
-    def stop(self, group_mask: int = 0) -> "Future[Any]":
-        """Stop the motors of a vehicle that has landed: those of the firmware idle on."""
-
-    def go_to(
-        self,
-        goal: Triple,
-        yaw: float,
-        duration: float,
-        relative: bool = False,
-        group_mask: int = 0,
-    ) -> "Future[Any]":
-        """Fly to a point (m) and heading (rad), or by them, in a duration (s)."""
-
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
         """Take a trajectory, to be uploaded or streamed."""
 
     def start(self) -> "Future[Any]":
         """Fly the trajectory that was prepared last."""
-
-    def emergency(self) -> "Future[Any]":
-        """Stop the motors at once."""
 
 
 class Clock(Protocol):

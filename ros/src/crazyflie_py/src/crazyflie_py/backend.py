@@ -7,6 +7,7 @@ two back-ends: `crazyflie_py.simulation` (--sim) and `crazyflie_py.ros_backend`.
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
+from crazyflie_mission_api.mission_vehicle import HighLevelCommands
 from crazyflie_model.angles import Triple
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import PolynomialPiece
@@ -28,26 +29,11 @@ class VehicleState(NamedTuple):
     rpy: Triple
 
 
-class Commands(Protocol):
+class Commands(HighLevelCommands, Protocol):
     """Commands to a vehicle, or to all vehicles of a swarm at the same moment.
 
-    Arguments are checked before. A command returns when it is sent, not when it is carried out. A
-    ``group_mask`` other than 0 restricts it to vehicles in one of these groups.
+    Arguments are checked before. A command returns when it is sent, not when it is carried out.
     """
-
-    def take_off(self, height: float, duration: float, group_mask: int) -> object:
-        """Climb to a height (m, world frame) in a duration (s), keeping the heading."""
-
-    def land(self, height: float, duration: float, group_mask: int) -> object:
-        """Descend to a height (m, world frame) in a duration (s), then stop the motors."""
-
-    def stop(self, group_mask: int) -> object:
-        """Stop the motors; a later command starts them again."""
-
-    def go_to(
-        self, goal: Triple, yaw: float, duration: float, relative: bool, group_mask: int
-    ) -> object:
-        """Fly to a position (m) and yaw (rad), or by them from the planned state."""
 
     def start_trajectory(
         self, trajectory_id: int, time_scale: float, reverse: bool, relative: bool, group_mask: int
@@ -56,9 +42,6 @@ class Commands(Protocol):
 
     def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
         """Return to high-level commands when the last setpoint is this old (ms)."""
-
-    def emergency(self) -> object:
-        """Stop the motors at once; commands have no effect any more."""
 
     def arm(self, arm: bool) -> None:
         """Arm or disarm."""

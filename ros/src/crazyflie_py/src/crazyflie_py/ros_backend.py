@@ -116,7 +116,7 @@ class RosBackend(EachVehicle, SwarmBackend):
     # Commands to all.
 
     @override
-    def take_off(self, height: float, duration: float, group_mask: int) -> None:
+    def take_off(self, height: float, duration: float, group_mask: int = 0) -> None:
         members = {v.name: v for v in self._vehicles if v.is_member(group_mask)}
         begun = [vehicle.has_begun for vehicle in members.values()]
         if self._top == ALL_OF_FLEET:
@@ -135,21 +135,26 @@ class RosBackend(EachVehicle, SwarmBackend):
         self._connection.finish("takeoff", calls, lambda name: members[name].has_begun())
 
     @override
-    def land(self, height: float, duration: float, group_mask: int) -> None:
+    def land(self, height: float | None, duration: float, group_mask: int = 0) -> None:
         for vehicle in self._vehicles:
             if vehicle.is_member(group_mask):
                 vehicle.held.free(duration)
-        self._call("land", srv.Land, group_mask, height, seconds(duration))
+        self._call("land", srv.Land, group_mask, height or 0.0, seconds(duration))
         for vehicle in self._vehicles:
             vehicle.note_landing(group_mask)
 
     @override
-    def stop(self, group_mask: int) -> None:
+    def stop(self, group_mask: int = 0) -> None:
         self._call("stop", srv.Stop, group_mask)
 
     @override
     def go_to(
-        self, goal: Triple, yaw: float, duration: float, relative: bool, group_mask: int
+        self,
+        goal: Triple,
+        yaw: float,
+        duration: float,
+        relative: bool = False,
+        group_mask: int = 0,
     ) -> None:
         yaw = self._vehicles[0].checked_yaw(yaw)
         self._call("go_to", srv.GoTo, group_mask, relative, Point(*goal), yaw, seconds(duration))

@@ -217,7 +217,7 @@ class RosVehicleBackend(VehicleBackend):
     # Commands.
 
     @override
-    def take_off(self, height: float, duration: float, group_mask: int) -> None:
+    def take_off(self, height: float, duration: float, group_mask: int = 0) -> None:
         calls = {self.name: self.begin_takeoff(height, duration, group_mask)}
         self._connection.finish("takeoff", calls, lambda _: self.has_begun())
 
@@ -239,18 +239,23 @@ class RosVehicleBackend(VehicleBackend):
         return group_mask == 0 or bool(group_mask & self._groups)
 
     @override
-    def land(self, height: float, duration: float, group_mask: int) -> None:
+    def land(self, height: float | None, duration: float, group_mask: int = 0) -> None:
         self.held.free(duration)
         self._command("land", self._vehicle.land(height, duration, group_mask))
         self.note_landing(group_mask)
 
     @override
-    def stop(self, group_mask: int) -> None:
+    def stop(self, group_mask: int = 0) -> None:
         self._command("stop", self._vehicle.stop(group_mask))
 
     @override
     def go_to(
-        self, goal: Triple, yaw: float, duration: float, relative: bool, group_mask: int
+        self,
+        goal: Triple,
+        yaw: float,
+        duration: float,
+        relative: bool = False,
+        group_mask: int = 0,
     ) -> None:
         if not relative:
             self._check("goTo", goal)

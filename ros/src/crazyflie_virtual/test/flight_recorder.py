@@ -22,7 +22,8 @@ import math
 import struct
 
 import pytest
-from virtual_bench import Bench, generic
+from cflib.crazyflie.mem import Poly4D
+from virtual_bench import Bench, cflib_client, generic
 
 from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_virtual.body.physics import STEP
@@ -45,6 +46,12 @@ TILT = 0.5
 
 PWM, PEAK = 500.0, 3000.0
 """Of motor commands."""
+
+NEAR = 0.06
+"""Of a position of a trajectory, m."""
+
+TURNED = 5.0
+"""Of the heading in a trajectory, deg."""
 
 _SAMPLE = 0.01
 _SUPERVISOR_PERIOD = 0.04
@@ -160,6 +167,72 @@ class Flight(Bench):
     def _sample(self):
         self.track.add(self)
         self.highest = max(self.highest, self.most)
+
+
+class CommandedFlight(Flight):
+    """A flight that is commanded with cflib."""
+
+    def fly(self, method, *arguments, **keywords):
+        """Send what cflib's high-level commander sends; return the error number."""
+        client, sent = cflib_client()
+        getattr(client.high_level_commander, method)(*arguments, **keywords)
+        (packet,) = sent
+        return self.ask_one(packet.port, packet.channel, packet.data)[3]
+
+    def climb(self, height):
+        """Take off; the scenarios go on a second after the climb."""
+        assert self.fly("takeoff", height, 2.0) == 0
+        self.run(3.0)
+
+    def upload(self, data, address=0):
+        """Write into the trajectory memory."""
+        for start in range(0, len(data), 24):
+            request = struct.pack("<BI", 1, address + start) + data[start : start + 24]
+            assert self.ask_one(Port.MEMORY, 2, request)[-1] == 0
+
+    def pose(self):
+        """Return x, y, z (m) and yaw (deg) of the estimate."""
+        e = self.firmware.estimate
+        return [e.x, e.y, e.z, e.yaw]
+
+    def follow(self, track, origin=(0.0, 0.0, 0.0, 0.0), near=NEAR, slack=0.0):
+        """Let time pass and compare with a recorded track: time, x, y, z, yaw from an origin.
+
+        The times of the track are good to ``slack``, as a fraction: the nearest pose counts.
+        """
+        begin = self.vehicle.time
+        for time, *expected in track:
+            self.run(begin + time * (1.0 - slack) - self.vehicle.time)
+            poses = [self._pose_from(origin)]
+            while self.vehicle.time < begin + time * (1.0 + slack):
+                self.run(_SAMPLE)
+                poses.append(self._pose_from(origin))
+            pose = min(poses, key=lambda pose: math.dist(pose[:3], expected[:3]))
+            assert pose[:3] == pytest.approx(expected[:3], abs=near), time
+            assert math.remainder(pose[3] - expected[3], 360.0) == pytest.approx(0.0, abs=TURNED)
+
+    def _pose_from(self, origin):
+        dx, dy, dz, turn = (a - b for a, b in zip(self.pose(), origin, strict=True))
+        c, s = math.cos(math.radians(origin[3])), math.sin(math.radians(origin[3]))
+        return (c * dx + s * dy, c * dy - s * dx, dz, turn)
+
+
+def circle(pieces=8, radius=0.5, period=4.0, height=0.6):
+    """Return a circle to the left that begins at the origin along x, as polynomial pieces."""
+    w = 2.0 * math.pi / period
+    duration = period / pieces
+    data = b""
+    for k in range(pieces):
+        phase = w * k * duration
+        # Of exp(i (phase + w t)), by powers of t.
+        terms = [w**n / math.factorial(n) for n in range(8)]
+        sines = [a * math.sin(phase + n * math.pi / 2) for n, a in enumerate(terms)]
+        cosines = [a * math.cos(phase + n * math.pi / 2) for n, a in enumerate(terms)]
+        x = [radius * a for a in sines]
+        y = [radius * ((n == 0) - a) for n, a in enumerate(cosines)]
+        axes = (x, y, [height] + [0.0] * 7, [0.0] * 8)
+        data += bytes(Poly4D(duration, *map(Poly4D.Poly, axes)).pack())
+    return data
 
 
 def position(x, y, z, yaw=0.0):

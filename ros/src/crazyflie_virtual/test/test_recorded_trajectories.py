@@ -9,134 +9,71 @@ import math
 import struct
 
 import pytest
-from cflib.crazyflie.mem import Poly4D
+from flight_recorder import NEAR, CommandedFlight, circle
 from recording import recorded
-from virtual_bench import Bench, cflib_client
 
 from crazyflie_virtual.link.crtp import Port
 
-NEAR = 0.06
-"""m."""
-
-TURNED = 5.0
-"""deg."""
-
-
-class Flight(Bench):
-    """A vehicle on the bench that is commanded with cflib."""
-
-    def command(self, method, *arguments, **keywords):
-        """Send what cflib's high-level commander sends; return the error number."""
-        client, sent = cflib_client()
-        getattr(client.high_level_commander, method)(*arguments, **keywords)
-        (packet,) = sent
-        return self.ask_one(packet.port, packet.channel, packet.data)[3]
-
-    def climb(self, height):
-        """Take off; the scenarios go on a second after the climb."""
-        assert self.command("takeoff", height, 2.0) == 0
-        self.run(3.0)
-
-    def upload(self, data, address=0):
-        """Write into the trajectory memory."""
-        for start in range(0, len(data), 24):
-            request = struct.pack("<BI", 1, address + start) + data[start : start + 24]
-            assert self.ask_one(Port.MEMORY, 2, request)[-1] == 0
-
-    def pose(self):
-        """Return x, y, z (m) and yaw (deg) of the estimate."""
-        e = self.firmware.estimate
-        return [e.x, e.y, e.z, e.yaw]
-
-    def follow(self, track, origin=(0.0, 0.0, 0.0, 0.0), near=NEAR):
-        """Let time pass and compare with a recorded track: time, x, y, z, yaw from an origin."""
-        begin = self.vehicle.time
-        c, s = math.cos(math.radians(origin[3])), math.sin(math.radians(origin[3]))
-        for time, *expected in track:
-            self.run(begin + time - self.vehicle.time)
-            dx, dy, dz, turn = (a - b for a, b in zip(self.pose(), origin, strict=True))
-            place = (c * dx + s * dy, c * dy - s * dx, dz)
-            assert place == pytest.approx(expected[:3], abs=near), time
-            assert math.remainder(turn - expected[3], 360.0) == pytest.approx(0.0, abs=TURNED)
-
 
 def test_go_to():
-    flight, firmware = Flight(), recorded("go_to")
+    flight, firmware = CommandedFlight(), recorded("go_to")
     flight.climb(0.5)
-    assert flight.command("go_to", 1.0, 0.0, 0.7, 1.57, 3.0) == firmware["abs_errno"]
+    assert flight.fly("go_to", 1.0, 0.0, 0.7, 1.57, 3.0) == firmware["abs_errno"]
     flight.follow(firmware["abs_track"])
-    error = flight.command("go_to", -0.5, 0.5, 0.0, 0.5, 2.0, relative=True)
+    error = flight.fly("go_to", -0.5, 0.5, 0.0, 0.5, 2.0, relative=True)
     assert error == firmware["rel_errno"]
     flight.follow(firmware["rel_track"])
-    error = flight.command("go_to", 0.0, 0.0, 0.5, -3.0, 2.0, linear=True)
+    error = flight.fly("go_to", 0.0, 0.0, 0.5, -3.0, 2.0, linear=True)
     assert error == firmware["lin_errno"]
     flight.follow(firmware["lin_track"])
 
 
 def test_spiral():
-    flight, firmware = Flight(), recorded("spiral")
+    flight, firmware = CommandedFlight(), recorded("spiral")
     flight.climb(0.6)
-    assert flight.command("spiral", math.pi / 2, 0.5, 0.5, 0.2, 3.0) == firmware["errno"]
+    assert flight.fly("spiral", math.pi / 2, 0.5, 0.5, 0.2, 3.0) == firmware["errno"]
     flight.follow(firmware["track"])
 
 
-def circle(pieces=8, radius=0.5, period=4.0, height=0.6):
-    """Return a circle to the left that begins at the origin along x, as polynomial pieces."""
-    w = 2.0 * math.pi / period
-    duration = period / pieces
-    data = b""
-    for k in range(pieces):
-        phase = w * k * duration
-        # Of exp(i (phase + w t)), by powers of t.
-        terms = [w**n / math.factorial(n) for n in range(8)]
-        sines = [a * math.sin(phase + n * math.pi / 2) for n, a in enumerate(terms)]
-        cosines = [a * math.cos(phase + n * math.pi / 2) for n, a in enumerate(terms)]
-        x = [radius * a for a in sines]
-        y = [radius * ((n == 0) - a) for n, a in enumerate(cosines)]
-        axes = (x, y, [height] + [0.0] * 7, [0.0] * 8)
-        data += bytes(Poly4D(duration, *map(Poly4D.Poly, axes)).pack())
-    return data
-
-
 def test_polynomials():
-    flight, firmware = Flight(), recorded("poly4d")
+    flight, firmware = CommandedFlight(), recorded("poly4d")
     data = circle()
     assert len(data) == firmware["bytes"]
     flight.upload(data)
-    assert flight.command("define_trajectory", 1, 0, 8) == firmware["define"]
+    assert flight.fly("define_trajectory", 1, 0, 8) == firmware["define"]
     flight.climb(0.6)
-    assert flight.command("start_trajectory", 1) == firmware["start_errno"]
+    assert flight.fly("start_trajectory", 1) == firmware["start_errno"]
     flight.follow(firmware["track_1x"])
     flight.run(2.0)
-    assert flight.command("start_trajectory", 1, 2.0, reversed=True) == firmware["start_rev_errno"]
+    assert flight.fly("start_trajectory", 1, 2.0, reversed=True) == firmware["start_rev_errno"]
     flight.follow(firmware["track_2x_rev"])
-    flight.command("go_to", 0.3, -0.3, 0.6, math.radians(46.0), 3.0)
+    flight.fly("go_to", 0.3, -0.3, 0.6, math.radians(46.0), 3.0)
     flight.run(6.0)
     start = flight.pose()
-    error = flight.command("start_trajectory", 1, relative_position=True)
+    error = flight.fly("start_trajectory", 1, relative_position=True)
     assert error == firmware["start_rel_errno"]
     track = [(*row[:4], row[4] + start[3]) for row in firmware["rel_track_from_start"]]
     flight.follow(track, (*start[:3], 0.0))
     # Positions of the last track are told by the heading at its start; there the recorded
     # vehicle was 7 cm from its setpoint.
-    flight.command("go_to", 0.3, -0.3, 0.6, math.radians(46.0), 3.0)
+    flight.fly("go_to", 0.3, -0.3, 0.6, math.radians(46.0), 3.0)
     flight.run(6.0)
     start = flight.pose()
-    error = flight.command("start_trajectory", 1, relative_position=True, relative_yaw=True)
+    error = flight.fly("start_trajectory", 1, relative_position=True, relative_yaw=True)
     assert error == firmware["start_relyaw_errno"]
     flight.follow(firmware["relyaw_track_from_start"], start, near=0.1)
 
 
 def test_start_of_what_is_not_defined():
-    flight, firmware = Flight(), recorded("start_undefined")
-    assert flight.command("start_trajectory", 3) == firmware["ground_errno"]
+    flight, firmware = CommandedFlight(), recorded("start_undefined")
+    assert flight.fly("start_trajectory", 3) == firmware["ground_errno"]
     flight.run(1.0)
     assert flight.motors_run == firmware["ground_motors"]
     flight.climb(0.5)
-    assert flight.command("start_trajectory", 3) == firmware["flight_errno"]
+    assert flight.fly("start_trajectory", 3) == firmware["flight_errno"]
     flight.run(1.0)
     assert flight.height == pytest.approx(firmware["z"], abs=NEAR)
-    assert flight.command("start_trajectory", 200) == firmware["id200_errno"]
+    assert flight.fly("start_trajectory", 200) == firmware["id200_errno"]
     flight.run(1.0)
     assert flight.height == pytest.approx(firmware["z2"], abs=NEAR)
 
@@ -160,7 +97,7 @@ def test_start_of_what_is_not_defined():
 def test_definitions(name, trajectory_id, location, kind, offset, pieces):
     expected = recorded("define_errors")[name]
     define = struct.pack("<4BIB", 6, trajectory_id, location, kind, offset, pieces)
-    answer = Flight().ask_one(Port.HIGH_LEVEL, 0, define)
+    answer = CommandedFlight().ask_one(Port.HIGH_LEVEL, 0, define)
     if isinstance(expected, list):
         assert [answer.hex()] == expected
     else:
@@ -169,13 +106,13 @@ def test_definitions(name, trajectory_id, location, kind, offset, pieces):
 
 def test_an_unknown_command():
     (answer,) = recorded("define_errors")["unknown_command_99"]
-    assert Flight().ask_one(Port.HIGH_LEVEL, 0, b"\x63").hex() == answer
+    assert CommandedFlight().ask_one(Port.HIGH_LEVEL, 0, b"\x63").hex() == answer
     assert bytes.fromhex(answer)[3] == errno.ENOEXEC
 
 
 def test_external_poses():
     firmware = recorded("external_pose")
-    flight = Flight(positioning="none")
+    flight = CommandedFlight(positioning="none")
     place = (0.5, -0.3, 0.0)
     left = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
 

@@ -46,14 +46,17 @@ def compress_quaternion(quaternion: Quaternion) -> int:
 
 
 def decompress_quaternion(word: int) -> Quaternion:
-    """Return the unit quaternion (x, y, z, w) of 32 bits; inverse of `compress_quaternion`."""
+    """Return the unit quaternion (x, y, z, w) of 32 bits; inverse of `compress_quaternion`.
+
+    Bits of no unit quaternion leave the largest component NaN, as in the firmware.
+    """
     largest = word >> 30
     parts = []
     for i in range(3):
         field = word >> (2 - i) * (_BITS + 1)
         magnitude = (field & _MASK) / _MASK * _ROOT_HALF
         parts.append(-magnitude if field >> _BITS & 1 else magnitude)
-    rest = math.sqrt(max(0.0, 1.0 - sum(part * part for part in parts)))
-    parts.insert(largest, rest)
+    rest = 1.0 - sum(part * part for part in parts)
+    parts.insert(largest, math.sqrt(rest) if rest >= 0.0 else math.nan)
     x, y, z, w = parts
     return x, y, z, w

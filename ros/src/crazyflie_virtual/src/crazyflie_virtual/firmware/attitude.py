@@ -6,9 +6,11 @@ the mixer adds to and takes from the thrust of the motors. The gains are those o
 modes, parameters and log variables.
 """
 
+from math import isnan
+
 from crazyflie_model.angles import Triple
 from crazyflie_model.inner_loops import HEADING, HEADING_RATE, OUTPUT_LIMIT, PERIOD, TILT, TILT_RATE
-from crazyflie_virtual.firmware.pid import FirmwarePid
+from crazyflie_virtual.firmware.pid import FirmwarePid, constrain
 from crazyflie_virtual.firmware.states import Estimate
 
 
@@ -25,9 +27,9 @@ class AttitudeController:
         self.pitch = FirmwarePid(TILT, PERIOD)
         self.yaw = FirmwarePid(HEADING, PERIOD)
         #: roll_rate, pitch_rate, yaw_rate: deg/s to PWM.
-        self.roll_rate = FirmwarePid(TILT_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
-        self.pitch_rate = FirmwarePid(TILT_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
-        self.yaw_rate = FirmwarePid(HEADING_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
+        self.roll_rate = FirmwarePid(TILT_RATE, PERIOD)
+        self.pitch_rate = FirmwarePid(TILT_RATE, PERIOD)
+        self.yaw_rate = FirmwarePid(HEADING_RATE, PERIOD)
         #: How far the desired heading may run ahead of the vehicle's, deg; 0 for no limit.
         self.yaw_max_delta = 0.0
 
@@ -54,12 +56,12 @@ class AttitudeController:
         Rates desired and measured (``gyro``) are in deg/s, pitch in the firmware's sign.
         """
         return (
-            _or_zero(self.roll_rate.update(rates[0], gyro[0])),
-            _or_zero(self.pitch_rate.update(rates[1], gyro[1])),
-            _or_zero(self.yaw_rate.update(rates[2], gyro[2])),
+            _to_16_bits(self.roll_rate.update(rates[0], gyro[0])),
+            _to_16_bits(self.pitch_rate.update(rates[1], gyro[1])),
+            _to_16_bits(self.yaw_rate.update(rates[2], gyro[2])),
         )
 
 
-def _or_zero(output):
-    # As the firmware's conversion of NaN to an integer of 16 bits.
-    return output if output == output else 0.0
+def _to_16_bits(output):
+    # NaN becomes 0, as an x86 converts it.
+    return 0.0 if isnan(output) else constrain(output, -OUTPUT_LIMIT, OUTPUT_LIMIT)

@@ -68,7 +68,7 @@ class Watch:
     state: str = ""  #: Of the flight, as the server publishes it.
     _reference: float = 0.0
     _blind_since: float = math.inf
-    _last: tuple[float, tuple[float, ...]] | None = None
+    _last: tuple[float, tuple[float, ...], float] | None = None
     _climb: float = 0.0
     _said: set[str] = field(default_factory=set)
 
@@ -101,15 +101,20 @@ class Watch:
 
     def _on_tf(self, message):
         time = self.graph.time
-        translation = message.transforms[0].transform.translation
+        transform = message.transforms[0]
+        translation = transform.transform.translation
         position = (translation.x, translation.y, translation.z)
-        before, self._last = self._last, (time, position)
+        stamp = transform.header.stamp.to_sec()
+        before, self._last = self._last, (time, position, stamp)
         if before is None or time <= before[0]:
             return
+        # Poses come closer together than they were measured where their latency is changed; the
+        # clock of their stamps may be set.
+        elapsed = max(time - before[0], stamp - before[2])
         height = self.height = position[2]
         self.distance = math.hypot(*position[:2])
         is_airborne = height > _AIRBORNE
-        speed = math.dist(position, before[1]) / (time - before[0])
+        speed = math.dist(position, before[1]) / elapsed
         self.highest = max(self.highest, height - self._reference)
         if is_airborne:
             # The ground of the models of 7 states has no friction.
@@ -117,7 +122,7 @@ class Watch:
         if height <= 0.001 < before[1][2] and not self.may_fall:
             self.hardest = max(self.hardest, -self._climb)
             self.check(-self._climb <= HARD_LANDING, f"hard landing: {-self._climb:.2f} m/s")
-        self._climb = (height - before[1][2]) / (time - before[0])
+        self._climb = (height - before[1][2]) / elapsed
         most = self._reference + (
             STARVED_OVERSHOOT if self.is_starved else DEAF_OVERSHOOT if self.may_fall else OVERSHOOT
         )

@@ -21,7 +21,8 @@ class Flight:
         self._random = Random(1)
         self.run.watch.may_fly = True
         self.run.watch.allow(3.0)
-        with_each(self._change)(self.run._flight)
+        self._fault = with_each(self._change)(self.run._flight)
+        next(self._fault)
 
     def _change(self, transform, _):
         translation = transform.transform.translation
@@ -53,11 +54,12 @@ def test_a_vehicle_that_took_off_from_a_table_lands_on_the_floor(dynamics, table
     flight.graph.advance(2.0)
     flight.take_off()
     flight.refer(table + 0.5)
+    watch = flight.run.watch
+    assert watch.height == pytest.approx(0.5, abs=0.05)
     while flight.z > 0.0:
         flight.z = max(flight.z - 0.002, 0.0)
         flight.graph.advance(0.02)
     flight.graph.advance(3.0)
-    watch = flight.run.watch
     assert watch.height == pytest.approx(table + 0.5, abs=0.05)
     land = flight.graph.call("/land", EmptyRequest())
     flight.graph.advance(12.0)

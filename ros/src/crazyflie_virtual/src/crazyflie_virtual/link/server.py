@@ -1,5 +1,6 @@
 """The virtual vehicle on a UDP port, in real time."""
 
+import math
 import random
 import select
 import time
@@ -41,6 +42,7 @@ class VehicleServer(Server):
         self._observer = (settings.observer_host, settings.observer_port)
         self._observation_period = 1.0 / settings.observer_rate
         self._next_observation = self._begin
+        self._observed = -math.inf  # Time of the vehicle at the last observation, s.
         number = _number(self.address[1])
         self._body_id = settings.body_id or number
         self._body_name = settings.body_name or f"cf{number}"
@@ -99,7 +101,10 @@ class VehicleServer(Server):
                     self._down.push(now, (answer, receiver))
         for datagram, receiver in self._down.pop(now):
             send(self._socket, datagram, receiver)
-        if self._observer[1] and now >= self._next_observation:
+        # The vehicle moves in steps: it may be where it was at the last observation.
+        is_new = self.vehicle.time > self._observed
+        if self._observer[1] and now >= self._next_observation and is_new:
+            self._observed = self.vehicle.time
             missed = (now - self._next_observation) // self._observation_period
             self._next_observation += (1 + missed) * self._observation_period
             send(self._socket, self.observe().encode(), self._observer)

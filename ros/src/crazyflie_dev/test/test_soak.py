@@ -23,7 +23,7 @@ POSE_PERIOD = 0.01
 @pytest.fixture(scope="module")
 def result():
     """Return what was seen in a soak with every fault."""
-    return soak(1000.0, seed=7, simulator_dt=POSE_PERIOD)
+    return soak(1100.0, seed=7, simulator_dt=POSE_PERIOD)
 
 
 # For minutes of simulated time: a quadrotor flies a shorter soak below.
@@ -214,3 +214,12 @@ def test_a_complaint_comes_once_in_a_flight(watch):
     watch.renew()
     command(watch, thrust=17.0)
     assert len(watch.violations) == 2
+
+
+def test_a_takeoff_that_is_refused_without_a_fault_is_a_violation(monkeypatch):
+    """A filter that hears nothing any more does no harm, and is of no use."""
+    run = Soak(seed=1)
+    monkeypatch.setattr(run.random, "uniform", lambda low, high: high)
+    run.graph.faults["/control/lqr"] = lambda message: []
+    run.fly(next(fault for fault in FAULTS if fault.name == "the wall clock is set"))
+    assert [text for text in run.watch.violations if "refused without a fault" in text]

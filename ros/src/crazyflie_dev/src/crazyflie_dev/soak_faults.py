@@ -478,9 +478,7 @@ FAULTS = [
     *(Fault(f"{n} is killed", _kill(n), _RESPAWN, _RESPAWN, drops=n == FILTER) for n in NODES),
     *(Fault(f"{n} is frozen", _freeze(n), 0.1, 4.0, drops=n == FILTER) for n in NODES),
     _dropping("this computer is too busy", _starve, 2.0, 12.0, starves=True),
-    _dropping(
-        "a second launch", together(*map(_second_launch, NODES)), _FLIGHT_LIMIT, _FLIGHT_LIMIT
-    ),
+    Fault("a second launch", together(*map(_second_launch, NODES)), _FLIGHT_LIMIT, _FLIGHT_LIMIT),
     Fault("the wall clock is set", _set_clock, 0.1, 4.0),
     *(
         Fault(f"the wall clock is set and {n} stopped", together(_set_clock, _freeze(n)), 0.1, 0.4)

@@ -58,6 +58,7 @@ class Watch:
     highest: float = -math.inf  #: Above the highest reference, m.
     hardest: float = 0.0  #: Speed at which the ground was met with motors on, m/s.
     farthest: float = 0.0  #: From the middle, in the air, m.
+    is_calm: bool = False  #: Whether nothing has failed in this flight.
     is_blind: bool = False  #: Whether a fault keeps good poses away.
     may_fly: bool = False  #: Whether a takeoff has been asked for since the last landing.
     may_fall: bool = False  #: Whether the vehicle may meet the ground at any speed.
@@ -83,6 +84,7 @@ class Watch:
         self._said.clear()
         self._reference = 0.0
         self.is_starved = False
+        self.is_calm = True
 
     def allow(self, height: float) -> None:
         """Allow the vehicle to be at a reference's height (m)."""

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from std_srvs.srv import TriggerRequest
 
 from crazyflie_control_merger.cmd_vel_converter_node import CmdVelConverterNode
 from crazyflie_msgs.msg import Control, ControlStamped
@@ -51,3 +52,19 @@ def test_what_is_not_finite_is_ignored(process, bad):
     assert process.published("/crazyflie/cmd_vel") == []
     [warning] = process.logged("warn")
     assert "/control/final" in warning
+
+
+def test_controls_of_a_simulation_are_not_sent_to_a_vehicle():
+    process = FakeProcess()
+    process.transport.foreign_services["/control/final/vehicle"] = "/simulator"
+    assert not process.launch(CmdVelConverterNode(), "/cmd_vel_converter", PARAMETERS)
+    assert "fly a vehicle of /simulator already (process 1 on" in process.logged("error")[0]
+
+
+def test_a_simulation_that_has_died_is_in_nobody_s_way():
+    process = FakeProcess()
+    process.transport.foreign_services["/control/final/vehicle"] = "/simulator"
+    process.transport.dead_nodes.add("/simulator")
+    assert process.launch(CmdVelConverterNode(), "/cmd_vel_converter", PARAMETERS)
+    answer = process.call("/control/final/vehicle", TriggerRequest())
+    assert answer.message == "a real vehicle, by /cmd_vel_converter"

@@ -289,3 +289,12 @@ def test_poses_that_the_machine_was_too_busy_for_are_made_up_for(monkeypatch, ha
     process.clock.set(200.0)
     assert len(transforms(process)) == 111
     assert transforms(process)[-1].header.stamp.to_sec() == pytest.approx(200.0)
+
+
+@NODES
+def test_a_simulator_does_not_join_the_flight_of_a_real_vehicle(node_class):
+    process = FakeProcess()
+    process.transport.foreign_services["/control/final/vehicle"] = "/cmd_vel_converter"
+    parameters = {**PARAMETERS, "topics/control": "/control/final"}
+    assert not process.launch(node_class(), "/simulator", parameters)
+    assert "/control/final fly a vehicle of /cmd_vel_converter" in process.logged("error")[0]

@@ -39,6 +39,9 @@ class NodeProcess:
     def signal(self, number):
         self._process.send_signal(number)
 
+    def is_running(self):
+        return self._process.poll() is None
+
     def wait(self):
         """Return the exit status; `duration` and `output` are known then."""
         status = self._process.wait(LIMIT)

@@ -30,6 +30,7 @@ class CmdVelConverterNode(Node):
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
+        handle.claim_controls(self._parameters.control_topic, "real")
         self._publisher = handle.publisher(self._parameters.cmd_vel_topic, Twist)
         handle.subscribe(
             self._parameters.control_topic, ControlStamped, self._on_control, finite="control"

@@ -131,6 +131,7 @@ class SimulatorNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
+        handle.claim_controls(parameters.control_topic, "simulated")
         position = (parameters.init_x, parameters.init_y, parameters.init_z)
         self._start = handle.time()
         self._vehicle = SimulatedVehicle(self._dynamics, position, self._start, self.max_tilt)

@@ -1,5 +1,6 @@
 """The only door between a node and ROS: roscpp's NodeHandle for Python."""
 
+import contextlib
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -8,10 +9,17 @@ from typing import Any, TypeVar
 
 import genpy
 import rosgraph.names
+from std_srvs.srv import Trigger, TriggerResponse
 
 from crazyflie_utils.context import ProcessContext
 from crazyflie_utils.log import FaultHandler, NodeLog
-from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, Parameters, read_parameter
+from crazyflie_utils.parameters.declaration import (
+    REQUIRED,
+    Declaration,
+    ParameterError,
+    Parameters,
+    read_parameter,
+)
 from crazyflie_utils.parameters.private import PrivateParameters
 from crazyflie_utils.parameters.reconfigure import Reconfiguration
 from crazyflie_utils.parameters.types import ParameterType
@@ -170,6 +178,27 @@ class NodeHandle:
 
         advertise = self._process.transport.advertise_service
         self._undo.append(advertise(full_name, service_type, begin, self.time))
+
+    def claim_controls(self, topic: str, kind: str) -> None:
+        """Have this node's vehicle, "simulated" or "real", be the only one that flies by a topic.
+
+        ``ParameterError`` while a node of another process has claimed it and lives: controls of a
+        simulation never reach a real vehicle. The claim is a service, ``TOPIC/vehicle``, that says
+        who flies.
+        """
+        name = f"{self.resolve(topic)}/vehicle"
+        owner = self.service_nodes().get(name)
+        place = None if owner is None else self._process.transport.living_node(owner)
+        if place is not None:
+            raise ParameterError(
+                f"{self.name}: the controls of {self.resolve(topic)} fly a vehicle of {owner} "
+                f"already ({place}, see {name}); expected no second one. End its launch first, or "
+                "give this vehicle topics of its own"
+            )
+        answer = TriggerResponse(True, f"a {kind} vehicle, by {self.name}")
+        # A second vehicle of one process flies by its nodes' own topics, or on purpose.
+        with contextlib.suppress(ServiceError):
+            self.advertise_service(name, Trigger, lambda _: answer)
 
     def call_service(
         self,

@@ -18,11 +18,14 @@ from crazyflie_utils.parameters.declaration import ParameterError, Parameters, p
 from crazyflie_utils.parameters.types import BOOLEAN, GraphName, ParameterType
 from crazyflie_utils.process import Process
 from crazyflie_utils.program import load, missing_module
-from crazyflie_utils.ros1.master_watch import MasterWatch
+from crazyflie_utils.ros1.master_watch import MasterWatch, namesake
 from crazyflie_utils.ros1.transport import RosTransport
 from crazyflie_utils.shutdown import FLUSH_TIME, Shutdown, catch_signals, exit_at_once, fail
 
 _END_LIMIT = 5.0  #: How long, in s, the end waits for nodes that have no flight any more.
+#: How long, in s, a node that roslaunch has started and that is refused waits before it ends: with
+#: respawn, it would otherwise take the processor from the nodes that fly.
+_REFUSED_TIME = 5.0
 _MASTER_LIMIT = 10.0  #: How long, in s, a node waits for a ROS master.
 #: How long, in s, a thread that has something to do waits for another that computes.
 _SWITCH_INTERVAL = 0.0005
@@ -114,14 +117,29 @@ def _node_class(path):
 def begin(default_name: str, signals: list[int] | None = None) -> Process:
     """Make this process a ROS node and return what its nodes share, not yet started.
 
-    Exits with status 1 without a ROS master, and at ``signals``, see `catch_signals`.
+    Exits with status 1 without a ROS master, if a node of this name lives, which the master would
+    shut down, and at ``signals``, see `catch_signals`.
     """
     # rospy's log does not flush: the last texts of a node that dies would be lost in a pipe.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     _wait_for_master(signals)
+    mappings = rospy.names.get_mappings()
+    own_name = mappings.get("__name", default_name)
+    refusal = namesake({rosgraph.names.resolve_name(own_name, rospy.get_name())})
+    if refusal:
+        print(refusal, file=sys.stderr, flush=True)
+        _end_refused("__log" in mappings, signals)
     rospy.init_node(default_name, disable_signals=signals is not None)
     return ros_process()
+
+
+def _end_refused(is_launched, signals):
+    """Exit with status 1, after a while if roslaunch may start the node again."""
+    end = time.monotonic() + (_REFUSED_TIME if is_launched else 0.0)
+    while not signals and time.monotonic() < end:
+        time.sleep(0.05)
+    sys.exit(1)
 
 
 def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
@@ -184,6 +202,9 @@ def _run(process, make_nodes, signals):
         with process.transport.starting():
             make = load(make_nodes) if isinstance(make_nodes, str) else make_nodes
             nodes = make(handle)
+            refusal = namesake(set(nodes) - {handle.name})
+            if refusal:
+                raise ParameterError(f"{handle.name}: {refusal}")
             for name, node in nodes.items():
                 if not node.initialize(process.handle(name)):
                     process.transport.log("fatal", f"{name}: not initialized; the process exits")

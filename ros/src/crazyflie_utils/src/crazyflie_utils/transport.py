@@ -114,6 +114,10 @@ class Transport(ABC):
     def service_nodes(self) -> dict[str, str]:
         """Return every service that any node offers -> the name of its node."""
 
+    def living_node(self, name: str) -> str | None:
+        """Return where a node of another process runs; None if it does not answer, by default."""
+        return None
+
     @abstractmethod
     def log(self, level: str, text: str) -> None:
         """Log at ``level``: debug, info, warn, error or fatal."""

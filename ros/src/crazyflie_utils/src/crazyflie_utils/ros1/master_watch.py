@@ -1,14 +1,67 @@
-"""A master that is started anew knows no node: nodes have to register again."""
+"""Nodes as the master knows them: others of the same name, and this process.
 
+A master shuts a node down when another one of its name registers, and a master that is restarted
+knows no node.
+"""
+
+import http.client
 import threading
 import xmlrpc.client
+from typing import Any
+from urllib.parse import urlsplit
 
 import rosgraph
 import rospy
+from typing_extensions import override
 
 from crazyflie_utils.ros1 import registering
 
 _PERIOD = 2.0  #: How often the master is asked whether it knows this process, s.
+_ANSWER_LIMIT = 3.0  #: A node that does not answer within this, s, counts as dead.
+
+
+class _BoundedTransport(xmlrpc.client.Transport):
+    @override
+    def make_connection(self, host):
+        connection = super().make_connection(host)
+        connection.timeout = _ANSWER_LIMIT
+        return connection
+
+
+def living_node(name: str) -> str | None:
+    """Return where a node runs, such as "process 12 on HOST", if it is registered and answers."""
+    caller = rospy.get_name()
+    try:
+        uri = rosgraph.Master(caller).lookupNode(name)
+        node: Any = xmlrpc.client.ServerProxy(uri, transport=_BoundedTransport())
+        _, _, pid = node.getPid(caller)
+    except (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException):
+        return None
+    try:
+        _, _, answers_as = node.getName(caller)
+    except (OSError, http.client.HTTPException, xmlrpc.client.Error, ValueError):
+        # Only nodes in Python can say their names.
+        answers_as = name
+    # The port of a node that has died may be that of another one by now.
+    return f"process {pid} on {urlsplit(uri).hostname}" if answers_as == name else None
+
+
+def namesake(names: set[str]) -> str | None:
+    """Return which node of these names lives, and what to do about it; None without any."""
+    try:
+        registrations = rosgraph.Master(rospy.get_name()).getSystemState()
+    except (OSError, rosgraph.MasterException):
+        # The master has just gone; who registers waits for it.
+        return None
+    registered = {node for kind in registrations for _, nodes in kind for node in nodes}
+    for name in sorted(names & registered):
+        place = living_node(name)
+        if place is not None:
+            return (
+                f"{name} runs already: {place}. It goes on, and this process ends; end the other "
+                "one or its launch first, or start this one under another name or namespace"
+            )
+    return None
 
 
 class MasterWatch:

@@ -23,6 +23,7 @@ from crazyflie_utils.ros1.calls import (
     wait_for_answer,
     withdrawn,
 )
+from crazyflie_utils.ros1.master_watch import living_node
 from crazyflie_utils.ros1.own_topics import OwnCallback, publish
 from crazyflie_utils.ros1.screen_log import shield_screen_log
 from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
@@ -194,6 +195,10 @@ class RosTransport(Transport):
         _, _, services = rosgraph.Master(rospy.get_name()).getSystemState()
         self._services_at_start = {name: nodes[0] for name, nodes in services}
         return self._services_at_start
+
+    def living_node(self, name: str) -> str | None:
+        """Ask the master for the node, and the node itself."""
+        return None if name == rospy.get_name() else living_node(name)
 
     def log(self, level: str, text: str) -> None:
         """Log to the screen, the node's log file and /rosout."""

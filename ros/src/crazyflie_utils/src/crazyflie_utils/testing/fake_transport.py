@@ -50,8 +50,9 @@ class FakeTransport(Transport):
     """An outside world that remembers everything and does nothing by itself.
 
     Every topic that is subscribed has publishers there, but for those in ``unpublished``.
-    ``foreign_services`` are those of other processes, name -> node. ``machine_timers`` measure how
-    long the calls of services take; without them, these have no limit.
+    ``foreign_services`` are those of other processes, name -> node; ``dead_nodes`` do not answer.
+    ``machine_timers`` measure how long the calls of services take; without them, these have no
+    limit.
     """
 
     machine_timers: SteadyTimers | None = None
@@ -64,6 +65,7 @@ class FakeTransport(Transport):
         self.services: dict[str, Callable[[Any], Future[Any]]] = {}
         self.service_types: dict[str, type] = {}
         self.foreign_services: dict[str, str] = {}
+        self.dead_nodes: set[str] = set()
         self.log_records: list[tuple[str, str]] = []
 
     def remap(self, name: str) -> str:
@@ -142,6 +144,11 @@ class FakeTransport(Transport):
     def service_nodes(self) -> dict[str, str]:
         """Return the services of this process and ``foreign_services``."""
         return dict.fromkeys(self.services, "/this_process") | self.foreign_services
+
+    def living_node(self, name: str) -> str | None:
+        """Return a process for nodes of ``foreign_services``, but for ``dead_nodes``."""
+        lives = name in self.foreign_services.values() and name not in self.dead_nodes
+        return "process 1 on elsewhere" if lives else None
 
     def log(self, level: str, text: str) -> None:
         """Keep the record."""

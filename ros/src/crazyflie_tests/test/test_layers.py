@@ -2,6 +2,7 @@
 
 import ast
 import graphlib
+import subprocess
 import sys
 
 import grimp
@@ -188,3 +189,27 @@ def test_a_circle_of_modules_is_found_even_for_types(two_floors):
         second="if TYPE_CHECKING:\n    from lower_floor.first import X",
     )
     assert (status, found) == (0, ["lower_floor.first", "lower_floor.second"])
+
+
+def test_a_node_loads_nothing_that_finds_packages():
+    """What looks for packages in the file system, and what brings it."""
+    nodes = [
+        "crazyflie_driver.server_node",
+        "crazyflie_lqr.linear_feedback_node",
+        "crazyflie_simulator.simulator_node",
+        "crazyflie_state_estimator.estimator_node",
+        "crazyflie_takeoff.takeoff_control_filter_node",
+        "crazyflie_takeoff.takeoff_server_node",
+        "crazyflie_utils.main",
+    ]
+    unwanted = {"setuptools", "pkg_resources", "distutils", "rosdistro", "rosdep2", "roslaunch"}
+    unwanted |= {f"dynamic_reconfigure.{each}" for each in ("encoding", "client", "server")}
+    program = f"import sys, {', '.join(nodes)}; print(*sys.modules)"
+    printed = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True
+    )
+    loaded = set(printed.stdout.split())
+    assert loaded >= set(nodes)
+    assert unwanted & loaded == set()
+    # Such as "the rosdep view is empty".
+    assert printed.stderr == ""

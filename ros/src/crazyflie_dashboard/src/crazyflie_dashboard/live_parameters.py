@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.msg import Config, ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
 from typing_extensions import override
@@ -16,6 +15,7 @@ from crazyflie_dashboard.page_data import ParameterInfo
 from crazyflie_dashboard.parameters import described, of_firmware, parsed, values_of
 from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
 from crazyflie_utils import NodeHandle, ParameterError
+from crazyflie_utils.parameters.reconfigure import config_message
 from crazyflie_utils.parameters.types import ParameterType
 from crazyflie_utils.refusal import RefusalError
 
@@ -69,7 +69,7 @@ class LiveParameters:
                 lambda _: self._handle.submit(self._update_firmware, parameter, top, name, outcome)
             )
             return outcome
-        service, config = f"{parameter.owner}{_SERVICE}", encode_config({parameter.name: value})
+        service, config = f"{parameter.owner}{_SERVICE}", config_message({parameter.name: value})
         answer = self._handle.call_service(
             service, Reconfigure, ReconfigureRequest(config), _CALL_TIMEOUT
         )

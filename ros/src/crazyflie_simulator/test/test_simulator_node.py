@@ -15,6 +15,7 @@ from crazyflie_simulator.simulator_node import (
     NearHoverSimulatorNode,
 )
 from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils.clock import SimulatedClock
 from crazyflie_utils.testing import FakeProcess
 
 
@@ -298,3 +299,24 @@ def test_a_simulator_does_not_join_the_flight_of_a_real_vehicle(node_class):
     parameters = {**PARAMETERS, "topics/control": "/control/final"}
     assert not process.launch(node_class(), "/simulator", parameters)
     assert "/control/final fly a vehicle of /cmd_vel_converter" in process.logged("error")[0]
+
+
+def test_poses_are_those_of_their_stamps_where_a_control_is_interrupted(monkeypatch):
+    monkeypatch.setattr(NodeHandle, "uses_sim_time", property(lambda handle: False))
+    time, delays = SimulatedClock.time, iter(())
+    monkeypatch.setattr(SimulatedClock, "time", lambda clock: time(clock) + next(delays, 0.0))
+    process = launch(time_step=0.001)
+    fly(process, 10, 9.81, pitch=0.1)
+    before = len(transforms(process))
+    for _ in range(20):
+        # Another process runs between two readings of the clock.
+        delays = iter((0.0, 0.004, 0.004))
+        command(process, thrust=9.81)
+        delays = iter(())
+        process.advance(0.01)
+    moved = transforms(process)[before:]
+    ways = [each.transform.translation.x for each in moved]
+    stamps = [each.header.stamp.to_sec() for each in moved]
+    speeds = np.diff(ways) / np.diff(stamps)
+    assert len(speeds) > 190
+    assert np.ptp(speeds) < 0.01

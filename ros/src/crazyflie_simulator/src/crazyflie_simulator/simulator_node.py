@@ -135,7 +135,7 @@ class SimulatorNode(Node):
         position = (parameters.init_x, parameters.init_y, parameters.init_z)
         self._start = handle.time()
         self._vehicle = SimulatedVehicle(self._dynamics, position, self._start, self.max_tilt)
-        self._broadcast = handle.broadcast_poses(self._catch_up)
+        self._broadcast = handle.broadcast_poses(lambda: self._catch_up(handle.time()))
         if parameters.publishes_clock:
             self._set_clock = handle.clock_publisher()
         handle.advertise_service("~reset", Empty, self._on_reset)
@@ -151,11 +151,14 @@ class SimulatorNode(Node):
             self._timer = handle.varying_timer(parameters.time_step, self._on_timer)
 
     def _on_control(self, message):
-        self._catch_up()
+        # One reading of the clock: the process may be interrupted between two, and the vehicle
+        # would be ahead of the poses that are still to be broadcast.
+        now = self._handle.time()
+        self._catch_up(now)
         # Without a clock of its own, the vehicle has to catch up all the way, so that the
         # control takes effect now and not at the last tick.
         if not self._parameters.publishes_clock:
-            self._advance_to(self._handle.time())
+            self._advance_to(now)
         self._vehicle.command(to_tuple(message.control))
 
     def _on_reset(self, _):
@@ -168,15 +171,15 @@ class SimulatorNode(Node):
             self._broadcast_pose()
         else:
             self._watch.tick(max(IDLE_PERIOD, self._parameters.time_step))
-            self._catch_up()
+            self._catch_up(self._handle.time())
 
-    def _catch_up(self):
-        """Advance to the clock, and broadcast all poses that have consumers."""
+    def _catch_up(self, now):
+        """Advance to the clock, which is at ``now`` (s); broadcast all poses with consumers."""
         if self._parameters.publishes_clock:
             self._advance_to(self._tick_time(self._ticks))
             self._broadcast_pose()
         elif not self._handle.uses_sim_time:
-            self._broadcast_missed(self._handle.time())
+            self._broadcast_missed(now)
             self._set_pace()
 
     def _broadcast_missed(self, now):
@@ -227,7 +230,7 @@ class SimulatorNode(Node):
             self._ticks += self._ticks_to_next_event()
         else:
             self._ticks += 1
-            self._catch_up()
+            self._catch_up(self._handle.time())
         self._set_clock(*map(self._tick_time, range(before + 1, self._ticks + 1)))
 
     def _ticks_to_next_event(self):

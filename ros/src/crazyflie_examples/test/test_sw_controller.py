@@ -78,7 +78,7 @@ def test_a_reference_of_the_takeoff_server_reaches_the_controller(controller):
 @pytest.mark.parametrize(
     ("controller", "dynamics", "file"),
     [
-        ("lift", "near_hover", "K_hover.txt"),
+        ("lift", "near_hover", "K_sim.txt"),
         ("position_velocity_yaw", "quadrotor", "K_quadrotor.txt"),
         ("full_state", "near_hover", "K_full_state.txt"),
         ("full_state", "quadrotor", "K_full_state.txt"),

@@ -55,8 +55,8 @@ def test_the_estimator_is_told_the_final_control():
 @pytest.mark.parametrize(
     ("dynamics", "file"),
     [
-        ("near_hover", "K_hover.txt"),
-        ("coupled_7d", "K_hover.txt"),
+        ("near_hover", "K_sim.txt"),
+        ("coupled_7d", "K_sim.txt"),
         ("quadrotor", "K_quadrotor.txt"),
     ],
 )

@@ -15,7 +15,7 @@ NODES = {
     "state_estimator": {"time_step": 0.02},
     "takeoff_server": {"duration": {"hover": 3.0}},
     "lqr_controller": {
-        "K_file": str(GAINS / "K_hover.txt"),
+        "K_file": str(GAINS / "K_sim.txt"),
         "u_ref_file": str(GAINS / "u_ref_hover.txt"),
     },
 }

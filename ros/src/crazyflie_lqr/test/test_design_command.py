@@ -18,6 +18,8 @@ USUAL = {
     "--model": "near_hover",
     "--Q": "1 1 4 1 1 4 100",
     "--R": "0.01 0.01 0.01 0.01",
+    # They bear too little delay to be flown.
+    "--force": "",
 }
 
 
@@ -43,7 +45,7 @@ def test_shipped_gains_are_what_the_command_in_their_comment_makes(path, tmp_pat
     made = out.read_text().splitlines()
     comments = [line for line in shipped if line.startswith("#")]
     assert [line for line in made if line.startswith("#")] == comments
-    x_dim = 12 if "full_state" in command else 7
+    x_dim = 12 if "--model full_state" in command else 7
     np.testing.assert_allclose(
         load_matrix(str(out), 4, x_dim), load_matrix(str(path), 4, x_dim), rtol=1e-8, atol=1e-12
     )
@@ -51,7 +53,7 @@ def test_shipped_gains_are_what_the_command_in_their_comment_makes(path, tmp_pat
 
 def test_there_are_gains_to_ship():
     names = {path.name for path in CONFIG.glob("K_*.txt")}
-    assert names == {"K_hover.txt", "K_soft.txt", "K_quadrotor.txt", "K_full_state.txt"}
+    assert names == {f"K_{use}.txt" for use in ("sim", "hover", "soft", "quadrotor", "full_state")}
 
 
 def test_prints_gains_poles_and_margins(capsys):
@@ -60,9 +62,11 @@ def test_prints_gains_poles_and_margins(capsys):
     assert "near_hover, continuous time" in output
     [poles] = re.findall(r"poles \(rad/s\): (.*)", output)
     assert "-2" in poles.split(", ")
-    [yaw] = [line for line in output.splitlines() if line.startswith("yaw_dot ")][1:]
+    _, yaw, flown = (line for line in output.splitlines() if line.startswith("yaw_dot "))
     assert yaw.split() == ["yaw_dot", "inf", "-inf", "90", "2", "785"]
-    assert len(output.splitlines()) < 20
+    # A control is held for 10 ms: half of that on average.
+    assert flown.split() == ["yaw_dot", "780", "0.99"]
+    assert len(output.splitlines()) < 25
     # Poles that are there twice, gains below the names of their states.
     assert "(x2)" in poles
     _, states, *gains = output.splitlines()[:6]
@@ -90,7 +94,7 @@ def test_a_gain_that_may_only_shrink_to_a_ninth_is_in_decibels():
 def test_margins_are_in_decibels(capsys):
     # z - 1 + k = 0 is stable up to k = 2; without a cost of the control k is 1.
     assert main(arguments(R="1 1 1e-6 1", sample_time=1.0)) == 0
-    [yaw] = [line for line in capsys.readouterr().out.splitlines() if line[:7] == "yaw_dot"][1:]
+    _, yaw, _ = (line for line in capsys.readouterr().out.splitlines() if line[:7] == "yaw_dot")
     assert yaw.split()[1:3] == ["6.02", "-inf"]
 
 
@@ -110,7 +114,7 @@ def test_the_command_in_the_comment_makes_the_same_gains(tmp_path):
 
 def test_sampled_design_says_so_and_keeps_it_in_the_comment(tmp_path, capsys):
     out = tmp_path / "K.txt"
-    assert main(arguments(sample_time=0.01, delay=0.025, out=out)) == 0
+    assert main(arguments(sample_time=0.01, delay=0.025, out=out, force=None)) == 0
     assert "sampled every 10 ms, 3 controls on their way" in capsys.readouterr().out
     assert "--sample_time 0.01 --delay 0.025\n" in out.read_text()
     K = load_matrix(str(out), 4, 7)
@@ -179,6 +183,21 @@ def test_wrong_usage_is_refused(changes, capsys):
 def test_a_file_that_cannot_be_written_is_named(tmp_path, capsys):
     assert main(arguments(out=tmp_path / "missing" / "K.txt")) == 1
     assert "missing/K.txt" in capsys.readouterr().err
+
+
+def test_gains_that_bear_too_little_delay_are_refused_unless_forced(tmp_path, capsys):
+    out = tmp_path / "K.txt"
+    assert main(arguments(out=out, force=None)) == 1
+    assert "bear 6.9 ms of delay; expected at least 20 ms" in capsys.readouterr().err
+    assert not out.exists()
+    assert main(arguments(out=out)) == 0
+    assert "--force\n" in out.read_text()
+
+
+def test_a_plant_without_a_state_of_the_model_is_refused(capsys):
+    assert main(["--model", "full_state", "--plant", "near_hover", "--Q", *["1"] * 12,
+                 "--R", *["1"] * 4]) == 1  # fmt: skip
+    assert "near_hover has no roll, pitch" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("times", [{}, {"sample_time": 0.01, "delay": 0.02}])

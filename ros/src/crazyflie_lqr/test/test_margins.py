@@ -2,15 +2,18 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import control
 import numpy as np
 import pytest
 
 from crazyflie_lqr.design import Design, Weights, design_gains, sampled
-from crazyflie_lqr.margins import loop_margins, loop_response
+from crazyflie_lqr.gain_file import load_matrix
+from crazyflie_lqr.margins import flown, loop_margins, loop_response
 from crazyflie_lqr.models import CONTROLS, full_state, near_hover
 
+CONFIG = Path(__file__).parents[1] / "config"
 MODEL = near_hover()
 WEIGHTS = Weights(np.diag([1.0, 1, 4, 1, 1, 4, 100]), 0.01 * np.eye(4), np.zeros((7, 4)))
 ALL = range(4)
@@ -183,3 +186,34 @@ def test_response_of_a_loop_is_that_of_its_transfer_function():
     s = 1j * frequency
     velocity = math.sqrt(100.0 + 20.0 / 9.81)
     np.testing.assert_allclose(response, 9.81 * (velocity * s + 10.0) / s**2, rtol=1e-6)
+
+
+@pytest.mark.parametrize("gain", [2.0, 8.0, 100.0])
+def test_margins_of_an_integrator_whose_control_is_held_are_those_of_the_closed_form(gain):
+    K = np.zeros((4, 7))
+    K[2, 6] = -gain
+    K[0, [1, 4]], K[1, [0, 3]], K[3, [2, 5]] = (2.5, 1.2), (-2.5, -1.2), (-6.0, -5.0)
+    margins = loop_margins(flown(K, MODEL.states, MODEL, 0.01), CONTROLS.index("yaw_dot"))
+    # L = k T / (z - 1): it is nearest to -1 at z = -1, and |L| = 1 at 2 sin(w T / 2) = k T.
+    assert margins.modulus == pytest.approx(1.0 - gain * 0.01 / 2.0, rel=1e-3)
+    half = math.asin(gain * 0.01 / 2.0)
+    assert margins.delay == pytest.approx((math.pi / 2.0 - half) * 0.01 / (2.0 * half), rel=1e-3)
+
+
+@pytest.mark.parametrize("plant", [near_hover(), full_state()], ids=lambda each: each.name)
+def test_a_loop_as_it_is_flown_is_stable_up_to_its_delay(plant):
+    K = load_matrix(str(CONFIG / "K_soft.txt"), 4, 7)
+    delay = min(loop_margins(flown(K, MODEL.states, plant), each).delay for each in range(4))
+
+    def is_stable(share):
+        # All loops are late at once here; roll and pitch, the worst, do not act on each other.
+        return flown(K, MODEL.states, plant, delay=share * delay).poles.real.max() < 0.0
+
+    assert is_stable(0.98)
+    assert not is_stable(1.02)
+
+
+def test_a_loop_that_is_not_stable_bears_no_delay():
+    K = load_matrix(str(CONFIG / "K_soft.txt"), 4, 7)
+    margins = loop_margins(flown(-K, MODEL.states, MODEL), 0)
+    assert (margins.delay, margins.modulus) == (0.0, 0.0)

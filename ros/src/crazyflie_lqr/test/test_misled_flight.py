@@ -18,8 +18,8 @@ BEGIN = 1.0
 HOVER = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 VEHICLES = {
-    "near_hover": (NearHover, "K_hover.txt", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-    "coupled": (Coupled7D, "K_hover.txt", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    "near_hover": (NearHover, "K_sim.txt", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    "coupled": (Coupled7D, "K_sim.txt", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
     "quadrotor": (StabilizedQuadrotor, "K_quadrotor.txt", (-0.1, 0.1, -4.0), (0.5, 0.5, 0.7)),
     "soft": (StabilizedQuadrotor, "K_soft.txt", (-0.05, 0.05, -0.5), (1.0, 1.0, 6.0)),
 }

@@ -8,6 +8,8 @@ import pytest
 from scipy.linalg import expm
 
 from crazyflie_lqr.gain_file import load_matrix, load_vector
+from crazyflie_lqr.margins import flown, loop_margins
+from crazyflie_lqr.models import full_state, near_hover
 
 CONFIG = Path(__file__).parents[1] / "config"
 REFERENCES = Path(__file__).parents[1] / "references"
@@ -54,6 +56,26 @@ def test_quadrotor_gains_have_the_closed_form_of_their_weights():
         math.sqrt(3.0 / 0.0625 + 2.0 * lift),
     )
     np.testing.assert_allclose(K, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("file", "plant"),
+    [
+        (CONFIG / "K_sim.txt", near_hover()),
+        (CONFIG / "K_soft.txt", full_state()),
+        (CONFIG / "K_quadrotor.txt", full_state()),
+        (CONFIG / "K_full_state.txt", full_state()),
+        (REFERENCES / "K_manual.txt", full_state()),
+    ],
+    ids=lambda each: getattr(each, "name", ""),
+)
+def test_gains_of_launch_files_bear_60_ms_of_delay(file, plant):
+    states = full_state().states if "full_state" in file.name else near_hover().states
+    loop = flown(load_matrix(str(file), 4, len(states)), states, plant)
+    for each in range(4):
+        margins = loop_margins(loop, each)
+        assert margins.delay >= 0.06
+        assert margins.modulus >= 0.5
 
 
 def test_reference_control_is_hover():

@@ -14,7 +14,7 @@ NODES = {
     "simulator": {"time_step": 0.02},
     "state_estimator": {"time_step": 0.02},
     "lqr_controller": {
-        "K_file": str(GAINS / "K_hover.txt"),
+        "K_file": str(GAINS / "K_sim.txt"),
         "u_ref_file": str(GAINS / "u_ref_hover.txt"),
     },
 }

@@ -23,6 +23,10 @@ HOVER_DURATION = 2.2
 HOVER_WINDOW = 2.0  #: Until the figure eight begins; the hover error is taken from it, s.
 
 EIGHT_DURATION = 6.0
+#: Of the figure of `crazyflie_demo.figure8`, which in this time would need all of the 15 degrees
+#: that a control may have.
+EIGHT_SCALE = 0.8
+REFERENCE_PERIOD = 0.01  #: As the controller's: it sees a reference that moves as its state does.
 
 SETTLING = 0.5  #: From the end of the figure eight to the landing, s.
 
@@ -39,8 +43,8 @@ def eight(moment: float) -> PositionVelocityYawState:
     """Return the reference of the figure eight, which turns once, at a time (s) since its begin."""
     rate = figure8.DURATION / EIGHT_DURATION
     x, y, turn = (
-        figure8.sine(figure8.WIDTH, 1, rate * moment),
-        figure8.sine(figure8.HEIGHT, 2, rate * moment),
+        figure8.sine(EIGHT_SCALE * figure8.WIDTH, 1, rate * moment),
+        figure8.sine(EIGHT_SCALE * figure8.HEIGHT, 2, rate * moment),
         figure8.phase(rate * moment),
     )
     return PositionVelocityYawState(
@@ -74,7 +78,7 @@ def fly_and_land() -> None:
     start = operator.time
     moment = 0.0
     while moment < EIGHT_DURATION:
-        operator.hover(0.02)
+        operator.hover(REFERENCE_PERIOD)
         moment = min(operator.time - start, EIGHT_DURATION)
         message = PositionVelocityYawStateStamped(state=eight(moment))
         message.header.stamp = handle.stamp()

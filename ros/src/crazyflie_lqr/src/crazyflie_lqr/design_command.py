@@ -4,20 +4,24 @@ import argparse
 import math
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from crazyflie_lqr.design import Design, DesignError, Weights, design_gains
 from crazyflie_lqr.gain_file import save_matrix
-from crazyflie_lqr.margins import loop_margins
+from crazyflie_lqr.margins import FLOWN_PERIOD, Margins, flown, loop_margins
 from crazyflie_lqr.models import CONTROLS, MODELS, LinearModel
 from crazyflie_utils.text_input import number_from_text
 
 _DESCRIPTION = """
 Design the gains K of u = u_ref + K (x - x_ref) that cost least, where the cost is the
-integral of x'Qx + u'Ru + 2x'Nu; print closed-loop poles and margins.
+integral of x'Qx + u'Ru + 2x'Nu; print closed-loop poles and margins, and those of the loop as
+it is flown.
 """
+
+LEAST_DELAY = 0.02  #: Gains that bear less delay when they are flown need ``--force`` (s).
 
 _MATRIX_HELP = """
 numbers, separated by blanks or commas: the diagonal, or the matrix row by row; or the path
@@ -33,6 +37,9 @@ def main(arguments: list[str] | None = None) -> int:
         weights = _weights(options, model)
         design = design_gains(model, weights, options.sample_time, options.delay)
         print(report(model, design))
+        loops = _flown_margins(options, model, design)
+        print(flown_report(loops, options))
+        _check_delay(loops, options)
         if options.out:
             save_matrix(options.out, design.K, _comment(model, weights, options))
             print(f"wrote {options.out}")
@@ -67,6 +74,43 @@ def report(model: LinearModel, design: Design) -> str:
     return "\n".join(lines)
 
 
+def flown_report(loops: Sequence[Margins], options: argparse.Namespace) -> str:
+    """Return the margins of the loops as they are flown as text."""
+    lines = [f"flown with {_plant(options)}, a control every {1e3 * _period(options):g} ms:"]
+    lines += ["loop      delay (ms)   modulus margin"]
+    lines += [
+        f"{control:8}{_number(1e3 * margins.delay):>12}{margins.modulus:>17.2f}"
+        for control, margins in zip(CONTROLS, loops, strict=True)
+    ]
+    return "\n".join(lines)
+
+
+def _flown_margins(options, model, design):
+    plant = MODELS[_plant(options)]()
+    missing = [name for name in model.states if name not in plant.states]
+    if missing:
+        raise DesignError(f"{plant.name} has no {', '.join(missing)}; expected a --plant that has")
+    loop = flown(design.K, model.states, plant, _period(options), options.delay)
+    return [loop_margins(loop, each) for each in range(len(CONTROLS))]
+
+
+def _plant(options):
+    return options.plant or options.model
+
+
+def _period(options):
+    return options.sample_time or FLOWN_PERIOD
+
+
+def _check_delay(loops, options):
+    least = min(margins.delay for margins in loops)
+    if least < LEAST_DELAY and not options.force:
+        raise DesignError(
+            f"flown, these gains bear {1e3 * least:.1f} ms of delay; expected at least "
+            f"{1e3 * LEAST_DELAY:g} ms: raise R or lower Q, or add --force"
+        )
+
+
 def _parser():
     parser = argparse.ArgumentParser(prog="design_gains", description=_DESCRIPTION)
     parser.add_argument("--model", choices=sorted(MODELS), required=True)
@@ -84,6 +128,16 @@ def _parser():
         type=float,
         default=0.0,
         help="s, from the measurement of a state until its control acts; needs --sample_time",
+    )
+    parser.add_argument(
+        "--plant",
+        choices=sorted(MODELS),
+        help="what is flown, for the margins (default: the model); full_state has an attitude lag",
+    )
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help=f"accept gains that bear less than {1e3 * LEAST_DELAY:g} ms of delay",
     )
     parser.add_argument("--out", metavar="FILE", help="write the gains to a file")
     parser.add_argument("--plot", metavar="FILE", help="draw step responses and Bode diagrams")
@@ -144,6 +198,10 @@ def _comment(model, weights, options):
     for name in ("sample_time", "delay"):
         if getattr(options, name):
             command += f" --{name} {getattr(options, name):g}"
+    if options.plant:
+        command += f" --plant {options.plant}"
+    if options.force:
+        command += " --force"
     return (
         "Gains K of u = u_ref + K (x - x_ref), SI units and rad.\n"
         f"Rows: {', '.join(CONTROLS)}. Columns: {', '.join(model.states)}.\n"

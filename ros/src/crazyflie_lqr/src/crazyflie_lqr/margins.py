@@ -1,18 +1,23 @@
 """How much worse each control loop may become before it is unstable.
 
 The loops are broken at the plant's input, one at a time, with the others
-closed: what is asked is how far one control channel may be off.
+closed: the question is how far one control channel may be off.
 """
 
 import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import control
 import numpy as np
 from numpy.typing import NDArray
 
-from crazyflie_lqr.design import Design
+from crazyflie_lqr.design import Design, sampled
+from crazyflie_lqr.models import LinearModel
+
+FLOWN_PERIOD = 0.01  #: Of the examples' estimators, each state of which is answered (s).
+_RATE = "_dot"  #: How the names of rates end.
 
 _FREQUENCIES = 500
 
@@ -29,7 +34,48 @@ class Margins:
     gain_down: float
     phase: float  #: Phase it may lose, rad; infinity if its gain is never 1.
     crossover: float  #: Where the phase margin is, rad/s; NaN without one.
-    delay: float  #: Time by which the control may be late in addition, s.
+    delay: float  #: Time by which the control may be late in addition, s; 0 if unstable without.
+    #: Least distance of the loop from -1, 1 / max |S| with the sensitivity S = 1 / (1 + L): 1 is a
+    #: loop that amplifies no disturbance, 0 one that is not stable.
+    modulus: float
+
+
+def flown(
+    K: NDArray[np.float64],
+    states: Sequence[str],
+    plant: LinearModel,
+    period: float = FLOWN_PERIOD,
+    delay: float = 0.0,
+) -> Design:
+    """Return gains and plant as the nodes close the loop.
+
+    Poses are sampled every ``period`` (s); rates are the differences of two poses
+    (`crazyflie_state_estimator.rate_filter.FiniteDifference`); each control is held until the next,
+    and acts ``delay`` (s) after its pose.
+
+    Parameters
+    ----------
+    K : array of shape (u_dim, x_dim)
+    states : sequence of str
+        Names of the columns of K: states of the plant.
+    plant : LinearModel
+        What is flown; it may have states that K does not feed back, such as the attitude.
+    """
+    A, B = sampled(plant, period, delay)
+    n = A.shape[0]
+    measured = [i for i, name in enumerate(plant.states) if not name.endswith(_RATE)]
+    # Behind the plant's states: the last pose.
+    A = np.pad(A, (0, len(measured)))
+    B = np.pad(B, ((0, len(measured)), (0, 0)))
+    A[n + np.arange(len(measured)), measured] = 1.0
+    feedback = np.zeros((K.shape[0], A.shape[0]))
+    for name, gains in zip(states, K.T, strict=True):
+        index = plant.states.index(name.removesuffix(_RATE))
+        if name.endswith(_RATE):
+            gains = gains / period
+            feedback[:, n + measured.index(index)] -= gains
+        feedback[:, index] += gains
+    return Design(feedback, A, B, period)
 
 
 def loop_response(design: Design, loop: int) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
@@ -63,12 +109,14 @@ def loop_margins(design: Design, loop: int) -> Margins:
             gains = [*gains, -1.0 / gain]
     delays = np.radians(np.mod(phases, 360.0)) / crossovers
     worst = np.argmin(np.abs(phases)) if len(phases) else None
+    is_stable = bool(design.poles.real.max() < 0.0)
     return Margins(
         gain_up=min((g for g in gains if g > 1.0), default=math.inf),
         gain_down=max((g for g in gains if g < 1.0), default=0.0),
         phase=math.inf if worst is None else math.radians(abs(phases[worst])),
         crossover=math.nan if worst is None else crossovers[worst],
-        delay=min(delays, default=math.inf),
+        delay=min(delays, default=math.inf) if is_stable else 0.0,
+        modulus=float(np.abs(1.0 + np.asarray(response)).min()) if is_stable else 0.0,
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from crazyflie_model.limits import MAX_TILT
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 from crazyflie_reports.bag_flights import Flight
 from crazyflie_reports.flight_record import Series
@@ -27,7 +27,13 @@ HOVER_TIME_LIMIT = 8.0  #: The takeoff server's 1 s of open loop and 5 s of hove
 TRACKING_LIMIT = 0.2  #: Largest distance from a moving reference, m.
 DELAY_LIMIT = 0.02  #: 95 % of the controls follow the pose within this time, s.
 LEAST_RATE = 50.0  #: Of states and controls, Hz; at lower ones velocities are poor.
+#: Mean change of roll and pitch from one control to the next (rad). Of gains with enough margin;
+#: those at the limit of stability reach ten times as much.
+CHANGE_LIMIT, HARDWARE_CHANGE_LIMIT = 0.01, 0.03
+SATURATED_LIMIT = 0.01  #: Share of controls that are at a limit.
 GAP_LIMIT = 0.1  #: Without a new state for longer than this the vehicle is not controlled, s.
+_ROUNDING = 1e-6  #: Of a control that was in degrees on its way (rad).
+_NO_TILT = np.empty((0, 2))  #: Roll and pitch of no control.
 LEAST_VOLTAGE = 3.2  #: Of one lithium polymer cell under load, V.
 
 
@@ -67,7 +73,14 @@ def hover_point(flight: Flight) -> tuple[float, float, float] | None:
 
 def figures(flight: Flight) -> list[Figure]:
     """Return the figures of a flight, always the same ones in the same order."""
-    return [*_hover(flight), *_tracking(flight), *_motion(flight), *_loop(flight), *_link(flight)]
+    return [
+        *_hover(flight),
+        *_tracking(flight),
+        *_motion(flight),
+        *_controls(flight),
+        *_loop(flight),
+        *_link(flight),
+    ]
 
 
 def _hover(flight: Flight) -> Iterator[Figure]:
@@ -124,6 +137,22 @@ def _motion(flight: Flight) -> Iterator[Figure]:
     yield Figure("tilt commanded, maximum", "deg", degrees, maximum=limit)
     yield Figure("thrust used, as time of hover", "s", impulse)
     yield Figure("thrust, mean", "m/s²", impulse * GRAVITY / (flight.end - flight.start))
+
+
+def _controls(flight: Flight) -> Iterator[Figure]:
+    """Return how restless the controls are while the controller flies."""
+    phases = [each for each in flight.phases if each.name == "flying"]
+    parts = [flight.record.final_control.between(each.start, each.end) for each in phases]
+    # From one phase to the next nothing changes.
+    changes = np.concatenate([np.abs(np.diff(each[:, :2], axis=0)) for each in parts] or [_NO_TILT])
+    tilt = np.concatenate([np.abs(each[:, :2]).max(axis=1) for each in parts] or [_NO_TILT[:, 0]])
+    thrust = np.concatenate([each[:, 3] for each in parts] or [_NO_TILT[:, 0]])
+    saturated = (tilt >= MAX_TILT - _ROUNDING) | (thrust >= MAX_THRUST) | (thrust <= MIN_THRUST)
+    change = float(changes.mean()) if len(changes) else math.nan
+    share = 100.0 * float(saturated.mean()) if len(saturated) else math.nan
+    limit = HARDWARE_CHANGE_LIMIT if flight.is_driven else CHANGE_LIMIT
+    yield Figure("roll and pitch, mean change per control", "rad", change, maximum=limit)
+    yield Figure("controls saturated", "%", share, maximum=100.0 * SATURATED_LIMIT)
 
 
 def _loop(flight: Flight) -> Iterator[Figure]:

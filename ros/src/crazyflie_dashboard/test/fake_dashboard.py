@@ -68,6 +68,7 @@ class FakeDashboard:
         #: s. On a loaded machine a click comes late, which is no matter of most tests.
         self.max_age = 30.0
         self.commands = []
+        self.emergencies = []
         self.flown = []
         self.fields = []
         self.picture = None
@@ -135,19 +136,25 @@ class FakeDashboard:
 
     def command(self, page, command):
         age = time.monotonic() - command.clicked
-        if command.action is not Action.EMERGENCY:
-            try:
-                self.pages.expect_control(page)
-            except ControlError as error:
-                return failed(error)
-            if age > self.max_age:
-                return failed(RefusalError(f"the click is {age:.0f} s old"))
+        try:
+            self.pages.expect_control(page)
+        except ControlError as error:
+            return failed(error)
+        if age > self.max_age:
+            return failed(RefusalError(f"the click is {age:.0f} s old"))
         self.commands.append(command)
         outcomes = tuple(Outcome(name, self.refusals.get(name, "")) for name in command.vehicles)
         for outcome in outcomes:
             if not outcome.text:
                 self._carry_out(outcome.vehicle, command)
         return done(outcomes)
+
+    def emergency(self, vehicles, age):
+        self.emergencies.append(vehicles)
+        names = tuple(self._scene.vehicles) if vehicles is None else vehicles
+        for name in names:
+            self.change(name, is_in_flight=False, is_emergency=True, state="emergency")
+        return done(tuple(Outcome(name, self.refusals.get(name, "")) for name in names))
 
     def _carry_out(self, name, command):
         x, y, _ = self._scene.vehicles[name].position
@@ -161,8 +168,6 @@ class FakeDashboard:
             self.change(name, position=(x, y, 0.0), is_in_flight=False, state="on the ground")
         elif command.action is Action.GO_TO:
             self.change(name, position=command.goal)
-        elif command.action is Action.EMERGENCY:
-            self.change(name, is_in_flight=False, is_emergency=True, state="emergency")
 
     def parameter_owners(self):
         return ("/cf1/controller", "cf1")

@@ -30,6 +30,22 @@ class Workers:
         pass
 
 
+class FakeLane:
+    """Keeps which services are to stop motors."""
+
+    def __init__(self):
+        self.stopped = []
+
+    def stop(self, services, age):
+        self.stopped.append(services)
+        done = Future()
+        done.set_result(())
+        return done
+
+    def close(self):
+        pass
+
+
 class FakeFleet:
     """Vehicles cf1, cf2, ... with high-level services, and a dashboard with one open page.
 
@@ -39,15 +55,14 @@ class FakeFleet:
         Services that were called.
     refusals : dict
         Service to what it answers.
-    alive : callable
-        ``alive(service)`` tells whether its node answers.
+    lane : FakeLane
     """
 
     def __init__(self, count=3, name="cf{}"):
         self.process = FakeProcess()
         self.names = [name.format(k + 1) for k in range(count)]
         self.calls, self.refusals, self.texts = [], {}, []
-        self.alive = lambda service: True
+        self.lane = FakeLane()
         node = self.process.handle("/fleet")
         self._status = {}
         for each in self.names:
@@ -67,7 +82,7 @@ class FakeFleet:
         self.dashboard = Dashboard(
             self.process.handle("/dashboard"),
             lambda: self.graph,
-            lambda service: self.alive(service),
+            self.lane,
             [],
             clock=self.process.clock.time,
             workers=Workers(),

@@ -1,5 +1,6 @@
 """Three vehicles as a page sees and commands them: found, flown, refused, stale."""
 
+import contextlib
 import os
 import signal
 import time
@@ -12,7 +13,7 @@ import rosgraph
 from crazyflie_dashboard import master
 from crazyflie_dashboard.control import ControlError
 from crazyflie_dashboard.dashboard import Dashboard
-from crazyflie_dashboard.dashboard_node import example_folders
+from crazyflie_dashboard.dashboard_node import example_folders, new_lane
 from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action, Kind
 from crazyflie_utils.main import ros_process
@@ -30,7 +31,7 @@ def dashboard():
     found = Dashboard(
         handle,
         partial(master.read, "/dashboard"),
-        partial(master.is_answering, "/dashboard"),
+        new_lane(handle),
         example_folders(),
     )
     process.start()
@@ -149,15 +150,57 @@ def test_live_parameters_right_and_wrong(dashboard, operator):
             set_to(wrong)
 
 
-def test_a_vehicle_whose_poses_stop_is_stale(dashboard, page):
-    uri = rosgraph.Master("/dashboard").lookupNode("/fleet")
-    process = ServerProxy(uri).getPid("/dashboard")[2]
+def pid_of(node):
+    return ServerProxy(rosgraph.Master("/dashboard").lookupNode(node)).getPid("/dashboard")[2]
+
+
+@contextlib.contextmanager
+def stopped(process):
+    """Stop a process, as one that hangs, for as long as the block takes."""
     os.kill(process, signal.SIGSTOP)
     try:
-        wait_until(lambda: fresh(dashboard) == [], "stale vehicles", LIMIT)
-        assert dashboard.scene().vehicles["cf1"].pose_age > 0.5
+        yield
     finally:
         os.kill(process, signal.SIGCONT)
+
+
+def test_a_takeoff_at_a_node_that_is_stopped_does_not_happen_when_it_goes_on(dashboard, operator):
+    with stopped(pid_of("/fleet")):
+        refused = command(dashboard, operator, Action.TAKEOFF, ["cf2"])["cf2"]
+    assert "has not been reached within" in refused
+    wait_until(lambda: fresh(dashboard) == [*NAMES], "fresh vehicles", LIMIT)
+    # What the node would do is done before a takeoff that comes later.
+    assert command(dashboard, operator, Action.TAKEOFF, ["cf3"]) == {"cf3": ""}
+    wait_until(lambda: height(dashboard, "cf3") > 0.9, "cf3 up", LIMIT)
+    assert height(dashboard, "cf2") < 0.05
+    assert command(dashboard, operator, Action.LAND, ["cf3"]) == {"cf3": ""}
+
+
+def test_an_emergency_with_a_stopped_master_stops_all_motors(dashboard, operator):
+    wait_until(
+        lambda: {each.state for each in dashboard.scene().vehicles.values()} == {"on the ground"},
+        "all on the ground",
+        LIMIT,
+    )
+    assert command(dashboard, operator, Action.TAKEOFF) == dict.fromkeys(NAMES, "")
+    wait_until(lambda: all(height(dashboard, n) > 0.9 for n in NAMES), "all up", LIMIT)
+    with stopped(rosgraph.Master("/dashboard").getPid()):
+        outcomes = dashboard.emergency(None, 0.0).result(LIMIT)
+        wait_until(
+            lambda: all(each.is_emergency for each in dashboard.scene().vehicles.values()),
+            "emergencies",
+            LIMIT,
+        )
+        wait_until(lambda: all(height(dashboard, n) < 0.05 for n in NAMES), "all fallen", LIMIT)
+    assert {each.vehicle: each.text for each in outcomes} == dict.fromkeys(
+        ("/all/emergency", *(f"/{name}/emergency" for name in NAMES)), ""
+    )
+
+
+def test_a_vehicle_whose_poses_stop_is_stale(dashboard, page):
+    with stopped(pid_of("/fleet")):
+        wait_until(lambda: fresh(dashboard) == [], "stale vehicles", LIMIT)
+        assert dashboard.scene().vehicles["cf1"].pose_age > 0.5
     wait_until(lambda: fresh(dashboard) == [*NAMES], "fresh vehicles", LIMIT)
 
 

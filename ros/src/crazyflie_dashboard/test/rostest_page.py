@@ -8,6 +8,7 @@ from selenium.webdriver.common.keys import Keys
 
 from crazyflie_dashboard import master
 from crazyflie_dashboard.dashboard import Dashboard
+from crazyflie_dashboard.dashboard_node import new_lane
 from crazyflie_utils.main import ros_process
 
 
@@ -15,9 +16,7 @@ from crazyflie_utils.main import ros_process
 def dashboard():
     process = ros_process()
     handle = process.handle("/dashboard")
-    found = Dashboard(
-        handle, partial(master.read, "/dashboard"), partial(master.is_answering, "/dashboard"), []
-    )
+    found = Dashboard(handle, partial(master.read, "/dashboard"), new_lane(handle), [])
     process.start()
     yield found
     found.close()

@@ -87,7 +87,35 @@ def test_the_key_of_the_emergency_works_without_control(browser, server):
     server.dashboard.change("cf1", is_in_flight=True, position=(-1.0, 0.0, 1.0))
     browser.type(Keys.ESCAPE, Keys.ESCAPE)
     browser.has("emergency", browser.card("cf1") + " .state")
-    assert server.actions() == [(Action.EMERGENCY, ("cf1", "cf2", "cf3"))]
+    browser.has("Emergency: all have answered", ".emergency-report")
+    assert server.dashboard.emergencies == [None]
+
+
+def test_the_emergency_says_what_has_failed_and_is_for_one_vehicle_on_its_card(browser, server):
+    server.dashboard.refusals["cf2"] = "it has not answered within 5 s"
+    browser.has("3 vehicles")
+    wait_for(
+        lambda: browser.find(f"{browser.card('cf2')} button.emergency").click() or True,
+        "its button",
+    )
+    browser.has("cf2: it has not answered within 5 s", ".emergency-report")
+    assert server.dashboard.emergencies == [("cf2",)]
+
+
+def test_the_emergency_counts_without_a_vehicle_on_the_page(browser, server):
+    server.dashboard.set_vehicles()
+    browser.has("0 vehicles")
+    browser.press("Emergency")
+    browser.has("Emergency: all have answered", ".emergency-report")
+    assert server.dashboard.emergencies == [None]
+
+
+def test_the_emergency_counts_in_a_page_that_has_no_connection_yet(browser, server, driver):
+    # As in a page that has just been loaded, and in one that has lost its connection.
+    driver.execute_script("window.socket.io.reconnection(false); window.socket.disconnect()")
+    wait_for(lambda: server.dashboard.pages.pages == (), "a page that is lost")
+    browser.type(Keys.ESCAPE, Keys.ESCAPE)
+    wait_for(lambda: server.dashboard.emergencies == [None], "the emergency")
 
 
 def test_one_escape_is_no_emergency(browser, server):
@@ -97,6 +125,7 @@ def test_one_escape_is_no_emergency(browser, server):
     browser.press("Take off")
     browser.has("hovering", browser.card("cf1"))
     assert server.actions() == [(Action.TAKEOFF, ("cf1",))]
+    assert server.dashboard.emergencies == []
 
 
 def test_boxes_show_what_is_chosen(browser):

@@ -9,6 +9,7 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 import pages
 from nicegui import core
 from pages import Browser, wait_for
+from selenium.webdriver.common.keys import Keys
 
 from crazyflie_dashboard.page_data import MAX_COMMAND_AGE
 from crazyflie_dashboard.snapshot import Action
@@ -54,6 +55,21 @@ def test_a_page_that_is_loaded_again_in_flight_moves_nothing_and_has_no_control(
     browser.press("Land")
     browser.has("this page only looks")
     assert server.actions() == [(Action.TAKEOFF, ("cf1",))]
+
+
+def test_the_emergency_is_reached_while_a_dialog_is_open(browser, server, driver):
+    other = server.dashboard.pages.open(lambda text: None)
+    try:
+        server.dashboard.pages.take(other)
+        browser.press("Take control")
+        browser.has("Only look")
+        # Selenium refuses to click what is covered.
+        browser.find(".emergency-all").click()
+        wait_for(lambda: server.dashboard.emergencies == [None], "the emergency by its button")
+        browser.type(Keys.ESCAPE, Keys.ESCAPE)
+        wait_for(lambda: server.dashboard.emergencies == [None, None], "the emergency by its key")
+    finally:
+        server.dashboard.pages.close(other)
 
 
 def test_a_click_that_has_waited_moves_nothing(browser, server, driver):

@@ -22,7 +22,7 @@ from crazyflie_dashboard.page_data import (
 from crazyflie_dashboard.snapshot import Action, VehicleSnapshot
 from crazyflie_driver import srv
 from crazyflie_model.angles import rpy_from_quaternion
-from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils import NodeHandle
 from crazyflie_utils.parameters.types import BOOLEAN
 from crazyflie_utils.refusal import RefusalError
 
@@ -62,19 +62,10 @@ class Actions:
         Its threads may wait for the master.
     time : callable
         time.monotonic.
-    is_answering : callable
-        ``is_answering(service)``; it may wait. What is not there must not be called when it comes.
     """
 
-    def __init__(
-        self,
-        handle: NodeHandle,
-        workers: Executor,
-        time: Callable[[], float],
-        is_answering: Callable[[str], bool],
-    ):
+    def __init__(self, handle: NodeHandle, workers: Executor, time: Callable[[], float]):
         self._handle, self._workers, self._time = handle, workers, time
-        self._is_answering = is_answering
         self._commanders: dict[str, subprocess.Popen[bytes]] = {}
 
     def carry_out(
@@ -93,10 +84,6 @@ class Actions:
         for name in command.vehicles:
             if name not in answers:
                 answers[name] = self._command(command, targets.get(name), name, graph)
-        if command.action == Action.EMERGENCY and set(command.vehicles) >= set(targets):
-            for service in ("/all/emergency", "/crazyflie_server/all/emergency"):
-                if service in graph.services:
-                    self._call(command, Service(service, Request.EMPTY), None)
         return gathered(answers)
 
     def close(self) -> None:
@@ -138,31 +125,34 @@ class Actions:
         return answers[0] if len(answers) == 1 else any_of(answers)
 
     def _call(self, command: Command, service: Service, target: Target | None) -> "Future[Any]":
-        """Call a service if it is there; the future fails with its refusal."""
+        """Call a service unless the command grows too old before it is reached."""
         outcome: Future[Any] = Future()
         limit = _FLIGHT_TIMEOUT if command.action in (Action.TAKEOFF, Action.LAND) else _TIMEOUT
 
-        def prepare():
-            if not self._is_answering(service.name):
-                raise ServiceError(f"there is no service {service.name}")
-            has_yaw = f"{service.name.rpartition('/')[0]}/reference/yaw"
-            is_go_to = service.request == Request.GO_TO
-            return not is_go_to or self._handle.get_param(has_yaw, BOOLEAN, _is_drivers(target))
-
-        def call(prepared):
+        def call(has_yaw):
             try:
-                has_yaw = prepared.result()
-                expect_fresh(command.action.value, self._time() - command.clicked)
-                request = _request(command, service, target, has_yaw)
+                age = self._time() - command.clicked
+                expect_fresh(command.action.value, age)
+                request = _request(command, service, target, has_yaw.result())
             except Exception as error:
                 outcome.set_exception(error)
                 return
-            kind = _TYPES[service.request]
-            answer = self._handle.call_service(service.name, kind, request, limit)
+            # What is not reached is withdrawn: it must not be carried out when the node goes on.
+            answer = self._handle.call_service(
+                service.name, _TYPES[service.request], request, limit, MAX_COMMAND_AGE - age
+            )
             answer.add_done_callback(lambda done: settle(done, outcome))
 
-        prepared = self._workers.submit(prepare)
-        prepared.add_done_callback(lambda done: self._handle.submit(call, done))
+        if service.request == Request.GO_TO:
+            has_yaw = f"{service.name.rpartition('/')[0]}/reference/yaw"
+            found = self._workers.submit(
+                self._handle.get_param, has_yaw, BOOLEAN, _is_drivers(target)
+            )
+            found.add_done_callback(lambda done: self._handle.submit(call, done))
+        else:
+            known: Future[bool] = Future()
+            known.set_result(False)
+            call(known)
         return outcome
 
     def _start_commander(self, vehicle, graph):

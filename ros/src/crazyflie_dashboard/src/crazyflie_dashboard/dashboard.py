@@ -11,6 +11,7 @@ from crazyflie_dashboard.answers import settle
 from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.doctor_report import examine
+from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.graph_model import GraphModel
 from crazyflie_dashboard.live_parameters import LiveParameters
 from crazyflie_dashboard.page_data import (
@@ -39,8 +40,8 @@ class Dashboard:
     handle : NodeHandle
     read_graph : callable
         Returns the `Graph`; it may wait.
-    is_answering : callable
-        ``is_answering(service)``; it may wait.
+    lane : EmergencyLane
+        It is closed with the dashboard.
     folders : list of str
         With missions and trajectories.
     clock : callable
@@ -53,7 +54,7 @@ class Dashboard:
         self,
         handle: NodeHandle,
         read_graph: Callable[[], Graph],
-        is_answering: Callable[[str], bool],
+        lane: EmergencyLane,
         folders: list[str],
         clock: Callable[[], float] = time.monotonic,
         workers: Executor | None = None,
@@ -63,7 +64,8 @@ class Dashboard:
         self._handle, self._folders, self._clock = handle, folders, clock
         self._workers = workers or ThreadPoolExecutor(8, "dashboard")
         self._model = GraphModel(handle, self._workers, read_graph, clock)
-        self._actions = Actions(handle, self._workers, clock, is_answering)
+        self._actions = Actions(handle, self._workers, clock)
+        self._lane = lane
         self._parameters = LiveParameters(handle, self._workers, self._model)
         self._missions = missions.Missions()
         self._model.missions = lambda: self._missions.running
@@ -75,6 +77,7 @@ class Dashboard:
     def close(self) -> None:
         """End what was begun here and flies nothing."""
         self._actions.close()
+        self._lane.close()
         self._workers.shutdown(wait=False, cancel_futures=True)
 
     def scene(self) -> Scene:
@@ -107,14 +110,10 @@ class Dashboard:
         self._handle.submit(lambda: self._page(page).remove_field(path))
 
     def command(self, page: int, command: Command) -> "Future[tuple[Outcome, ...]]":
-        """Carry out a command; each vehicle has its outcome.
-
-        An emergency may come from any page. For the others the page must have control.
-        """
+        """Carry out a command of the page that has control; each vehicle has its outcome."""
 
         def do():
-            if command.action != Action.EMERGENCY:
-                self.pages.expect_control(page)
+            self.pages.expect_control(page)
             now = self._model.scene.vehicles
             targets = {
                 name: Target(model.vehicle, now[name])
@@ -124,6 +123,23 @@ class Dashboard:
             return self._actions.carry_out(command, targets, self._model.graph)
 
         return self._do(do)
+
+    def emergency(
+        self, vehicles: tuple[str, ...] | None, age: float
+    ) -> "Future[tuple[Outcome, ...]]":
+        """Stop motors, of all vehicles if ``vehicles`` is None; no page needs control for it.
+
+        It waits for no other command and for no turn. ``age`` (s) is that of the click. Each
+        service has its outcome, after `MAX_EMERGENCY_AGE` at the latest.
+        """
+        if vehicles is None:
+            return self._lane.stop(None, age)
+        services = []
+        for name in vehicles:
+            model = self._model.models.get(name)
+            found = () if model is None else model.vehicle.services.get(Action.EMERGENCY, ())
+            services += [each.name for each in found] or [f"/{name}/emergency".replace("///", "/")]
+        return self._lane.stop(services, age)
 
     def parameter_owners(self) -> tuple[str, ...]:
         """Return nodes with live parameters, and vehicles with those of firmware."""

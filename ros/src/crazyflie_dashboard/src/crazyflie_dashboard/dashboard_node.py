@@ -11,6 +11,7 @@ from typing_extensions import override
 from crazyflie_dashboard import master
 from crazyflie_dashboard.access import Access, AccessError, expect_free_port, is_loopback, new_token
 from crazyflie_dashboard.dashboard import Dashboard
+from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import Integer, Text
 
@@ -59,7 +60,7 @@ class DashboardNode(Node):
         dashboard = Dashboard(
             handle,
             lambda: master.read(handle.name),
-            partial(master.is_answering, handle.name),
+            new_lane(handle),
             folders or example_folders(),
         )
         self._open.callback(dashboard.close)
@@ -74,6 +75,14 @@ class DashboardNode(Node):
     @override
     def shutdown(self) -> None:
         self._open.close()
+
+
+def new_lane(handle: NodeHandle) -> EmergencyLane:
+    """Return the lane for emergencies of the running graph; what becomes of them is logged."""
+    name = handle.name
+    return EmergencyLane(
+        name, partial(master.services, name), partial(master.lookup, name), handle.warn
+    )
 
 
 def example_folders() -> list[str]:

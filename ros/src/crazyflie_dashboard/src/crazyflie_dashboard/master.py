@@ -1,21 +1,24 @@
-"""Questions to the ROS master; they wait for answers, so they are for threads that may."""
+"""Questions to the ROS master, each with a limit of time; they are for threads that may wait."""
 
-import contextlib
-import socket
-from urllib.parse import urlsplit
+import http.client
+import xmlrpc.client
+from collections.abc import Mapping
 
 import rosgraph
 
 from crazyflie_dashboard.discovery import Graph
 
-_LIMIT = 0.5  #: Of a connection to a service, s.
+_LIMIT = 2.0  #: Of an answer of the master, s.
+
+
+class MasterError(OSError):
+    """The master does not answer, or not what was asked for."""
 
 
 def read(caller: str) -> Graph:
-    """Return what the master knows; OSError or rosgraph.MasterException if it does not answer."""
-    master = rosgraph.Master(caller)
-    types = dict(master.getTopicTypes())
-    published, _, services = master.getSystemState()
+    """Return what the master knows, or raise `MasterError`."""
+    types = dict(_ask("getTopicTypes", caller))
+    published, _, services = _ask("getSystemState", caller)
     return Graph(
         topics={topic: types[topic] for topic, _ in published if topic in types},
         types=types,
@@ -23,10 +26,31 @@ def read(caller: str) -> Graph:
     )
 
 
-def is_answering(caller: str, service: str) -> bool:
-    """Tell whether the node of a service takes connections now."""
-    with contextlib.suppress(OSError, rosgraph.MasterException, ValueError):
-        uri = urlsplit(rosgraph.Master(caller).lookupService(service))
-        socket.create_connection((uri.hostname or "", uri.port or 0), _LIMIT).close()
-        return True
-    return False
+def services(caller: str) -> Mapping[str, str]:
+    """Return service -> node, or raise `MasterError`."""
+    _, _, found = _ask("getSystemState", caller)
+    return {name: nodes[0] for name, nodes in found if nodes}
+
+
+def lookup(caller: str, service: str) -> str:
+    """Return the address of a service, as in rosrpc://host:port, or raise `MasterError`."""
+    return _ask("lookupService", caller, service)
+
+
+class _Transport(xmlrpc.client.Transport):
+    def make_connection(self, host):
+        connection = super().make_connection(host)
+        connection.timeout = _LIMIT
+        return connection
+
+
+def _ask(method, *arguments):
+    uri = rosgraph.get_master_uri()
+    try:
+        with xmlrpc.client.ServerProxy(uri, transport=_Transport()) as proxy:
+            code, text, value = getattr(proxy, method)(*arguments)
+    except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
+        raise MasterError(f"the master at {uri} does not answer: {error}") from None
+    if code != 1:
+        raise MasterError(text)
+    return value

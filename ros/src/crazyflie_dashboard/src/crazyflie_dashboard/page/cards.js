@@ -30,7 +30,9 @@ export default {
       this.$emit("choose", { name: vehicle.name, add });
     },
     act(vehicle, action, event) {
-      this.$emit("act", { name: vehicle.name, action, clicked: window.clickTime(event) });
+      // The handlers of the page are not needed for it.
+      if (action === "emergency") window.emergency(event, [vehicle.name]);
+      else this.$emit("act", { name: vehicle.name, action, clicked: window.clickTime(event) });
     },
   },
 };

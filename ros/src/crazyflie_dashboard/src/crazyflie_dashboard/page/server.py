@@ -1,13 +1,17 @@
 """Serves the page from a thread of its own."""
 
+import asyncio
 import logging
 import socket
 import threading
+from functools import partial
 from pathlib import Path
 
 import uvicorn
 from fastapi import FastAPI
 from nicegui import Client, app, core, ui
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
 
 from crazyflie_dashboard.access import Access
 from crazyflie_dashboard.dashboard import Dashboard
@@ -27,6 +31,18 @@ ANSWER_TIMEOUT = 10.0
 CLOSING_TIME = 3.0  #: Longest time, s, that the server has to end.
 
 
+async def _emergency(dashboard: Dashboard, request: Request) -> Response:
+    """Stop motors; answer with what has failed, a list of texts."""
+    try:
+        asked = await request.json()
+        age, vehicles = float(asked["age"]), asked["vehicles"]
+        names = None if vehicles is None else tuple(map(str, vehicles))
+    except (KeyError, TypeError, ValueError):
+        return JSONResponse(['the request is not {"age": s, "vehicles": list or null}'], 422)
+    outcomes = await asyncio.wrap_future(dashboard.emergency(names, age))
+    return JSONResponse([f"{each.vehicle}: {each.text}" for each in outcomes if each.text])
+
+
 class Page:
     """The server of the page; one in a process, since NiceGUI has one application in a process.
 
@@ -41,6 +57,7 @@ class Page:
         self._listener = socket.create_server((host, port), family=family)
         application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         Client.shared_head_html = HEAD
+        application.post("/emergency")(partial(_emergency, dashboard))
 
         # Without a history of messages a page that has lost its connection is loaded anew.
         ui.page("/", title="Crazyflie mission control")(lambda: View(dashboard))

@@ -16,7 +16,6 @@ from crazyflie_dashboard.page.plots_panel import PlotsPanel
 from crazyflie_dashboard.page.scene_view import SceneView
 from crazyflie_dashboard.page.session import CLICKED, Session
 from crazyflie_dashboard.page.vehicles_panel import VehiclesPanel
-from crazyflie_dashboard.snapshot import Action
 
 SCENE_PERIOD = 0.05
 PANEL_PERIOD = 0.5  #: Between two updates, s.
@@ -51,7 +50,7 @@ class View:
         self._take = ui.button("Take control", on_click=self._take_or_release)
         self._take.props("outline").classes("take")
         emergency = ui.button("Emergency").props("unelevated color=negative icon=dangerous")
-        emergency.classes("emergency-all").on("click", self._emergency, js_handler=CLICKED)
+        emergency.classes("emergency-all").on("click", js_handler="(event) => emergency(event)")
         with emergency:
             ui.label("Esc Esc").classes("key")
             ui.tooltip("Stops the motors of all vehicles, also from a page without control")
@@ -126,9 +125,6 @@ class View:
         else:
             await self._session.take_control()
         self._show_control()
-
-    async def _emergency(self, event: GenericEventArguments) -> None:
-        await self._session.command(Action.EMERGENCY, self._session.vehicles, event.args)
 
     async def _stop_mission(self, event: GenericEventArguments) -> None:
         await self._session.succeeds(self._dashboard.stop_mission(self._session.page, event.args))

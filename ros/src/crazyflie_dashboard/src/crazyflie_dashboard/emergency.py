@@ -1,0 +1,288 @@
+"""The emergency: services are called over connections of their own, which are kept open.
+
+The lane shares no thread, queue or connection with other commands. Once a service has been found,
+the master is not needed.
+"""
+
+import contextlib
+import io
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future
+from urllib.parse import urlsplit
+
+from rosgraph.network import (
+    ROSHandshakeException,
+    read_ros_handshake_header,
+    write_ros_handshake_header,
+)
+from std_srvs.srv import Empty
+
+from crazyflie_dashboard.page_data import Outcome
+
+#: Longest time from a click to the emergency, s; older ones are refused. Longest for an answer.
+MAX_EMERGENCY_AGE = 5.0
+#: These are called first.
+ALL = ("/all/emergency", "/crazyflie_server/all/emergency")
+
+_CONNECT_LIMIT = 2.0  #: To connect to a service in advance, s.
+_PERIOD = 1.0  #: From one look at the master to the next, s; longer where it takes long:
+_SHARE = 0.02  #: of the time at most.
+_EMPTY = struct.pack("<I", 0)  #: A request of std_srvs/Empty: the length of nothing.
+
+
+class _CallError(Exception):
+    """Why a service could not be called."""
+
+
+class EmergencyLane:
+    """Calls of all emergency services of the graph.
+
+    Connections to them are opened as soon as the master names them, also while no page is open.
+    `stop` may be called from any thread, and waits for nothing.
+
+    Parameters
+    ----------
+    caller : str
+        Name of the node that calls.
+    services : callable
+        Returns service -> node of all services that the master knows, within some seconds.
+    lookup : callable
+        ``lookup(service)`` returns the address of a service, as in rosrpc://host:port, within some
+        seconds. Both raise OSError when the master does not answer.
+    report : callable
+        ``report(text)`` is told of each emergency and of what has become of it.
+    """
+
+    def __init__(
+        self,
+        caller: str,
+        services: Callable[[], Mapping[str, str]],
+        lookup: Callable[[str], str],
+        report: Callable[[str], None] = lambda text: None,
+    ):
+        self._caller, self._services, self._lookup = caller, services, lookup
+        self._report = report
+        self._lock = threading.Lock()
+        self._nodes: dict[str, str] = {}
+        self._addresses: dict[str, str] = {}
+        self._open: dict[str, socket.socket] = {}
+        self._trouble = "the master has not answered yet"
+        self._is_closed = threading.Event()
+        threading.Thread(target=self._follow, name="emergency", daemon=True).start()
+
+    @property
+    def ready(self) -> tuple[str, ...]:
+        """Services to which a connection is open."""
+        with self._lock:
+            return tuple(self._open)
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._is_closed.set()
+        with self._lock:
+            for connection in self._open.values():
+                connection.close()
+            self._open.clear()
+
+    def stop(self, services: Iterable[str] | None, age: float) -> "Future[tuple[Outcome, ...]]":
+        """Call emergency services, of all vehicles if ``services`` is None.
+
+        Parameters
+        ----------
+        services : iterable of str or None
+        age : float
+            How long ago the operator clicked, s.
+
+        Returns
+        -------
+        concurrent.futures.Future
+            An outcome for each service, after 5 s at the latest; its text is "" if it has answered.
+        """
+        result: Future[tuple[Outcome, ...]] = Future()
+        what = "all vehicles" if services is None else ", ".join(services := tuple(services))
+        if not age <= MAX_EMERGENCY_AGE:
+            text = f"the click is {age:.1f} s old; expected at most {MAX_EMERGENCY_AGE:g} s"
+            self._end(what, result, {"emergency": f"{text}; nothing was done"})
+            return result
+        with self._lock:
+            wanted = sorted(self._nodes, key=_order) if services is None else list(services)
+            # Each connection serves one call at a time: a second click opens others.
+            taken = {name: self._open.pop(name) for name in wanted if name in self._open}
+        deadline = time.monotonic() + MAX_EMERGENCY_AGE
+        if not wanted:
+            self._end(what, result, {"emergency": f"no service has been found: {self._trouble}"})
+            return result
+        # What is open is told at once, in order; nothing here waits.
+        sent = {name for name, connection in taken.items() if _send(connection)}
+        texts: dict[str, str] = {}
+
+        def finish(name, text):
+            with self._lock:
+                texts[name] = text
+                is_last = len(texts) == len(wanted)
+            if is_last:
+                self._end(what, result, {each: texts[each] for each in wanted})
+
+        def await_answers():
+            for name in (each for each in wanted if each in sent):
+                finish(name, self._answer(name, taken[name], deadline))
+
+        def call(name):
+            try:
+                connection = self._reach(name, deadline)
+                _send(connection)
+            except (OSError, _CallError) as error:
+                finish(name, str(error) or "it does not answer")
+            else:
+                finish(name, self._answer(name, connection, deadline))
+
+        if sent:
+            threading.Thread(target=await_answers, daemon=True).start()
+        for name in wanted:
+            if name not in sent:
+                threading.Thread(target=call, args=(name,), daemon=True).start()
+        return result
+
+    def _end(self, what, result, texts):
+        result.set_result(tuple(Outcome(name, text) for name, text in texts.items()))
+        failures = "; ".join(f"{name}: {text}" for name, text in texts.items() if text)
+        self._report(f"emergency for {what}: {failures or 'all services have answered'}")
+
+    def _answer(self, name, connection, deadline):
+        """Return why a call has failed, or ""; what has answered stays open."""
+        try:
+            connection.settimeout(max(deadline - time.monotonic(), 0.001))
+            is_done, length = struct.unpack("<BI", _receive(connection, 5))
+            words = _receive(connection, length).decode(errors="replace")
+        except TimeoutError:
+            connection.close()
+            return f"it has not answered within {MAX_EMERGENCY_AGE:g} s"
+        except (OSError, struct.error) as error:
+            connection.close()
+            return f"the connection has ended: {error}"
+        self._keep(name, connection)
+        return "" if is_done else words or "it has refused"
+
+    def _keep(self, name, connection):
+        with self._lock:
+            before = self._open.get(name)
+            if before is None and not self._is_closed.is_set():
+                self._open[name] = connection
+            else:
+                connection.close()
+
+    def _reach(self, name: str, deadline: float) -> socket.socket:
+        """Open a connection where the service was last, or where the master says that it is."""
+        address = self._addresses.get(name)
+        if address is not None:
+            with contextlib.suppress(OSError, _CallError):
+                return self._connect(name, address, deadline)
+        return self._connect(name, self._lookup(name), deadline)
+
+    def _connect(self, name: str, address: str, deadline: float) -> socket.socket:
+        limit = deadline - time.monotonic()
+        if limit <= 0.0:
+            raise _CallError(f"it has not answered within {MAX_EMERGENCY_AGE:g} s")
+        uri = urlsplit(address)
+        connection = socket.create_connection((uri.hostname or "", uri.port or 0), limit)
+        try:
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+            header = {
+                "callerid": self._caller,
+                "service": name,
+                "md5sum": Empty._md5sum,
+                "type": Empty._type,
+                "persistent": "1",
+            }
+            write_ros_handshake_header(connection, header)
+            # The answer shows that the process runs: the kernel accepts for one that is stopped.
+            answer = read_ros_handshake_header(connection, io.BytesIO(), 4096)
+            if "error" in answer:
+                raise _CallError(answer["error"])
+        except TimeoutError:
+            connection.close()
+            raise _CallError(f"it has not answered within {limit:.0f} s") from None
+        except ROSHandshakeException as error:
+            connection.close()
+            raise _CallError(str(error)) from None
+        except (OSError, _CallError):
+            connection.close()
+            raise
+        with self._lock:
+            self._addresses[name] = address
+        return connection
+
+    def _follow(self):
+        while not self._is_closed.is_set():
+            began = time.monotonic()
+            try:
+                self._update({n: node for n, node in self._services().items() if is_emergency(n)})
+                self._trouble = "there is none on the graph"
+            except Exception as error:
+                # Whatever it is: the next look may succeed, and what is known stays.
+                self._trouble = str(error)
+            with self._lock:
+                ended = [n for n, connection in self._open.items() if _has_ended(connection)]
+                for name in ended:
+                    self._open.pop(name).close()
+                missing = [name for name in self._nodes if name not in self._open]
+            for name in sorted(missing, key=_order):
+                with contextlib.suppress(OSError, _CallError):
+                    self._keep(name, self._reach(name, time.monotonic() + _CONNECT_LIMIT))
+            self._is_closed.wait(max(_PERIOD, (time.monotonic() - began) / _SHARE * _PERIOD))
+
+    def _update(self, nodes):
+        with self._lock:
+            moved = [n for n, node in self._nodes.items() if nodes.get(n) != node]
+            for name in moved:
+                self._addresses.pop(name, None)
+                if name in self._open:
+                    self._open.pop(name).close()
+            self._nodes = nodes
+
+
+def is_emergency(service: str) -> bool:
+    """Tell whether a service is, by its name, an emergency's."""
+    return service.endswith("/emergency")
+
+
+def _order(name):
+    return name not in ALL, name
+
+
+def _send(connection: socket.socket) -> bool:
+    """Send a request if the other side has not ended the connection."""
+    if _has_ended(connection):
+        connection.close()
+        return False
+    try:
+        connection.sendall(_EMPTY)
+    except OSError:
+        connection.close()
+        return False
+    return True
+
+
+def _has_ended(connection):
+    connection.setblocking(False)
+    try:
+        return not connection.recv(1, socket.MSG_PEEK)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+
+
+def _receive(connection: socket.socket, count: int) -> bytes:
+    received = b""
+    while len(received) < count:
+        part = connection.recv(count - len(received))
+        if not part:
+            raise OSError("the other side has closed it")
+        received += part
+    return received

@@ -121,3 +121,35 @@ def test_why_a_mission_has_failed_is_what_it_said_last(missions, script):
     missions.dry_run(mission, ("cf1",)).result(LIMIT)
     with pytest.raises(RefusalError, match="cf1 is lost"):
         missions.fly(mission, ("cf1",)).result(LIMIT)
+
+
+SWARM = """
+from pycrazyswarm import Crazyswarm
+swarm = Crazyswarm(args="")
+print([each.prefix for each in swarm.allcfs.crazyflies])
+swarm.allcfs.takeoff(0.5, 1.0)
+swarm.timeHelper.sleep(1.5)
+swarm.allcfs.land(0.0, 1.0)
+swarm.timeHelper.sleep(1.5)
+assert len(swarm.allcfs.crazyflies) == 1
+"""
+
+
+def test_a_dry_run_is_one_whatever_options_a_script_of_crazyswarm_gives_itself(script, monkeypatch):
+    # Where it would look for vehicles that fly there is no master.
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    result = Missions().dry_run(script("swarm.py", SWARM), ("cf2",)).result(LIMIT)
+    assert (result.passed, result.text) == (True, "flown by ideal vehicles")
+
+
+def test_a_script_of_crazyswarm_is_told_which_vehicles_are_chosen(missions, script, tmp_path):
+    (tmp_path / "python").write_text(
+        f"#!{sys.executable}\nimport os, sys\n"
+        "is_dry = os.environ.get('CRAZYFLIE_PY_DRY_RUN')\n"
+        "if is_dry: sys.exit(0)\n"
+        "sys.exit('for ' + os.environ['CRAZYFLIE_PY_VEHICLES'])\n"
+    )
+    mission = script("swarm.py", SWARM)
+    missions.dry_run(mission, ("cf1", "cf3")).result(LIMIT)
+    with pytest.raises(RefusalError, match="for cf1:cf3"):
+        missions.fly(mission, ("cf1", "cf3")).result(LIMIT)

@@ -29,8 +29,8 @@ robots:
 
 
 @pytest.fixture
-def allcfs(monkeypatch, tmp_path):
-    """Return all vehicles of a script that names none, in a process with a fleet."""
+def attach(monkeypatch, tmp_path):
+    """Return a function that begins a script which names no vehicles, in a process with a fleet."""
     process = FakeProcess()
 
     class FakeClock:
@@ -53,12 +53,26 @@ def allcfs(monkeypatch, tmp_path):
         assert process.launch(node, name), process.logged("error")
     process.advance(0.6)
     options = build_argparser().parse_args([])
-    return CrazyflieServer(ros_backend.RosBackend(None, options, process))
+    return lambda: CrazyflieServer(ros_backend.RosBackend(None, options, process))
+
+
+@pytest.fixture
+def allcfs(attach):
+    """Return all vehicles of a script that names none."""
+    return attach()
 
 
 def test_vehicles_are_in_the_order_of_the_fleet_file(allcfs):
     assert [cf.name for cf in allcfs.crazyflies] == ["cf10", "cf2"]
     assert [cf.id for cf in allcfs.crazyflies] == [10, 2]
+
+
+def test_a_script_has_only_the_vehicles_that_are_chosen_outside_of_it(attach, monkeypatch):
+    monkeypatch.setenv("CRAZYFLIE_PY_VEHICLES", "cf3:cf4")
+    with pytest.raises(SystemExit, match="CRAZYFLIE_PY_VEHICLES is cf3:cf4; expected vehicles of"):
+        attach()
+    monkeypatch.setenv("CRAZYFLIE_PY_VEHICLES", "cf2:cf3")
+    assert [cf.name for cf in attach().crazyflies] == ["cf2"]
 
 
 def test_a_parameter_of_the_real_firmware_is_kept_and_said_once(allcfs, caplog):

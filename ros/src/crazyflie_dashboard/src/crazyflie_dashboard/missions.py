@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -75,10 +75,11 @@ class Missions:
         command = [self._python, *_RUNNER, "dry_run", mission.path, *vehicles]
         if not mission.is_trajectory and _is_crazyswarm(mission.path):
             command = [self._python, mission.path, "--sim"]
+        environment = _environment(vehicles) | {"CRAZYFLIE_PY_DRY_RUN": "1"}
         key = _key(mission, vehicles)
 
         def work():
-            done = _run(command, _DRY_RUN_TIMEOUT)
+            done = _run(command, environment, _DRY_RUN_TIMEOUT)
             if done.passed:
                 with self._lock:
                     self._passed.add(key)
@@ -104,7 +105,7 @@ class Missions:
                 raise RefusalError(f"{self._title} flies; expected it to have ended, or stop it")
             if _key(mission, vehicles) not in self._passed:
                 raise RefusalError(f"{mission.title}: expected a dry run of it that has passed")
-            process = self._flying = _start(command)
+            process = self._flying = _start(command, _environment(vehicles))
             self._title, self._command = mission.title, ""
 
         def work():
@@ -144,8 +145,8 @@ class Missions:
         killer.start()
 
 
-def _run(command: list[str], limit: float) -> DryRunResult:
-    process = _start(command)
+def _run(command: list[str], environment: Mapping[str, str], limit: float) -> DryRunResult:
+    process = _start(command, environment)
     try:
         output, _ = process.communicate(timeout=limit)
     except subprocess.TimeoutExpired:
@@ -161,7 +162,12 @@ def _run(command: list[str], limit: float) -> DryRunResult:
     return DryRunResult(False, _last(output, process.returncode))
 
 
-def _start(command):
+def _environment(vehicles):
+    """Return what a script of Crazyswarm's API cannot get around by options of its own."""
+    return {"CRAZYFLIE_PY_VEHICLES": ":".join(vehicles)}
+
+
+def _start(command, environment):
     # In a session of its own: Ctrl-C at the dashboard must not end a flight.
     return subprocess.Popen(
         command,
@@ -171,7 +177,7 @@ def _start(command):
         text=True,
         errors="replace",
         start_new_session=True,
-        env={**os.environ, "MPLBACKEND": "Agg"},
+        env={**os.environ, "MPLBACKEND": "Agg", **environment},
     )
 
 

@@ -4,6 +4,7 @@ import argparse
 import atexit
 import logging
 import math
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -77,6 +78,8 @@ class Crazyswarm:
     ):
         parser = build_argparser([] if parent_parser is None else [parent_parser])
         options, _ = parser.parse_known_args(args.split() if isinstance(args, str) else args)
+        # Whoever starts a script decides that it does not fly, whatever options it gives itself.
+        options.sim = options.sim or bool(os.environ.get(fleet.DRY_RUN))
         backend = _backend(crazyflies_yaml, options)
         atexit.register(backend.close)
         self.allcfs = CrazyflieServer(backend)
@@ -98,7 +101,9 @@ def _backend(crazyflies_yaml: str | Path | None, options: argparse.Namespace) ->
     if options.sim:
         from crazyflie_py.simulation import Simulation
 
-        return Simulation(fleet.load(crazyflies_yaml), options)
+        vehicles = fleet.load(crazyflies_yaml)
+        names = fleet.chosen([vehicle.name for vehicle in vehicles])
+        return Simulation([each for each in vehicles if each.name in names], options)
     # Only here, so that scripts with --sim need neither ROS nor the time to import it.
     from crazyflie_py.ros_backend import RosBackend
 

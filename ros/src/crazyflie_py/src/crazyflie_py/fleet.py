@@ -1,8 +1,10 @@
 """The vehicles of a fleet file, in Crazyswarm's layout or crazyswarm2's."""
 
 import logging
+import os
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +14,12 @@ from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_model.angles import Triple
 from crazyflie_utils import ParameterError
+
+#: Variables of the environment, by which whoever starts a script decides, and not the script: it
+#: flies ideal vehicles, as with --sim, if this is set;
+DRY_RUN = "CRAZYFLIE_PY_DRY_RUN"
+#: it has these vehicles only, names with colons between them.
+VEHICLES = "CRAZYFLIE_PY_VEHICLES"
 
 _LOG = logging.getLogger(__name__)
 
@@ -59,6 +67,20 @@ def load(crazyflies_yaml: str | Path | None) -> list[FleetVehicle]:
             names = ", ".join(v.name for v in vehicles if v.id == vehicle_id)
             raise ValueError(f"{names} have one id, {vehicle_id}; expected different ids")
     return vehicles
+
+
+def chosen(names: Sequence[str]) -> list[str]:
+    """Return those of a fleet's vehicles that the variable `VEHICLES` of the environment names.
+
+    Without it they are all. ValueError if it names none of them.
+    """
+    text = os.environ.get(VEHICLES)
+    if not text:
+        return list(names)
+    wanted = text.split(":")
+    if found := [name for name in names if name in wanted]:
+        return found
+    raise ValueError(f"{VEHICLES} is {text}; expected vehicles of {', '.join(names)}")
 
 
 def _id(vehicle: VehicleConfig) -> int:

@@ -61,8 +61,10 @@ class RosBackend(EachVehicle, SwarmBackend):
         handle = process.handle("/crazyswarm")
         try:
             names = [v.name for v in vehicles] if vehicles else running_vehicles(handle)
+            names = fleet_files.chosen(names)
+            vehicles = vehicles and [each for each in vehicles if each.name in names]
             fleet = Fleet(names, startup_timeout=_FIND_LIMIT, process=process)
-        except MissionError as error:
+        except (MissionError, ValueError) as error:
             self._end()
             sys.exit(str(error))
         self._connection = Connection(handle, fleet, options.unchecked)

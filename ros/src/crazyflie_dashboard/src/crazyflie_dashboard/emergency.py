@@ -247,8 +247,8 @@ class EmergencyLane:
 
 
 def is_emergency(service: str) -> bool:
-    """Tell whether a service is, by its name, an emergency's."""
-    return service.endswith("/emergency")
+    """Tell whether a service stops motors, by its name; one of high_level only calls another."""
+    return service.endswith("/emergency") and not service.endswith("/high_level/emergency")
 
 
 def _order(name):

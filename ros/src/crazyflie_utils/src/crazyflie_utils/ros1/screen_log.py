@@ -1,6 +1,11 @@
-"""Logging raises nothing when the disk is full or the screen is gone."""
+"""Logging raises nothing when the disk is full or the screen is gone, and waits for no master."""
 
 import logging
+
+import rospy
+from rospy.impl import paramserver
+
+_NO_TOPICS = "/rosout_disable_topics_generation"
 
 ROSOUT = "rosout"  #: The logger behind rospy.loginfo and its like.
 
@@ -30,3 +35,13 @@ def shield_screen_log() -> None:
         if not isinstance(handler, Shielded):
             logger.removeHandler(handler)
             logger.addHandler(Shielded(handler))
+
+
+def log_without_master() -> None:
+    """Read the parameter with which rospy leaves topics out of /rosout, once.
+
+    rospy caches no parameter that is not set: it asked the master at each line, and waited for one
+    that was frozen, in the middle of an emergency.
+    """
+    value = rospy.get_param(_NO_TOPICS, False)
+    paramserver.get_param_server_cache().set(_NO_TOPICS, value)

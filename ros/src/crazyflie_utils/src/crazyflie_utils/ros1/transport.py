@@ -25,7 +25,7 @@ from crazyflie_utils.ros1.calls import (
 )
 from crazyflie_utils.ros1.master_watch import living_node
 from crazyflie_utils.ros1.own_topics import OwnCallback, publish
-from crazyflie_utils.ros1.screen_log import shield_screen_log
+from crazyflie_utils.ros1.screen_log import log_without_master, shield_screen_log
 from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
 
 #: Messages kept for a listener that does not keep up: a simulation that runs as fast as it can
@@ -73,6 +73,7 @@ class RosTransport(Transport):
         self._complaints = Throttle()
         self._limits_rate = limits_rate
         shield_screen_log()
+        log_without_master()
         patches.harden_tcp_server(self._refuse)
         allow_many_topics()
         self._remappings = dict(rospy.names.get_resolved_mappings())

@@ -1,5 +1,7 @@
 """Vehicles as a page sees them: found, stale, gone."""
 
+import math
+
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from dynamic_reconfigure.encoding import encode_config
@@ -12,6 +14,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard.discovery import Graph
 from crazyflie_msgs.msg import ControlStamped, FlightStatus
+from crazyflie_utils.tf.poses import PoseCodec, StampedPose
 
 
 @pytest.fixture
@@ -207,3 +210,31 @@ def test_the_frame_of_a_vehicle_without_a_name_is_its_own_on_the_ground_too():
     fleet.send_poses(["crazyflie"], z=0.0)
     assert fleet.vehicles["/"].frame == "crazyflie"
     assert fleet.dashboard.scene().frames == ()
+
+
+@pytest.mark.parametrize("rotation", [(0.0,) * 4, (math.nan, 0.0, 0.0, 1.0)])
+def test_a_pose_that_is_none_makes_its_own_vehicle_old_and_no_other(rotation):
+    fleet = FakeFleet()
+    fleet.find()
+    for _ in range(12):
+        fleet.stamp = fleet.process.clock.nanoseconds()
+        bad = StampedPose("world", "cf1", fleet.stamp, (0.0, 0.0, 1.0), rotation)
+        fleet.process.publish("/tf", PoseCodec().encode([bad]))
+        fleet.send_poses(["cf2", "cf3"], z=2.0)
+    assert [each.is_stale for each in fleet.vehicles.values()] == [True, False, False]
+    assert fleet.vehicles["cf3"].position[2] == 2.0
+    (sentence,) = [each for each in fleet.dashboard.scene().sentences if "cf1" in each.text]
+    assert (sentence.level, sentence.source) == ("error", "dashboard")
+
+
+def test_a_master_that_does_not_answer_is_said_until_it_does():
+    fleet = FakeFleet()
+    fleet.find()
+    known = fleet.graph
+    del fleet.graph
+    fleet.process.advance(4.1)
+    (sentence,) = fleet.dashboard.scene().sentences
+    assert sentence.text.startswith("no graph: ")
+    fleet.graph = known
+    fleet.process.advance(4.1)
+    assert fleet.dashboard.scene().sentences == ()

@@ -10,7 +10,7 @@ from fake_dashboard import vehicle
 from pages import wait_for
 from selenium.webdriver.common.keys import Keys
 
-from crazyflie_dashboard.snapshot import Action
+from crazyflie_dashboard.snapshot import Action, Sentence
 
 
 def test_vehicles_take_off_go_where_the_floor_is_clicked_and_land(browser, server):
@@ -74,6 +74,13 @@ def test_a_stale_vehicle_says_how_old_its_pose_is(browser):
     browser.has("7.4 s ago", browser.card("cf3"))
     assert "stale" in browser.find(browser.card("cf3")).get_attribute("class")
     assert "stale" not in browser.find(browser.card("cf1")).get_attribute("class")
+
+
+def test_the_bar_says_that_the_scene_is_not_what_it_was(browser, server):
+    browser.has("3 vehicles", ".summary")
+    sentence = Sentence("error", "dashboard", "no graph: the master does not answer")
+    server.dashboard.set_vehicles(vehicle("cf1", 0.0), sentences=(sentence,))
+    browser.has("no graph: the master does not answer", ".summary.bad")
 
 
 def test_a_vehicle_that_is_clicked_in_the_scene_is_chosen(browser):

@@ -1,5 +1,6 @@
 """Poses of all frames of /tf, decoded as often as they are shown and not as often as they come."""
 
+import math
 import struct
 from collections import Counter
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from crazyflie_utils.tf.poses import PoseCodec, entries
 _MAX_DEPTH = 10  #: Frames above a frame that are followed: a loop has no end.
 
 _MAX_FRAMES = 1000
+_MIN_SQUARE, _MAX_SQUARE = 0.8, 1.2  #: Of the length of a quaternion, squared.
 
 
 @dataclass
@@ -45,6 +47,8 @@ class Frames:
 
     def __init__(self, time: Callable[[], float], nanoseconds: Callable[[], int]):
         self.poses: dict[str, Pose] = {}
+        #: Frames whose newest pose is no pose -> when it came, s.
+        self.rejected: dict[str, float] = {}
         self._time, self._nanoseconds = time, nanoseconds
         self._codec = PoseCodec()
         self._latest: dict[bytes, tuple[bytes, int, int]] = {}
@@ -74,6 +78,11 @@ class Frames:
             known = self.poses.get(name)
             if known is not None and known.stamp == stamp:
                 continue
+            if not _is_pose(position, rotation):
+                # The pose before stays, and grows old.
+                self.rejected[name] = now
+                continue
+            self.rejected.pop(name, None)
             delay = max(self._nanoseconds() - stamp, 0) * 1e-9
             pose = Pose(parent, position, rotation, stamp, now, delay)
             if known is not None:
@@ -115,6 +124,12 @@ class Frames:
             a, b, c = pose.position
             position, rotation = (a + x, b + y, c + z), _product(pose.rotation, rotation)
         return None
+
+
+def _is_pose(position: Triple, rotation: Rotation) -> bool:
+    """Tell whether a position is finite and a quaternion has a length near 1."""
+    square = sum(each * each for each in rotation)
+    return all(map(math.isfinite, position)) and _MIN_SQUARE < square < _MAX_SQUARE
 
 
 def _velocity(before: Pose, now: Pose) -> Triple:

@@ -16,7 +16,7 @@ from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.messages import Diagnostics, log_line
 from crazyflie_dashboard.page_state import IMAGES
 from crazyflie_dashboard.plots import VehiclePlots
-from crazyflie_dashboard.snapshot import Frame, LogLine, Scene, Sentence, Triple
+from crazyflie_dashboard.snapshot import Frame, LogLine, Scene, Sentence, Triple, VehicleSnapshot
 from crazyflie_dashboard.surroundings import Surroundings
 from crazyflie_dashboard.vehicle_model import VehicleModel, frame_of
 from crazyflie_utils import NodeHandle
@@ -69,6 +69,7 @@ class GraphModel:
         self._poll_at = 0.0
         self._known_frames = 0
         self._is_polling = False
+        self._trouble = ""  #: Why there is no newer graph.
 
     def begin(self) -> None:
         """Begin to look at the graph: a page is open."""
@@ -132,8 +133,10 @@ class GraphModel:
             return
         # Without a master what is known is shown, and grows old.
         if done.exception() is not None:
-            self._parent.warn(f"no graph: {done.exception()}", throttle=60.0)
+            self._trouble = f"no graph: {done.exception()}"
+            self._parent.warn(self._trouble, throttle=60.0)
             return
+        self._trouble = ""
         self.graph = done.result()
         self._update_vehicles(vehicles(self.graph), now)
         self._surroundings.follow(self.graph)
@@ -177,7 +180,7 @@ class GraphModel:
         own = {model.frame for model in self.models.values()} - {None}
         roots = [frames.root(str(frame)) for frame in own or frames.poses]
         fixed = max(sorted(set(roots)), key=roots.count, default="world")
-        snapshots = {name: model.snapshot(frames, fixed) for name, model in self.models.items()}
+        snapshots = {name: self._snapshot(name, fixed) for name in self.models}
         for name, plots in self.plots.items():
             if name in snapshots:
                 has_state = "state" in self.models[name].vehicle.topics
@@ -194,11 +197,29 @@ class GraphModel:
             fences=self._surroundings.fences,
             frames=tuple(others),
             paths={**self._surroundings.paths(frames, fixed), **self.paths},
-            sentences=self._diagnostics.sentences() + self.sentences,
+            sentences=self._own_sentences() + self._diagnostics.sentences() + self.sentences,
             log=tuple(self._log) if self._lines != _last(self.scene.log) else self.scene.log,
             images=tuple(sorted(t for t, kind in self.graph.topics.items() if kind in IMAGES)),
             missions=self.missions(),
         )
+
+    def _snapshot(self, name, fixed):
+        """Return what is known of a vehicle; one that cannot be drawn holds up no other."""
+        try:
+            return self.models[name].snapshot(self._frames, fixed)
+        except Exception as error:
+            self._parent.warn(f"{name} cannot be shown: {error}", throttle=10.0, key=name)
+            return VehicleSnapshot(name, state="cannot be shown", reason=str(error))
+
+    def _own_sentences(self):
+        found = []
+        if self._trouble:
+            remedy = "new vehicles are not seen, and those that are gone stay"
+            found.append(Sentence("error", "dashboard", self._trouble, remedy))
+        for frame in sorted(self._frames.rejected):
+            text = f"the newest pose of {frame} on /tf has no unit quaternion, or is not finite"
+            found.append(Sentence("error", "dashboard", text, "an older pose is shown"))
+        return tuple(found)
 
 
 def _last(log):

@@ -101,7 +101,11 @@ class View:
         flying = sum(each.is_in_flight for each in scene.vehicles.values())
         count = len(scene.vehicles)
         noun = "vehicle" if count == 1 else "vehicles"
-        self._summary.text = f"{count} {noun} · {flying} in flight · frame {scene.fixed_frame}"
+        trouble = next((f" · {s.text}" for s in scene.sentences if s.source == "dashboard"), "")
+        self._summary.text = (
+            f"{count} {noun} · {flying} in flight · frame {scene.fixed_frame}{trouble}"
+        )
+        self._summary.classes(add="bad" if trouble else "", remove="" if trouble else "bad")
         self._missions.text = " · ".join(scene.missions)
         self._stop.set_visibility(bool(scene.missions))
         self._show_control()

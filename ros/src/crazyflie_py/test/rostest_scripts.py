@@ -13,7 +13,7 @@ from pycrazyswarm import Crazyswarm
 swarm = Crazyswarm()
 cf1, cf2 = swarm.allcfs.crazyflies
 swarm.allcfs.takeoff(0.8, 2.0)
-swarm.timeHelper.sleep(2.5)
+swarm.timeHelper.sleep(4.0)
 print("bits", [cf.get_status()["supervisor"] for cf in (cf1, cf2)])
 print("height", round(cf1.position()[2], 1), "speed", round(abs(cf1.velocity()[0]), 1))
 swarm.allcfs.setParam("usd.logging", 1)

@@ -1,11 +1,12 @@
 """The age of states, by their stamps."""
 
+from crazyflie_utils.clock import CLOCK_STEP
+
 #: Clocks that differ by more than this, s, are not meant to agree: one of them is simulated, or is
 #: that of a bag.
 SAME_CLOCK = 60.0
 
 _DRIFT = 1e-3  #: By how much clocks that are not meant to agree may run apart, s/s.
-CLOCK_STEP = 0.02  #: A larger change of wall clock minus monotonic clock is a step, s.
 
 
 class StateAge:

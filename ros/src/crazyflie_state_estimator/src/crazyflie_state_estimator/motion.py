@@ -20,7 +20,7 @@ class Motion(NamedTuple):
 
 #: A larger change between wall clock and monotonic clock, or between the stamps of poses and their
 #: arrivals, is a step, s.
-CLOCK_STEP = 0.03
+STAMP_STEP = 0.03
 STEP_TIMEOUT = 0.5  #: How long after a step of the wall clock stamps may still step, s.
 
 
@@ -40,11 +40,11 @@ class ClockStepMonitor:
         """
         step = (stamp - self._stamp) - (time - self._time)
         self._stamp, self._time = stamp, time
-        if abs(step) <= CLOCK_STEP:
+        if abs(step) <= STAMP_STEP:
             return False
         # The pose may also have been delayed.
         offset = wall_clock(time) * 1e-9 - time
-        if abs(offset - self._offset) > CLOCK_STEP:
+        if abs(offset - self._offset) > STAMP_STEP:
             self._stepped_at = time
         self._offset = offset
         return time - self._stepped_at < STEP_TIMEOUT

@@ -3,11 +3,12 @@
 import math
 from typing import NamedTuple
 
+from crazyflie_utils.clock import CLOCK_STEP
+
 MAX_FEEDBACK_AGE = 0.2  #: Oldest state that controls the vehicle and its limits, s.
 MAX_POSITION_AGE = 0.5  #: Oldest position that counts as that of the vehicle, s.
 DRIFT = 0.1  #: Rate at which the usual age of messages may grow, s/s.
 MIN_AGE = -0.05  #: Least age of a message that is on time, by its stamp, s.
-CLOCK_STEP = 0.02  #: Change of wall clock minus monotonic clock that is a step, s.
 TOUCHDOWN_HEIGHT = 0.05  #: Largest height of a vehicle that is down where it took off, m.
 ON_GROUND_HEIGHT = 0.1  #: Largest height of a vehicle that has not been flown, m.
 TOUCHDOWN_SPEED = 0.1  #: Largest speed of a vehicle that is down, m/s.

@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import genpy
 
+CLOCK_STEP = 0.02  #: A larger change of wall clock minus monotonic clock is a step, s.
 _QUIET = 100_000  #: Two readings of clocks that are this close, in ns, were not interrupted.
 #: Wall clock and monotonic clock may drift apart by this, in ns, before stamps follow.
 _OFFSET_TOLERANCE = 1_000_000

@@ -1,5 +1,6 @@
 """Logging raises nothing when the disk is full or the screen is gone, and waits for no master."""
 
+import contextlib
 import logging
 
 import rospy
@@ -43,5 +44,8 @@ def log_without_master() -> None:
     rospy caches no parameter that is not set: it asked the master at each line, and waited for one
     that was frozen, in the middle of an emergency.
     """
-    value = rospy.get_param(_NO_TOPICS, False)
+    value = False
+    # A master that has just gone is in no process's way.
+    with contextlib.suppress(OSError):
+        value = rospy.get_param(_NO_TOPICS, False)
     paramserver.get_param_server_cache().set(_NO_TOPICS, value)

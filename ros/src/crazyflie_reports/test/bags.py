@@ -63,8 +63,11 @@ def steps(gap=()):
             yield number, float(time)
 
 
-def write_flight(bag, name="", gap=(), is_typed=True):
-    """Write the topics of a vehicle that flies (C++ workspace: without FlightStatus)."""
+def write_flight(bag, name="", gap=(), is_typed=True, tilt=0.0):
+    """Write the topics of a vehicle that flies (C++ workspace: without FlightStatus).
+
+    Its roll is commanded to +-``tilt`` (rad) in turn.
+    """
     top = f"/{name}" if name else ""
     for number, time in steps(gap):
         z, speed = height(time)
@@ -72,7 +75,8 @@ def write_flight(bag, name="", gap=(), is_typed=True):
         message = PositionVelocityYawStateStamped(header=header(time, number), state=state)
         bag.write(f"{top}/state", message, stamp(time))
         thrust = 9.81 if TAKEOFF <= time < LANDED else 0.0
-        control = ControlStamped(header=header(time, number), control=Control(thrust=thrust))
+        roll = tilt if number % 2 else -tilt
+        control = ControlStamped(header(time, number), Control(roll=roll, thrust=thrust))
         bag.write(f"{top}/control/final", control, stamp(time + DELAY))
     hover = PositionVelocityStateStamped(header(TAKEOFF), PositionVelocityState(z=1.0))
     bag.write(f"{top}/ref", hover, stamp(TAKEOFF))

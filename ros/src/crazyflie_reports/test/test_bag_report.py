@@ -59,6 +59,8 @@ EXPECTED = {
     "control rate": 100.0,
     "state gap, longest": 10.0,
     "states not recorded": 0.0,
+    "roll and pitch, mean change per control": 0.0,
+    "controls saturated": 0.0,
 }
 
 
@@ -75,6 +77,18 @@ def test_figures(run, compression, is_typed):
     phases = page(run.folder)[1]["recordings"][0]["flights"][0]["phases"]
     assert [each[0] for each in phases] == ["taking off", "flying", "landing"]
     assert phases[1][1] == pytest.approx(bags.FLYING - bags.TAKEOFF, abs=0.01)
+
+
+def test_restless_controls_are_not_normal(run):
+    bag = bags.flight_bag(run.folder / "a.bag", tilt=0.2618)
+    status, printed, (flight,) = run(bag)
+    assert status == 0
+    found = values(flight)
+    # Roll jumps from one limit to the other with each control, pitch stays.
+    assert found["roll and pitch, mean change per control"] == pytest.approx(0.2618, rel=1e-3)
+    assert found["controls saturated"] == pytest.approx(100.0)
+    assert "mean change per control 0.2618 rad (≤ 0.01 rad)" in printed
+    assert "controls saturated 100 % (≤ 1 %)" in printed
 
 
 def test_a_gap(run):

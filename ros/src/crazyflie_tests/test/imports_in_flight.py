@@ -9,22 +9,46 @@ import of each process in the output of roslaunch.
 import json
 import os
 import re
+import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
+
+import rosnode
 
 from crazyflie_demo.figure8 import figure8
 from crazyflie_mission_api import Fleet, Limits
 from crazyflie_utils.testing.launching import roslaunch
 
 _IMPORT = re.compile(r"^import time: +\d+ \| +\d+ \| +([\w.]+)", re.MULTILINE)
+_ENDED = re.compile(r"\[([\w/]+)-\d+\] process has finished cleanly")
 _LIMITS = Limits(speed=1.0, acceleration=1.5)  #: Those of the trajectory are below.
+_START_LIMIT = 60.0  #: The nodes have started after this time (s).
 _STARTED = {"rospy", "numpy"}  #: Each process has imported them when it is up.
 
 
 def imports(log: Path) -> list[str]:
     """Return what the processes have imported so far."""
     return _IMPORT.findall(log.read_text(errors="replace"))
+
+
+def ended(log: Path) -> list[str]:
+    """Return the nodes that have done their work and ended."""
+    return [f"/{name}" for name in _ENDED.findall(log.read_text(errors="replace"))]
+
+
+def wait_for_nodes(launch: list[str], log: Path) -> None:
+    """Wait until each node of a launch file has started, and so has imported its modules."""
+    listed = subprocess.run(
+        ["roslaunch", "--nodes", *launch], capture_output=True, text=True, check=True
+    )
+    missing = set(listed.stdout.split())
+    deadline = time.monotonic() + _START_LIMIT
+    while missing := missing - {*rosnode.get_node_names(), *ended(log)}:
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"after {_START_LIMIT} s {sorted(missing)} have not started")
+        time.sleep(0.1)
 
 
 def mission(fleet: Fleet) -> None:
@@ -42,6 +66,7 @@ def main(launch: list[str], names: list[str]) -> dict[str, list[str]]:
         os.environ["PYTHONPROFILEIMPORTTIME"] = "1"
         with roslaunch(launch, log), Fleet(names, limits=_LIMITS) as fleet:
             fleet.dry_run(mission)
+            wait_for_nodes(launch, log)
             before = imports(log)
             mission(fleet)
             after = imports(log)

@@ -55,9 +55,8 @@ def test_controller_is_the_one_asked_for(controller, dynamics):
     assert {f"/{name}" for name in classes} == set(nodes) - {"/robot_base_link_publisher"}
     for name, node_class in classes.items():
         node = nodes[f"/{name}"]
-        executable = Path(PACKAGES.get_path(node.package)) / "exec" / node.type
         path = f"{node_class.__module__}:{node_class.__name__}"
-        assert f'"{path}"' in executable.read_text()
+        assert launch_files.node_class(node) == path
 
 
 @pytest.mark.parametrize("controller", CLASSES)

@@ -30,9 +30,8 @@ def test_executables_and_classes_are_the_same_nodes(dynamics):
     assert {f"/{name}" for name in classes} == set(nodes) - {"/robot_base_link_publisher"}
     for name, node_class in classes.items():
         node = nodes[f"/{name}"]
-        executable = Path(PACKAGES.get_path(node.package)) / "exec" / node.type
         path = f"{node_class.__module__}:{node_class.__name__}"
-        assert f'"{path}"' in executable.read_text()
+        assert launch_files.node_class(node) == path
 
 
 @pytest.mark.parametrize("estimator_filter", ["finite_difference", "kalman"])

@@ -3,13 +3,16 @@
 This reads what CMake has written for the built workspace; test_install_space.py installs a copy.
 """
 
+import os
 import re
 import runpy
 from pathlib import Path
 
 import pytest
 import setuptools
-from workspaces import INSTALLED, TOP, code_of, data_of
+from workspaces import INSTALLED, TOP, code_of, data_of, programs_of
+
+from crazyflie_utils.program import load
 
 ROS = TOP / "ros"
 RULE = re.compile(
@@ -39,7 +42,9 @@ def rules_of(package):
 @pytest.mark.parametrize("package", INSTALLED)
 def test_programs_and_data_are_installed(package):
     rules = rules_of(package)
-    for source in INSTALLED[package].glob("exec/*"):
+    built = {name: ROS / "devel" / "lib" / package / name for name in programs_of(package)}
+    for source in (*INSTALLED[package].glob("exec/*"), *built.values()):
+        assert os.access(source, os.X_OK)
         kind, program = rules[Path("lib", package, source.name)]
         assert kind == "PROGRAM"
         # catkin chooses the interpreter.
@@ -47,6 +52,12 @@ def test_programs_and_data_are_installed(package):
     for name, source in data_of(package):
         _, file = rules[Path("share", package, name)]
         assert file.read_bytes() == source.read_bytes()
+
+
+@pytest.mark.parametrize("package", [name for name in INSTALLED if programs_of(name)])
+def test_programs_call_what_exists(package):
+    for name, path in programs_of(package).items():
+        assert callable(load(path)), f"{name} calls {path}"
 
 
 @pytest.mark.parametrize("package", INSTALLED)

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 import pytest
-from workspaces import FAST, FLY, INSTALLED, code_of, data_of
+from workspaces import FAST, FLY, INSTALLED, TOP, code_of, data_of, programs_of
 
 INSPECT = Path(__file__).with_name("inspect_install.py")
 
@@ -74,7 +74,8 @@ def test_users_scripts_find_their_modules(terminal):
 @pytest.mark.parametrize("package", INSTALLED)
 def test_programs_and_data_are_installed(package, install_space):
     programs = {path.name: path for path in (install_space / "lib" / package).glob("*")}
-    for source in INSTALLED[package].glob("exec/*"):
+    built = [TOP / "ros" / "devel" / "lib" / package / name for name in programs_of(package)]
+    for source in (*INSTALLED[package].glob("exec/*"), *built):
         assert source.name in programs
         assert os.access(programs[source.name], os.X_OK)
         # catkin chooses the interpreter.

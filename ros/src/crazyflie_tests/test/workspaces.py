@@ -1,6 +1,7 @@
 """Copies of the workspace and shells to use them with."""
 
 import os
+import re
 import shutil
 import socket
 from collections.abc import Iterator
@@ -77,6 +78,12 @@ def clean_environment(home: Path) -> dict[str, str]:
         "ROS_IP": "127.0.0.1",
         "ROS_MASTER_URI": f"http://127.0.0.1:{free_port(socket.SOCK_STREAM)}",
     }
+
+
+def programs_of(package: str) -> dict[str, str]:
+    """Return the programs that CMake makes for a package, and "package.module:name" they call."""
+    text = (INSTALLED[package] / "CMakeLists.txt").read_text()
+    return dict(re.findall(r"^crazyflie_add_program\((\S+)\s+([\w.]+:\w+)", text, re.MULTILINE))
 
 
 def code_of(script: Path) -> str:

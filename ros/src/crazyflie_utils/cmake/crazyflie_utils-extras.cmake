@@ -1,3 +1,39 @@
+# Make a program of this package that calls what is named as package.module:name, and install it.
+#
+# :param name: file name of the program
+# :param callable: the function, for crazyflie_utils.run_program
+# :param NODE: name of the node, unless the launch file gives another; the callable is its class
+# :param NODES: the same for a process whose nodes the function returns, see crazyflie_utils.run_nodes
+# :param DESTINATION: in the place of CATKIN_PACKAGE_BIN_DESTINATION
+function(crazyflie_add_program name callable)
+  cmake_parse_arguments(program "" "NODE;NODES;DESTINATION" "" ${ARGN})
+  if(program_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "crazyflie_add_program(${name}): ${program_UNPARSED_ARGUMENTS} has no meaning")
+  endif()
+  if(program_NODE)
+    set(call "run(\"${callable}\", \"${program_NODE}\")")
+  elseif(program_NODES)
+    set(call "run_nodes(\"${program_NODES}\", \"${callable}\")")
+  else()
+    set(call "run_program(\"${callable}\")")
+  endif()
+  string(REGEX MATCH "^[a-z_]+" function "${call}")
+  set(code "from crazyflie_utils import ${function}\n\n${call}\n")
+  set(destination ${CATKIN_PACKAGE_BIN_DESTINATION})
+  if(program_DESTINATION)
+    set(destination ${program_DESTINATION})
+  endif()
+  # The interpreters are those of catkin_install_python.
+  set(in_devel "${CATKIN_DEVEL_PREFIX}/${destination}/${name}")
+  file(CONFIGURE OUTPUT "${in_devel}" CONTENT "#!${PYTHON_EXECUTABLE}\n${code}" @ONLY)
+  file(CHMOD "${in_devel}" PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE
+    GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+  get_filename_component(python "${PYTHON_EXECUTABLE}" NAME)
+  set(installed "${CMAKE_CURRENT_BINARY_DIR}/catkin_generated/installspace/${name}")
+  file(CONFIGURE OUTPUT "${installed}" CONTENT "#!/usr/bin/env ${python}\n${code}" @ONLY)
+  install(PROGRAMS "${installed}" DESTINATION ${destination})
+endfunction()
+
 # Run the unit tests (test_*.py) of a folder or a file with pytest, as part of
 # run_tests. catkin itself knows nose only.
 #

@@ -1,13 +1,12 @@
 """The launch files, expanded by roslaunch without a master; every node takes its parameters."""
 
 import functools
-import importlib
-import re
 from pathlib import Path
 
 import pytest
-import rospkg
 
+from crazyflie_demo.trajectory_flight_node import TrajectoryFlightNode
+from crazyflie_utils.program import load
 from crazyflie_utils.testing import FakeProcess, launch_files
 from mocap_optitrack.mocap_node import MocapNode
 
@@ -204,11 +203,9 @@ def tree(parameters, prefix):
 
 def node_class(node):
     """Return the class that an executable runs."""
-    package = Path(rospkg.RosPack().get_path(node.package))
-    text = (package / "exec" / node.type).read_text()
-    # In quotes, or imported, where the command line decides.
-    module, name = re.search(r"(crazyflie_\w+\.\w+)(?::| import )(\w+)", text).groups()
-    return getattr(importlib.import_module(module), name)
+    if node.type == "execute_trajectory.py":
+        return TrajectoryFlightNode
+    return load(launch_files.node_class(node))
 
 
 @pytest.mark.parametrize("file", [path.name for path in LAUNCH_FILES])

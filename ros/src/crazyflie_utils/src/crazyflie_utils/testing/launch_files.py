@@ -1,11 +1,13 @@
 """Expands launch files as roslaunch does, without a master."""
 
+import re
 from pathlib import Path
 from unittest.mock import patch
 
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.core import Node
 from roslaunch.xmlloader import XmlLoader
+from roslib.packages import find_node
 
 
 def expand(path: Path, **arguments: object) -> tuple[dict[str, Node], dict[str, object]]:
@@ -30,3 +32,14 @@ def composed_nodes(parameters: dict[str, object]) -> dict[str, str]:
         for name, value in parameters.items()
         if name.startswith(listed)
     }
+
+
+def node_class(node: Node) -> str:
+    """Return the "package.module:Class" that a node's program runs; ValueError for other programs.
+
+    The program is one of `crazyflie_add_program`, and the only one of its name.
+    """
+    [program] = find_node(node.package, node.type)
+    if found := re.search(r'^run\("([\w.]+:\w+)"', Path(program).read_text(), re.MULTILINE):
+        return found[1]
+    raise ValueError(f"{program} is not made by crazyflie_add_program with NODE")

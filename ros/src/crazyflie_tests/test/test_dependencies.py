@@ -176,7 +176,7 @@ FLIGHTS = {
     "virtual_hw_hover": (
         ["demo", "vehicles"],
         {"composed": True},
-        ["crazyflie_driver.server_node", "crazyflie_virtual.server_node"],
+        ["crazyflie_driver.server_node", "crazyflie_virtual.nodes"],
     ),
     "sw_swarm": (
         ["demo", "vehicles"],

@@ -117,7 +117,6 @@ IN_FUNCTIONS = {
     "crazyflie_mission_api/__init__.py",
     # Chosen by the command line: a node, or a program that does without ROS.
     "crazyflie_py/crazyswarm_py.py",
-    "crazyflie_virtual/main.py",
     # Optional: pictures, pages, schedulers and motion capture that may not be installed.
     "crazyflie_batch/monte_carlo_command.py",
     "crazyflie_dashboard/dashboard_node.py",

@@ -26,8 +26,8 @@ from cflib.crazyflie.mem import Poly4D
 from virtual_bench import Bench, cflib_client, generic
 
 from crazyflie_model.angles import zyx_from_quaternion
-from crazyflie_virtual.body.physics import STEP
-from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.body import STEP
+from crazyflie_virtual.crtp import Port
 
 MOMENT = 0.06
 """s."""

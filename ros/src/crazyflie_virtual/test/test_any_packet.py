@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from virtual_bench import Bench, attitude
 
-from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual.crtp import Packet, Port
 
 FLOATS = st.floats(width=32)
 PORTS = st.sampled_from(list(Port))

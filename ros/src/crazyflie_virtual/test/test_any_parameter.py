@@ -9,9 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from virtual_bench import Bench, attitude
 
-from crazyflie_virtual.link.crtp import Packet, Port
-from crazyflie_virtual.tables.number_types import FLOAT
-from crazyflie_virtual.tables.parameter_table import parameter_specs
+from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.parameters import parameter_specs
+from crazyflie_virtual.toc import FLOAT
 
 SPECS = parameter_specs()
 NAMES = [f"{spec.group}.{spec.name}" for spec in SPECS]

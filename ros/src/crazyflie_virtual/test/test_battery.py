@@ -2,8 +2,8 @@
 
 import pytest
 
-from crazyflie_virtual.body.battery import LOW_CHARGE, Battery, open_circuit_voltage
-from crazyflie_virtual.firmware.power import LOW, ON_BATTERY, PowerMonitor
+from crazyflie_virtual.body import LOW_CHARGE, Battery, open_circuit_voltage
+from crazyflie_virtual.firmware.supervisor import LOW, ON_BATTERY, PowerMonitor
 
 
 def drained(battery, duration, load, dt=0.1):

@@ -9,11 +9,11 @@ from cflib.utils.power_switch import PowerSwitch
 from virtual_client import LIMIT, Client
 
 from crazyflie_utils.testing.waiting import wait_until
-from crazyflie_virtual.firmware.supervisor_states import State
-from crazyflie_virtual.link.server import VehicleServer
+from crazyflie_virtual.firmware.supervisor import State
+from crazyflie_virtual.log import log_variables
+from crazyflie_virtual.parameters import parameter_specs
+from crazyflie_virtual.server import VehicleServer
 from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings
-from crazyflie_virtual.tables.log_table import log_variables
-from crazyflie_virtual.tables.parameter_table import parameter_specs
 
 
 @pytest.fixture

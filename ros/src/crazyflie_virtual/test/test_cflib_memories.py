@@ -11,9 +11,9 @@ from cflib.utils.multiranger import Multiranger
 from virtual_client import LIMIT, Client
 
 from crazyflie_utils.testing.waiting import wait_until
-from crazyflie_virtual.link.server import VehicleServer
+from crazyflie_virtual.memory import LighthouseMemory
+from crazyflie_virtual.server import VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
-from crazyflie_virtual.tables.memories import LighthouseMemory
 
 
 @pytest.fixture(scope="module")

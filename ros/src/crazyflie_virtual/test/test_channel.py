@@ -5,8 +5,8 @@ import random
 
 import pytest
 
-from crazyflie_virtual.faults import FaultSwitches
-from crazyflie_virtual.link.channel import Channel
+from crazyflie_virtual.server import Channel
+from crazyflie_virtual.settings import FaultSwitches
 
 
 def channel(**faults):

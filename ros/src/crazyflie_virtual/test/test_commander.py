@@ -8,9 +8,9 @@ import pytest
 from virtual_bench import SETPOINTS_STOP, Bench, attitude, generic
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_virtual.body.physics import STEP
-from crazyflie_virtual.firmware.supervisor_states import State
-from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.body import STEP
+from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.firmware.supervisor import State
 
 HOLD = generic(7, "ffff", 0.0, 0.0, 1.0, 0.0)
 LAND = struct.pack("<BBff?f", 8, 0, 0.0, 0.0, False, 2.0)

@@ -8,7 +8,7 @@ from cflib.crazyflie.mem import CompressedSegment, CompressedStart
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_virtual.firmware.compressed_trajectory import read_compressed
+from crazyflie_virtual.firmware.planner import read_compressed
 
 POINT = st.floats(-3.0, 3.0)
 CURVE = st.sampled_from([0, 1, 3, 7]).flatmap(lambda n: st.lists(POINT, min_size=n, max_size=n))

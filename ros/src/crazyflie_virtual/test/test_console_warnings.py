@@ -5,8 +5,8 @@ import struct
 import pytest
 from virtual_bench import Bench
 
-from crazyflie_virtual.link.crtp import Port
-from crazyflie_virtual.tables.parameter_table import parameter_specs
+from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.parameters import parameter_specs
 
 NAMES = [f"{spec.group}.{spec.name}" for spec in parameter_specs()]
 

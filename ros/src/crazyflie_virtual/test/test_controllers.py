@@ -5,10 +5,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_model.pid import Gains
-from crazyflie_virtual.body.sensors import Sensors
-from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
-from crazyflie_virtual.firmware.pid import FirmwarePid
-from crazyflie_virtual.firmware.position import PositionController
+from crazyflie_virtual.body import Sensors
+from crazyflie_virtual.firmware.controllers import (
+    AttitudeController,
+    FirmwarePid,
+    PositionController,
+    wrap_degrees,
+)
 from crazyflie_virtual.firmware.stabilizer import MELLINGER, Stabilizer
 from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Estimate, Modes, Setpoint
 

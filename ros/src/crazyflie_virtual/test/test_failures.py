@@ -12,7 +12,7 @@ from virtual_client import LIMIT, Client
 
 from crazyflie_utils.testing.programs import free_port
 from crazyflie_utils.testing.waiting import wait_until
-from crazyflie_virtual.firmware.supervisor_states import State
+from crazyflie_virtual.firmware.supervisor import State
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ import pytest
 from virtual_bench import Bench, command
 
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_virtual.crtp import Port
 from crazyflie_virtual.firmware.planner import REFUSED
-from crazyflie_virtual.link.crtp import Port
 
 
 @pytest.fixture

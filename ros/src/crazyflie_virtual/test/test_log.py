@@ -6,10 +6,9 @@ import struct
 import pytest
 from virtual_bench import Bench
 
-from crazyflie_virtual.link.crtp import Port
-from crazyflie_virtual.ports.log import packed
-from crazyflie_virtual.tables.log_table import log_variables
-from crazyflie_virtual.tables.number_types import FLOAT, I16, LOG_TYPES, U16
+from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.log import log_variables, packed
+from crazyflie_virtual.toc import FLOAT, I16, LOG_TYPES, U16
 
 TABLE, CONTROL, DATA = 0, 1, 2
 

@@ -6,9 +6,8 @@ import threading
 import pytest
 from natnet import NatNetClient
 
-from crazyflie_virtual.link.server import VehicleServer
-from crazyflie_virtual.mocap.server import MocapServer
-from crazyflie_virtual.mocap.settings import MocapSettings
+from crazyflie_virtual.mocap import MocapServer, MocapSettings
+from crazyflie_virtual.server import VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
 
 LIMIT = 60.0

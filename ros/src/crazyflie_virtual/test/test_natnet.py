@@ -12,9 +12,9 @@ from natnet.server_info import ServerInfo
 from natnet.version import Version
 from scipy.spatial.transform import Rotation
 
-from crazyflie_virtual.mocap import natnet
-from crazyflie_virtual.mocap.natnet import BodyPose, Encoder
-from crazyflie_virtual.mocap.scene import MocapSwitches, Scene
+from crazyflie_virtual import natnet
+from crazyflie_virtual.mocap import MocapSwitches, Scene
+from crazyflie_virtual.natnet import BodyPose, Encoder
 from crazyflie_virtual.observer import Observation
 
 BODIES = [

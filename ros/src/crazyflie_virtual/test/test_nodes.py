@@ -9,8 +9,7 @@ from tf2_msgs.msg import TFMessage
 
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_virtual.mocap.mocap_node import VirtualMocapNode
-from crazyflie_virtual.vehicle_node import VirtualCrazyflieNode
+from crazyflie_virtual.nodes import VirtualCrazyflieNode, VirtualMocapNode
 
 LIMIT = 60.0
 QUIET = {"port": 0, "observer/port": 0}

@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from crazyflie_virtual.link.server import VehicleServer
 from crazyflie_virtual.observer import Observation, decode
+from crazyflie_virtual.server import VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
 
 LIMIT = 60.0

@@ -7,9 +7,9 @@ import struct
 import pytest
 from virtual_bench import Bench
 
-from crazyflie_virtual.link.crtp import Port
-from crazyflie_virtual.tables.number_types import FLOAT, PARAMETER_CODES, U8
-from crazyflie_virtual.tables.parameter_table import parameter_specs
+from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.parameters import parameter_specs
+from crazyflie_virtual.toc import FLOAT, PARAMETER_CODES, U8
 
 TABLE, READ, WRITE, MISC = 0, 1, 2, 3
 READ_ONLY, EXTENDED = 0x40, 0x10

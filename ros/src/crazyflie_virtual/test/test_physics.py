@@ -5,9 +5,7 @@ import pytest
 
 from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_model.units import GRAVITY, HOVER_PWM
-from crazyflie_virtual.body.battery import FULL_VOLTAGE
-from crazyflie_virtual.body.physics import STEP, Physics
-from crazyflie_virtual.body.sensors import Sensors
+from crazyflie_virtual.body import FULL_VOLTAGE, STEP, Physics, Sensors
 
 
 def fly(physics, commands, duration, voltage=FULL_VOLTAGE):

@@ -8,9 +8,9 @@ import pytest
 from virtual_bench import Bench
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.parameters import parameter_specs
 from crazyflie_virtual.settings import VehicleSettings
-from crazyflie_virtual.tables.parameter_table import parameter_specs
 from crazyflie_virtual.vehicle import VirtualVehicle
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_virtual.link.radio import (
+from crazyflie_virtual.radio import (
     BROADCAST_GAP,
     ROUND_TRIP,
     SETUP_REQUEST,

@@ -6,9 +6,8 @@ import pytest
 from virtual_bench import Bench
 
 from crazyflie_utils import ParameterError
-from crazyflie_virtual.body.physics import Physics
-from crazyflie_virtual.body.ranging import NOTHING, RangingSensors
-from crazyflie_virtual.tables.log_table import log_variables
+from crazyflie_virtual.body import NOTHING, Physics, RangingSensors
+from crazyflie_virtual.log import log_variables
 
 SIDES = ("front", "back", "left", "right", "up")
 

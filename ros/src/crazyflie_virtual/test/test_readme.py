@@ -4,8 +4,8 @@ from pathlib import Path
 
 from test_cflib_examples import OTHERS, RUNNING
 
-from crazyflie_virtual.tables.log_table import log_variables
-from crazyflie_virtual.tables.parameter_table import parameter_specs
+from crazyflie_virtual.log import log_variables
+from crazyflie_virtual.parameters import parameter_specs
 
 README = (Path(__file__).parent.parent / "README.md").read_text()
 

@@ -7,7 +7,7 @@ from flight_recorder import HEIGHT, MOMENT, PEAK, Flight
 from recording import recorded
 from virtual_bench import attitude
 
-from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.crtp import Port
 
 ARM, RECOVER, EMERGENCY_STOP, WATCHDOG = 1, 2, 3, 4
 

@@ -9,7 +9,7 @@ from flight_recorder import HEIGHT, NEAR, PEAK, TURN, CommandedFlight, circle, p
 from recording import recorded
 from virtual_bench import SETPOINTS_STOP, attitude, generic
 
-from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.crtp import Port
 from crazyflie_virtual.quaternions import compress_quaternion
 
 SLACK = 0.05

@@ -13,7 +13,7 @@ from recording import recorded
 from virtual_bench import attitude, generic
 
 from crazyflie_model.angles import quaternion_from_zyx, zyx_from_quaternion
-from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.crtp import Port
 from crazyflie_virtual.quaternions import compress_quaternion
 
 HOVER_PWM = 42000

@@ -7,7 +7,7 @@ from flight_recorder import HEIGHT, PEAK, PWM, Flight, position
 from recording import recorded
 from virtual_bench import SETPOINTS_STOP, attitude, generic
 
-from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.crtp import Port
 
 HOVER = position(0.0, 0.0, 0.6)
 

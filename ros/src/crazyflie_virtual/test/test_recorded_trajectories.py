@@ -12,7 +12,7 @@ import pytest
 from flight_recorder import NEAR, CommandedFlight, circle
 from recording import recorded
 
-from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.crtp import Port
 
 
 def test_go_to():

@@ -7,9 +7,9 @@ import pytest
 from recording import recorded
 from virtual_bench import Bench
 
-from crazyflie_virtual.link.crtp import Port
-from crazyflie_virtual.tables.log_table import log_variables
-from crazyflie_virtual.tables.parameter_table import parameter_specs
+from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.log import log_variables
+from crazyflie_virtual.parameters import parameter_specs
 
 TABLE, READ, WRITE, MISC = 0, 1, 2, 3
 CONTROL, DATA = 1, 2

@@ -6,9 +6,9 @@ import struct
 import pytest
 from virtual_bench import Bench, attitude, cflib_client, generic
 
+from crazyflie_virtual.crtp import Port
 from crazyflie_virtual.firmware.setpoints import decode_generic
 from crazyflie_virtual.firmware.states import ABSOLUTE, DISABLED, VELOCITY
-from crazyflie_virtual.link.crtp import Port
 
 
 def sent_by_cflib(method, *arguments, protocol=12):

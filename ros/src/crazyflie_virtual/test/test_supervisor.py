@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from crazyflie_virtual.firmware.states import DISABLED, VELOCITY, Modes, Setpoint
-from crazyflie_virtual.firmware.supervisor import Supervisor
-from crazyflie_virtual.firmware.supervisor_states import TRANSITIONS, State
+from crazyflie_virtual.firmware.supervisor import TRANSITIONS, State, Supervisor
 
 PERIOD = 0.04
 

@@ -9,7 +9,7 @@ from cflib.crazyflie.high_level_commander import HighLevelCommander
 from cflib.crazyflie.mem import CompressedSegment, CompressedStart, Poly4D
 from virtual_bench import Bench, cflib_client, command
 
-from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.crtp import Port
 
 
 @pytest.fixture

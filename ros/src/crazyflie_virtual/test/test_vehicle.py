@@ -7,9 +7,8 @@ import pytest
 from virtual_bench import Bench, attitude, generic
 
 from crazyflie_model.units import HOVER_PWM
-from crazyflie_virtual.firmware.power import LOW
-from crazyflie_virtual.firmware.supervisor_states import State
-from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.firmware.supervisor import LOW, State
 
 HOLD = generic(7, "ffff", 0.0, 0.0, 1.0, 0.0)
 EMERGENCY_STOPS = {

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_virtual.link.crtp import Packet, decode
-from crazyflie_virtual.tables.number_types import (
+from crazyflie_virtual.crtp import Packet, decode
+from crazyflie_virtual.toc import (
     FLOAT,
     FP16,
     I8,
@@ -18,8 +18,8 @@ from crazyflie_virtual.tables.number_types import (
     U8,
     U16,
     U32,
+    Table,
 )
-from crazyflie_virtual.tables.toc import Table
 
 
 def test_header_is_port_reserved_bits_channel():

@@ -5,8 +5,8 @@ from unittest.mock import MagicMock
 
 from cflib.crazyflie import Crazyflie
 
-from crazyflie_virtual.link import crtp
-from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual import crtp
+from crazyflie_virtual.crtp import Packet, Port
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
 

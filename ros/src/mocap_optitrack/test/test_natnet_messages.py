@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_virtual.mocap.natnet import VERSIONS, BodyPose, Encoder
+from crazyflie_virtual.natnet import VERSIONS, BodyPose, Encoder
 from mocap_optitrack import natnet_messages as natnet
 from mocap_optitrack.frames import Body
 

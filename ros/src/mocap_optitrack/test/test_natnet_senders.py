@@ -9,7 +9,7 @@ import pytest
 from natnet_connection import GROUP, LIMIT, connection, is_named, server, wait_for_frame
 
 from crazyflie_utils.testing.programs import free_port
-from crazyflie_virtual.mocap import natnet
+from crazyflie_virtual import natnet
 from mocap_optitrack import natnet_source as module
 from mocap_optitrack.natnet_source import NatNetSource
 from mocap_optitrack.parameters import NatNetParameters

@@ -11,10 +11,9 @@ import pytest
 from natnet_connection import GROUP, LIMIT, connection, is_named, see, server, wait_for_frame
 
 from crazyflie_utils.testing.programs import free_port
-from crazyflie_virtual.mocap import natnet
-from crazyflie_virtual.mocap.natnet import VERSIONS
-from crazyflie_virtual.mocap.server import MocapServer
-from crazyflie_virtual.mocap.settings import MocapSettings
+from crazyflie_virtual import natnet
+from crazyflie_virtual.mocap import MocapServer, MocapSettings
+from crazyflie_virtual.natnet import VERSIONS
 from mocap_optitrack import natnet_source as module
 from mocap_optitrack.natnet_source import NatNetSource
 from mocap_optitrack.parameters import NatNetParameters

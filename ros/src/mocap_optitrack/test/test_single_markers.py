@@ -8,8 +8,8 @@ from std_srvs.srv import TriggerRequest
 from swarm_scenes import RATE, SwapFlight, fly
 from test_mocap_node import launch, refusal
 
-from crazyflie_virtual.mocap.natnet import Encoder
-from crazyflie_virtual.mocap.scene import MocapSwitches, Scene
+from crazyflie_virtual.mocap import MocapSwitches, Scene
+from crazyflie_virtual.natnet import Encoder
 from crazyflie_virtual.observer import Observation
 from mocap_optitrack import natnet_messages
 from mocap_optitrack.frames import Frame

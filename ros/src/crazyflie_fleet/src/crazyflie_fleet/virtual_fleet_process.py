@@ -4,8 +4,7 @@ from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_fleet.mocap_process import bodies
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import Integer, Number
-from crazyflie_virtual.mocap.mocap_node import VirtualMocapNode
-from crazyflie_virtual.vehicle_node import VirtualCrazyflieNode
+from crazyflie_virtual.nodes import VirtualCrazyflieNode, VirtualMocapNode
 from mocap_optitrack.mocap_node import MocapNode
 
 _UDP_PORT = Integer(1, 65535)

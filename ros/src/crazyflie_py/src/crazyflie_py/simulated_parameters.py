@@ -8,12 +8,10 @@ from typing import Protocol
 
 from crazyflie_model.angles import Triple
 from crazyflie_py.backend import DEFAULT_COLOR
-from crazyflie_virtual.body.physics import Physics
-from crazyflie_virtual.faults import FaultSwitches
+from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.firmware import Firmware
-from crazyflie_virtual.ports.parameters import Parameter
-from crazyflie_virtual.settings import VehicleSettings
-from crazyflie_virtual.tables.parameter_table import parameter_specs
+from crazyflie_virtual.parameters import Parameter, parameter_specs
+from crazyflie_virtual.settings import FaultSwitches, VehicleSettings
 
 _log = logging.getLogger(__name__)
 

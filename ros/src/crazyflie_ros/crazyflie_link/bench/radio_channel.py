@@ -5,7 +5,7 @@ Run it in a shell that has sourced the workspace:
 
     python3 ros/src/crazyflie_ros/crazyflie_link/bench/radio_channel.py
 
-Both are calculated in simulated time with the model of a channel in crazyflie_virtual.link.radio,
+Both are calculated in simulated time with the model of a channel in crazyflie_virtual.radio,
 which names its sources; the skew with virtual vehicles that miss some of the packets. Nothing is
 asserted.
 """
@@ -15,8 +15,7 @@ import struct
 
 from crazyflie_link.broadcast import REPEAT_PERIOD, REPEATS
 from crazyflie_link.packed_poses import POSES_PER_PACKET, POSITIONS_PER_PACKET
-from crazyflie_virtual.link.radio import Load, RadioChannel, usage
-from crazyflie_virtual.link.radio_swarm import RadioSwarm
+from crazyflie_virtual.radio import Load, RadioChannel, RadioSwarm, usage
 
 TAKEOFF = bytes([8 << 4]) + struct.pack("<BBff?f", 7, 0, 1.0, 0.0, True, 2.0)
 #: Vehicles per packet, and bytes of it with its header.

@@ -6,8 +6,7 @@ import pytest
 
 from crazyflie_link.broadcast import REPEAT_PERIOD, REPEATS
 from crazyflie_link.packed_poses import pack
-from crazyflie_virtual.link.radio import RadioChannel
-from crazyflie_virtual.link.radio_swarm import RadioSwarm
+from crazyflie_virtual.radio import RadioChannel, RadioSwarm
 
 VEHICLES = 20
 TAKEOFF = bytes([8 << 4]) + struct.pack("<BBff?f", 7, 0, 1.0, 0.0, True, 2.0)

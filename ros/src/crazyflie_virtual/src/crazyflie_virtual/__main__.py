@@ -1,5 +1,5 @@
 """``python -m crazyflie_virtual``."""
 
-from crazyflie_virtual.main import virtual_crazyflie
+from crazyflie_virtual.server import virtual_crazyflie
 
 virtual_crazyflie()

@@ -1,11 +1,32 @@
-"""What both servers of this package share: UDP sockets, and a thread if wanted."""
+"""The virtual vehicle on a UDP port, in real time.
+
+`Server` and `run_server` are also those of the virtual motion capture system.
+"""
 
 import contextlib
+import math
+import random
+import select
+import signal
 import socket
+import sys
 import threading
+import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
+from random import Random
 from typing import Any
+
+from typing_extensions import override
+
+import crazyflie_utils
+from crazyflie_utils.parameters.command_line import parse_arguments
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters
+from crazyflie_virtual.crtp import is_broadcast
+from crazyflie_virtual.observer import Observation
+from crazyflie_virtual.settings import FIRST_PORT, FaultSwitches, VehicleSettings
+from crazyflie_virtual.vehicle import VirtualVehicle
 
 Address = tuple[str, int]  #: Host and port.
 _BURST = 256  #: Datagrams taken in at one time, so that a flood does not stop everything else.
@@ -77,3 +98,181 @@ def send(source: socket.socket, datagram: bytes, receiver: Address) -> None:
     """Send a datagram; one that the network does not take is one that is lost."""
     with contextlib.suppress(OSError):
         source.sendto(datagram, receiver)
+
+
+Item = tuple[bytes, Address]  #: Datagram, and its sender or receiver.
+
+
+class Channel:
+    """Datagrams on their way; ``random`` decides which are lost."""
+
+    def __init__(self, faults: FaultSwitches, random: Random):
+        self._faults = faults
+        self._random = random
+        self._on_the_way: deque[tuple[float, Item]] = deque()
+
+    def push(self, time: float, item: Item) -> None:
+        """Send something at ``time`` (s)."""
+        faults = self._faults
+        if faults.silence > 0.0 or self._random.random() < faults.loss:
+            return
+        due = time + max(faults.delay, 0.0)
+        if self._on_the_way:
+            # Nothing overtakes, also when the delay has become shorter.
+            due = max(due, self._on_the_way[-1][0])
+        self._on_the_way.append((due, item))
+
+    def pop(self, time: float) -> list[Item]:
+        """Return what has arrived at ``time`` (s), oldest first."""
+        arrived = []
+        while self._on_the_way and self._on_the_way[0][0] <= time:
+            arrived.append(self._on_the_way.popleft()[1])
+        return [] if self._faults.silence > 0.0 else arrived
+
+    def next_arrival(self) -> float:
+        """Return when the next one arrives, s; infinity when there is none."""
+        return self._on_the_way[0][0] if self._on_the_way else math.inf
+
+
+def run_server(
+    program: str,
+    description: str,
+    settings_type: type[Parameters],
+    server_type: Callable[..., Server],
+    node_type: str,
+) -> None:
+    """Run a server until interrupted: with ROS when roslaunch starts it, without otherwise.
+
+    ``node_type`` is the "package.module:Class" of the node. The command line has the settings.
+    """
+    # roslaunch gives every node its name this way; parameters for rosrun look alike.
+    if any(":=" in argument for argument in sys.argv[1:]):
+        crazyflie_utils.run(node_type, program)
+    settings = parse_arguments(settings_type, sys.argv[1:], program, description)
+    try:
+        server = server_type(settings, lambda text: print(text, file=sys.stderr, flush=True))
+    except OSError as error:
+        sys.exit(f"{program}: cannot listen: {error}")
+    except ParameterError as error:
+        sys.exit(f"{program}: {error}")
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    print(server.description, flush=True)
+    try:
+        server.run()
+    except KeyboardInterrupt:
+        # Ctrl-C is how it ends.
+        pass
+
+
+_TICK = 0.005  #: How long the vehicle may be behind the clock when nothing happens, s.
+#: What is simulated at once, s; beyond that the vehicle loses time instead of its link.
+_GREATEST_LAG = 0.25
+_NULL = b"\xff"  #: What a scanner sends: it is no client.
+
+
+class VehicleServer(Server):
+    """A vehicle behind a socket; OSError if the port is taken.
+
+    ``warn(text)`` is called when the vehicle cannot keep up with the clock.
+    """
+
+    def __init__(self, settings: VehicleSettings, warn: Callable[[str], None] = lambda text: None):
+        self._socket = open_socket(settings.host, settings.port)
+        super().__init__(self._socket)
+        self.address = self._socket.getsockname()  #: Host and port.
+        self._warn = warn
+        self.vehicle = VirtualVehicle(settings)
+        self.switches = self.vehicle.faults
+        source = random.Random(settings.seed)
+        self._up = Channel(self.vehicle.faults, source)
+        self._down = Channel(self.vehicle.faults, source)
+        self._client: Address | None = None
+        self._begin = self._last_time = time.monotonic()
+        self._observer = (settings.observer_host, settings.observer_port)
+        self._observation_period = 1.0 / settings.observer_rate
+        self._next_observation = self._begin
+        self._observed = -math.inf  # Time of the vehicle at the last observation, s.
+        number = _number(self.address[1])
+        self._body_id = settings.body_id or number
+        self._body_name = settings.body_name or f"cf{number}"
+
+    @property
+    @override
+    def description(self) -> str:
+        host, port = self.address
+        return f"virtual Crazyflie at udp://{host}:{port}"
+
+    @override
+    def serve(self) -> None:
+        datagrams = list(received(self._socket))
+        # What has been received was sent before now.
+        now = time.monotonic()
+        self._process(now, datagrams)
+        arrival = min(self._up.next_arrival(), self._down.next_arrival())
+        wake = min(now - (now - self._begin) % _TICK + _TICK, arrival)
+        select.select([self._socket], [], [], max(0.0, wake - time.monotonic()))
+
+    def observe(self) -> Observation:
+        """Return the truth about the vehicle, as of now."""
+        physics = self.vehicle.physics
+        return Observation(
+            self._body_id,
+            self._body_name,
+            self._begin + self.vehicle.time,
+            physics.position,
+            physics.velocity,
+            physics.quaternion,
+            physics.rates,
+        )
+
+    def _process(self, now, datagrams):
+        self.vehicle.faults.pass_time(now - self._last_time)
+        self._last_time = now
+        for item in datagrams:
+            self._up.push(now, item)
+        lag = now - self._begin - self.vehicle.time
+        if lag > _GREATEST_LAG:
+            self._begin += lag
+            self._next_observation += lag
+            self._warn(f"the machine is too slow: the vehicle has lost {lag:.2f} s")
+        for datagram in self.vehicle.advance_to(now - self._begin):
+            if self._client is not None:
+                self._down.push(now, (datagram, self._client))
+        for datagram, sender in self._up.pop(now):
+            receiver: Address | None = sender
+            if is_broadcast(datagram):
+                # As on a radio, what answers it goes to the client.
+                receiver = self._client
+            elif datagram[:1] != _NULL:
+                self._client = sender
+            for answer in self.vehicle.receive(datagram):
+                if receiver is not None:
+                    self._down.push(now, (answer, receiver))
+        for datagram, receiver in self._down.pop(now):
+            send(self._socket, datagram, receiver)
+        # The vehicle moves in steps: it may be where it was at the last observation.
+        is_new = self.vehicle.time > self._observed
+        if self._observer[1] and now >= self._next_observation and is_new:
+            self._observed = self.vehicle.time
+            missed = (now - self._next_observation) // self._observation_period
+            self._next_observation += (1 + missed) * self._observation_period
+            send(self._socket, self.observe().encode(), self._observer)
+
+
+def virtual_crazyflie() -> None:
+    """Run a virtual vehicle until interrupted."""
+    run_server(
+        "virtual_crazyflie",
+        "A Crazyflie in software that speaks CRTP over UDP: connect with any cflib program to "
+        "udp://HOST:PORT.",
+        VehicleSettings,
+        VehicleServer,
+        "crazyflie_virtual.nodes:VirtualCrazyflieNode",
+    )
+
+
+def _number(port):
+    # 1, 2, ... for the ports that clients scan; in any case different for
+    # different ports, nearly.
+    number = port - FIRST_PORT + 1 if port >= FIRST_PORT else port
+    return number & 0x7FFF or 1

@@ -1,10 +1,30 @@
-"""The settings of a virtual vehicle: ROS parameters, or a command line."""
+"""The settings of a virtual vehicle, ROS parameters or a command line, and its faults."""
+
+from dataclasses import dataclass
 
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, METRES, TEXT, Integer, Number, Text
-from crazyflie_virtual.faults import FaultSwitches
-from crazyflie_virtual.firmware.localization import DECK, NONE
+from crazyflie_virtual.firmware.estimator import DECK, NONE
 from crazyflie_virtual.observer import DEFAULT_PORT
+
+
+@dataclass
+class FaultSwitches:
+    """Switches, which may be changed at any time."""
+
+    loss: float = 0.0  #: Probability in [0, 1] with which a packet, either way, is lost.
+    delay: float = 0.0  #: What each packet takes, each way, s.
+    #: For how long the link is to be silent from now on, s; counts down. The vehicle's port stays
+    #: open, and the vehicle flies on.
+    silence: float = 0.0
+    low_battery: int = 0  #: Not 0: the battery is nearly empty. Emptying cannot be undone.
+    motor_failure: int = 0  #: Number of the failed motor, 1 to 4; 0 for none.
+
+    def pass_time(self, dt: float) -> None:
+        """Let ``dt`` (s) of the silence pass."""
+        if self.silence > 0.0:
+            self.silence = max(0.0, self.silence - dt)
+
 
 FIRST_PORT = 19850  #: UDP port of the first vehicle: clients scan from here to 19859.
 

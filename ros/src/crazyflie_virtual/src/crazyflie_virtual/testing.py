@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Iterator
 from typing import Any
 
-from crazyflie_virtual.link.server import VehicleServer
+from crazyflie_virtual.server import VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
 
 

@@ -1,16 +1,102 @@
-"""A virtual Crazyflie without sockets and clock."""
+"""A virtual Crazyflie without sockets and clock: body, battery, radio chip and microcontroller."""
 
 import logging
 import math
+from collections.abc import Callable
+from functools import partial
 
-from crazyflie_virtual.board import Board, Storage
-from crazyflie_virtual.body.battery import LOW_CHARGE, Battery
-from crazyflie_virtual.body.physics import OFF, STEP, Physics
-from crazyflie_virtual.firmware.assertion import FirmwareAssertionError
-from crazyflie_virtual.link import crtp
-from crazyflie_virtual.link.crtp import Packet, Port
-from crazyflie_virtual.settings import VehicleSettings
+from crazyflie_virtual import crtp, ports
+from crazyflie_virtual.body import LOW_CHARGE, OFF, STEP, Battery, Physics
+from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.firmware.console import FirmwareAssertionError
+from crazyflie_virtual.firmware.estimator import DECK
+from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
+from crazyflie_virtual.log import LogPort
+from crazyflie_virtual.memory import LighthouseMemory, MemoryPort, decks, eeprom, memories
+from crazyflie_virtual.parameters import ParameterPort
+from crazyflie_virtual.ports import LocalizationPort
+from crazyflie_virtual.settings import FaultSwitches, VehicleSettings
 from crazyflie_world import world_file
+
+_ADDRESS_PREFIX = 0xE7E7E7E700
+
+
+class Storage:
+    """Memories and stored parameters, which persist over a restart."""
+
+    def __init__(self, settings: VehicleSettings):
+        self.eeprom = eeprom(_ADDRESS_PREFIX | settings.address)
+        self.one_wire = [
+            (deck.serial, deck.one_wire())
+            for deck in decks(settings.positioning == DECK, settings.multiranger)
+        ]
+        self.lighthouse: dict[int, bytes] = {}
+        self.parameters: dict[str, float] = {}
+
+
+class Board:
+    """A running firmware behind its ports; for ``failure`` see `Firmware`."""
+
+    def __init__(
+        self,
+        physics: Physics,
+        faults: FaultSwitches,
+        settings: VehicleSettings,
+        storage: Storage,
+        failure: str = "",
+    ):
+        firmware = self.firmware = Firmware(physics, faults, settings, failure)
+        self._log = LogPort(firmware)
+        lighthouse = LighthouseMemory(storage.lighthouse)
+        memory = MemoryPort(
+            memories(
+                storage.eeprom,
+                firmware.planner.memory,
+                firmware.memory_tester,
+                lighthouse,
+                storage.one_wire,
+            ),
+            firmware.warn,
+        )
+        self._handlers: dict[int, Callable[[int, bytes], bytes | None]] = {
+            Port.LINK: partial(ports.handle_link, firmware),
+            Port.PLATFORM: partial(ports.handle_platform, firmware),
+            Port.LOG: self._log.handle,
+            Port.PARAMETERS: ParameterPort(firmware, storage.parameters).handle,
+            Port.MEMORY: memory.handle,
+            Port.SETPOINT: partial(ports.handle_attitude, firmware),
+            Port.GENERIC_SETPOINT: partial(ports.handle_generic, firmware),
+            Port.HIGH_LEVEL: partial(ports.handle_high_level, firmware),
+            Port.LOCALIZATION: LocalizationPort(firmware, settings.address, lighthouse).handle,
+        }
+        if settings.protocol >= SUPERVISOR_PROTOCOL:
+            self._handlers[Port.SUPERVISOR] = partial(ports.handle_supervisor, firmware)
+
+    def receive(self, packet: Packet, is_broadcast: bool = False) -> Packet | None:
+        """Return the answer to a packet, from the same port and channel; None for no answer."""
+        statistics = self.firmware.link_statistics
+        statistics.count_received(self.firmware.time, is_broadcast)
+        if packet.port not in self._handlers:
+            self.firmware.warn("port", f"CRTP: nothing listens on port {packet.port}")
+            return None
+        answer = self._handlers[packet.port](packet.channel, packet.data)
+        if answer is None:
+            return None
+        statistics.count_sent(1)
+        return packet._replace(data=answer)
+
+    def unsolicited(self) -> list[Packet]:
+        """Return the packets that answer no request: log data and console."""
+        packets = self._log.collect()
+        firmware = self.firmware
+        while firmware.link_statistics.is_connected:
+            piece = firmware.console.pop()
+            if piece is None:
+                break
+            packets.append(Packet(Port.CONSOLE, 0, piece))
+        firmware.link_statistics.count_sent(len(packets))
+        return packets
+
 
 #: Of the link port: packets that the radio chip answers itself, also while the microcontroller is
 #: off.

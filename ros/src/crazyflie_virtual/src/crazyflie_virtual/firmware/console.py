@@ -1,9 +1,17 @@
-"""The console: what the firmware prints, and warnings about commands without effect."""
+"""The console: what the firmware prints, warnings without effect, and failed assertions."""
 
 from collections import deque
 from collections.abc import Callable, Hashable
 
-from crazyflie_virtual.link.crtp import MAX_DATA
+from crazyflie_virtual.crtp import MAX_DATA
+
+
+class FirmwareAssertionError(Exception):
+    """An assertion of the firmware has failed, on a packet that it takes no care of.
+
+    The text says on what.
+    """
+
 
 Warn = Callable[[Hashable, str], bool]  #: See `Console.warn`.
 _BUFFER_SIZE = 100  #: Packets kept until a client is connected: the latest.

@@ -1,24 +1,17 @@
 """The firmware: its parts and the order in which they run."""
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_virtual.body.physics import OFF, STEP, MotorCommands, Physics
-from crazyflie_virtual.body.ranging import RangingSensors
-from crazyflie_virtual.body.sensors import Sensors
-from crazyflie_virtual.faults import FaultSwitches
-from crazyflie_virtual.firmware.commander import Commander
+from crazyflie_virtual.body import OFF, STEP, MotorCommands, Physics, RangingSensors, Sensors
+from crazyflie_virtual.crtp import LinkStatistics
 from crazyflie_virtual.firmware.console import Console
-from crazyflie_virtual.firmware.estimator import Estimator
-from crazyflie_virtual.firmware.localization import DECK, Localization
+from crazyflie_virtual.firmware.estimator import DECK, Estimator, Localization
 from crazyflie_virtual.firmware.planner import ACTIVE, Planner, TrajectoryState
-from crazyflie_virtual.firmware.power import PowerMonitor
-from crazyflie_virtual.firmware.setpoints import AttitudeDecoder
+from crazyflie_virtual.firmware.setpoints import AttitudeDecoder, Commander
 from crazyflie_virtual.firmware.stabilizer import IDLE_THRUST, Stabilizer
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
-from crazyflie_virtual.firmware.supervisor import Supervisor
-from crazyflie_virtual.firmware.supervisor_states import State
-from crazyflie_virtual.link.statistics import LinkStatistics
-from crazyflie_virtual.settings import VehicleSettings
-from crazyflie_virtual.tables.memories import MemoryTester
+from crazyflie_virtual.firmware.supervisor import PowerMonitor, State, Supervisor
+from crazyflie_virtual.memory import MemoryTester
+from crazyflie_virtual.settings import FaultSwitches, VehicleSettings
 
 #: The first protocol in which the supervisor has a port and reports the high-level commander.
 SUPERVISOR_PROTOCOL = 12

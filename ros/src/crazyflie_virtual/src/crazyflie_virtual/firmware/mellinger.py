@@ -13,8 +13,8 @@ import math
 from crazyflie_model.angles import Triple, quaternion_from_zyx, rotate, zyx_from_quaternion
 from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.units import GRAVITY
-from crazyflie_virtual.body.sensors import Sensors
-from crazyflie_virtual.firmware.pid import constrain
+from crazyflie_virtual.body import Sensors
+from crazyflie_virtual.firmware.controllers import constrain
 from crazyflie_virtual.firmware.states import ABSOLUTE, DISABLED, VELOCITY, Estimate, Setpoint
 
 TORQUE_LIMIT = 32000.0  #: Largest output about an axis, PWM.

@@ -5,11 +5,13 @@ import math
 from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.mixer import limit, mix
-from crazyflie_virtual.body.physics import OFF, MotorCommands
-from crazyflie_virtual.body.sensors import Sensors
-from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
+from crazyflie_virtual.body import OFF, MotorCommands, Sensors
+from crazyflie_virtual.firmware.controllers import (
+    AttitudeController,
+    PositionController,
+    wrap_degrees,
+)
 from crazyflie_virtual.firmware.mellinger import MellingerController
-from crazyflie_virtual.firmware.position import PositionController
 from crazyflie_virtual.firmware.states import (
     ABSOLUTE,
     DISABLED,

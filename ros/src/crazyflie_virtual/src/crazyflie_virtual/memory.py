@@ -1,9 +1,62 @@
-"""The memories of the vehicle that a client can read and write."""
+"""The memories of vehicle and decks, and port 4, which reads and writes them."""
 
+import errno
 import struct
+import zlib
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from typing_extensions import override
+
+from crazyflie_virtual.firmware.console import FirmwareAssertionError, Warn
+
+_SIZE = 112  #: Of a one-wire memory, bytes.
+_BITCRAZE = 0xBC  #: Vendor.
+_FAMILY = 0x0D  #: First byte of the serial numbers of this kind of memory.
+
+_HEADER_MARK, _NAME, _REVISION = 0xEB, 1, 2
+
+
+class Deck(NamedTuple):
+    """A deck."""
+
+    name: str  #: Also of its parameter in the group ``deck``.
+    product: int
+    revision: str
+
+    @property
+    def serial(self) -> bytes:
+        """Serial number of its memory, 8 bytes."""
+        return bytes([_FAMILY, self.product, 0, 0, 0, 0, 0, 0])
+
+    def one_wire(self) -> bytearray:
+        """Return the content of its memory.
+
+        Header: mark, pins, vendor, product; elements: version, size, and each as
+        number, size, text; after both the low byte of their CRC-32.
+        """
+        header = struct.pack("<BIBB", _HEADER_MARK, 0, _BITCRAZE, self.product)
+        texts = ((_NAME, self.name), (_REVISION, self.revision))
+        elements = b"".join(bytes([n, len(text)]) + text.encode() for n, text in texts)
+        elements = bytes([0, len(elements)]) + elements
+        content = b"".join(part + bytes([zlib.crc32(part) & 0xFF]) for part in (header, elements))
+        return bytearray(content.ljust(_SIZE, b"\xff"))
+
+
+LED_RING_DECK = Deck("bcLedRing", 0x01, "D1")
+MULTIRANGER_DECK = Deck("bcMultiranger", 0x0C, "D")
+FLOW_DECK = Deck("bcFlow2", 0x0F, "C")
+LIGHTHOUSE_DECK = Deck("bcLighthouse4", 0x10, "D")
+
+
+def decks(has_positioning: bool, has_multiranger: bool) -> list[Deck]:
+    """Return the decks of a vehicle."""
+    return [
+        LED_RING_DECK,
+        *((FLOW_DECK, LIGHTHOUSE_DECK) if has_positioning else ()),
+        *((MULTIRANGER_DECK,) if has_multiranger else ()),
+    ]
+
 
 EEPROM, ONE_WIRE, LED_RING, TRAJECTORY, LIGHTHOUSE = 0x00, 0x01, 0x10, 0x12, 0x14
 TESTER, LED_TIMINGS, DECKS = 0x15, 0x17, 0x19  #: Types.
@@ -165,3 +218,61 @@ def eeprom(radio_address: int) -> bytearray:
     )
     content += bytes([sum(content) & 0xFF])
     return bytearray(content.ljust(_EEPROM_SIZE, b"\0"))
+
+
+_INFO, _READ, _WRITE = 0, 1, 2
+_COUNT, _DETAILS = 1, 2
+
+_MOST = 24  #: Bytes read at once.
+
+
+class MemoryPort:
+    """Reads and writes memories, in the order of their numbers; for ``warn`` see `Console.warn`."""
+
+    def __init__(self, memories: Iterable[Memory], warn: Warn):
+        self._memories = tuple(memories)
+        self._warn = warn
+
+    def handle(self, channel: int, data: bytes) -> bytes | None:
+        """Return the data of the answer; None for no answer."""
+        handlers = {_INFO: self._info, _READ: self._read, _WRITE: self._write}
+        return handlers.get(channel, self._unknown)(data)
+
+    def _info(self, data):
+        if data[:1] == bytes([_COUNT]):
+            return bytes([_COUNT, len(self._memories)])
+        if data[:1] == bytes([_DETAILS]) and len(data) >= 2:
+            if data[1] >= len(self._memories):
+                return data[:2]
+            memory = self._memories[data[1]]
+            return data[:2] + struct.pack("<BI8s", memory.type, memory.size, memory.serial)
+        return self._unknown(data)
+
+    def _unknown(self, data):
+        self._warn("memory", f"MEM: unknown request {data[:1].hex()}")
+        return None
+
+    def _read(self, data):
+        if len(data) < 6:
+            return None
+        number, address, count = struct.unpack_from("<BIB", data)
+        if count > _MOST:
+            raise FirmwareAssertionError(f"a read of {count} bytes of memory, of {_MOST} at most")
+        content = None
+        if number < len(self._memories):
+            content = self._memories[number].read(address, count)
+        if content is None:
+            self._warn("memory", f"MEM: {number} has no {count} bytes at {address:#x} to read")
+            return data[:5] + bytes([errno.EIO])
+        return data[:5] + b"\0" + content
+
+    def _write(self, data):
+        if len(data) < 5:
+            return None
+        number, address = struct.unpack_from("<BI", data)
+        content = data[5:]
+        done = number < len(self._memories) and self._memories[number].write(address, content)
+        if not done:
+            text = f"MEM: {number} has no {len(content)} bytes at {address:#x} to write"
+            self._warn("memory", text)
+        return data[:5] + bytes([0 if done else errno.EIO])

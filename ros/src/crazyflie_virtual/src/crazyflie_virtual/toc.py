@@ -1,8 +1,79 @@
-"""Tables of contents: what a client can log and set, with names and types."""
+"""Tables of contents: what a client can log and set, with names and C types."""
 
+import math
 import struct
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class NumberType:
+    """A number's type."""
+
+    name: str  #: As in C.
+    format: str  #: As in the module struct, without byte order.
+
+    @property
+    def is_float(self) -> bool:
+        """Whether it has a fraction."""
+        return self.format in "fe"
+
+    @property
+    def size(self) -> int:
+        """Bytes on the wire."""
+        return struct.calcsize("<" + self.format)
+
+    def pack(self, value: float) -> bytes:
+        """Return the bytes of a value; whole numbers are limited to the type's range."""
+        return struct.pack("<" + self.format, self.convert(value))
+
+    def unpack(self, data: bytes) -> float:
+        """Return the value of `size` bytes."""
+        return struct.unpack("<" + self.format, data)[0]
+
+    def convert(self, value: float) -> float:
+        """Return the value that is packed: limited, and whole where the type is whole."""
+        if self.is_float:
+            largest = _LARGEST.get(self.format, math.inf)
+            return value if math.isnan(value) else max(-largest, min(largest, value))
+        bits = 8 * self.size
+        low, high = (
+            (0, 2**bits - 1) if self.format.isupper() else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+        )
+        return 0 if math.isnan(value) else int(max(low, min(high, value)))
+
+
+_LARGEST = {"f": 3.4028234e38, "e": 65504.0}
+
+U8 = NumberType("uint8_t", "B")
+U16 = NumberType("uint16_t", "H")
+U32 = NumberType("uint32_t", "I")
+I8 = NumberType("int8_t", "b")
+I16 = NumberType("int16_t", "h")
+I32 = NumberType("int32_t", "i")
+FLOAT = NumberType("float", "f")
+FP16 = NumberType("FP16", "e")
+U64 = NumberType("uint64_t", "Q")
+
+#: Code of a log variable on the wire -> type.
+LOG_TYPES = {1: U8, 2: U16, 3: U32, 4: I8, 5: I16, 6: I32, 7: FLOAT, 8: FP16}
+
+#: Code of a parameter on the wire -> type.
+PARAMETER_TYPES = {
+    0x8: U8,
+    0x9: U16,
+    0xA: U32,
+    0xB: U64,
+    0x0: I8,
+    0x1: I16,
+    0x2: I32,
+    0x6: FLOAT,
+}
+
+LOG_CODES = {number_type: code for code, number_type in LOG_TYPES.items()}
+PARAMETER_CODES = {number_type: code for code, number_type in PARAMETER_TYPES.items()}
+
 
 _ITEM, _INFO = 2, 3
 

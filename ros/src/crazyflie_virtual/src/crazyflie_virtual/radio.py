@@ -1,4 +1,4 @@
-"""Model of a radio channel: how long a Crazyradio is busy with each packet.
+"""Model of a radio channel: how long a Crazyradio is busy with each packet; and vehicles on it.
 
 All vehicles of a channel share it. A packet to one vehicle is acknowledged, and the acknowledgement
 carries what the vehicle has to send; a broadcast is not.
@@ -11,6 +11,11 @@ vehicle (syslink, 1 Mbit/s).
 """
 
 from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+from crazyflie_virtual.settings import VehicleSettings
+from crazyflie_virtual.vehicle import VirtualVehicle
 
 BIT_RATE = 2e6  #: bit/s on air, of radio://.../2M.
 TURNAROUND = 130e-6  #: Of a transceiver, from standby or reception to transmission, s.
@@ -110,3 +115,41 @@ def usage(load: Load, channel: RadioChannel, duration: float = 1.0) -> Usage:
             due, vehicle = polls.pop(0)
             poll_delay = max(poll_delay, channel.unicast(now, vehicle, *load.poll_size) - due)
     return Usage(channel.busy / duration, frame_delay, poll_delay)
+
+
+SPACING = 1.0  #: Between two vehicles, m.
+
+
+class RadioSwarm:
+    """Vehicles with the addresses 1, 2, ..., side by side along y.
+
+    Each misses broadcasts with a probability ``loss``. Their clocks are the channel's.
+    """
+
+    def __init__(self, vehicles: int, channel: RadioChannel, loss: float = 0.0, seed: int = 0):
+        self.channel = channel
+        self._loss = loss
+        self._random = Random(seed)
+        self.vehicles = [self._vehicle(number) for number in range(1, vehicles + 1)]
+
+    @staticmethod
+    def _vehicle(number: int) -> VirtualVehicle:
+        settings: dict[str, Any] = {
+            "address": number,
+            "init_y": SPACING * number,
+            "positioning": "none",
+        }
+        return VirtualVehicle(VehicleSettings(**settings))
+
+    def broadcast(self, time: float, datagram: bytes) -> dict[int, tuple[float, list[bytes]]]:
+        """Send a packet to all from ``time`` (s) on.
+
+        Returns, for the address of each vehicle that has received it, when (s), and its answers.
+        """
+        arrival = self.channel.broadcast(time, len(datagram))
+        received = {}
+        for number, vehicle in enumerate(self.vehicles, start=1):
+            vehicle.advance_to(arrival)
+            if self._random.random() >= self._loss:
+                received[number] = (arrival, vehicle.receive(datagram))
+        return received

@@ -1,13 +1,14 @@
-"""A server of this package as a ROS node: settings from parameters, switches while it runs."""
+"""Virtual vehicle and virtual motion capture as ROS nodes: parameters are settings and switches."""
 
-from typing import ClassVar
+from functools import partial
+from typing import ClassVar, cast
 
 from typing_extensions import override
 
-from crazyflie_utils.handle import NodeHandle
-from crazyflie_utils.node import Node
-from crazyflie_utils.parameters.declaration import ParameterError, Parameters
-from crazyflie_virtual.server import Server
+from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, TransformError
+from crazyflie_virtual.mocap import MocapServer, MocapSettings
+from crazyflie_virtual.server import Server, VehicleServer
+from crazyflie_virtual.settings import VehicleSettings
 
 _POLL_PERIOD = 0.5  #: How often the switches are read, s.
 
@@ -61,3 +62,42 @@ class ServerNode(Node):
             if value != getattr(self._settings, name):
                 setattr(self._server.switches, name, value)
         self._settings = settings
+
+
+_LOOK_PERIOD = 0.05  #: Period at which the moving objects of the vehicle's world are looked up, s.
+
+
+class VirtualCrazyflieNode(ServerNode):
+    """A virtual vehicle behind a UDP port.
+
+    What moves in its world is where /tf says, or where it began.
+    """
+
+    settings_type = VehicleSettings
+    server_type = VehicleServer
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        super().register_callbacks(handle)
+        physics = cast(VehicleServer, self._server).vehicle.physics
+        if physics.world is not None and physics.world.moving:
+            self._lookup = handle.listen_to_transforms()
+            handle.timer(_LOOK_PERIOD, partial(self._look, physics, physics.world))
+
+    def _look(self, physics, world):
+        centres = {}
+        for each in world.moving:
+            try:
+                place = self._lookup(world.frame, each.name).transform.translation
+            except TransformError:
+                # No node moves it at present: it stays where it is.
+                continue
+            centres[each.name] = (place.x, place.y, place.z)
+        physics.world = world.placed(centres)
+
+
+class VirtualMocapNode(ServerNode):
+    """A NatNet server."""
+
+    settings_type = MocapSettings
+    server_type = MocapServer

@@ -1,1 +1,0 @@
-"""Airframe, battery and sensors."""

@@ -1,0 +1,93 @@
+"""Packets of the Crazy RealTime Protocol, one in a UDP datagram, and their number."""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+MAX_DATA = 30  #: Bytes that a packet holds beside its header.
+_RESERVED = 3 << 2  #: Bits of the header that are set, but in broadcast packets.
+
+
+class Port(IntEnum):
+    """Who a packet is for."""
+
+    CONSOLE = 0x0
+    PARAMETERS = 0x2
+    SETPOINT = 0x3
+    MEMORY = 0x4
+    LOG = 0x5
+    LOCALIZATION = 0x6
+    GENERIC_SETPOINT = 0x7
+    HIGH_LEVEL = 0x8
+    SUPERVISOR = 0x9
+    PLATFORM = 0xD
+    LINK = 0xF
+
+
+class Packet(NamedTuple):
+    """One packet."""
+
+    #: port, channel: 0 to 15 and 0 to 3.
+    port: int
+    channel: int
+    data: bytes  #: At most `MAX_DATA`.
+
+    def encode(self) -> bytes:
+        """Return the packet as a datagram; ValueError if there is too much data for one."""
+        if len(self.data) > MAX_DATA:
+            raise ValueError(f"a packet holds {MAX_DATA} bytes, got {len(self.data)}")
+        return bytes([self.port << 4 | _RESERVED | self.channel]) + self.data
+
+
+def decode(datagram: bytes) -> Packet | None:
+    """Return the packet in a datagram; None when it holds none."""
+    if not 1 <= len(datagram) <= MAX_DATA + 1:
+        return None
+    return Packet(datagram[0] >> 4, datagram[0] & 3, datagram[1:])
+
+
+def is_broadcast(datagram: bytes) -> bool:
+    """Return whether a datagram is for all vehicles of a radio channel.
+
+    Over UDP each gets a copy, in whose header the bits of the link are cleared.
+    """
+    is_for_link = datagram[0] >> 4 == Port.LINK if datagram else True
+    return not is_for_link and not datagram[0] & _RESERVED
+
+
+_ACTIVE = 2.0  #: How long after the last packet the client counts as connected, s.
+
+
+class LinkStatistics:
+    """Traffic of the link, for the log."""
+
+    def __init__(self) -> None:
+        self.is_connected = False  #: Whether a packet came lately.
+        #: Packets since the start, to this vehicle and to all, modulo 2^16.
+        self.received = self.received_broadcasts = 0
+        self.received_rate = self.sent_rate = 0.0  #: Packets per second, over the last second.
+        self._last: float | None = None
+        self._window = 0.0
+        self._in = self._out = 0
+
+    def count_received(self, time: float, is_broadcast: bool) -> None:
+        """Count a packet that came at ``time`` (s)."""
+        if is_broadcast:
+            self.received_broadcasts = (self.received_broadcasts + 1) & 0xFFFF
+        else:
+            self.received = (self.received + 1) & 0xFFFF
+        self._in += 1
+        self._last = time
+        self.is_connected = True
+
+    def count_sent(self, packets: int) -> None:
+        """Count packets to the client."""
+        self._out += packets
+
+    def update(self, time: float) -> None:
+        """Let time pass, to ``time`` (s)."""
+        self.is_connected = self._last is not None and time - self._last < _ACTIVE
+        elapsed = time - self._window
+        if elapsed >= 1.0:
+            self.received_rate, self.sent_rate = self._in / elapsed, self._out / elapsed
+            self._in = self._out = 0
+            self._window = time

@@ -1,1 +1,0 @@
-"""A NatNet server that shows the virtual vehicles."""

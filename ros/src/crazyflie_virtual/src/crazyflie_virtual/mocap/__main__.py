@@ -1,5 +1,0 @@
-"""``python -m crazyflie_virtual.mocap``."""
-
-from crazyflie_virtual.main import virtual_mocap
-
-virtual_mocap()

@@ -1,0 +1,323 @@
+"""The firmware's smaller ports.
+
+Link, setpoints, supervisor, platform, localization and high-level commands.
+"""
+
+import errno
+import math
+import struct
+from collections.abc import Callable
+
+from crazyflie_virtual.crtp import MAX_DATA
+from crazyflie_virtual.firmware.firmware import Firmware
+from crazyflie_virtual.firmware.setpoints import PRIORITY_CRTP, decode_generic
+from crazyflie_virtual.memory import LighthouseMemory
+from crazyflie_virtual.quaternions import decompress_quaternion
+
+_ECHO, _SOURCE, _SINK = 0, 1, 2
+
+_IDENTITY = b"Bitcraze Crazyflie"
+
+
+def handle_link(firmware: Firmware, channel: int, data: bytes) -> bytes | None:
+    """Return the data of the answer; None for no answer."""
+    if channel == _ECHO:
+        return data
+    if channel == _SOURCE:
+        return _IDENTITY.ljust(MAX_DATA, b"\0")
+    if channel != _SINK:
+        firmware.warn("link", f"LINK: unknown channel {channel}")
+    return None
+
+
+_SETPOINT, _META = 0, 1
+_SETPOINTS_STOP = b"\0"
+
+
+def handle_attitude(firmware: Firmware, channel: int, data: bytes) -> None:
+    """Process an attitude setpoint; there is no answer."""
+    f = firmware
+    if channel != _SETPOINT:
+        f.warn("setpoint", f"CMD: unknown channel {channel}")
+        return
+    setpoint = f.attitude_decoder.decode(data, f.commander.priority, f.time)
+    if setpoint is None:
+        f.warn("setpoint", "CMD: an attitude setpoint of less than 14 bytes")
+        return
+    f.stream(setpoint)
+    if f.attitude_decoder.is_locked:
+        f.warn("thrust", "CMD: thrust is locked until a setpoint without thrust comes")
+
+
+def handle_generic(firmware: Firmware, channel: int, data: bytes) -> None:
+    """Process a setpoint of another type or the end of streaming; there is no answer."""
+    f = firmware
+    if channel == _SETPOINT:
+        setpoint = decode_generic(data, f.time)
+        if setpoint is None:
+            f.warn("setpoint", f"CMD: no setpoints of type {data[:1].hex()}")
+        else:
+            f.stream(setpoint)
+    elif channel == _META and data[:1] == _SETPOINTS_STOP:
+        f.commander.relax_priority(f.estimate)
+    else:
+        f.warn("setpoint", f"CMD: unknown command {channel}/{data[:1].hex()}")
+
+
+_SUPERVISOR_INFO, _SUPERVISOR_COMMAND = 0, 1
+_FIRST_BIT, _ALL_BITS = 0x01, 0x0C
+_ARM, _RECOVER, _EMERGENCY_STOP, _EMERGENCY_WATCHDOG = 1, 2, 3, 4
+_RESPONSE = 0x80
+
+
+def handle_supervisor(firmware: Firmware, channel: int, data: bytes) -> bytes | None:
+    """Return the data of the answer; None for no answer."""
+    if not data:
+        return None
+    command = data[0]
+    answer = None
+    if channel == _SUPERVISOR_INFO and _FIRST_BIT <= command <= _ALL_BITS:
+        answer = _supervisor_info(firmware, command)
+    elif channel == _SUPERVISOR_COMMAND and _ARM <= command <= _EMERGENCY_WATCHDOG:
+        answer = _command_supervisor(firmware, command, data[1:])
+    else:
+        firmware.warn("supervisor", f"SUP: unknown command {channel}/{command}")
+    return None if answer is None else bytes([_RESPONSE | command]) + answer
+
+
+def _command_supervisor(firmware: Firmware, command: int, data: bytes) -> bytes | None:
+    """Execute a command; return the data of the answer, None for no answer.
+
+    The answer to `_ARM` and `_RECOVER` is two bytes: done, and armed or recovered.
+    """
+    supervisor = firmware.supervisor
+    if command == _ARM:
+        # Without its byte the firmware takes the one that an earlier packet
+        # has left in its place: nothing changes.
+        done = supervisor.arm(bool(data[0]) if data else supervisor.is_armed)
+        return bytes([done, supervisor.is_armed])
+    if command == _RECOVER:
+        done = supervisor.recover()
+        return bytes([done, not supervisor.is_crashed])
+    if command == _EMERGENCY_STOP:
+        supervisor.stop()
+    elif command == _EMERGENCY_WATCHDOG:
+        supervisor.feed_watchdog(firmware.time)
+    return None
+
+
+def _supervisor_info(firmware, command):
+    bits = firmware.info
+    if command == _ALL_BITS:
+        return struct.pack("<H", bits)
+    return bytes([bits >> (command - _FIRST_BIT) & 1])
+
+
+_PLATFORM_COMMAND, _VERSION = 0, 1
+_CONTINUOUS_WAVE, _NOTIFY = 0, 3
+_PROTOCOL, _FIRMWARE, _DEVICE = 0, 1, 2
+
+#: The firmware is the release whose behaviour is imitated.
+_NAMES = {_FIRMWARE: "2026.08 virtual", _DEVICE: "Crazyflie 2.1"}
+
+
+def handle_platform(firmware: Firmware, channel: int, data: bytes) -> bytes | None:
+    """Return the data of the answer; None for no answer."""
+    if not data:
+        return None
+    command, rest = data[0], data[1:]
+    answer = None
+    if channel == _VERSION:
+        answer = _version(firmware, command)
+    elif channel == _PLATFORM_COMMAND and command in (_ARM, _RECOVER):
+        answer = _command_supervisor(firmware, command, rest)
+    elif channel == _PLATFORM_COMMAND and command in (_CONTINUOUS_WAVE, _NOTIFY):
+        answer = rest
+    else:
+        firmware.warn("platform", f"PLATFORM: unknown command {channel}/{command}")
+    return None if answer is None else bytes([command]) + answer
+
+
+def _version(firmware, command):
+    if command == _PROTOCOL:
+        return struct.pack("<i", firmware.protocol)
+    if command in _NAMES:
+        return _NAMES[command].encode()[: MAX_DATA - 1]
+    firmware.warn("platform", f"PLATFORM: unknown version {command}")
+    return None
+
+
+_POSITION, _GENERIC, _PACKED_POSITIONS = 0, 1, 2
+_STOP_MESSAGE, _WATCHDOG_MESSAGE, _POSE, _PACKED_POSES = 3, 4, 8, 9
+_STORE_LIGHTHOUSE = 11
+
+_PACKED_POSITION = struct.Struct("<B3h")
+_PACKED_POSE = struct.Struct("<B3hI")
+
+
+class LocalizationPort:
+    """Hands external measurements to the estimator.
+
+    ``address`` is the last byte of the radio's: packed positions and poses of several vehicles are
+    marked with it.
+    """
+
+    def __init__(self, firmware: Firmware, address: int, lighthouse: LighthouseMemory):
+        self._firmware = firmware
+        self._address = address
+        self._lighthouse = lighthouse
+
+    def handle(self, channel: int, data: bytes) -> bytes | None:
+        """Process a measurement; only to storing lighthouse data there is an answer."""
+        if channel == _POSITION and len(data) == 12:
+            self._take_position(struct.unpack("<fff", data))
+        elif channel == _PACKED_POSITIONS:
+            for values in _each(_PACKED_POSITION, data):
+                if values[0] == self._address:
+                    self._take_position([part / 1000.0 for part in values[1:]])
+        elif channel == _GENERIC and len(data) == 5 and data[0] == _STORE_LIGHTHOUSE:
+            done = self._lighthouse.store(*struct.unpack_from("<HH", data, 1))
+            return bytes([_STORE_LIGHTHOUSE, done])
+        elif channel == _GENERIC and data:
+            self._generic(data[0], data[1:])
+        else:
+            text = f"LOC: nothing done with {len(data)} bytes on channel {channel}"
+            self._firmware.warn("location", text)
+        return None
+
+    def _generic(self, command, data):
+        supervisor = self._firmware.supervisor
+        if command == _POSE and len(data) == 28:
+            values = struct.unpack("<7f", data)
+            self._take_pose(values[:3], values[3:])
+        elif command == _PACKED_POSES:
+            for values in _each(_PACKED_POSE, data):
+                if values[0] == self._address:
+                    position = [part / 1000.0 for part in values[1:4]]
+                    self._take_pose(position, decompress_quaternion(values[4]))
+        elif command == _STOP_MESSAGE:
+            supervisor.stop()
+        elif command == _WATCHDOG_MESSAGE:
+            supervisor.feed_watchdog(self._firmware.time)
+        else:
+            self._firmware.warn("location", f"LOC: nothing done with a message {command}")
+
+    def _take_position(self, position):
+        if all(map(math.isfinite, position)):
+            self._firmware.localization.take_position(self._firmware.time, position)
+        else:
+            self._refuse()
+
+    def _take_pose(self, position, quaternion):
+        norm = math.hypot(*quaternion)
+        # No rotation, or not a number.
+        if not (all(map(math.isfinite, position)) and 0.5 < norm < 2.0):
+            self._refuse()
+            return
+        unit = tuple(part / norm for part in quaternion)
+        self._firmware.localization.take_pose(self._firmware.time, position, unit)
+
+    def _refuse(self):
+        self._firmware.warn("location", "LOC: a measurement that is not a number, or no rotation")
+
+
+def _each(form, data):
+    return form.iter_unpack(data[: len(data) // form.size * form.size])
+
+
+_ALL_GROUPS = 0
+
+
+def handle_high_level(firmware: Firmware, channel: int, data: bytes) -> bytes | None:
+    """Return the answer to a command: four bytes, the last an error number."""
+    if not data:
+        return None
+    return data[:3].ljust(3, b"\0") + bytes([_execute(firmware, data[0], data[1:])])
+
+
+def _execute(f, command, data):
+    if command not in _COMMANDS:
+        f.warn("command", f"HLC: unknown command {command}")
+        return errno.ENOEXEC
+    form, handler = _COMMANDS[command]
+    if len(data) < struct.calcsize("<" + form):
+        f.warn("command", f"HLC: command {command} is too short")
+        return errno.EINVAL
+    values = struct.unpack_from("<" + form, data)
+    if command in _FOR_ALL:
+        return handler(f, *values)
+    if command in _PLANS and f.planner.blocked:
+        f.warn("planner", f"HLC: refuses command {command}: {f.supervisor.state.value}")
+        return errno.EBUSY
+    if command in _PLANS and f.commander.priority == PRIORITY_CRTP:
+        f.warn("planner", f"HLC: command {command} has no effect before setpoints stop")
+    group, *arguments = values
+    is_meant = group == _ALL_GROUPS or group & f.planner.groups
+    return handler(f, *arguments) if is_meant else 0
+
+
+def _set_groups(f, groups):
+    f.planner.groups = groups
+    return 0
+
+
+def _take_off(f, height, yaw, keep_yaw, duration):
+    return f.planner.take_off(f.time, height, None if keep_yaw else yaw, duration)
+
+
+def _land(f, height, yaw, keep_yaw, duration):
+    return f.planner.land(f.time, height, None if keep_yaw else yaw, duration)
+
+
+def _take_off_at_speed(f, height, relative, yaw, keep_yaw, speed):
+    speed = speed if speed > 0.0 else f.planner.takeoff_speed
+    height, duration = f.planner.climb_time(height, relative, speed)
+    return _take_off(f, height, yaw, keep_yaw, duration)
+
+
+def _land_at_speed(f, height, relative, yaw, keep_yaw, speed):
+    speed = speed if speed > 0.0 else f.planner.landing_speed
+    height = -height if relative else height
+    height, duration = f.planner.climb_time(height, relative, speed)
+    return _land(f, height, yaw, keep_yaw, duration)
+
+
+def _go_to(f, relative, linear, x, y, z, yaw, duration):
+    return f.planner.go_to(f.time, (x, y, z), yaw, duration, relative, linear)
+
+
+def _spiral(f, sideways, clockwise, angle, first, last, ascent, duration):
+    radii = (first, last)
+    return f.planner.spiral(f.time, angle, radii, ascent, duration, sideways, clockwise)
+
+
+def _start(f, relative, relative_yaw, backwards, trajectory_id, time_scale):
+    reason = f.planner.unflyable(trajectory_id)
+    if reason:
+        f.console.write_line(f"HLC: no trajectory {trajectory_id}: {reason}")
+    elif not time_scale > 0.0:
+        f.console.write_line(f"HLC: at its end at once: time scale {time_scale:g}")
+    return f.planner.start(f.time, trajectory_id, time_scale, backwards, relative, relative_yaw)
+
+
+#: Command -> (fields, handler). 1, 2, 4 and 5 are those of older clients.
+_COMMANDS: dict[int, tuple[str, Callable[..., int]]] = {
+    0: ("B", _set_groups),
+    1: ("Bff", lambda f, height, duration: _take_off(f, height, 0.0, False, duration)),
+    2: ("Bff", lambda f, height, duration: _land(f, height, 0.0, False, duration)),
+    3: ("B", lambda f: f.planner.stop()),
+    4: ("B?5f", lambda f, relative, *goal: _go_to(f, relative, False, *goal)),
+    5: ("B??Bf", lambda f, relative, *trajectory: _start(f, relative, False, *trajectory)),
+    6: ("3BIB", lambda f, *definition: f.planner.define(*definition)),
+    7: ("Bff?f", _take_off),
+    8: ("Bff?f", _land),
+    9: ("Bf?f?f", _take_off_at_speed),
+    10: ("Bf?f?f", _land_at_speed),
+    11: ("B??5f", _spiral),
+    12: ("B??5f", _go_to),
+    13: ("B???Bf", _start),
+}
+
+#: Commands that are refused while the vehicle cannot fly, for any group.
+_PLANS = tuple(command for command in _COMMANDS if command not in (0, 3, 6))
+_FOR_ALL = (0, 6)  #: Commands that do not begin with the group of vehicles that they are for.

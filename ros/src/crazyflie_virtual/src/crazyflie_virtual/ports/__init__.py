@@ -1,1 +1,0 @@
-"""The ports of CRTP: packets in, packets out."""

@@ -1,1 +1,0 @@
-"""What a client can list: log variables, parameters, memories."""

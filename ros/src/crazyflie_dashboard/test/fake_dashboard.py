@@ -5,6 +5,7 @@ from concurrent.futures import Future
 from dataclasses import replace
 
 from crazyflie_dashboard.control import ControlError, PageControl
+from crazyflie_dashboard.moves import formation
 from crazyflie_dashboard.page_data import (
     DryRunResult,
     MissionFile,
@@ -167,7 +168,8 @@ class FakeDashboard:
         elif command.action is Action.LAND:
             self.change(name, position=(x, y, 0.0), is_in_flight=False, state="on the ground")
         elif command.action is Action.GO_TO:
-            self.change(name, position=command.goal)
+            places = {each: self._scene.vehicles[each].position for each in command.vehicles}
+            self.change(name, position=formation(places, command.goal)[name])
 
     def parameter_owners(self):
         return ("/cf1/controller", "cf1")

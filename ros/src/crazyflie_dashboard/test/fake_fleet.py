@@ -30,6 +30,20 @@ class Workers:
         pass
 
 
+class FakeMaster:
+    """Answers with a graph, and with parameters that are set."""
+
+    def __init__(self, graph):
+        self._graph = graph
+        self.values = {}
+
+    def graph(self):
+        return self._graph()
+
+    def parameters(self, names):
+        return {name: self.values[name] for name in names if name in self.values}
+
+
 class FakeLane:
     """Keeps which services are to stop motors."""
 
@@ -56,6 +70,8 @@ class FakeFleet:
     refusals : dict
         Service to what it answers.
     lane : FakeLane
+    master : FakeMaster
+        Its ``values`` are parameters.
     """
 
     def __init__(self, count=3, name="cf{}"):
@@ -79,9 +95,10 @@ class FakeFleet:
         topics = {f"/{each}/state": STATE for each in self.names}
         topics |= {f"/{each}/{STATUS}": "crazyflie_msgs/FlightStatus" for each in self.names}
         self.graph = Graph(topics, topics, services)
+        self.master = FakeMaster(lambda: self.graph)
         self.dashboard = Dashboard(
             self.process.handle("/dashboard"),
-            lambda: self.graph,
+            self.master,
             self.lane,
             [],
             clock=self.process.clock.time,
@@ -103,12 +120,13 @@ class FakeFleet:
     def vehicles(self):
         return self.dashboard.scene().vehicles
 
-    def send_poses(self, names=None, z=1.0):
-        """Publish a pose of each vehicle on /tf, and let a scene be made."""
+    def send_poses(self, names=None, z=1.0, places=None):
+        """Publish a pose of each vehicle on /tf, and let a scene be made; ``places`` by name."""
         self.stamp = self.process.clock.nanoseconds()
+        places = places or {n: (float(k), 0.0, z) for k, n in enumerate(names or self.names)}
         poses = [
-            StampedPose("world", name, self.stamp, (float(k), 0.0, z), (0.0, 0.0, 0.0, 1.0))
-            for k, name in enumerate(names or self.names)
+            StampedPose("world", name, self.stamp, place, (0.0, 0.0, 0.0, 1.0))
+            for name, place in places.items()
         ]
         self.process.publish("/tf", PoseCodec().encode(poses))
         self.process.advance(0.05)
@@ -119,6 +137,12 @@ class FakeFleet:
         self.send_poses()
         self.process.advance(2.1)
         self.send_poses()
+
+    def fly(self, **places):
+        """Have vehicles in flight, at places (m) by name."""
+        for name in self.names:
+            self.report(name, FlightStatus.FLYING)
+        self.send_poses(places=places)
 
     def report(self, name, state, reason="", takeoff_refusal=""):
         """Publish the state of a flight."""

@@ -4,16 +4,15 @@ import contextlib
 import os
 import signal
 import time
-from functools import partial
 from xmlrpc.client import ServerProxy
 
 import pytest
 import rosgraph
 
-from crazyflie_dashboard import master
 from crazyflie_dashboard.control import ControlError
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.dashboard_node import example_folders, new_lane
+from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action, Kind
 from crazyflie_utils.main import ros_process
@@ -30,7 +29,7 @@ def dashboard():
     handle = process.handle("/dashboard")
     found = Dashboard(
         handle,
-        partial(master.read, "/dashboard"),
+        Master("/dashboard"),
         new_lane(handle),
         example_folders(),
     )

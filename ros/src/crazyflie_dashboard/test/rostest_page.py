@@ -1,14 +1,14 @@
 """Three simulated vehicles, flown from a page in Chromium."""
 
-from functools import partial
+import math
 
 import pytest
 from pages import Browser, Server, chromium, wait_for
 from selenium.webdriver.common.keys import Keys
 
-from crazyflie_dashboard import master
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.dashboard_node import new_lane
+from crazyflie_dashboard.master import Master
 from crazyflie_utils.main import ros_process
 
 
@@ -16,7 +16,7 @@ from crazyflie_utils.main import ros_process
 def dashboard():
     process = ros_process()
     handle = process.handle("/dashboard")
-    found = Dashboard(handle, partial(master.read, "/dashboard"), new_lane(handle), [])
+    found = Dashboard(handle, Master("/dashboard"), new_lane(handle), [])
     process.start()
     yield found
     found.close()
@@ -54,6 +54,43 @@ def test_all_take_off_go_where_the_floor_is_clicked_and_land(browser, dashboard)
     browser.press("Land")
     browser.has("0 in flight")
     wait_for(lambda: vehicle(dashboard, "cf2").position[2] < 0.03, "cf2 on the ground")
+
+
+def go(browser, *goal):
+    for axis, value in zip("xyz", goal, strict=True):
+        browser.enter(f'input[aria-label="{axis}, m"]', f"{value:.2f}")
+    browser.press("Go")
+
+
+def test_two_above_each_other_keep_their_distance(browser, dashboard):
+    def place(name):
+        return vehicle(dashboard, name).position
+
+    def is_near(name, goal):
+        return math.dist(place(name), goal) < 0.1
+
+    browser.press("None")
+    browser.choose("cf1", "cf2")
+    browser.has("on the ground", browser.card("cf2"))
+    browser.press("Take off")
+    for name in ("cf1", "cf2"):
+        wait_for(lambda name=name: place(name)[2] > 0.9, f"{name} at its height")
+    x, y, _ = place("cf2")
+    browser.press("None")
+    browser.choose("cf1")
+    # The way there would lead through the other.
+    go(browser, x, y, 1.0)
+    browser.has("cf1 and cf2 would be 0.")
+    go(browser, place("cf1")[0], y, 2.0)
+    wait_for(lambda: place("cf1")[2] > 1.9, "cf1 above")
+    go(browser, x, y, 2.0)
+    wait_for(lambda: is_near("cf1", (x, y, 2.0)), "cf1 above cf2")
+    browser.choose("cf2")
+    go(browser, x + 0.5, y, 1.5)
+    wait_for(lambda: is_near("cf2", (x + 0.5, y, 1.0)), "cf2 below the goal")
+    assert is_near("cf1", (x + 0.5, y, 2.0))
+    browser.press("Land")
+    browser.has("0 in flight")
 
 
 def test_the_key_of_the_emergency_stops_a_flight(browser, dashboard):

@@ -3,11 +3,16 @@
 import math
 
 import pytest
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.msg import Config
 from fake_fleet import FakeFleet
 
 from crazyflie_dashboard.control import ControlError
+from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.snapshot import Action
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.tf.poses import PoseCodec, StampedPose
 
 
 @pytest.fixture
@@ -37,6 +42,7 @@ def test_each_vehicle_has_its_own_outcome_in_the_words_of_its_service(fleet):
 
 
 def test_going_somewhere_takes_as_long_as_the_speed_says(fleet):
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 0.0, 1.0))
     assert fleet.command(Action.GO_TO, ["cf2"], goal=(1.0, 2.0, 1.0), speed=0.5) == {"cf2": ""}
     ((service, request),) = fleet.calls
     assert service == "/cf2/high_level/go_to"
@@ -55,7 +61,6 @@ def test_going_somewhere_takes_as_long_as_the_speed_says(fleet):
         {"goal": (0.0, 0.0, 1.0), "speed": 0.0},
         {"goal": (0.0, 0.0, 1.0), "speed": 50.0},
         {"goal": (0.0, 0.0, 1.0), "yaw": math.nan},
-        {"goal": (0.0, 0.0, 1.0), "names": ["cf1", "cf2"]},
     ],
 )
 def test_moves_that_make_no_sense_are_refused(fleet, details):
@@ -81,6 +86,103 @@ def test_a_service_that_has_gone_is_not_called_when_it_comes_back(fleet):
     services["/cf1/high_level/takeoff"] = gone
     fleet.process.advance(120.0)
     assert called(fleet) == ["/cf2/high_level/takeoff"]
+
+
+def goals(fleet):
+    return {
+        service.split("/")[1]: (request.goal.x, request.goal.y, request.goal.z)
+        for service, request in fleet.calls
+    }
+
+
+def test_vehicles_above_each_other_keep_their_distance(fleet):
+    fleet.fly(cf1=(0.0, 0.0, 0.5), cf2=(0.0, 0.0, 1.5), cf3=(3.0, 0.0, 1.0))
+    fleet.command(Action.GO_TO, ["cf1", "cf2"], goal=(1.0, 1.0, 1.2))
+    assert goals(fleet) == {
+        "cf1": pytest.approx((1.0, 1.0, 0.7)),
+        "cf2": pytest.approx((1.0, 1.0, 1.7)),
+    }
+    first, second = (request.duration for _, request in fleet.calls)
+    assert first == second
+
+
+def test_all_go_or_none(fleet):
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 0.0, 1.0))
+    fleet.report("cf2", FlightStatus.ON_GROUND)
+    assert fleet.command(Action.GO_TO, goal=(1.0, 1.0, 1.0)) == {
+        "cf1": "not all of them can go",
+        "cf2": "the vehicle is on the ground; expected it to fly",
+        "cf3": "not all of them can go",
+    }
+    assert fleet.calls == []
+
+
+def test_those_that_have_begun_are_held_when_one_refuses(fleet):
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 0.0, 1.0))
+    fleet.refusals["/cf2/high_level/go_to"] = "the vehicle is landing; expected it to fly"
+    outcome = fleet.command(Action.GO_TO, ["cf1", "cf2"], goal=(0.5, 1.0, 1.0))
+    assert outcome["cf1"] == "is held: not all of them can go"
+    service, request = fleet.calls[-1]
+    assert (service, request.relative) == ("/cf1/high_level/go_to", True)
+    assert (request.goal.x, request.goal.y, request.goal.z) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("x", [0.9, 4.0])
+def test_a_way_that_comes_too_near_to_another_vehicle_is_refused(fleet, x):
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 2.0, 1.0))
+    fleet.master.values["/cf2/buffer"] = 0.2
+    with pytest.raises(
+        RefusalError, match=r"cf1 and cf2 would be 0.\d+ m apart, .* at least 0.37 m"
+    ):
+        fleet.command(Action.GO_TO, ["cf1"], goal=(x, 0.0, 1.0))
+    assert fleet.calls == []
+    assert fleet.command(Action.GO_TO, ["cf1"], goal=(x, -4.0, 1.0)) == {"cf1": ""}
+
+
+def test_a_move_that_is_on_its_way_counts_until_it_is_left(fleet):
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(4.0, 0.0, 1.0), cf3=(2.0, 2.0, 1.0))
+    fleet.command(Action.GO_TO, ["cf1"], goal=(2.0, 0.0, 1.0))
+    with pytest.raises(RefusalError, match="cf1 and cf2 would be"):
+        fleet.command(Action.GO_TO, ["cf2"], goal=(2.0, 0.0, 1.0))
+    # Another command has led it elsewhere.
+    fleet.send_poses(places={"cf1": (0.0, 3.0, 1.0), "cf2": (4.0, 0.0, 1.0)})
+    assert fleet.command(Action.GO_TO, ["cf2"], goal=(2.0, 0.0, 1.0)) == {"cf2": ""}
+
+
+def test_vehicles_that_are_too_near_may_fly_apart(fleet):
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(0.2, 0.0, 1.0), cf3=(2.0, 2.0, 1.0))
+    assert fleet.command(Action.GO_TO, ["cf1"], goal=(-1.0, 0.0, 1.0)) == {"cf1": ""}
+
+
+def test_a_goal_is_given_to_a_vehicle_in_its_own_frame(fleet):
+    half = math.sqrt(0.5)
+    for _ in range(2):
+        stamp = fleet.process.clock.nanoseconds()
+        above = StampedPose("map", "world", stamp, (5.0, 0.0, 0.0), (0.0, 0.0, half, half))
+        fleet.process.publish("/tf_static", PoseCodec().encode([above]))
+        fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 0.0, 1.0))
+    assert fleet.dashboard.scene().fixed_frame == "map"
+    assert fleet.vehicles["cf2"].position == pytest.approx((5.0, 1.0, 1.0))
+    fleet.master.values["/cf2/high_level/reference/yaw"] = True
+    fleet.command(Action.GO_TO, ["cf2"], goal=(4.0, 1.5, 1.0), yaw=math.pi / 2)
+    assert goals(fleet) == {"cf2": pytest.approx((1.5, 1.0, 1.0))}
+    assert fleet.calls[0][1].yaw == pytest.approx(0.0)
+    fleet.master.values["/cf2/high_level/frames/fixed"] = "elsewhere"
+    with pytest.raises(RefusalError, match="cf2 is commanded in the frame elsewhere, .* shows map"):
+        fleet.command(Action.GO_TO, ["cf2"], goal=(4.0, 1.0, 1.0))
+
+
+def test_a_goal_outside_of_the_geofence_is_refused(fleet):
+    topic = "/cf2/geofence/parameter_updates"
+    topics = {**fleet.graph.topics, topic: Config._type}
+    fleet.graph = Graph(topics, topics, fleet.graph.services)
+    fleet.process.advance(2.1)
+    fleet.process.publish(topic, encode_config({"box/max/x": 1.5}))
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 2.0, 1.0))
+    with pytest.raises(RefusalError, match=r"cf2 would leave its geofence: x is 1.60 m; .* 1.5 m"):
+        fleet.command(Action.GO_TO, ["cf1", "cf2"], goal=(1.1, 0.0, 1.0))
+    assert fleet.calls == []
+    assert fleet.command(Action.GO_TO, ["cf2"], goal=(1.4, 0.0, 1.0)) == {"cf2": ""}
 
 
 def test_a_vehicle_that_is_stale_goes_nowhere_and_still_lands(fleet):

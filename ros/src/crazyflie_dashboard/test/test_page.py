@@ -20,17 +20,14 @@ def test_vehicles_take_off_go_where_the_floor_is_clicked_and_land(browser, serve
     browser.has("hovering", browser.card("cf1"))
     browser.click_floor(0.5, -0.5)
     browser.press("Go")
-    wait_for(lambda: len(server.dashboard.commands) == 3, "two commands more")
-    # Both keep their formation: their middle is where the click was, at the height of the takeoff.
-    goals = [command.goal for command in server.dashboard.commands[1:]]
-    assert goals[0] == pytest.approx((0.0, -0.5, 1.0), abs=0.02)
-    assert goals[1] == pytest.approx((1.0, -0.5, 1.0), abs=0.02)
+    wait_for(lambda: len(server.dashboard.commands) == 2, "one command for both")
+    # Their middle goes where the click was, at the height of the takeoff.
+    assert server.dashboard.commands[1].goal == pytest.approx((0.5, -0.5, 1.0), abs=0.02)
     browser.press("Land")
     browser.has("on the ground", browser.card("cf1"))
     assert server.actions() == [
         (Action.TAKEOFF, ("cf1", "cf2")),
-        (Action.GO_TO, ("cf1",)),
-        (Action.GO_TO, ("cf2",)),
+        (Action.GO_TO, ("cf1", "cf2")),
         (Action.LAND, ("cf1", "cf2")),
     ]
 

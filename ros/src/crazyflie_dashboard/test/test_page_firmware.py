@@ -1,6 +1,7 @@
 """Firmware parameters in headless Chromium: a virtual vehicle, the driver, a whole dashboard."""
 
 import pytest
+from fake_fleet import FakeMaster
 from pages import Browser, wait_for
 
 from crazyflie_dashboard.dashboard import Dashboard
@@ -37,7 +38,7 @@ def live(driven, server, driver, monkeypatch):
     handle, graph = process.handle("/dashboard"), Graph(services=services)
     # No emergency service is on its graph.
     lane = EmergencyLane("/dashboard", dict, str)
-    dashboard = Dashboard(handle, lambda: graph, lane, [])
+    dashboard = Dashboard(handle, FakeMaster(lambda: graph), lane, [])
     # NiceGUI has one server in a process: its next page shows this dashboard.
     monkeypatch.setattr(page_server, "View", lambda _: View(dashboard))
     browser = Browser(driver, server.url)

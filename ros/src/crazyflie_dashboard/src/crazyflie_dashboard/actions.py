@@ -14,16 +14,16 @@ from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest
 
 from crazyflie_dashboard.answers import any_of, failed, gathered, settle
 from crazyflie_dashboard.discovery import Graph, Request, Service, Vehicle
-from crazyflie_dashboard.page_data import (
-    MAX_COMMAND_AGE,
-    Command,
-    Outcome,
-)
-from crazyflie_dashboard.snapshot import Action, VehicleSnapshot
+from crazyflie_dashboard.frames import Frames
+from crazyflie_dashboard.master import Master
+from crazyflie_dashboard.moves import Move, expect_apart, formation, in_frame
+from crazyflie_dashboard.page_data import MAX_COMMAND_AGE, Command, Outcome
+from crazyflie_dashboard.snapshot import Action, Triple, VehicleSnapshot
 from crazyflie_driver import srv
+from crazyflie_fleet.fleet_config import BUFFER
 from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_takeoff.limits import Box
 from crazyflie_utils import NodeHandle
-from crazyflie_utils.parameters.types import BOOLEAN
 from crazyflie_utils.refusal import RefusalError
 
 _FLIGHT_TIMEOUT = 60.0  #: Of services that answer when the vehicle flies or has landed, s.
@@ -32,6 +32,12 @@ _CLIMB_SPEED = 0.5  #: Mean speed of a takeoff, m/s.
 _UNKNOWN_HEIGHT = 1.0  #: From which a vehicle lands whose position is not known, m.
 _MIN_DURATION = 1.0  #: Of a move, s.
 _MAX_SPEED = 2.0  #: m/s.
+
+_HOLD_DURATION = 1.0  #: Of a move to where a vehicle is, s.
+_STAYS = "not all of them can go"
+
+#: Parameters of the nodes that carry out a go to: whether headings can change; the goals' frame.
+_YAW, _FIXED = "reference/yaw", "frames/fixed"
 
 _YAW_REFERENCE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 
@@ -50,6 +56,7 @@ class Target:
 
     vehicle: Vehicle
     now: VehicleSnapshot
+    fence: Box | None = None  #: Its geofence, in the frame of its states.
 
 
 class Actions:
@@ -60,18 +67,32 @@ class Actions:
     handle : NodeHandle
     workers : concurrent.futures.Executor
         Its threads may wait for the master.
+    master : Master
+    frames : Frames
+        Those in which the page shows vehicles.
     time : callable
         time.monotonic.
     """
 
-    def __init__(self, handle: NodeHandle, workers: Executor, time: Callable[[], float]):
+    def __init__(
+        self,
+        handle: NodeHandle,
+        workers: Executor,
+        master: Master,
+        frames: Frames,
+        time: Callable[[], float],
+    ):
         self._handle, self._workers, self._time = handle, workers, time
+        self._master, self._frames = master, frames
+        self._moves: dict[str, Move] = {}
         self._commanders: dict[str, subprocess.Popen[bytes]] = {}
 
     def carry_out(
-        self, command: Command, targets: Mapping[str, Target], graph: Graph
+        self, command: Command, targets: Mapping[str, Target], graph: Graph, fixed: str
     ) -> "Future[tuple[Outcome, ...]]":
         """Call the services that a command needs; the outcomes come when all have answered.
+
+        ``fixed`` is the frame of the command's goal.
 
         Raises
         ------
@@ -80,6 +101,8 @@ class Actions:
         """
         expect_fresh(command.action.value, self._time() - command.clicked)
         _check(command)
+        if command.action == Action.GO_TO:
+            return self._go_to(command, targets, graph, fixed)
         answers = self._land_all(command, targets, graph)
         for name in command.vehicles:
             if name not in answers:
@@ -103,57 +126,152 @@ class Actions:
         ]
         if len(own) < 2:
             return {}
-        answer = self._call(command, Service("/all/land", Request.EMPTY), None)
+        answer = self._call(command, Service("/all/land", Request.EMPTY), EmptyRequest())
         return dict.fromkeys(own, answer)
 
     def _command(self, command, target, name, graph):
         services = () if target is None else _services(target, command.action)
         if not services:
-            known = "there is no such vehicle" if target is None else "it has no service for it"
-            return failed(f"{command.action.value}: {known}")
-        if any(each.needs_commander for each in services):
-            self._start_commander(target.vehicle, graph)
-            return failed(
-                f"{name} had no services for moves; they are being started, try again in a moment"
-            )
-        may_move = Action.GO_TO in (command.action, *target.now.actions)
+            return failed(_why_no_service(command.action, target))
+        may_move = Action.GO_TO in target.now.actions
         if command.action == Action.TAKEOFF and may_move:
             go_to = _services(target, Action.GO_TO)
             if any(each.needs_commander for each in go_to):
                 self._start_commander(target.vehicle, graph)
-        answers = [self._call(command, service, target) for service in services]
+        answers = [
+            self._call(command, service, _request(command, service, target)) for service in services
+        ]
         return answers[0] if len(answers) == 1 else any_of(answers)
 
-    def _call(self, command: Command, service: Service, target: Target | None) -> "Future[Any]":
+    def _call(self, command: Command, service: Service, request: Any) -> "Future[Any]":
         """Call a service unless the command grows too old before it is reached."""
-        outcome: Future[Any] = Future()
+        age = self._time() - command.clicked
+        try:
+            expect_fresh(command.action.value, age)
+        except RefusalError as error:
+            return failed(str(error))
         limit = _FLIGHT_TIMEOUT if command.action in (Action.TAKEOFF, Action.LAND) else _TIMEOUT
+        outcome: Future[Any] = Future()
+        # What is not reached is withdrawn: it must not be carried out when the node goes on.
+        answer = self._handle.call_service(
+            service.name, _TYPES[service.request], request, limit, MAX_COMMAND_AGE - age
+        )
+        answer.add_done_callback(lambda done: settle(done, outcome))
+        return outcome
 
-        def call(has_yaw):
-            try:
-                age = self._time() - command.clicked
-                expect_fresh(command.action.value, age)
-                request = _request(command, service, target, has_yaw.result())
-            except Exception as error:
+    # Several vehicles that go somewhere.
+
+    def _go_to(self, command, targets, graph, fixed):
+        """Have the middle of vehicles go somewhere: all of them, or none."""
+        refusals = {}
+        for name in command.vehicles:
+            if text := self._why_it_stays(name, targets.get(name), graph):
+                refusals[name] = text
+        if refusals:
+            return gathered({name: failed(refusals.get(name, _STAYS)) for name in command.vehicles})
+        chosen = {name: targets[name] for name in command.vehicles}
+        moving = {name: move for name, move in self._moves.items() if name in targets}
+        ready = self._workers.submit(
+            self._prepared, command, chosen, targets, moving, graph, fixed, self._time()
+        )
+        outcome: Future[tuple[Outcome, ...]] = Future()
+
+        def call():
+            error = ready.exception()
+            if error is not None:
                 outcome.set_exception(error)
                 return
-            # What is not reached is withdrawn: it must not be carried out when the node goes on.
-            answer = self._handle.call_service(
-                service.name, _TYPES[service.request], request, limit, MAX_COMMAND_AGE - age
-            )
-            answer.add_done_callback(lambda done: settle(done, outcome))
+            moves, requests = ready.result()
+            answers = {}
+            for name, (service, request) in requests.items():
+                answers[name] = self._call(command, service, request)
+            self._moves = {**moving, **moves}
+            gathered(answers).add_done_callback(lambda done: end(done.result()))
 
-        if service.request == Request.GO_TO:
-            has_yaw = f"{service.name.rpartition('/')[0]}/reference/yaw"
-            found = self._workers.submit(
-                self._handle.get_param, has_yaw, BOOLEAN, _is_drivers(target)
-            )
-            found.add_done_callback(lambda done: self._handle.submit(call, done))
-        else:
-            known: Future[bool] = Future()
-            known.set_result(False)
-            call(known)
+        def end(outcomes):
+            gone = [each for each in outcomes if not each.text]
+            if 0 < len(gone) < len(outcomes):
+                # The ways were checked for all of them.
+                self._handle.submit(self._hold, [targets[each.vehicle] for each in gone])
+                outcomes = tuple(
+                    each if each.text else Outcome(each.vehicle, f"is held: {_STAYS}")
+                    for each in outcomes
+                )
+            outcome.set_result(outcomes)
+
+        ready.add_done_callback(lambda _: self._handle.submit(call))
         return outcome
+
+    def _why_it_stays(self, name, target, graph):
+        services = () if target is None else _services(target, Action.GO_TO)
+        if not services:
+            return _why_no_service(Action.GO_TO, target)
+        if services[0].needs_commander:
+            self._start_commander(target.vehicle, graph)
+            return "it had no services for moves; they are being started, try again in a moment"
+        if target.now.position is None or target.now.is_stale:
+            return "its position is not known; expected a new one"
+        if "flight_status" in target.vehicle.topics and not target.now.is_in_flight:
+            return f"the vehicle is {target.now.state}; expected it to fly"
+        return ""
+
+    def _prepared(self, command, chosen, targets, moving, graph, fixed, now):
+        """Return moves, and service with request, of vehicles; it waits for the master."""
+        services = {name: _services(target, Action.GO_TO)[0] for name, target in chosen.items()}
+        spaces = {name: _namespace(service, graph) for name, service in services.items()}
+        wanted = {name: f"{each.vehicle.namespace}/{BUFFER}" for name, each in targets.items()}
+        known = self._master.parameters(
+            [
+                *wanted.values(),
+                *(f"{space}/{key}" for space in spaces.values() for key in (_YAW, _FIXED)),
+            ]
+        )
+        places = {n: t.now.position for n, t in targets.items() if t.now.position is not None}
+        goals = formation({name: places[name] for name in chosen}, command.goal)
+        distance = max(math.dist(places[name], goal) for name, goal in goals.items())
+        duration = max(_MIN_DURATION, distance / command.speed)
+        moves = {n: Move(places[n], goal, now, duration) for n, goal in goals.items()}
+        requests = {}
+        for name, target in chosen.items():
+            space = spaces[name]
+            has_yaw = known.get(f"{space}/{_YAW}", target.vehicle.has_driver)
+            own = known.get(f"{space}/{_FIXED}") or self._frames.parent(target.now.frame) or fixed
+            yaw = rpy_from_quaternion(*target.now.rotation)[2]
+            yaw = yaw if command.yaw is None else command.yaw
+            goal, yaw = self._in_own_frame(name, goals[name], yaw, own.strip("/"), fixed)
+            _expect_inside(name, goal, target.fence)
+            requests[name] = (
+                services[name],
+                srv.GoToRequest(
+                    groupMask=0,
+                    relative=False,
+                    goal=Point(*goal),
+                    yaw=yaw if has_yaw else 0.0,
+                    duration=genpy.Duration.from_sec(duration),
+                ),
+            )
+        buffers = {name: float(known[key]) for name, key in wanted.items() if key in known}
+        expect_apart(moves, places, moving, buffers, now)
+        return moves, requests
+
+    def _in_own_frame(self, name, goal, yaw, own, fixed):
+        if own == fixed:
+            return goal, yaw
+        place = self._frames.in_fixed(own, fixed)
+        if place is None:
+            raise RefusalError(
+                f"go to: {name} is commanded in the frame {own}, and the page shows {fixed}; "
+                "expected one of them above the other on /tf"
+            )
+        return in_frame(goal, yaw, place)
+
+    def _hold(self, targets):
+        """Have vehicles stay where they are."""
+        request = srv.GoToRequest(relative=True, duration=genpy.Duration.from_sec(_HOLD_DURATION))
+        for target in targets:
+            self._moves.pop(target.vehicle.name, None)
+            (service,) = _services(target, Action.GO_TO)
+            self._handle.call_service(service.name, srv.GoTo, request, _TIMEOUT)
 
     def _start_commander(self, vehicle, graph):
         name = vehicle.commander
@@ -185,8 +303,8 @@ def _check(command: Command) -> None:
         raise RefusalError(f"{command.action.value}: no vehicle is chosen")
     if command.action != Action.GO_TO:
         return
-    if command.goal is None or len(command.vehicles) != 1:
-        raise RefusalError("go to: expected one vehicle and one goal")
+    if command.goal is None:
+        raise RefusalError("go to: there is no goal; expected x, y and z")
     if not 0.0 < command.speed <= _MAX_SPEED:
         raise RefusalError(
             f"go to: the speed is {command.speed:g} m/s; expected more than 0 and at most "
@@ -200,11 +318,31 @@ def _services(target: Target, action: Action) -> tuple[Service, ...]:
     return target.vehicle.services.get(action, ())
 
 
-def _is_drivers(target):
-    return target is not None and target.vehicle.has_driver
+def _why_no_service(action: Action, target: Target | None) -> str:
+    known = "there is no such vehicle" if target is None else "it has no service for it"
+    return f"{action.value}: {known}"
 
 
-def _request(command: Command, service: Service, target: Target | None, has_yaw: bool) -> Any:
+def _namespace(service: Service, graph: Graph) -> str:
+    """Return where the node that offers a service has its parameters."""
+    space, _, _ = service.name.rpartition("/")
+    return space if space.endswith("/high_level") else graph.services.get(service.name, space)
+
+
+def _expect_inside(name: str, goal: Triple, fence: Box | None) -> None:
+    if goal[2] < 0.0:
+        raise RefusalError(f"go to: {name} would go to z = {goal[2]:.2f} m; expected 0 or more")
+    if fence is None or fence.excess(goal) <= 0.0:
+        return
+    for axis, low, x, high in zip("xyz", fence.lower, goal, fence.upper, strict=True):
+        if not low <= x <= high:
+            raise RefusalError(
+                f"go to: {name} would leave its geofence: {axis} is {x:.2f} m; expected "
+                f"{low:g} to {high:g} m"
+            )
+
+
+def _request(command: Command, service: Service, target: Target | None) -> Any:
     if service.request == Request.EMPTY:
         return EmptyRequest()
     if service.request == Request.SET_BOOL:
@@ -214,19 +352,6 @@ def _request(command: Command, service: Service, target: Target | None, has_yaw:
         return srv.TakeoffRequest(0, command.height, genpy.Duration.from_sec(duration))
     assert target is not None
     position = target.now.position
-    if service.request == Request.LAND:
-        height = _UNKNOWN_HEIGHT if position is None else position[2]
-        duration = max(_MIN_DURATION, height / _CLIMB_SPEED)
-        return srv.LandRequest(0, 0.0, genpy.Duration.from_sec(duration))
-    assert command.goal is not None
-    if position is None or target.now.is_stale:
-        raise RefusalError(f"{target.vehicle.name}: its position is not known; expected a new one")
-    heading = rpy_from_quaternion(*target.now.rotation)[2] if has_yaw else 0.0
-    duration = max(_MIN_DURATION, math.dist(position, command.goal) / command.speed)
-    return srv.GoToRequest(
-        groupMask=0,
-        relative=False,
-        goal=Point(*command.goal),
-        yaw=heading if command.yaw is None else command.yaw,
-        duration=genpy.Duration.from_sec(duration),
-    )
+    height = _UNKNOWN_HEIGHT if position is None else position[2]
+    duration = max(_MIN_DURATION, height / _CLIMB_SPEED)
+    return srv.LandRequest(0, 0.0, genpy.Duration.from_sec(duration))

@@ -9,11 +9,11 @@ from crazyflie_dashboard import missions
 from crazyflie_dashboard.actions import Actions, Target, expect_fresh
 from crazyflie_dashboard.answers import settle
 from crazyflie_dashboard.control import PageControl
-from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.doctor_report import examine
 from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.graph_model import GraphModel
 from crazyflie_dashboard.live_parameters import LiveParameters
+from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.page_data import (
     Command,
     DryRunResult,
@@ -38,8 +38,7 @@ class Dashboard:
     Parameters
     ----------
     handle : NodeHandle
-    read_graph : callable
-        Returns the `Graph`; it may wait.
+    master : Master
     lane : EmergencyLane
         It is closed with the dashboard.
     folders : list of str
@@ -53,7 +52,7 @@ class Dashboard:
     def __init__(
         self,
         handle: NodeHandle,
-        read_graph: Callable[[], Graph],
+        master: Master,
         lane: EmergencyLane,
         folders: list[str],
         clock: Callable[[], float] = time.monotonic,
@@ -63,8 +62,8 @@ class Dashboard:
         self.pages = PageControl()
         self._handle, self._folders, self._clock = handle, folders, clock
         self._workers = workers or ThreadPoolExecutor(8, "dashboard")
-        self._model = GraphModel(handle, self._workers, read_graph, clock)
-        self._actions = Actions(handle, self._workers, clock)
+        self._model = GraphModel(handle, self._workers, master.graph, clock)
+        self._actions = Actions(handle, self._workers, master, self._model.frames, clock)
         self._lane = lane
         self._parameters = LiveParameters(handle, self._workers, self._model)
         self._missions = missions.Missions()
@@ -116,11 +115,12 @@ class Dashboard:
             self.pages.expect_control(page)
             now = self._model.scene.vehicles
             targets = {
-                name: Target(model.vehicle, now[name])
+                name: Target(model.vehicle, now[name], self._model.fence(model.vehicle))
                 for name, model in self._model.models.items()
                 if name in now
             }
-            return self._actions.carry_out(command, targets, self._model.graph)
+            fixed = self._model.scene.fixed_frame
+            return self._actions.carry_out(command, targets, self._model.graph, fixed)
 
         return self._do(do)
 

@@ -1,17 +1,16 @@
 """ROS interface of the dashboard."""
 
 import contextlib
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
 import rospkg
 from typing_extensions import override
 
-from crazyflie_dashboard import master
 from crazyflie_dashboard.access import Access, AccessError, expect_free_port, is_loopback, new_token
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.emergency import EmergencyLane
+from crazyflie_dashboard.master import Master
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import Integer, Text
 
@@ -59,7 +58,7 @@ class DashboardNode(Node):
         folders = [path for path in self._parameters.folders.split(":") if path]
         dashboard = Dashboard(
             handle,
-            lambda: master.read(handle.name),
+            Master(handle.name),
             new_lane(handle),
             folders or example_folders(),
         )
@@ -79,10 +78,8 @@ class DashboardNode(Node):
 
 def new_lane(handle: NodeHandle) -> EmergencyLane:
     """Return the lane for emergencies of the running graph; what becomes of them is logged."""
-    name = handle.name
-    return EmergencyLane(
-        name, partial(master.services, name), partial(master.lookup, name), handle.warn
-    )
+    master = Master(handle.name)
+    return EmergencyLane(handle.name, master.services, master.lookup, handle.warn)
 
 
 def example_folders() -> list[str]:

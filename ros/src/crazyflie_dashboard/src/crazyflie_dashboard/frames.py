@@ -55,6 +55,11 @@ class Frames:
         self._counts: Counter[bytes] = Counter()
         self._counted_since = time()
 
+    def clear(self) -> None:
+        """Forget all frames."""
+        for known in (self.poses, self.rejected, self._latest, self._counts):
+            known.clear()
+
     def read(self, raw: bytes) -> None:
         """Take a serialized tf2_msgs/TFMessage."""
         try:
@@ -99,6 +104,11 @@ class Frames:
         """Return how old the pose of a frame is, s."""
         pose = self.poses[name]
         return pose.delay + self._time() - pose.arrival
+
+    def parent(self, name: str | None) -> str | None:
+        """Return the frame right above a frame; None if it is not known."""
+        pose = None if name is None else self.poses.get(name)
+        return None if pose is None else pose.parent
 
     def root(self, name: str) -> str:
         """Return the frame at the top of a frame's tree."""

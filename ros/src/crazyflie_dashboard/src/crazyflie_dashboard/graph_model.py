@@ -19,6 +19,7 @@ from crazyflie_dashboard.plots import VehiclePlots
 from crazyflie_dashboard.snapshot import Frame, LogLine, Scene, Sentence, Triple, VehicleSnapshot
 from crazyflie_dashboard.surroundings import Surroundings
 from crazyflie_dashboard.vehicle_model import VehicleModel, frame_of
+from crazyflie_takeoff.limits import Box
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.tf.poses import RawTransforms
 
@@ -60,7 +61,7 @@ class GraphModel:
         self._parent, self._workers, self._read_graph = handle, workers, read_graph
         self._clock = clock
         self._handle: NodeHandle | None = None
-        self._frames = Frames(clock, handle.nanoseconds)
+        self.frames = Frames(clock, handle.nanoseconds)
         self._diagnostics = Diagnostics(clock)
         self._surroundings = Surroundings(handle)
         self._log: deque[LogLine] = deque(maxlen=_MAX_LINES)
@@ -76,11 +77,11 @@ class GraphModel:
         if self._handle is not None:
             return
         handle = self._handle = self._parent.child()
-        self._frames = Frames(self._clock, handle.nanoseconds)
+        self.frames.clear()
         self._surroundings = Surroundings(handle)
         self._poll_at = 0.0
         for topic in ("/tf", "/tf_static"):
-            handle.subscribe(topic, RawTransforms, lambda message: self._frames.read(message.raw))
+            handle.subscribe(topic, RawTransforms, lambda message: self.frames.read(message.raw))
         handle.subscribe("/rosout_agg", Log, self._on_log)
         handle.subscribe("/diagnostics", DiagnosticArray, self._diagnostics.take)
         handle.timer(SCENE_PERIOD, self._on_timer, steady=True)
@@ -105,11 +106,15 @@ class GraphModel:
             self.plots[name] = VehiclePlots(self._clock)
         self._receive()
 
+    def fence(self, vehicle: Vehicle) -> Box | None:
+        """Return the geofence of a vehicle, in the frame of its states; None if it has none."""
+        return self._surroundings.box(vehicle.namespace)
+
     def _receive(self):
         """Receive of each vehicle what is shown of it."""
         is_few = len(self.models) <= _FEW
         for name, model in self.models.items():
-            model.frame = frame_of(model.vehicle, self._frames, len(self.models) == 1)
+            model.frame = frame_of(model.vehicle, self.frames, len(self.models) == 1)
             model.receive(name in self.plots, is_few, self.graph.topics)
 
     def _on_timer(self):
@@ -119,9 +124,9 @@ class GraphModel:
             self._workers.submit(self._read_graph).add_done_callback(
                 lambda done: self._parent.submit(self._on_graph, done, began)
             )
-        self._frames.update()
-        if len(self._frames.poses) != self._known_frames:
-            self._known_frames = len(self._frames.poses)
+        self.frames.update()
+        if len(self.frames.poses) != self._known_frames:
+            self._known_frames = len(self.frames.poses)
             self._receive()
         self.scene = self._make_scene()
 
@@ -176,7 +181,7 @@ class GraphModel:
         self._log.append(log_line(self._lines, message))
 
     def _make_scene(self) -> Scene:
-        frames = self._frames
+        frames = self.frames
         own = {model.frame for model in self.models.values()} - {None}
         roots = [frames.root(str(frame)) for frame in own or frames.poses]
         fixed = max(sorted(set(roots)), key=roots.count, default="world")
@@ -206,7 +211,7 @@ class GraphModel:
     def _snapshot(self, name, fixed):
         """Return what is known of a vehicle; one that cannot be drawn holds up no other."""
         try:
-            return self.models[name].snapshot(self._frames, fixed)
+            return self.models[name].snapshot(self.frames, fixed)
         except Exception as error:
             self._parent.warn(f"{name} cannot be shown: {error}", throttle=10.0, key=name)
             return VehicleSnapshot(name, state="cannot be shown", reason=str(error))
@@ -216,7 +221,7 @@ class GraphModel:
         if self._trouble:
             remedy = "new vehicles are not seen, and those that are gone stay"
             found.append(Sentence("error", "dashboard", self._trouble, remedy))
-        for frame in sorted(self._frames.rejected):
+        for frame in sorted(self.frames.rejected):
             text = f"the newest pose of {frame} on /tf has no unit quaternion, or is not finite"
             found.append(Sentence("error", "dashboard", text, "an older pose is shown"))
         return tuple(found)

@@ -2,7 +2,8 @@
 
 import http.client
 import xmlrpc.client
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import rosgraph
 
@@ -15,26 +16,49 @@ class MasterError(OSError):
     """The master does not answer, or not what was asked for."""
 
 
-def read(caller: str) -> Graph:
-    """Return what the master knows, or raise `MasterError`."""
-    types = dict(_ask("getTopicTypes", caller))
-    published, _, services = _ask("getSystemState", caller)
-    return Graph(
-        topics={topic: types[topic] for topic, _ in published if topic in types},
-        types=types,
-        services={name: nodes[0] for name, nodes in services if nodes},
-    )
+class Master:
+    """The ROS master, as it answers a node; every method may raise `MasterError`."""
 
+    def __init__(self, caller: str):
+        self._caller = caller
 
-def services(caller: str) -> Mapping[str, str]:
-    """Return service -> node, or raise `MasterError`."""
-    _, _, found = _ask("getSystemState", caller)
-    return {name: nodes[0] for name, nodes in found if nodes}
+    def graph(self) -> Graph:
+        """Return all topics and services."""
+        types = dict(self._ask("getTopicTypes"))
+        published, _, services = self._ask("getSystemState")
+        return Graph(
+            topics={topic: types[topic] for topic, _ in published if topic in types},
+            types=types,
+            services={name: nodes[0] for name, nodes in services if nodes},
+        )
 
+    def services(self) -> Mapping[str, str]:
+        """Return service -> node."""
+        _, _, found = self._ask("getSystemState")
+        return {name: nodes[0] for name, nodes in found if nodes}
 
-def lookup(caller: str, service: str) -> str:
-    """Return the address of a service, as in rosrpc://host:port, or raise `MasterError`."""
-    return _ask("lookupService", caller, service)
+    def lookup(self, service: str) -> str:
+        """Return the address of a service, as in rosrpc://host:port."""
+        return self._ask("lookupService", service)
+
+    def parameters(self, names: Iterable[str]) -> dict[str, Any]:
+        """Return the values of those parameters that are set, in one request."""
+        names = list(dict.fromkeys(names))
+
+        def ask(proxy):
+            several: Any = xmlrpc.client.MultiCall(proxy)
+            for name in names:
+                several.getParam(self._caller, name)
+            return [*several()]
+
+        answers = zip(names, _answer(ask), strict=True)
+        return {name: value for name, (code, _, value) in answers if code == 1}
+
+    def _ask(self, method, *arguments):
+        code, text, value = _answer(lambda proxy: getattr(proxy, method)(self._caller, *arguments))
+        if code != 1:
+            raise MasterError(text)
+        return value
 
 
 class _Transport(xmlrpc.client.Transport):
@@ -44,13 +68,10 @@ class _Transport(xmlrpc.client.Transport):
         return connection
 
 
-def _ask(method, *arguments):
+def _answer(ask: Callable[[Any], Any]) -> Any:
     uri = rosgraph.get_master_uri()
     try:
         with xmlrpc.client.ServerProxy(uri, transport=_Transport()) as proxy:
-            code, text, value = getattr(proxy, method)(*arguments)
+            return ask(proxy)
     except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
         raise MasterError(f"the master at {uri} does not answer: {error}") from None
-    if code != 1:
-        raise MasterError(text)
-    return value

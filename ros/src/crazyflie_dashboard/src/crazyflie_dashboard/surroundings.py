@@ -11,6 +11,7 @@ from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.snapshot import Solid, Triple
 from crazyflie_model.angles import rotate
 from crazyflie_takeoff.flight_topics import follow_box
+from crazyflie_takeoff.limits import Box
 from crazyflie_utils import NodeHandle
 
 _MARKERS = ("world/markers", "sweep/markers", "plan/markers")  #: How the topics of markers end.
@@ -36,7 +37,7 @@ class Surroundings:
         self._topics: set[str] = set()
         self._markers: dict[str, list[Marker]] = {}
         self._paths: dict[str, tuple[str, tuple[Triple, ...]]] = {}
-        self._fences: dict[str, tuple[Triple, Triple]] = {}
+        self._fences: dict[str, Box] = {}
         self._solids: tuple[Solid, ...] = ()
 
     def follow(self, graph: Graph) -> None:
@@ -76,13 +77,18 @@ class Surroundings:
     @property
     def fences(self) -> tuple[tuple[Triple, Triple], ...]:
         """Lower and upper corners of the geofences, m, each once."""
-        return tuple(dict.fromkeys(self._fences.values()))
+        return tuple(dict.fromkeys(_drawn(box) for box in self._fences.values()))
+
+    def box(self, namespace: str) -> Box | None:
+        """Return the box of a vehicle's geofence; None if it has none."""
+        found = (box for topic, box in self._fences.items() if topic.startswith(f"{namespace}/"))
+        return next(found, None)
 
     def _subscribe(self, topic, kind):
         if topic.endswith(_MARKERS) and kind == MarkerArray._type:
             self._handle.subscribe(topic, MarkerArray, lambda message: self._draw(topic, message))
         elif topic.endswith(_FENCES):
-            follow_box(self._handle, topic, lambda box: self._fence(topic, box))
+            follow_box(self._handle, topic, lambda box: self._fences.update({topic: box}))
         elif kind == _PATH and (path_type := roslib.message.get_message_class(_PATH)):
             self._handle.subscribe(topic, path_type, lambda message: self._plan(topic, message))
         else:
@@ -102,11 +108,13 @@ class Surroundings:
         points = [each.pose.position for each in message.poses]
         self._paths[topic] = message.header.frame_id.strip("/"), _path(points)
 
-    def _fence(self, topic, box):
-        lower, upper = (
-            tuple(min(max(x, -_FAR), _FAR) for x in corner) for corner in (box.lower, box.upper)
-        )
-        self._fences[topic] = lower, upper
+
+def _drawn(box: Box) -> tuple[Triple, Triple]:
+    def near(corner):
+        x, y, z = (min(max(each, -_FAR), _FAR) for each in corner)
+        return x, y, z
+
+    return near(box.lower), near(box.upper)
 
 
 def _path(points: list[Point]) -> tuple[Triple, ...]:

@@ -14,6 +14,9 @@ from crazyflie_fleet.settings import MachineSettings, RobotSettings
 #: that rotors throw down takes lift from a vehicle below.
 DOWNWASH = 2.0
 
+#: Parameter below a vehicle's name: its collision buffer, m, by which others plan.
+BUFFER = "buffer"
+
 
 @dataclass(frozen=True)
 class LogTopic:

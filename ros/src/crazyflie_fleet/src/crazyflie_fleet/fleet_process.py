@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 from crazyflie_fleet.battery_report_node import BatteryReportNode
-from crazyflie_fleet.fleet_config import VehicleConfig
+from crazyflie_fleet.fleet_config import BUFFER, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FlyParameters
 from crazyflie_fleet.fleet_services_node import FleetServicesNode
 from crazyflie_fleet.high_level_node import HighLevelNode
@@ -20,7 +20,6 @@ from crazyflie_fleet.vectorized_simulator_node import (
     VectorizedSimulatorParameters,
 )
 from crazyflie_fleet.vehicle_nodes import (
-    BUFFER,
     INHIBITION,
     PLACE,
     Tree,

@@ -28,8 +28,6 @@ IN_FLIGHT = "in_flight"
 FLIGHT_STATUS = f"{IN_FLIGHT}_flight_status"  #: Topics and services of a vehicle, below its name.
 #: Topic below a vehicle's name: why its takeoffs are refused; empty if they are not.
 INHIBITION = "takeoff_inhibition"
-#: Parameter below a vehicle's name: its collision buffer, m, by which missions are planned.
-BUFFER = "buffer"
 #: Parameter below a vehicle's name: its place in the fleet file, from 0.
 PLACE = "place_in_fleet"
 

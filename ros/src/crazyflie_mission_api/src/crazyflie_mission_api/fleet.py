@@ -16,9 +16,9 @@ from std_msgs.msg import String
 from typing_extensions import override
 
 from crazyflie_fleet import fleet_file
+from crazyflie_fleet.fleet_config import BUFFER
 from crazyflie_fleet.high_level_node import HighLevelNode
 from crazyflie_fleet.mission_watch import MISSION_PERIOD, MISSION_TOPIC, Claim, MissionWatch
-from crazyflie_fleet.vehicle_nodes import BUFFER
 from crazyflie_mission_api import observer
 from crazyflie_mission_api.dry_run import dry_run
 from crazyflie_mission_api.group_state import Obstacle, Rules

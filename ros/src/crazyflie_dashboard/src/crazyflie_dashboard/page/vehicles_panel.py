@@ -1,7 +1,7 @@
 """Cards of the vehicles, and what the chosen ones can be told."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from nicegui import ui
@@ -104,26 +104,8 @@ class VehiclesPanel:
             self._session.say("go to: click on the floor, or type x, y and z", "warning")
             return
         yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
-        vehicles = [self._session.vehicles[name] for name in self._session.chosen_names]
-        for name, place in formation(vehicles, goal).items():
-            await self._session.command(Action.GO_TO, [name], event.args, goal=place, yaw=yaw)
-        if not vehicles:
-            await self._session.command(Action.GO_TO, (), event.args)
-
-
-def formation(
-    vehicles: list[VehicleSnapshot], goal: Sequence[float]
-) -> dict[str, tuple[float, float, float]]:
-    """Return where each vehicle goes, m, so that their middle comes to the goal.
-
-    A vehicle whose position is not known goes nowhere, since it could hit another one.
-    """
-    known = {each.name: each.position for each in vehicles if each.position is not None}
-    x, y = (sum(place[k] for place in known.values()) / max(1, len(known)) for k in (0, 1))
-    return {
-        name: (goal[0] + place[0] - x, goal[1] + place[1] - y, goal[2])
-        for name, place in known.items()
-    }
+        names = self._session.chosen_names
+        await self._session.command(Action.GO_TO, names, event.args, goal=tuple(goal), yaw=yaw)
 
 
 def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:

@@ -1,0 +1,105 @@
+"""Go to: the places of a formation, and whether vehicles come too near to others on their ways."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from crazyflie_dashboard.snapshot import Rotation, Triple
+from crazyflie_fleet.fleet_config import DOWNWASH, close_pairs
+from crazyflie_fleet.separation import RELEASE_RATIO
+from crazyflie_model.angles import rotate_back, rpy_from_quaternion
+from crazyflie_model.trajectory import minimum_jerk
+from crazyflie_utils.refusal import RefusalError
+
+SEPARATION = 0.3  #: Of any two vehicles, m; as that of missions by default.
+FAR = 0.5  #: A vehicle that is further from its move than this, m, has been told something else.
+
+_STEP = 0.05  #: Between two places of the fastest vehicle that are checked, m.
+_MAX_STEPS = 400
+_APPROACH = 0.02  #: Two that are too near already may fly apart, and come nearer by this, m.
+
+
+@dataclass(frozen=True)
+class Move:
+    """A straight move from rest to rest: start and goal in m, begin and duration in s."""
+
+    start: Triple
+    goal: Triple
+    begin: float = 0.0
+    duration: float = 1.0
+
+
+def formation(places: Mapping[str, Triple], goal: Triple) -> dict[str, Triple]:
+    """Return where vehicles go, m, so that their middle comes to the goal."""
+    x, y, z = (goal[k] - sum(p[k] for p in places.values()) / len(places) for k in range(3))
+    return {name: (p[0] + x, p[1] + y, p[2] + z) for name, p in places.items()}
+
+
+def in_frame(point: Triple, yaw: float, frame: tuple[Triple, Rotation]) -> tuple[Triple, float]:
+    """Return a point (m) and a heading (rad) in a frame, whose own position and rotation are known.
+
+    Raises
+    ------
+    ValueError
+        The rotation is no quaternion.
+    """
+    (a, b, c), rotation = frame
+    x, y, z = rotate_back(rotation, (point[0] - a, point[1] - b, point[2] - c))
+    return (x, y, z), yaw - rpy_from_quaternion(*rotation)[2]
+
+
+def expect_apart(
+    moves: Mapping[str, Move],
+    places: Mapping[str, Triple],
+    known: Mapping[str, Move],
+    buffers: Mapping[str, float],
+    now: float,
+) -> None:
+    """Refuse moves on which two vehicles come nearer than missions let them.
+
+    Parameters
+    ----------
+    moves : dict
+        That are to begin ``now``, s, by vehicle.
+    places : dict
+        Where all vehicles are, m; those that do not move stay there.
+    known : dict
+        Moves that began before; each counts while its vehicle is on it.
+    buffers : dict
+        Collision buffers of vehicles that have one, m.
+
+    Raises
+    ------
+    RefusalError
+        It names the first two.
+    """
+    names = list(places)
+    radii = [max(SEPARATION / 2.0, RELEASE_RATIO * buffers.get(name, 0.0)) for name in names]
+    present = {name: Move(place, place) for name, place in places.items()}
+    for name, move in known.items():
+        is_on_its_way = name in places and now < move.begin + move.duration
+        if is_on_its_way and math.dist(_places([move], now)[0], places[name]) < FAR:
+            present[name] = move
+    rows = [moves.get(name, present[name]) for name in names]
+    end = max(move.begin + move.duration for move in rows)
+    way = max(math.dist(move.start, move.goal) for move in rows)
+    before = np.array(list(places.values()))
+    for time in np.linspace(now, max(end, now), min(2 + math.ceil(2.0 * way / _STEP), _MAX_STEPS)):
+        for i, j, distance, limit in close_pairs(_places(rows, time), radii):
+            one, two = names[i], names[j]
+            apart = np.linalg.norm((before[i] - before[j]) / (1.0, 1.0, DOWNWASH))
+            if moves.keys() & {one, two} and distance < apart - _APPROACH:
+                raise RefusalError(
+                    f"go to: {one} and {two} would be {distance:.2f} m apart, {time - now:.1f} s "
+                    f"from now; expected at least {limit:.2f} m, heights counting half"
+                )
+
+
+def _places(moves, time):
+    """Return where moves are at a time, s, shape (n, 3), m."""
+    begins, durations = (np.array([getattr(m, a) for m in moves]) for a in ("begin", "duration"))
+    value, _ = minimum_jerk(np.clip((time - begins) / durations, 0.0, 1.0)[:, None])
+    start = np.array([move.start for move in moves])
+    return start + (np.array([move.goal for move in moves]) - start) * value

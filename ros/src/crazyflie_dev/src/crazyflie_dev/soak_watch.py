@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from crazyflie_model.limits import OFF_AGE
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.flight_state import flight_state
 from crazyflie_takeoff.safe_control import SINK_SPEED
@@ -13,10 +14,6 @@ from crazyflie_utils.testing import FakeGraph
 MOST_THRUST = 16.0  #: Of a final control, m/s^2: the controller's limit.
 MOST_TILT = math.radians(15.1)  #: Of a final control, rad: the controller's limit.
 OVERSHOOT = 0.2  #: How far above its highest reference a vehicle may be, m.
-
-#: The same while nothing passes the last node before the vehicle, which then keeps for 0.5 s what
-#: it was told last, m.
-DEAF_OVERSHOOT = 0.5
 
 #: The same while all nodes stop for up to 0.6 s: a first stop in a climb at full thrust, of 6.2
 #: m/s^2, comes without warning and makes 1.1 m, and ending that climb with 4 m/s^2 1.7 m, less what
@@ -27,8 +24,9 @@ STARVED_OVERSHOOT = 2.5
 #: back, 5 s of descent, and what it falls then; and the way down at `SINK_SPEED` beside.
 BLIND_LIMIT = 8.0
 
-#: Of a vehicle, m/s: references are 1.4 m away at most, and approached at less than half of it.
-MOST_SPEED = 3.0
+#: Of a vehicle, m/s: a reference is at most 3 m away (`reference/max_jump`), and the largest tilt of
+#: both axes accelerates over the first half of the way.
+MOST_SPEED = math.sqrt(3.0 * math.hypot(1.0, 1.0) * GRAVITY * math.tan(MOST_TILT))
 
 #: How far from the middle a vehicle may come in a flight that begins there, m: the models of 7
 #: states have no drag, and glide on while they sink blindly.
@@ -71,6 +69,7 @@ class Watch:
     _blind_since: float = math.inf
     _last: tuple[float, tuple[float, ...], float] | None = None
     _climb: float = 0.0
+    _deaf_height: float = 0.0  #: Highest place to which the last control alone leads, m.
     _said: set[str] = field(default_factory=set)
 
     def begin(self) -> None:
@@ -125,9 +124,9 @@ class Watch:
             self.hardest = max(self.hardest, -self._climb)
             self.check(-self._climb <= HARD_LANDING, f"hard landing: {-self._climb:.2f} m/s")
         self._climb = (height - before[1][2]) / elapsed
-        most = self._reference + (
-            STARVED_OVERSHOOT if self.is_starved else DEAF_OVERSHOOT if self.may_fall else OVERSHOOT
-        )
+        most = self._reference + (STARVED_OVERSHOOT if self.is_starved else OVERSHOOT)
+        if self.may_fall:
+            most = max(most, self._deaf_height)
         limits = f"{height:.2f} m, reference {self._reference:.2f} m"
         self.check(height <= most or not self.may_fly, f"too high: {limits}")
         self.check(height <= 0.1 or self.may_fly, f"in the air unasked: {height:.2f} m")
@@ -149,6 +148,11 @@ class Watch:
         self.check(tilt <= MOST_TILT, f"tilt out of limits: {tilt:.2f} rad")
         is_still = thrust <= 0.0 or not self.is_emergency
         self.check(is_still, f"thrust in emergency: {thrust:.2f} m/s^2")
+        # The firmware keeps the thrust of the last control until it switches the motors off.
+        excess = thrust - GRAVITY
+        final = self._climb + excess * OFF_AGE
+        rise = (self._climb + final) / 2.0 * OFF_AGE + max(final, 0.0) ** 2 / (2.0 * GRAVITY)
+        self._deaf_height = self.height + rise + OVERSHOOT
         is_asked = thrust <= 1.2 * GRAVITY or self.may_fly
         self.check(is_asked, f"thrust without a takeoff: {thrust:.2f} m/s^2")
 

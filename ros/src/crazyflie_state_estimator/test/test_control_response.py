@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from crazyflie_state_estimator.control_response import (
-    Departure,
     ResponseMonitor,
     _Estimate,
-    _Prediction,
     _significance,
     _Stay,
 )
@@ -139,8 +137,8 @@ def test_a_prediction_is_the_module_s_formula(t):
     monitor = ResponseMonitor()
     monitor._speed, monitor._way, monitor._noise = speed_now, way_now, 0.002
     start = _Estimate(1.0, p, v, d, P.tolist(), a, speed, way)
-    duration, departure, deviation = monitor._predict(1.0 + t, start)
-    assert duration == pytest.approx(t)
+    monitor._stay = _Stay(0.0, (1.0, 2.0, 3.0), 100)
+    departure = monitor._predicted(t, start, monitor._offset(t, start))
     np.testing.assert_allclose(
         departure.position, p + v * t + d * t**2 / 2 + way_now - way - speed * t
     )
@@ -153,14 +151,14 @@ def test_a_prediction_is_the_module_s_formula(t):
         # 3 mm, and 4 standard deviations of the mean of 4 poses.
         + (0.003 + 4.0 * 0.002 / 2.0) ** 2
     )
-    assert deviation**2 == pytest.approx(variance, rel=1e-9)
+    assert monitor._deviation(t, start) ** 2 == pytest.approx(variance, rel=1e-9)
 
 
 def test_the_uncertainty_of_the_disturbance_grows_no_further_than_it_changes():
     monitor = ResponseMonitor()
     monitor._noise = 0.0
     for t, variance in ((0.1, 0.25**2 * 0.1**5 / 20.0), (2.0, 0.1**2)):
-        deviation = monitor._predict(t, estimate(0.0)).deviation
+        deviation = monitor._deviation(t, estimate(0.0))
         assert deviation**2 - 0.003**2 == pytest.approx(variance, rel=1e-6)
 
 
@@ -178,10 +176,7 @@ def test_the_uncertainty_of_the_disturbance_grows_no_further_than_it_changes():
     ],
 )
 def test_how_far_away_counts(duration, position, significance):
-    place = (1.0, 2.0, 3.0)
-    there = [a + b for a, b in zip(place, position, strict=True)]
-    prediction = _Prediction(duration, Departure(there, ZERO), 0.1)
-    assert _significance(prediction, place) == pytest.approx(significance)
+    assert _significance(duration, position, 0.1) == pytest.approx(significance)
 
 
 def staying(before=None, estimates=()):

@@ -24,8 +24,8 @@ STARVED_OVERSHOOT = 2.5
 #: back, 5 s of descent, and what it falls then; and the way down at `SINK_SPEED` beside.
 BLIND_LIMIT = 8.0
 
-#: Of a vehicle, m/s: a reference is at most 3 m away (`reference/max_jump`), and the largest tilt of
-#: both axes accelerates over the first half of the way.
+#: Of a vehicle, m/s: a reference is at most 3 m away (`reference/max_jump`), and the vehicle tilts
+#: about both axes as far as it may over the first half of the way.
 MOST_SPEED = math.sqrt(3.0 * math.hypot(1.0, 1.0) * GRAVITY * math.tan(MOST_TILT))
 
 #: How far from the middle a vehicle may come in a flight that begins there, m: the models of 7

@@ -68,12 +68,6 @@ class Departure(NamedTuple):
     velocity: Vector
 
 
-class _Prediction(NamedTuple):
-    duration: float
-    departure: Departure
-    deviation: float
-
-
 class _Estimate(NamedTuple):
     """The Kalman filter's estimate, and the integrals of the commanded acceleration until then."""
 
@@ -197,37 +191,61 @@ class ResponseMonitor:
         estimates = [each for each in self._estimates if each.time > settled]
         if self._before is not None and time - self._before.time < 2.0 * WINDOW:
             estimates.insert(0, self._before)
-        place = self._stay.mean
-        predictions = [self._predict(time, each) for each in estimates]
-        best = max(predictions, key=lambda each: _significance(each, place), default=None)
-        return best.departure if best is not None and _significance(best, place) > 1.0 else None
+        tolerated = min(limit for _, limit in THRESHOLDS) * self._place_error
+        best, most = None, 1.0
+        for start in estimates:
+            duration = time - start.time
+            offset = self._offset(duration, start)
+            # Nearly all predictions of a flight that nothing disturbs end nearer than that.
+            if math.hypot(*offset) > tolerated:
+                deviation = self._deviation(duration, start)
+                significance = _significance(duration, offset, deviation)
+                if significance > most:
+                    best, most = (start, offset), significance
+        return None if best is None else self._predicted(time - best[0].time, *best)
 
-    def _predict(self, time, start):
-        """Return what follows from an estimate."""
-        t = time - start.time
-        speed = [b - a for a, b in zip(start.speed, self._speed, strict=True)]
-        position, velocity = [], []
-        for axis in range(3):
-            disturbance = start.disturbance[axis]
-            way = self._way[axis] - start.way[axis] - start.speed[axis] * t
-            position.append(
-                start.position[axis] + (start.velocity[axis] + 0.5 * disturbance * t) * t + way
-            )
-            velocity.append(start.velocity[axis] + disturbance * t + speed[axis])
+    @property
+    def _place_error(self):
+        return PLACE_ERROR + TOLERANCE_FACTOR * self._noise / math.sqrt(BLOCK_POSES)
+
+    def _offset(self, t, start):
+        """Return where an estimate leads within ``t`` (s), less the place of the stay (m)."""
+        x, y, z = self._stay.mean
+        (px, py, pz), (vx, vy, vz), (dx, dy, dz) = start.position, start.velocity, start.disturbance
+        (wx, wy, wz), (ux, uy, uz), (sx, sy, sz) = self._way, start.way, start.speed
+        return (
+            px + (vx + 0.5 * dx * t) * t + (wx - ux - sx * t) - x,
+            py + (vy + 0.5 * dy * t) * t + (wy - uy - sy * t) - y,
+            pz + (vz + 0.5 * dz * t) * t + (wz - uz - sz * t) - z,
+        )
+
+    def _deviation(self, t, start):
+        """Return the standard deviation of such an offset (m)."""
         (p00, p01, p02), (_, p11, p12), (_, _, p22) = start.covariance
         variance = p00 + t * (2.0 * p01 + t * (p11 + p02 + t * (p12 + 0.25 * t * p22)))
         variance += min(DISTURBANCE_WALK**2 * t / 5.0, DISTURBANCE_CHANGE**2) * t**4 / 4.0
-        changes = (v - a * t for v, a in zip(speed, start.commanded, strict=True))
+        changes = (
+            end - begin - a * t
+            for begin, end, a in zip(start.speed, self._speed, start.commanded, strict=True)
+        )
         variance += LAG_ERROR**2 * sum(each * each for each in changes)
-        variance += (PLACE_ERROR + TOLERANCE_FACTOR * self._noise / math.sqrt(BLOCK_POSES)) ** 2
-        return _Prediction(t, Departure(position, velocity), math.sqrt(variance))
+        return math.sqrt(variance + self._place_error**2)
+
+    def _predicted(self, t, start, offset):
+        position = [a + b for a, b in zip(self._stay.mean, offset, strict=True)]
+        velocity = [
+            v + disturbance * t + end - begin
+            for v, disturbance, begin, end in zip(
+                start.velocity, start.disturbance, start.speed, self._speed, strict=True
+            )
+        ]
+        return Departure(position, velocity)
 
 
-def _significance(prediction: _Prediction, place: Vector) -> float:
-    """Return how far away from the place a prediction is, over what is tolerated."""
-    duration, (position, _), deviation = prediction
+def _significance(duration: float, offset: Vector, deviation: float) -> float:
+    """Return how far a prediction is from the place of the stay, over what is tolerated."""
     threshold = next((limit for least, limit in THRESHOLDS if duration >= least), math.inf)
-    x, y, z = (a - b for a, b in zip(position, place, strict=True))
+    x, y, z = offset
     # A vehicle that is to sink may stand on something, and friction (of coefficient 1) hold it.
     distance = math.hypot(x, y, z) if z >= 0.0 else max(math.hypot(x, y) + z, 0.0)
     return distance / (threshold * deviation)

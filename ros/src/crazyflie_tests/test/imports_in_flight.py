@@ -63,7 +63,7 @@ def main(launch: list[str], names: list[str]) -> dict[str, list[str]]:
     """Fly; return what was imported until the vehicles were ready, and in the flight."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "launch.log"
-        os.environ["PYTHONPROFILEIMPORTTIME"] = "1"
+        os.environ["PYTHONPROFILEIMPORTTIME"] = os.environ["PYTHONUNBUFFERED"] = "1"
         with roslaunch(launch, log), Fleet(names, limits=_LIMITS) as fleet:
             fleet.dry_run(mission)
             wait_for_nodes(launch, log)

@@ -193,8 +193,10 @@ def test_after_an_emergency_or_a_removal_nothing_passes(events):
     latched = {Event.EMERGENCY_STOP, Event.REMOVAL} & set(events)
     link = [event for event in events if event in (Event.LINK_LOST, Event.LINK_BACK)]
     is_down = bool(link) and link[-1] is Event.LINK_LOST
+    battery = [e for e in events if e in (Event.BATTERY_CRITICAL, Event.BATTERY_RECOVERED)]
+    is_empty = bool(battery) and battery[-1] is Event.BATTERY_CRITICAL
     for time, is_zero in ((0.0, False), (0.1, True), (5.0, False)):
-        assert bool(gate.refusal(time, is_zero)) is bool(latched or is_down)
+        assert bool(gate.refusal(time, is_zero)) is bool(latched or is_down or is_empty)
 
 
 def test_a_stream_that_was_landed_for_its_battery_has_to_pause():

@@ -148,11 +148,7 @@ class Watch:
         self.check(tilt <= MOST_TILT, f"tilt out of limits: {tilt:.2f} rad")
         is_still = thrust <= 0.0 or not self.is_emergency
         self.check(is_still, f"thrust in emergency: {thrust:.2f} m/s^2")
-        # The firmware keeps the thrust of the last control until it switches the motors off.
-        excess = thrust - GRAVITY
-        final = self._climb + excess * OFF_AGE
-        rise = (self._climb + final) / 2.0 * OFF_AGE + max(final, 0.0) ** 2 / (2.0 * GRAVITY)
-        self._deaf_height = self.height + rise + OVERSHOOT
+        self._deaf_height = self.height + _rise(self._climb, thrust - GRAVITY) + OVERSHOOT
         is_asked = thrust <= 1.2 * GRAVITY or self.may_fly
         self.check(is_asked, f"thrust without a takeoff: {thrust:.2f} m/s^2")
 
@@ -161,3 +157,11 @@ class Watch:
         before, self.state = self.state, "" if state is None else state.word
         is_legal = not before or self.state == before or self.state in _LEGAL.get(before, ())
         self.check(is_legal, f"flight state went from {before} to {self.state}")
+
+
+def _rise(climb, acceleration):
+    """Return how far a vehicle rises (m) with the last thrust, which the firmware keeps."""
+    final = climb + acceleration * OFF_AGE
+    if final > 0.0:
+        return (climb + final) / 2.0 * OFF_AGE + final**2 / (2.0 * GRAVITY)
+    return climb**2 / (-2.0 * acceleration) if climb > 0.0 else 0.0

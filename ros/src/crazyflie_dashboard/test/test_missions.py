@@ -1,7 +1,10 @@
 """Missions: programs that are listed, rehearsed, flown and stopped."""
 
+import json
 import os
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -13,7 +16,7 @@ from crazyflie_utils.testing.waiting import wait_until
 LIMIT = 30.0
 
 STAND_IN = """#!{python}
-import json, sys, time
+import json, os, sys, time
 _, _, runner, word, path, *vehicles = sys.argv
 assert runner == "crazyflie_mission_api.mission_runner"
 if word == "dry_run":
@@ -28,7 +31,11 @@ if "waits" in path:
     try:
         time.sleep({limit})
     except KeyboardInterrupt:
+        print("lands", flush=True)
+        while not os.path.exists(path + ".ground"):
+            time.sleep(0.01)
         print("has landed")
+        open(path + ".landed", "w").close()
         sys.exit(130)
 print("cf1 is lost")
 sys.exit(1 if "fails" in path else 0)
@@ -41,7 +48,7 @@ def missions(tmp_path):
     program = tmp_path / "python"
     program.write_text(STAND_IN.format(python=sys.executable, limit=LIMIT))
     program.chmod(0o755)
-    return Missions(str(program))
+    return Missions(str(program), tmp_path / "flights")
 
 
 @pytest.fixture
@@ -63,7 +70,7 @@ def test_scripts_of_missions_and_trajectories_are_listed(script, tmp_path):
 
 
 def test_a_dry_run_has_a_result_and_paths(missions, script):
-    result = missions.dry_run(script("one.py"), ("cf1",)).result(LIMIT)
+    result = missions.dry_run(script("one.py"), ("cf1",), {}).result(LIMIT)
     assert (result.passed, result.text, result.duration) == (True, "far", 4.0)
     assert result.paths == (("cf1", ((0, 0, 0), (0, 0, 1))),)
 
@@ -71,36 +78,110 @@ def test_a_dry_run_has_a_result_and_paths(missions, script):
 def test_what_has_not_passed_does_not_fly(missions, script):
     bad = script("bad.py")
     with pytest.raises(RefusalError, match=r"bad.py: expected a dry run of it that has passed"):
-        missions.fly(bad, ("cf1",))
-    result = missions.dry_run(bad, ("cf1",)).result(LIMIT)
+        missions.fly(bad, ("cf1",), {})
+    result = missions.dry_run(bad, ("cf1",), {}).result(LIMIT)
     assert (result.passed, result.text) == (False, "cf1: y is 3 m")
     with pytest.raises(RefusalError, match="expected a dry run"):
-        missions.fly(bad, ("cf1",))
+        missions.fly(bad, ("cf1",), {})
 
 
 def test_another_script_or_other_vehicles_need_another_dry_run(missions, script):
     mission = script("one.py")
-    missions.dry_run(mission, ("cf1",)).result(LIMIT)
+    missions.dry_run(mission, ("cf1",), {}).result(LIMIT)
     with pytest.raises(RefusalError, match="expected a dry run"):
-        missions.fly(mission, ("cf2",))
+        missions.fly(mission, ("cf2",), {})
     os.utime(mission.path, (1.0, 1.0))
     with pytest.raises(RefusalError, match="expected a dry run"):
-        missions.fly(mission, ("cf1",))
+        missions.fly(mission, ("cf1",), {})
 
 
 def test_one_mission_flies_at_a_time_until_it_is_stopped(missions, script):
     mission = script("waits.py")
-    missions.dry_run(mission, ("cf1",)).result(LIMIT)
-    end = missions.fly(mission, ("cf1",))
+    missions.dry_run(mission, ("cf1",), {}).result(LIMIT)
+    end = missions.fly(mission, ("cf1",), {})
     assert missions.running[0].startswith("waits.py")
     wait_until(lambda: missions.running == ("waits.py takeoff: cf1",))
     with pytest.raises(RefusalError, match=r"waits.py flies; expected it to have ended"):
-        missions.fly(mission, ("cf1",))
+        missions.fly(mission, ("cf1",), {})
     missions.stop()
+    open(mission.path + ".ground", "w").close()
     assert end.result(LIMIT) == ""
     assert missions.running == ()
     with pytest.raises(RefusalError, match="no mission flies"):
         missions.stop()
+
+
+def test_a_second_stop_does_not_interrupt_the_landing(missions, script):
+    mission = script("waits.py")
+    missions.dry_run(mission, ("cf1",), {}).result(LIMIT)
+    end = missions.fly(mission, ("cf1",), {})
+    wait_until(lambda: missions.running == ("waits.py takeoff: cf1",))
+    missions.stop()
+    with pytest.raises(RefusalError, match=r"waits.py was stopped before, and its vehicles land"):
+        missions.stop()
+    Path(mission.path + ".ground").touch()
+    assert end.result(LIMIT) == ""
+    assert Path(mission.path + ".landed").exists()
+
+
+DASHBOARD = """
+import sys
+from pathlib import Path
+from crazyflie_dashboard.missions import Missions
+from crazyflie_dashboard.page_data import MissionFile
+python, folder, path = sys.argv[1:]
+missions, mission = Missions(python, Path(folder)), MissionFile(path, "waits.py", False)
+assert missions.dry_run(mission, ("cf1",), {}).result().passed
+missions.fly(mission, ("cf1",), {})
+print("flies", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_mission_outlives_its_dashboard_and_the_next_one_stops_it(script, missions, tmp_path):
+    mission = script("waits.py")
+    arguments = [str(tmp_path / "python"), str(tmp_path / "flights"), mission.path]
+    command = [sys.executable, "-c", DASHBOARD, *arguments]
+    with subprocess.Popen(command, stdin=-1, stdout=-1) as first:
+        assert first.stdout.readline() == b"flies\n"
+        first.kill()
+    second = Missions(*map(Path, arguments[:2]))
+    wait_until(lambda: second.running == ("waits.py takeoff: cf1",), limit=LIMIT)
+    with pytest.raises(RefusalError, match=r"waits.py flies"):
+        second.fly(mission, ("cf1",), {})
+    second.stop()
+    third = Missions(*map(Path, arguments[:2]))
+    with pytest.raises(RefusalError, match="was stopped before"):
+        third.stop()
+    Path(mission.path + ".ground").touch()
+    # What it says after its dashboard has gone does not end it before it has landed.
+    wait_until(lambda: Path(mission.path + ".landed").exists(), limit=LIMIT)
+    wait_until(lambda: second.running == () == third.running, limit=LIMIT)
+
+
+def test_a_process_that_has_the_number_of_a_mission_now_is_not_stopped(missions, tmp_path):
+    (tmp_path / "flights").mkdir()
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=-1) as other:
+        record = {"title": "one.py", "pid": other.pid, "began": 1, "is_stopped": False}
+        record["master"] = os.environ.get("ROS_MASTER_URI", "")
+        (tmp_path / "flights" / f"{other.pid}.json").write_text(json.dumps(record))
+        found = Missions("python", tmp_path / "flights")
+        assert found.running == ()
+        with pytest.raises(RefusalError, match="no mission flies"):
+            found.stop()
+        assert other.poll() is None
+        other.communicate(b"\n")
+
+
+def test_a_dry_run_expires_when_a_vehicle_or_what_a_script_imports_changes(missions, script):
+    mission, other = script("fails.py"), script("helper.py", "SPEED = 1.0\n")
+    here, there = {"cf1": (0.0, 0.0, 0.0)}, {"cf1": (0.0, 0.5, 0.0)}
+    missions.dry_run(mission, ("cf1",), here).result(LIMIT)
+    with pytest.raises(RefusalError, match="cf1 is not where it was at the dry run"):
+        missions.fly(mission, ("cf1",), there)
+    os.utime(other.path, (1.0, 1.0))
+    with pytest.raises(RefusalError, match="expected a dry run of it that has passed"):
+        missions.fly(mission, ("cf1",), here)
 
 
 def test_a_mission_that_is_stopped_while_python_starts_has_not_failed(tmp_path, script):
@@ -111,16 +192,16 @@ def test_a_mission_that_is_stopped_while_python_starts_has_not_failed(tmp_path, 
         "; exit 1;; esac\n"
     )
     program.chmod(0o755)
-    missions, mission = Missions(str(program)), script("one.py")
-    missions.dry_run(mission, ("cf1",)).result(LIMIT)
-    assert missions.fly(mission, ("cf1",)).result(LIMIT) == ""
+    missions, mission = Missions(str(program), tmp_path / "flights"), script("one.py")
+    missions.dry_run(mission, ("cf1",), {}).result(LIMIT)
+    assert missions.fly(mission, ("cf1",), {}).result(LIMIT) == ""
 
 
 def test_why_a_mission_has_failed_is_what_it_said_last(missions, script):
     mission = script("fails.py")
-    missions.dry_run(mission, ("cf1",)).result(LIMIT)
+    missions.dry_run(mission, ("cf1",), {}).result(LIMIT)
     with pytest.raises(RefusalError, match="cf1 is lost"):
-        missions.fly(mission, ("cf1",)).result(LIMIT)
+        missions.fly(mission, ("cf1",), {}).result(LIMIT)
 
 
 SWARM = """
@@ -138,7 +219,7 @@ assert len(swarm.allcfs.crazyflies) == 1
 def test_a_dry_run_is_one_whatever_options_a_script_of_crazyswarm_gives_itself(script, monkeypatch):
     # Where it would look for vehicles that fly there is no master.
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
-    result = Missions().dry_run(script("swarm.py", SWARM), ("cf2",)).result(LIMIT)
+    result = Missions().dry_run(script("swarm.py", SWARM), ("cf2",), {}).result(LIMIT)
     assert (result.passed, result.text) == (True, "flown by ideal vehicles")
 
 
@@ -150,6 +231,6 @@ def test_a_script_of_crazyswarm_is_told_which_vehicles_are_chosen(missions, scri
         "sys.exit('for ' + os.environ['CRAZYFLIE_PY_VEHICLES'])\n"
     )
     mission = script("swarm.py", SWARM)
-    missions.dry_run(mission, ("cf1", "cf3")).result(LIMIT)
+    missions.dry_run(mission, ("cf1", "cf3"), {}).result(LIMIT)
     with pytest.raises(RefusalError, match="for cf1:cf3"):
-        missions.fly(mission, ("cf1", "cf3")).result(LIMIT)
+        missions.fly(mission, ("cf1", "cf3"), {}).result(LIMIT)

@@ -178,7 +178,7 @@ class Dashboard:
 
         def do():
             self.pages.expect_control(page)
-            result = self._missions.dry_run(mission, vehicles)
+            result = self._missions.dry_run(mission, vehicles, self._places(vehicles))
             result.add_done_callback(lambda done: self._handle.submit(show, done))
             return result
 
@@ -192,7 +192,7 @@ class Dashboard:
         def do():
             self.pages.expect_control(page)
             expect_fresh(mission.title, self._clock() - clicked)
-            return self._missions.fly(mission, vehicles)
+            return self._missions.fly(mission, vehicles, self._places(vehicles))
 
         return self._do(do)
 
@@ -245,6 +245,10 @@ class Dashboard:
 
         self._handle.submit(run)
         return outcome
+
+    def _places(self, names):
+        known = self._model.scene.vehicles
+        return {n: known[n].position for n in names if n in known and known[n].position}
 
     def _page(self, number):
         if number not in self.pages.pages:

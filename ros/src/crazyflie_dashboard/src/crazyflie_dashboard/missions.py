@@ -2,20 +2,23 @@
 
 import contextlib
 import json
+import math
 import os
 import re
+import select
 import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from pathlib import Path
+from typing import Any
 
-from crazyflie_dashboard.page_data import (
-    DryRunResult,
-    MissionFile,
-)
+import rospkg
+
+from crazyflie_dashboard.page_data import DryRunResult, MissionFile
+from crazyflie_dashboard.snapshot import Triple
 from crazyflie_utils.refusal import RefusalError
 
 #: Flies missions, and makes dry runs; how the line with the result of a dry run begins, and what
@@ -26,6 +29,10 @@ _COMMAND = re.compile(r" *[0-9.]+ s  (\w+: .+)")
 _DRY_RUN_TIMEOUT = 60.0  #: s.
 _LAND_TIMEOUT = 60.0  #: From the end of a mission that is stopped until its process is killed, s.
 _MAX_OUTPUT = 2000  #: Of the text of a failure, characters.
+
+_POLL = 0.2  #: From one look at the output of a mission to the next, s.
+_MAX_DISTANCE = 0.2  #: From where vehicles were at a dry run to where they are, m.
+_SOURCES = (".py", ".csv", ".yaml", ".yml")  #: Of files beside a script that it may read.
 
 _CRAZYSWARM = ("pycrazyswarm", "crazyflie_py")
 
@@ -45,32 +52,133 @@ def listed(folders: Iterable[str | Path]) -> tuple[MissionFile, ...]:
     return tuple(found)
 
 
+class Flight:
+    """A mission in a process of its own, which goes on without this one.
+
+    Its output is a file. What is beside it, ``record``, says which process it is: a process number
+    alone may be another's by now.
+
+    Raises
+    ------
+    OSError, ValueError, KeyError
+        It does not fly any more, or is not of this master.
+    """
+
+    def __init__(self, record: Path):
+        known = json.loads(record.read_text())
+        self.title: str = known["title"]
+        self.command = ""  #: The last one.
+        self.is_stopped: bool = known["is_stopped"]
+        self.said = ""  #: The end of its output.
+        self._record, self._known, self._pid = record, known, known["pid"]
+        # From here on no other process has this number for what is done by it.
+        self._process = os.pidfd_open(self._pid)
+        if known["began"] != _began(self._pid) or known["master"] != _master():
+            os.close(self._process)
+            raise ProcessLookupError
+
+    @staticmethod
+    def begin(
+        folder: Path, title: str, command: list[str], environment: Mapping[str, str]
+    ) -> "tuple[Flight, subprocess.Popen[Any]]":
+        """Start a mission, with its files in a folder."""
+        folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.glob("*.out"):
+            if not old.with_suffix(".json").exists():
+                old.unlink(missing_ok=True)
+        started = folder / f"starting_{os.getpid()}"
+        with started.open("w") as output:
+            process = _start(command, environment, output)
+        record = folder / f"{process.pid}.json"
+        started.rename(record.with_suffix(".out"))
+        known = {"title": title, "pid": process.pid, "began": _began(process.pid)}
+        record.write_text(json.dumps({**known, "master": _master(), "is_stopped": False}))
+        return Flight(record), process
+
+    def wait(self, process: "subprocess.Popen[Any] | None" = None) -> int:
+        """Follow it to its end; return its exit status, 0 if it was begun by another process."""
+        with self._record.with_suffix(".out").open(errors="replace") as output:
+            has_ended = False
+            while not has_ended:
+                has_ended = self._has_ended(_POLL)
+                for line in output:
+                    self.said = (self.said + line)[-_MAX_OUTPUT:]
+                    if match := _COMMAND.match(line):
+                        self.command = match[1]
+        status = 0 if process is None else process.wait()
+        self._record.unlink(missing_ok=True)
+        return status
+
+    def stop(self) -> None:
+        """Have it land its vehicles; it is killed if it does not end. Only the first time counts.
+
+        Raises
+        ------
+        RefusalError
+            It lands already: a second signal would interrupt that.
+        """
+        if self.is_stopped:
+            raise RefusalError(f"stop: {self.title} was stopped before, and its vehicles land")
+        self.is_stopped = self._known["is_stopped"] = True
+        self._record.write_text(json.dumps(self._known))
+        with contextlib.suppress(ProcessLookupError):
+            signal.pidfd_send_signal(self._process, signal.SIGINT)
+        self.limit()
+
+    def limit(self) -> None:
+        """Kill it if it has not ended after a while."""
+
+        def kill():
+            # As long as it lives, the group has its number.
+            if not self._has_ended(0.0):
+                _kill(self._pid)
+
+        killer = threading.Timer(_LAND_TIMEOUT, kill)
+        killer.daemon = True
+        killer.start()
+
+    def _has_ended(self, limit):
+        poll = select.poll()
+        poll.register(self._process, select.POLLIN)
+        return bool(poll.poll(limit * 1000))
+
+
 class Missions:
-    """The mission that flies, if there is one, and dry runs.
+    """Missions that fly, those included that an earlier dashboard began, and dry runs.
 
     Parameters
     ----------
     python : str, optional
         Interpreter.
+    folder : Path, optional
+        Of records and outputs; by default in ROS's own.
     """
 
-    def __init__(self, python: str = sys.executable):
+    def __init__(self, python: str = sys.executable, folder: Path | None = None):
         self._python = python
+        self._folder = folder or Path(rospkg.get_ros_home()) / "crazyflie_missions"
         self._lock = threading.Lock()
-        self._flying: subprocess.Popen[str] | None = None
-        self._passed: set[tuple[str, float, tuple[str, ...]]] = set()
-        self._title = self._command = ""
+        self._flights: list[Flight] = []
+        self._passed: dict[tuple[Any, ...], Mapping[str, Triple]] = {}
+        for record in self._folder.glob("*.json"):
+            try:
+                flight = Flight(record)
+            except (OSError, ValueError, KeyError):
+                continue
+            self._follow(flight, None, lambda status: None)
+            if flight.is_stopped:
+                flight.limit()
 
     @property
     def running(self) -> tuple[str, ...]:
         """Titles of what flies, each with its last command if that is known."""
         with self._lock:
-            if self._flying is None:
-                return ()
-            return (f"{self._title} {self._command}".strip(),)
+            return tuple(f"{each.title} {each.command}".strip() for each in self._flights)
 
-    def dry_run(self, mission: MissionFile, vehicles: tuple[str, ...]) -> "Future[DryRunResult]":
-        """Fly a mission with ideal vehicles."""
+    def dry_run(
+        self, mission: MissionFile, vehicles: tuple[str, ...], places: Mapping[str, Triple]
+    ) -> "Future[DryRunResult]":
+        """Fly a mission with ideal vehicles; ``places`` (m) are where the real ones are."""
         result: Future[DryRunResult] = Future()
         command = [self._python, *_RUNNER, "dry_run", mission.path, *vehicles]
         if not mission.is_trajectory and _is_crazyswarm(mission.path):
@@ -82,75 +190,101 @@ class Missions:
             done = _run(command, environment, _DRY_RUN_TIMEOUT)
             if done.passed:
                 with self._lock:
-                    self._passed.add(key)
+                    self._passed[key] = dict(places)
             result.set_result(done)
 
         threading.Thread(target=work, daemon=True).start()
         return result
 
-    def fly(self, mission: MissionFile, vehicles: tuple[str, ...]) -> "Future[str]":
+    def fly(
+        self, mission: MissionFile, vehicles: tuple[str, ...], places: Mapping[str, Triple]
+    ) -> "Future[str]":
         """Fly a mission; the future has "" at its end, or fails with what it has said.
 
         Raises
         ------
         RefusalError
-            Its dry run has not passed with these vehicles, it has changed since, or one flies.
+            Its dry run has not passed with these vehicles, they have moved, its files have changed
+            since, or one flies.
         """
         end: Future[str] = Future()
         command = [self._python, *_RUNNER, "fly", mission.path, *vehicles]
         if not mission.is_trajectory and _is_crazyswarm(mission.path):
             command = [self._python, mission.path]
         with self._lock:
-            if self._flying is not None:
-                raise RefusalError(f"{self._title} flies; expected it to have ended, or stop it")
-            if _key(mission, vehicles) not in self._passed:
+            if self._flights:
+                title = self._flights[0].title
+                raise RefusalError(f"{title} flies; expected it to have ended, or stop it")
+            before = self._passed.get(_key(mission, vehicles))
+            if before is None:
                 raise RefusalError(f"{mission.title}: expected a dry run of it that has passed")
-            process = self._flying = _start(command, _environment(vehicles))
-            self._title, self._command = mission.title, ""
+            for name, place in before.items():
+                if math.dist(place, places.get(name, (math.inf,) * 3)) > _MAX_DISTANCE:
+                    raise RefusalError(
+                        f"{mission.title}: {name} is not where it was at the dry run; expected "
+                        "another one"
+                    )
+        flight, process = Flight.begin(self._folder, mission.title, command, _environment(vehicles))
 
-        def work():
-            output = ""
-            for line in process.stdout:
-                output = (output + line)[-_MAX_OUTPUT:]
-                if match := _COMMAND.match(line):
-                    self._command = match[1]
-            process.wait()
-            with self._lock:
-                self._flying = None
+        def finish(status):
             # Stopped while Python itself still started: nothing has flown.
-            is_early = output.startswith("Fatal Python error: init_import_site")
-            if is_early or process.returncode in (0, 130, 143, -signal.SIGINT):
+            is_early = flight.said.startswith("Fatal Python error: init_import_site")
+            if is_early or status in (0, 130, 143, -signal.SIGINT):
                 end.set_result("")
             else:
-                end.set_exception(RefusalError(_last(output, process.returncode)))
+                end.set_exception(RefusalError(_last(flight.said, status)))
 
-        threading.Thread(target=work, daemon=True).start()
+        self._follow(flight, process, finish)
         return end
 
     def stop(self) -> None:
-        """Have the mission that flies end and land its vehicles.
+        """Have the missions that fly end and land their vehicles.
 
         Raises
         ------
         RefusalError
-            None flies.
+            None flies, or all of them land already.
         """
         with self._lock:
-            process = self._flying
-        if process is None:
-            raise RefusalError("stop: no mission flies that was begun here")
-        process.send_signal(signal.SIGINT)
-        killer = threading.Timer(_LAND_TIMEOUT, _kill, (process,))
-        killer.daemon = True
-        killer.start()
+            flights = [each for each in self._flights if not each.is_stopped] or self._flights[:1]
+        if not flights:
+            raise RefusalError("stop: no mission flies that was begun by a dashboard")
+        for flight in flights:
+            flight.stop()
+
+    def _follow(
+        self,
+        flight: Flight,
+        process: "subprocess.Popen[Any] | None",
+        finish: Callable[[int], None],
+    ) -> None:
+        with self._lock:
+            self._flights.append(flight)
+
+        def work():
+            status = flight.wait(process)
+            with self._lock:
+                self._flights.remove(flight)
+            finish(status)
+
+        threading.Thread(target=work, daemon=True).start()
+
+
+def _began(pid: int) -> int:
+    """Return when a process began, in ticks since the computer did."""
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19])
+
+
+def _master():
+    return os.environ.get("ROS_MASTER_URI", "")
 
 
 def _run(command: list[str], environment: Mapping[str, str], limit: float) -> DryRunResult:
-    process = _start(command, environment)
+    process = _start(command, environment, subprocess.PIPE)
     try:
         output, _ = process.communicate(timeout=limit)
     except subprocess.TimeoutExpired:
-        _kill(process)
+        _kill(process.pid)
         return DryRunResult(False, f"the dry run did not end within {limit:g} s")
     for line in output.splitlines():
         if line.startswith(_RESULT):
@@ -167,12 +301,12 @@ def _environment(vehicles):
     return {"CRAZYFLIE_PY_VEHICLES": ":".join(vehicles)}
 
 
-def _start(command, environment):
+def _start(command: list[str], environment: Mapping[str, str], output: Any) -> Any:
     # In a session of its own: Ctrl-C at the dashboard must not end a flight.
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
+        stdout=output,
         stderr=subprocess.STDOUT,
         text=True,
         errors="replace",
@@ -181,9 +315,9 @@ def _start(command, environment):
     )
 
 
-def _kill(process):
+def _kill(group):
     with contextlib.suppress(OSError):
-        os.killpg(process.pid, signal.SIGKILL)
+        os.killpg(group, signal.SIGKILL)
 
 
 def _last(output: str, status: int) -> str:
@@ -198,8 +332,11 @@ def _is_crazyswarm(path):
     return False
 
 
-def _key(mission, vehicles):
+def _key(mission: MissionFile, vehicles: tuple[str, ...]) -> tuple[Any, ...]:
+    """Return what changes with a mission, its vehicles, and what is beside its file to be read."""
     try:
-        return mission.path, os.stat(mission.path).st_mtime, tuple(vehicles)
+        files = {Path(mission.path), *Path(mission.path).parent.iterdir()}
+        times = [(str(f), f.stat().st_mtime_ns) for f in files if f.suffix in _SOURCES]
     except OSError as error:
         raise RefusalError(f"{mission.title}: {error.strerror}") from None
+    return mission.path, tuple(sorted(times)), vehicles

@@ -14,7 +14,7 @@ import argparse
 import struct
 
 from crazyflie_link.broadcast import REPEAT_PERIOD, REPEATS
-from crazyflie_link.packed_poses import POSES_PER_PACKET, POSITIONS_PER_PACKET
+from crazyflie_link.localization import POSES_PER_PACKET, POSITIONS_PER_PACKET
 from crazyflie_virtual.radio import Load, RadioChannel, RadioSwarm, usage
 
 TAKEOFF = bytes([8 << 4]) + struct.pack("<BBff?f", 7, 0, 1.0, 0.0, True, 2.0)

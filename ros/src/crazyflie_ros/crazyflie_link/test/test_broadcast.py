@@ -11,9 +11,9 @@ from crazyflie_link import cflib_internals
 from crazyflie_link.address import Address
 from crazyflie_link.broadcast import REPEATS, Broadcaster, SharedCommand
 from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.emergency import BROADCAST_STOP
-from crazyflie_link.packed_poses import PackedPoses, pack
+from crazyflie_link.localization import PackedPoses, pack
 from crazyflie_link.safe_crazyflie import packet
+from crazyflie_link.supervisor import BROADCAST_STOP
 from crazyflie_link.testing.fake_dongle import PLACES
 from crazyflie_link.testing.fake_vehicle import FakeVehicle
 from crazyflie_utils.testing.waiting import wait_until

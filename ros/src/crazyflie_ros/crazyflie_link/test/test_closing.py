@@ -32,14 +32,14 @@ def test_a_link_that_is_lost_at_the_moment_of_closing_is_closed(link_class):
 
     def fail():
         # As `close` does, before it looks.
-        vehicle._reconnector._closed.set()
+        vehicle._closed.set()
         taken.set()
         return LinkLostError("gone")
 
     type(link).error = PropertyMock(side_effect=fail)
     vehicle.connect()
     assert taken.wait(LIMIT)
-    wait_until(lambda: not vehicle._reconnector._watcher.is_alive(), "the end of the watch")
+    wait_until(lambda: not vehicle._watcher.is_alive(), "the end of the watch")
     link.close.assert_called()
 
 
@@ -66,12 +66,12 @@ def test_a_vehicle_that_is_closed_as_its_link_is_lost_closes_it_once_and_waits(l
     link.error = None
     vehicle = Crazyflie(URI)
     states = []
-    vehicle._reconnector._on_state = lambda state, _: (
+    vehicle._on_state = lambda state, _: (
         states.append(state) or (state is LinkState.LOST and vehicle.close())
     )
     vehicle.connect()
     link.error = LinkLostError("gone")
-    wait_until(lambda: not vehicle._reconnector._watcher.is_alive(), "the end of the watch")
+    wait_until(lambda: not vehicle._watcher.is_alive(), "the end of the watch")
     vehicle.close()
     link.close.assert_called()
 

@@ -6,9 +6,9 @@ import threading
 import pytest
 
 from crazyflie_link.crazyflie import LinkState
-from crazyflie_link.emergency import EmergencyStop
 from crazyflie_link.errors import CrazyflieError
-from crazyflie_link.link_setup import Limits
+from crazyflie_link.link_monitor import Limits
+from crazyflie_link.supervisor import EmergencyStop
 from crazyflie_utils.testing.waiting import wait_until
 
 LIMIT = 60.0
@@ -102,7 +102,7 @@ def test_it_was_pressed_while_the_link_is_silent(vehicle, make_link, states):
     vehicle.is_frozen = True
     states.wait_for(LinkState.LOST)
     link.supervisor.emergency_stop()
-    wait_until(lambda: link._reconnector.opening is not None, "a new attempt")
+    wait_until(lambda: link._opening is not None, "a new attempt")
     vehicle.deaf.add((5, 0, b""))
     vehicle.received.clear()
     answer_state(vehicle, LOCKED)
@@ -120,23 +120,22 @@ def test_a_link_that_is_set_up_anew_begins_with_it(vehicle, make_link, states):
     assert link.supervisor.wait_for_emergency_stop(LIMIT)
     vehicle.is_frozen = True
     states.wait_for(LinkState.LOST)
-    wait_until(lambda: link._reconnector.opening is not None, "a new attempt")
+    wait_until(lambda: link._opening is not None, "a new attempt")
     vehicle.received.clear()
     vehicle.is_frozen = False
     vehicle.wait_for_packets(9, 1)
 
 
 def test_no_attempt_to_connect_waits_long(vehicle, make_link, states, monkeypatch):
-    monkeypatch.setattr("crazyflie_link.reconnector.FIRST_PAUSE", LIMIT)
-    monkeypatch.setattr("crazyflie_link.reconnector.LONGEST_PAUSE", LIMIT)
+    monkeypatch.setattr("crazyflie_link.crazyflie.FIRST_PAUSE", LIMIT)
+    monkeypatch.setattr("crazyflie_link.crazyflie.LONGEST_PAUSE", LIMIT)
     link = make_link(vehicle.uri, reconnect=True, on_state=states)
     link.connect()
     vehicle.close()
-    reconnector = link._reconnector
-    while "nothing listens" not in states.wait_for(LinkState.LOST) or reconnector.opening:
+    while "nothing listens" not in states.wait_for(LinkState.LOST) or link._opening:
         pass
     attempts = []
-    monkeypatch.setattr(reconnector, "_open", lambda: attempts.append(True) or fail())
+    monkeypatch.setattr(link, "_open", lambda: attempts.append(True) or fail())
     link.supervisor.emergency_stop()
     wait_until(lambda: len(attempts) >= 3, "attempts")
 

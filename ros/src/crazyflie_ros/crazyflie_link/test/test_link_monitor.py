@@ -4,7 +4,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from crazyflie_link.link_monitor import LOST_AFTER, LinkHealth, LinkMonitor, Uptime
+from crazyflie_link.link_monitor import LOST_AFTER, LinkHealth, LinkMonitor
+from crazyflie_link.log import Uptime
 
 
 def watch(monitor, begin, end, step=0.05, bad=LinkHealth.SILENT):

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from crazyflie_link import high_level_replies
+from crazyflie_link import high_level as module
 from crazyflie_link.errors import AlreadyLandingError, NoReplyError, RefusedError
 from crazyflie_model.supervisor import SupervisorState
 
@@ -87,8 +87,8 @@ def test_a_repeated_landing_that_is_refused_is_under_way_whatever_the_state(flyi
 @pytest.mark.parametrize("lag", [0, 1, 3])
 def test_the_supervisor_takes_note_of_a_takeoff_a_little_later(monkeypatch, lag):
     states = [READY] * lag + [READY | SupervisorState.HIGH_LEVEL_ACTIVE]
-    monkeypatch.setattr(high_level_replies, "read_state", lambda link: states.pop(0))
-    assert high_level_replies.is_carried_out(None, TAKEOFF)
+    monkeypatch.setattr(module, "read_state", lambda link: states.pop(0))
+    assert module.is_carried_out(None, TAKEOFF)
     assert states == []
 
 

@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from crazyflie_link.broadcast import REPEAT_PERIOD, REPEATS
-from crazyflie_link.packed_poses import pack
+from crazyflie_link.localization import pack
 from crazyflie_virtual.radio import RadioChannel, RadioSwarm
 
 VEHICLES = 20

@@ -1,34 +1,28 @@
 """When a link is kept, and when it is tried again, with a clock that is moved by hand."""
 
 from types import SimpleNamespace
+from unittest.mock import patch
 
 import pytest
 
-from crazyflie_link import reconnector as module
+from crazyflie_link import crazyflie as module
+from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import LinkLostError
+from crazyflie_link.link import Link
 from crazyflie_link.link_monitor import LinkHealth
-from crazyflie_link.reconnector import LinkState, Reconnector
-
-
-def refuse():
-    raise LinkLostError("no vehicle")
+from crazyflie_link.supervisor import EmergencyStop
 
 
 class Bench:
-    """A reconnector that finds no vehicle, its states, and a clock that waiting moves."""
+    """A vehicle that cannot be reached, its states, and a clock that waiting moves."""
 
-    def __init__(self, monkeypatch, is_urgent=False):
+    def __init__(self, monkeypatch):
         self.now, self.states = 5.0, []
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now))
-        self.reconnector = Reconnector(
-            "udp://here",
-            refuse,
-            lambda: "",
-            lambda: is_urgent,
-            lambda state, text: self.states.append(state),
-            True,
+        self.vehicle = Crazyflie(
+            "udp://here:1", True, lambda state, text: self.states.append(state), cache="/here"
         )
-        self.reconnector._closed = SimpleNamespace(wait=self.wait, is_set=lambda: False)
+        self.vehicle._closed = SimpleNamespace(wait=self.wait, is_set=lambda: False)
 
     def wait(self, period):
         self.now += period
@@ -42,22 +36,25 @@ def test_pauses_between_attempts_grow_up_to_five_seconds(monkeypatch):
         pauses.append(pause)
         return len(pauses) == 9
 
-    bench.reconnector._has_closed_within = has_closed_within
-    assert not bench.reconnector._reconnect()
+    bench.vehicle._has_closed_within = has_closed_within
+    with patch("crazyflie_link.crazyflie.Link", spec=Link) as link_class:
+        link_class.side_effect = LinkLostError("no vehicle")
+        assert not bench.vehicle._connect_again()
     assert pauses == pytest.approx([0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0])
     assert bench.states == [LinkState.LOST]
 
 
 @pytest.mark.parametrize(("is_urgent", "end"), [(False, 6.0), (True, 5.05)])
 def test_an_urgent_attempt_does_not_wait(monkeypatch, is_urgent, end):
-    bench = Bench(monkeypatch, is_urgent)
-    assert not bench.reconnector._has_closed_within(1.0)
+    bench = Bench(monkeypatch)
+    monkeypatch.setattr(EmergencyStop, "is_requested", is_urgent)
+    assert not bench.vehicle._has_closed_within(1.0)
     assert bench.now == pytest.approx(end, abs=0.06)
 
 
 def test_a_silent_link_is_kept_for_a_second(monkeypatch):
     bench = Bench(monkeypatch)
-    is_usable = bench.reconnector._is_usable
+    is_usable = bench.vehicle._is_usable
     assert is_usable(LinkHealth.ALIVE, "")
     assert bench.states == []
     assert is_usable(LinkHealth.SILENT, "silent")
@@ -71,4 +68,4 @@ def test_a_silent_link_is_kept_for_a_second(monkeypatch):
 
 
 def test_a_link_to_a_restarted_vehicle_is_not_kept(monkeypatch):
-    assert not Bench(monkeypatch).reconnector._is_usable(LinkHealth.RESTARTED, "restarted")
+    assert not Bench(monkeypatch).vehicle._is_usable(LinkHealth.RESTARTED, "restarted")

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from crazyflie_link.errors import LinkLostError, NoReplyError
-from crazyflie_link.request_reply import Request, RequestReply
+from crazyflie_link.transmission import Request, RequestReply
 
 
 def test_the_answer_is_the_first_packet_that_fits():

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from crazyflie_link.errors import LinkLostError
-from crazyflie_link.transmit_queue import TransmitQueue
+from crazyflie_link.transmission import TransmitQueue
 
 LIMIT = 60.0
 

@@ -12,7 +12,7 @@ from crazyflie_link.errors import (
     UnknownNameError,
     ValueRangeError,
 )
-from crazyflie_link.memory import find_memory, write_memory
+from crazyflie_link.subsystem import find_memory, write_memory
 
 NAN = float("nan")
 

@@ -11,7 +11,7 @@ from crazyflie_link.address import Address
 from crazyflie_link.broadcast import Broadcaster, SharedCommand
 from crazyflie_link.errors import LinkLostError
 from crazyflie_link.link import Link
-from crazyflie_link.packed_poses import PackedPoses
+from crazyflie_link.localization import PackedPoses
 
 
 class Channel:

@@ -23,8 +23,8 @@ from crazyflie_driver.status import diagnostics
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_link.address import Address
-from crazyflie_link.emergency import BROADCAST_STOP
 from crazyflie_link.errors import AddressError, CrazyflieError
+from crazyflie_link.supervisor import BROADCAST_STOP
 from crazyflie_utils import Node, NodeHandle, ServiceError
 
 ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"  #: Services of the server.

@@ -1,7 +1,7 @@
 """Parameters of the driver."""
 
 from crazyflie_link.broadcast import REPEAT_PERIOD, REPEATS
-from crazyflie_link.checks import MIN_DURATION
+from crazyflie_link.subsystem import MIN_DURATION
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TOPIC, Integer, Number

@@ -9,7 +9,7 @@ from crazyflie_driver.landings import Landings, Reason
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
-from crazyflie_link.request_reply import REPLY_LIMIT
+from crazyflie_link.transmission import REPLY_LIMIT
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ServiceError
 

@@ -16,7 +16,7 @@ _HOME = {
     "CrazyflieError": "crazyflie_link.errors",
     "LinkState": "crazyflie_link.crazyflie",
     "LogBlock": "crazyflie_link.log",
-    "scan": "crazyflie_link.scanning",
+    "scan": "crazyflie_link.discovery",
 }
 
 __all__ = ["Crazyflie", "CrazyflieError", "LinkState", "LogBlock", "scan"]

@@ -25,7 +25,7 @@ EXPECTED = (
 )
 
 _HIGHEST_CHANNEL = 125
-_DEFAULT_ADDRESS = "E7E7E7E7E7"  #: That of a vehicle when it is new, which cflib takes for none.
+_DEFAULT_ADDRESS = "E7E7E7E7E7"  #: Of a new vehicle; cflib assumes it where the URI has no address.
 _HIGHEST_PORT = 65535
 _SERIAL_LENGTH = 10  #: cflib takes so many digits for a serial number, fewer for a dongle's number.
 _THIS_MACHINE = "127.0.0.1"
@@ -56,7 +56,7 @@ class Address:
 
     @property
     def dongle(self) -> str:
-        """The Crazyradio of a radio's address, by number or serial number; empty for none."""
+        """The Crazyradio of a radio's address, number or serial number; empty without a radio."""
         dongle = self._parts.get("dongle", "").upper()
         return str(int(dongle)) if dongle.isdigit() and len(dongle) < _SERIAL_LENGTH else dongle
 
@@ -91,7 +91,7 @@ class Address:
 
     @classmethod
     def parse(cls, uri: str) -> "Address":
-        """Return the address that a text stands for; raise `AddressError` if it is none."""
+        """Return the address in a text; raise `AddressError` if it is malformed."""
         text = str(uri).strip()
         scheme = text.partition("://")[0]
         match = _FORMS[scheme].fullmatch(text) if scheme in _FORMS else None

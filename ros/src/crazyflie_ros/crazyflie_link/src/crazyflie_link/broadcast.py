@@ -13,14 +13,14 @@ from crazyflie_link.address import Address
 from crazyflie_link.cflib_internals import RadioBroadcast
 from crazyflie_link.link import Link
 from crazyflie_link.safe_crazyflie import packet
-from crazyflie_link.transmit_queue import TransmitQueue
+from crazyflie_link.transmission import TransmitQueue
 
-#: How often a command is sent, and how long after each other, s: a vehicle that receives only the
-#: last one begins 4 ms after the others.
+#: Number of times that a command is sent, and the period (s): a vehicle that receives only the last
+#: one begins 4 ms after the others.
 REPEATS, REPEAT_PERIOD = 5, 0.001
 
-#: How long the first vehicle of a shared command waits for the last, s; after 0.2 s without an
-#: answer each is sent its own command.
+#: Time limit from the first vehicle that is ready for a shared command to the last, s; after 0.2 s
+#: without an answer each is sent its own command.
 READY_TIME = 0.15
 
 #: Bits of the header that belong to the link. Over UDP they are cleared in a broadcast packet.
@@ -57,15 +57,15 @@ class Broadcaster:
     def send(
         self, packets: Sequence[CRTPPacket], urgent: bool = False, end: float = math.inf
     ) -> None:
-        """Have packets sent again and again, none after a time (s, monotonic); does not block.
+        """Queue packets to be sent repeatedly until a time (s, monotonic); does not block.
 
-        Urgent ones go before all others. What cannot be sent is logged: every vehicle has to be
-        looked at afterwards in any case.
+        Urgent packets go before all others. A failure is only logged: the caller has to check every
+        vehicle afterwards in any case.
         """
         self._queue.put(partial(self._repeat, packets, end), urgent)
 
     def put_latest(self, stream: str, make: Callable[[], Sequence[CRTPPacket]]) -> None:
-        """Have the packets that ``make()`` returns sent once; see `TransmitQueue.put_latest`."""
+        """Queue the packets that ``make()`` will return; see `TransmitQueue.put_latest`."""
         self._queue.put_latest(stream, lambda: self._transmit(make()))
 
     def close(self) -> None:
@@ -112,7 +112,7 @@ class SharedCommand:
         self._lock = threading.Lock()
 
     def ready(self, command: CRTPPacket) -> None:
-        """Take note that one more vehicle is ready for the command, the same for all."""
+        """Count one more vehicle as ready for the command; the last one has it sent to all."""
         with self._lock:
             now = time.monotonic()
             if self._end is None:

@@ -43,14 +43,14 @@ PRIVATE_NAMES = (
     "cflib.crtp.radiodriver:_SharedRadioInstance._rsp_queue",
 )
 
-#: Every vehicle listens to it, beside its own address (crazyflie2-nrf-firmware).
+#: Every vehicle listens to it as well as to its own address (crazyflie2-nrf-firmware).
 BROADCAST_ADDRESS = (0xFF, 0xE7, 0xE7, 0xE7, 0xE7)
 
 #: Between two broadcast packets, s: a vehicle hands one on to its main processor at 1 Mbit/s, with
 #: 37 bytes of 10 bits in 0.37 ms; crazyflie_cpp keeps the same distance.
 PACKET_GAP = 0.0005
 
-#: How long, in s, the dongle may take for a broadcast; cflib gives it 1 s for a packet.
+#: Time limit of a broadcast in the dongle, s; cflib gives a packet 1 s.
 _DONGLE_LIMIT = 2.0
 
 
@@ -81,7 +81,7 @@ def pinned_version() -> str:
 
 
 def forget_dead_radios() -> None:
-    """Have cflib open every dongle anew whose thread has ended or that has no user."""
+    """Let cflib open again every dongle whose thread has ended or that has no user."""
     with RadioManager._lock:
         for devid, radio in enumerate(RadioManager._radios):
             if radio is None:

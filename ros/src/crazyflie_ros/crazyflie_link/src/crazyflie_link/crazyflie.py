@@ -1,5 +1,7 @@
 """A vehicle, over a link that is set up again after a loss."""
 
+import codecs
+import enum
 import threading
 import time
 from collections.abc import Callable
@@ -8,35 +10,73 @@ from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.address import Address
 from crazyflie_link.broadcast import is_broadcast
-from crazyflie_link.console import Console
-from crazyflie_link.emergency import EmergencyStop
-from crazyflie_link.errors import RefusedError, UnknownNameError, ValueRangeError
+from crazyflie_link.discovery import check_is_radio, reboot
+from crazyflie_link.errors import (
+    CrazyflieError,
+    LinkLostError,
+    RefusedError,
+    UnknownNameError,
+    ValueRangeError,
+)
 from crazyflie_link.high_level import HighLevel
 from crazyflie_link.lighthouse import Lighthouse
 from crazyflie_link.link import LOG_DATA, Link, OnPacket
-from crazyflie_link.link_monitor import Uptime
-from crazyflie_link.link_setup import Limits
+from crazyflie_link.link_monitor import Limits, LinkHealth
 from crazyflie_link.localization import Localization
 from crazyflie_link.log import Log, LogBlock
 from crazyflie_link.parameters import FirmwareParameters
-from crazyflie_link.reboot import reboot
-from crazyflie_link.reconnector import LinkState, Reconnector
-from crazyflie_link.safe_crazyflie import table_cache
+from crazyflie_link.safe_crazyflie import CLOSE_LIMIT, table_cache
 from crazyflie_link.setpoints import Setpoints
-from crazyflie_link.supervisor import Supervisor
+from crazyflie_link.supervisor import EmergencyStop, Supervisor
 from crazyflie_link.trajectory import Trajectories
 
-_STAMP_END = 4  #: A log packet begins with the number of its block and three bytes of time.
+CHECK_PERIOD = 0.05  #: Period at which the link is checked, s.
+
+#: How long a silent link is kept, s: if the vehicle is heard again, no set-up is needed. Silence of
+#: up to 1.4 s ends that way before 2 s, when the firmware locks; the set-up of a new link can take
+#: a second on a busy machine.
+SILENCE_LIMIT = 1.0
+
+#: Pause after the first failed attempt to connect again, and the longest one, s; each is twice the
+#: one before.
+FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
+
+_JOIN_LIMIT = 0.3  #: How long `Crazyflie.close` waits for the thread that checks the link, s.
+_CLOSED = "the link was closed"
+
+
+class LinkState(enum.Enum):
+    """State of the link to a vehicle."""
+
+    DISCONNECTED = "disconnected"
+    CONNECTING = "connecting"
+    CONNECTED = "connected"
+    LOST = "lost"
+
+
+class Console:
+    """The text that the firmware prints: ``on_line(text)`` is called for each line."""
+
+    def __init__(self, on_line: Callable[[str], None]):
+        self._on_line = on_line
+        self._decoder = codecs.getincrementaldecoder("utf-8")(errors="replace")
+        self._line = ""
+
+    def receive(self, data: bytes) -> None:
+        """Take up to 30 bytes; a character may begin in one packet and end in the next."""
+        *lines, self._line = (self._line + self._decoder.decode(data)).split("\n")
+        for line in lines:
+            self._on_line(line.rstrip("\r\0"))
 
 
 class Crazyflie:
     """A vehicle: connect, use, close; or use it in a ``with`` statement.
 
-    The first `connect` succeeds or raises. After that the link is watched: when no packet has come
-    for 0.45 s, or no log data, it is lost. If the vehicle is heard again soon, the link is taken up
-    as it was; otherwise, with ``reconnect``, a new one is tried at once, then with growing pauses
-    until `close`, and log blocks are started anew; those that the vehicle then refuses are named in
-    the text of the state.
+    The first `connect` succeeds or raises. Afterwards a thread checks the link: when no packet has
+    come for 0.45 s, or no log data, it is lost. If the vehicle is heard again within
+    `SILENCE_LIMIT`, the link is used as it was. Otherwise, with ``reconnect``, a new one is tried
+    at once, then with growing pauses until `close`, and log blocks are started again; blocks that
+    the vehicle then refuses are named in the text of the state.
 
     All callbacks come from threads of this object or of cflib, and must be quick. Raises
     `AddressError` if the address is malformed.
@@ -71,15 +111,16 @@ class Crazyflie:
         limits: Limits | None = None,
     ):
         self.address = Address.parse(uri)
-        self._emergency = EmergencyStop(lambda: self._reconnector.any_link())
-        self._reconnector = Reconnector(
-            self.address.uri,
-            lambda: self._make_link(cache, limits),
-            self._start_blocks,
-            lambda: self._emergency.is_requested,
-            on_state,
-            reconnect,
-        )
+        self.state = LinkState.DISCONNECTED  #: State of the link.
+        self.connection_count = 0  #: How many times the link has been set up.
+        #: Restarts of the firmware that were noticed, and packets sent to this vehicle alone.
+        self.restarts = self.sent = 0
+        #: Strength of the vehicle's reception (-dBm), as the Crazyradio has it; None elsewhere.
+        self.rssi: float | None = None
+        self._reconnect, self._cache, self._limits = reconnect, cache, limits
+        self._on_state, self._on_packet = on_state, on_packet
+        self._console = Console(on_console) if on_console is not None else None
+        self._emergency = EmergencyStop(self._any_link)
         link = self.link
         #: setpoints, high_level, trajectories, localization, lighthouse, parameters, log,
         #: supervisor: Parts of the firmware; see their classes.
@@ -89,16 +130,19 @@ class Crazyflie:
         self.localization = Localization(link)
         self.lighthouse = Lighthouse(link)
         self.parameters = FirmwareParameters(link)
-        self._uptime = Uptime()
-        self.log = Log(link, self._uptime)
+        self.log = Log(link)
         self.supervisor = Supervisor(link, self._emergency)
-        self.restarts = self.sent = 0  #: Packets that were sent to this vehicle alone.
-        self._on_packet = on_packet
         self._blocks: list[LogBlock] = []
         self._blocks_lock = threading.Lock()
-        self._console = Console(on_console) if on_console is not None else None
-        #: Strength of the vehicle's reception (-dBm), as the Crazyradio has it; None elsewhere.
-        self.rssi: float | None = None
+        # The link in use, and the one that is being opened.
+        self._link: Link | None = None
+        self._opening: Link | None = None
+        self._silent_since: float | None = None
+        self._reason = "not connected yet"
+        self._reported: tuple[LinkState, str] | None = None
+        self._closed = threading.Event()
+        self._closing: threading.Thread | None = None
+        self._watcher: threading.Thread | None = None
 
     def __enter__(self) -> "Crazyflie":
         """Connect."""
@@ -109,28 +153,32 @@ class Crazyflie:
         """Close."""
         self.close()
 
-    @property
-    def state(self) -> LinkState:
-        """State of the link."""
-        return self._reconnector.state
-
-    @property
-    def connection_count(self) -> int:
-        """How many times the link has been set up."""
-        return self._reconnector.connection_count
-
     def connect(self) -> None:
         """Connect for the first time; blocks. A `CrazyflieError` has the reason and what to do."""
-        self._reconnector.connect()
+        uri = self.address.uri
+        if self._watcher is not None or self._closed.is_set():
+            raise CrazyflieError(f"{uri}: connect can be called once only")
+        self._set_state(LinkState.CONNECTING, f"connecting to {uri}")
+        try:
+            self._open()
+        except CrazyflieError as error:
+            self._set_state(LinkState.DISCONNECTED, str(error))
+            raise
+        self._set_state(LinkState.CONNECTED, f"connected to {uri}")
+        self._watcher = threading.Thread(target=self._watch, name="crazyflie-watch", daemon=True)
+        self._watcher.start()
 
     def link(self) -> Link:
         """Return the link on which the vehicle is heard; `LinkLostError` if there is none."""
-        return self._reconnector.link()
+        link = self._link
+        if link is None or self._silent_since is not None:
+            raise LinkLostError(f"no link to the vehicle: {self._reason}")
+        return link
 
     def add_log_block(self, block: LogBlock) -> None:
-        """Have the vehicle send a block, now and after every reconnection; blocks.
+        """Start a log block, now and after every reconnection; blocks.
 
-        Raises `CrazyflieError` if the block is not possible.
+        Raises `CrazyflieError` if the vehicle cannot send the block.
         """
         self.log.start(block)
         with self._blocks_lock:
@@ -141,7 +189,7 @@ class Crazyflie:
         self.link().send(port, channel, data)
 
     def latency(self) -> float:
-        """Return the time that 95 % of the latest pings took at most, s."""
+        """Return the 95th percentile of the round-trip times of the latest pings, s."""
         return float(self.link().cflib.link_statistics.latency.latency) / 1000.0
 
     def quality(self) -> float:
@@ -157,26 +205,142 @@ class Crazyflie:
         return self.link().monitor.age(time.monotonic())
 
     def reboot(self, mode: str = "firmware") -> None:
-        """Restart the vehicle, or switch it off; see `crazyflie_link.reboot`. Blocks.
+        """Restart the vehicle, or switch it off; see `crazyflie_link.discovery.reboot`. Blocks.
 
-        The link is lost by that: it is taken up again if `reconnect` is set.
+        The link is lost by that; with ``reconnect`` a new one is set up.
         """
-        reboot(self.address, lambda: self._reconnector.close_link("the vehicle is restarted"), mode)
+        check_is_radio(self.address)
+        self._close_link("the vehicle is restarted")
+        reboot(self.address, mode)
 
     def close(self) -> None:
         """End the connection; safe to call twice and while connecting."""
         self._emergency.close()
-        self._reconnector.close()
+        self._closed.set()
+        opening = self._opening
+        if opening is not None:
+            opening.close()
+        self._close_link(_CLOSED)
+        watcher = self._watcher
+        if watcher is not None and watcher is not threading.current_thread():
+            watcher.join(timeout=_JOIN_LIMIT)
+        if self._closing is not None:
+            self._closing.join(timeout=CLOSE_LIMIT)
+        self._set_state(LinkState.DISCONNECTED, _CLOSED)
 
-    def _make_link(self, cache, limits):
-        folder = table_cache() if cache is None else cache
-        link = Link(self.address, limits, folder, self._on_received)
+    # The life of the link: opened by `connect`, then followed in a thread of its own.
+
+    def _any_link(self):
+        # Also one that is silent or still being opened.
+        return self._link or self._opening
+
+    def _set_state(self, state, text):
+        self.state = state
+        self._reason = text
+        if (state, text) != self._reported:
+            self._reported = (state, text)
+            if self._on_state is not None:
+                self._on_state(state, text)
+
+    def _close_link(self, reason):
+        link, self._link = self._link, None
+        self._reason = reason
+        if link is not None:
+            link.close(reason)
+
+    def _make_link(self):
+        folder = table_cache() if self._cache is None else self._cache
+        link = Link(self.address, self._limits, folder, self._on_received)
         link.cflib.packet_sent.add_callback(self._on_sent)
         link.cflib.link_statistics.uplink_rssi_updated.add_callback(self._on_rssi)
         return link
 
+    def _open(self):
+        self._opening = link = self._make_link()
+        try:
+            # `close` looks for it here; if it was called before, it has found nothing.
+            self._end_if_closed(link)
+            link.open()
+        finally:
+            self._opening = None
+        self._link = link
+        self.connection_count += 1
+        self._end_if_closed(link)
+
+    def _end_if_closed(self, link):
+        if self._closed.is_set():
+            self._link = None
+            link.close(_CLOSED)
+            raise LinkLostError("the link was closed while connecting")
+
+    def _watch(self):
+        while not self._closed.wait(CHECK_PERIOD):
+            link = self._link
+            end = LinkLostError(self._reason) if link is None else link.error
+            why = str(end)
+            if link is not None and end is None:
+                health, why = link.health()
+                if self._is_usable(health, why):
+                    continue
+            # The loss is reported first: closing the link takes a moment.
+            self._link = None
+            self._silent_since = None
+            if self._closed.is_set():
+                # `close` may have looked for the link just now, and found nothing.
+                if link is not None:
+                    link.close(_CLOSED)
+                return
+            self._set_state(LinkState.LOST, why)
+            if link is not None:
+                self._closing = threading.Thread(target=link.close, args=(why,), daemon=True)
+                self._closing.start()
+            if not self._reconnect or not self._connect_again():
+                return
+
+    def _is_usable(self, health, text):
+        # Whether the link may stay, at least for a while.
+        if health is LinkHealth.ALIVE:
+            was_silent = self._silent_since is not None
+            self._silent_since = None
+            if was_silent:
+                self._set_state(LinkState.CONNECTED, f"{self.address.uri} is heard again")
+            return True
+        if health is LinkHealth.RESTARTED:
+            return False
+        now = time.monotonic()
+        if self._silent_since is None:
+            self._silent_since = now
+            self._set_state(LinkState.LOST, text)
+        return now - self._silent_since < SILENCE_LIMIT
+
+    def _connect_again(self):
+        pause = 0.0
+        while not self._has_closed_within(pause):
+            pause = min(max(2.0 * pause, FIRST_PAUSE), LONGEST_PAUSE)
+            try:
+                self._open()
+                problems = self._start_blocks()
+            except CrazyflieError as error:
+                self._close_link(str(error))
+                if not self._closed.is_set():
+                    self._set_state(LinkState.LOST, str(error))
+            else:
+                text = f"connected to {self.address.uri} again{problems}"
+                self._set_state(LinkState.CONNECTED, text)
+                return True
+        return False
+
+    def _has_closed_within(self, pause):
+        end = time.monotonic() + pause
+        while time.monotonic() < end and not self._closed.wait(CHECK_PERIOD):
+            # An emergency stop does not wait for the next attempt.
+            if self._emergency.is_requested:
+                break
+        return self._closed.is_set()
+
     def _start_blocks(self):
-        # Other firmware may have been installed; the vehicle needs a link all the same.
+        # Returns which blocks were refused: other firmware may have been installed, and the vehicle
+        # needs a link all the same.
         refused = ""
         with self._blocks_lock:
             for block in self._blocks:
@@ -186,15 +350,13 @@ class Crazyflie:
                     refused += f", without log block {block.name!r}: {error}"
         return refused
 
-    # What arrives, in cflib's thread.
+    # Packets, in cflib's thread.
 
     def _on_received(self, port, channel, data):
         self._emergency.receive(port, channel, data)
-        if (port, channel) == LOG_DATA and len(data) > _STAMP_END:
-            time_ms = int.from_bytes(data[1:_STAMP_END], "little")
-            if self._uptime.has_restarted(time_ms, time.monotonic()):
-                self.restarts += 1
-                self.high_level.forget_trajectories()
+        if (port, channel) == LOG_DATA and self.log.shows_restart(data, time.monotonic()):
+            self.restarts += 1
+            self.high_level.forget_trajectories()
         if port == CRTPPort.CONSOLE and channel == 0 and self._console is not None:
             self._console.receive(data)
         if self._on_packet is not None:

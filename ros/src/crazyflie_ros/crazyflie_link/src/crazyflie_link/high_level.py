@@ -3,26 +3,29 @@
 import copy
 import math
 import os
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 from cflib.crazyflie.high_level_commander import HighLevelCommander
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.broadcast import SharedCommand, recorded
-from crazyflie_link.checks import check_byte, check_duration, check_finite
-from crazyflie_link.errors import AlreadyLandingError, RefusedError, ValueRangeError
-from crazyflie_link.high_level_replies import is_carried_out, request_after_broadcast
+from crazyflie_link.errors import AlreadyLandingError, NoReplyError, RefusedError, ValueRangeError
 from crazyflie_link.link import Link
-from crazyflie_link.request_reply import REPLY_LIMIT, Request
-from crazyflie_link.subsystem import Subsystem
+from crazyflie_link.subsystem import Subsystem, check_byte, check_duration, check_finite
+from crazyflie_link.supervisor import read_state
+from crazyflie_link.transmission import REPLY_LIMIT, RESEND_PERIOD, Request, Send
+from crazyflie_model.supervisor import SupervisorState
 
 ALL_GROUPS = 0  #: Group mask that every vehicle obeys.
 
 # The first protocol versions with the present forms of two commands.
 _GO_TO_2_PROTOCOL = 8
 _START_2_PROTOCOL = 10
+
+REPORT_LAG = 0.1  #: Time after which the supervisor, at 25 Hz, reports a takeoff, s.
 
 _BUSY = 1  #: Reply to a takeoff while the planner flies, and to a landing while it lands.
 
@@ -45,7 +48,7 @@ class HighLevel(Subsystem):
 
     All raise `CrazyflieError`: `RefusedError` with the vehicle's reason,
     `NoReplyError`, `LinkLostError`, or `ValueRangeError` before anything is sent. Durations and
-    time scales are at least `crazyflie_link.checks.MIN_DURATION`.
+    time scales are at least `crazyflie_link.subsystem.MIN_DURATION`.
     """
 
     def __init__(self, current_link: Callable[[], Link]):
@@ -55,7 +58,7 @@ class HighLevel(Subsystem):
         self._shared: SharedCommand | None = None
 
     def forget_trajectories(self) -> None:
-        """Take note that the vehicle has restarted: no trajectory is defined, it has no group."""
+        """Forget trajectories and groups: a vehicle that has restarted has none."""
         self._knowledge.defined.clear()
         self._knowledge.groups = 0
 
@@ -267,7 +270,7 @@ class HighLevel(Subsystem):
         self._knowledge.defined[trajectory_id] = place
 
     def begin_upload(self, trajectory_id: int, place: range) -> None:
-        """Take note that bytes of the memory are written: what was defined there cannot fly."""
+        """Mark the trajectories in these bytes of the memory as overwritten by another one."""
         known = self._knowledge
         for other, written in known.defined.items():
             if written.start < place.stop and place.start < written.stop:
@@ -300,6 +303,35 @@ class HighLevel(Subsystem):
             is_landing = code == _BUSY and number == HighLevelCommander.COMMAND_LAND_2
             error = AlreadyLandingError if is_landing else RefusedError
             raise error(f"{what}: the vehicle refuses it ({os.strerror(code)}, {code})")
+
+
+def request_after_broadcast(link: Link, transmit: Send, request: Request) -> bytes:
+    """Request what must not be done twice, first by a broadcast; see `Link.request`.
+
+    The vehicle gets a command of its own only if the planner's last plan has ended, which it has
+    not once this one is carried out.
+    """
+    try:
+        return link.request(transmit, replace(request, limit=RESEND_PERIOD))
+    except NoReplyError:
+        state = read_state(link)
+        if state is None or SupervisorState.TRAJECTORY_FINISHED not in state:
+            raise
+        return link.request(transmit, request)
+
+
+def is_carried_out(link: Link, number: int) -> bool:
+    """Return whether a repeated command (its number) was refused because the first is obeyed."""
+    if number != HighLevelCommander.COMMAND_TAKEOFF_2:
+        return number == HighLevelCommander.COMMAND_LAND_2
+    end = time.monotonic() + REPORT_LAG
+    while True:
+        state = read_state(link)
+        if state is None or not state.reports_planner:
+            return True
+        if SupervisorState.HIGH_LEVEL_ACTIVE in state or time.monotonic() > end:
+            return SupervisorState.HIGH_LEVEL_ACTIVE in state
+        time.sleep(REPORT_LAG / 4)
 
 
 def _check(what: str, duration: float, group_mask: int, *values: float) -> None:

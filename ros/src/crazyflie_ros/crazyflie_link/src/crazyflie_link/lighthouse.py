@@ -15,12 +15,11 @@ from cflib.crtp.crtpstack import CRTPPort
 from cflib.localization import LighthouseConfigFileManager
 
 from crazyflie_link.errors import RefusedError, ValueRangeError
-from crazyflie_link.memory import find_memory, write_memory
 from crazyflie_link.parameters import FirmwareParameters
-from crazyflie_link.request_reply import Request
-from crazyflie_link.subsystem import Subsystem
+from crazyflie_link.subsystem import Subsystem, find_memory, write_memory
+from crazyflie_link.transmission import Request
 
-STATIONS = 16  #: As many as the firmware can be built for.
+STATIONS = 16  #: The most that the firmware can be built for.
 
 _TYPE = "lighthouse.systemType"
 _STORE = bytes([Localization.LH_PERSIST_DATA])

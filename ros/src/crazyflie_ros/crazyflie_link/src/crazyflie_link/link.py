@@ -19,11 +19,9 @@ from crazyflie_link.errors import (
     ValueRangeError,
     explain,
 )
-from crazyflie_link.link_monitor import LinkHealth, LinkMonitor
-from crazyflie_link.link_setup import Limits, LinkSetup
-from crazyflie_link.request_reply import Request, RequestReply
+from crazyflie_link.link_monitor import Limits, LinkHealth, LinkMonitor, LinkSetup
 from crazyflie_link.safe_crazyflie import SafeCrazyflie, init_drivers, packet
-from crazyflie_link.transmit_queue import Send, TransmitQueue
+from crazyflie_link.transmission import Request, RequestReply, Send, TransmitQueue
 
 LOG_DATA = (CRTPPort.LOGGING, CHAN_LOGDATA)  #: Port and channel of log data.
 
@@ -171,8 +169,8 @@ class Link:
     ) -> bytes:
         """Send a request and return the data of its answer; see `RequestReply.request`.
 
-        What is sent is a call, or data for the port and channel of the answer. It is withdrawn
-        when this returns or raises: what still waits for the link then is not sent.
+        ``send`` is a call, or data for the port and channel of the answer. A request that still
+        waits for the link when this returns or raises is withdrawn.
         """
         transmit = (
             partial(self.cflib.send_packet, packet(request.port, request.channel, send))

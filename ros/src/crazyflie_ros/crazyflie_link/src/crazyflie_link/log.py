@@ -15,12 +15,17 @@ from crazyflie_link.errors import (
     unknown_name,
 )
 from crazyflie_link.link import Link
-from crazyflie_link.link_monitor import Uptime
-from crazyflie_link.request_reply import REPLY_LIMIT
 from crazyflie_link.subsystem import Subsystem, elements
+from crazyflie_link.transmission import REPLY_LIMIT
 
 #: The firmware counts periods in 10 ms, in one byte of which 255 is not allowed.
 SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS, PERIOD_STEP_MS = 10, 2540, 10
+
+_STAMP_END = 4  #: A log packet begins with the number of its block and three bytes of time.
+_TICKS = 1 << 24  #: The vehicle counts ms in 24 bits.
+_REORDERED_MS = 100  #: A packet that is older by at most this was overtaken by another, ms.
+#: The largest delay of the quickest packet, ms: this machine may have been busy.
+_LATEST_FIRST_MS = 60_000.0
 
 
 def quaternion_from_compressed(number: int) -> tuple[float, ...]:
@@ -48,12 +53,61 @@ class LogBlock:
     callback: Callable[[int, tuple[float, ...]], None] = field(compare=False)
 
 
-class Log(Subsystem):
-    """The log variables of a vehicle, whose clock is followed by an uptime."""
+class Uptime:
+    """The vehicle's clock, in log packets, which is 0 when the firmware starts.
 
-    def __init__(self, current_link: Callable[[], Link], uptime: Uptime):
+    Its 24 bits also wrap to 0 every 4.66 h. The firmware has restarted if an unwrapped time would
+    be ahead of this machine's clock: packets come late, but never early.
+    """
+
+    def __init__(self) -> None:
+        # The second last one was received, and its time with all bits.
+        self._latest: tuple[int, float] | None = None
+        self._late_ms = 0.0
+
+    def has_restarted(self, time_ms: int, now: float) -> bool:
+        """Return whether the clock (ms, 24 bits), read at a time (s), shows a restart."""
+        if self._latest is None:
+            self._latest = time_ms, now
+            return False
+        before_ms, before = self._latest
+        elapsed_ms = 1000.0 * (now - before)
+        if (before_ms - time_ms) % _TICKS <= _REORDERED_MS and elapsed_ms < _TICKS / 2:
+            return False
+        step_ms = (time_ms - before_ms) % _TICKS
+        # After hours without a packet.
+        step_ms += _TICKS * max(0, round((elapsed_ms - step_ms) / _TICKS))
+        # How much later than the quickest packet this one came.
+        late = self._late_ms + elapsed_ms - step_ms
+        self._late_ms = max(0.0, late)
+        has_restarted = late < -_LATEST_FIRST_MS
+        self._latest = (time_ms if has_restarted else before_ms + step_ms), now
+        return has_restarted
+
+    def unwrapped(self, time_ms: int) -> int:
+        """Return a time (ms, 24 bits) near the latest one with all its bits.
+
+        It never jumps back while the vehicle is on; bits that it had before the first call are
+        not known.
+        """
+        if self._latest is None:
+            return time_ms
+        ahead = (time_ms - self._latest[0] + _TICKS // 2) % _TICKS - _TICKS // 2
+        return max(0, self._latest[0] + ahead)
+
+
+class Log(Subsystem):
+    """The log variables and log blocks of a vehicle."""
+
+    def __init__(self, current_link: Callable[[], Link]):
         super().__init__(current_link)
-        self._uptime = uptime
+        self._uptime = Uptime()
+
+    def shows_restart(self, data: bytes, now: float) -> bool:
+        """Return whether a packet of log data, received at a time (s), shows a restart."""
+        if len(data) <= _STAMP_END:
+            return False
+        return self._uptime.has_restarted(int.from_bytes(data[1:_STAMP_END], "little"), now)
 
     def variables(self) -> dict[str, str]:
         """Return the vehicle's variables: "group.name" -> C type, sorted by name."""
@@ -89,7 +143,7 @@ class Log(Subsystem):
             )
 
     def start(self, block: LogBlock) -> None:
-        """Have the vehicle send a block; blocks until it has agreed, or raises `CrazyflieError`."""
+        """Start a block; blocks until the vehicle has confirmed it, or raises `CrazyflieError`."""
         self.check(block)
         link = self._current_link()
         backend = link.cflib

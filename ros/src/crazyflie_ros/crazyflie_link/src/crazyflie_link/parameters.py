@@ -17,8 +17,8 @@ from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.errors import NoReplyError, RefusedError, ValueRangeError, unknown_name
 from crazyflie_link.link import Link
-from crazyflie_link.request_reply import Request
 from crazyflie_link.subsystem import Subsystem, elements
+from crazyflie_link.transmission import Request
 
 
 class FirmwareParameters(Subsystem):

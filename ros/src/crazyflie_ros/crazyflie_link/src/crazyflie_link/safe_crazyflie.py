@@ -20,9 +20,9 @@ _init_lock = threading.Lock()
 
 _UDP_RECEIVE_LIMIT = 0.1
 
-#: How long, in s, the end of a link waits for a callback that is at work, or for other dongles.
+#: Time limit for a running callback, or for other dongles, when a link ends, s.
 _JOIN_LIMIT = 0.3
-CLOSE_LIMIT = 1.0  #: How long, in s, the end of a link waits for a driver.
+CLOSE_LIMIT = 1.0  #: Time limit for the driver when a link ends, s.
 
 _log = logging.getLogger(__name__)
 
@@ -62,7 +62,7 @@ def packet(port: int, channel: int, data: bytes) -> CRTPPacket:
 
 
 class _Guarded(Caller):
-    """cflib's list of callbacks for packets; none of them ends the thread that receives."""
+    """cflib's list of callbacks for packets; no exception in one ends the receiving thread."""
 
     def call(self, *args):
         for callback in list(self.callbacks):

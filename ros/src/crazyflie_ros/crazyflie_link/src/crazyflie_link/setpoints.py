@@ -14,10 +14,9 @@ from cflib.crazyflie.commander import (
 )
 from cflib.crtp.crtpstack import CRTPPort
 
-from crazyflie_link.checks import check_finite
 from crazyflie_link.errors import ValueRangeError
 from crazyflie_link.safe_crazyflie import packet
-from crazyflie_link.subsystem import Subsystem
+from crazyflie_link.subsystem import Subsystem, check_finite
 from crazyflie_model.limits import FULL_PWM
 
 ZEROS = 100  #: Setpoints of zero thrust after connecting and before leaving.
@@ -135,7 +134,7 @@ class Setpoints(Subsystem):
         link.put_latest(_STREAM, lambda: send(link.cflib.commander))
 
     def _stream_legacy(self, kind, *values):
-        # What crazyflie_cpp sends, and all firmware knows; the firmware negates the yaw rate. From
+        # The types of crazyflie_cpp, which all firmware knows and whose yaw rate it negates. From
         # protocol 9 on cflib sends other types.
         link = self._current_link()
 

@@ -1,14 +1,59 @@
-"""Base class of the parts of the firmware, and the tables of its names."""
+"""What the parts of the firmware share: the link, names, memories, limits of numbers."""
 
 import copy
+import math
+import struct
 from collections.abc import Callable
 from typing import Any, Self, TypeVar, cast
 
-from crazyflie_link.link import Link
-from crazyflie_link.request_reply import Request
-from crazyflie_link.transmit_queue import Send
+from cflib.crazyflie.mem import CHAN_WRITE, MemoryElement, _WriteRequest
+from cflib.crtp.crtpstack import CRTPPort
 
-#: Is called in the thread that sends, right before each packet: whether it is sent.
+from crazyflie_link.errors import RefusedError, ValueRangeError
+from crazyflie_link.link import Link
+from crazyflie_link.transmission import Request, Send
+
+#: Numbers go over the link in single precision; a smaller one may arrive as 0.
+SMALLEST_FLOAT, LARGEST_FLOAT = 1.2e-38, 3.4e38
+
+#: A shorter duration (s), or a smaller time scale, is a mistake: the planner, at 100 Hz, would ask
+#: for the end of the motion at once.
+MIN_DURATION = 0.01
+
+
+def check_finite(what: str, *values: float) -> None:
+    """Raise `ValueRangeError` unless all values are finite, in single precision, too."""
+    for value in values:
+        if not math.isfinite(value):
+            raise ValueRangeError(f"{what}: {value} is not finite")
+        if abs(value) > LARGEST_FLOAT:
+            raise ValueRangeError(f"{what}: {value:g} is beyond +-{LARGEST_FLOAT:g}")
+
+
+def check_positive(what: str, value: float) -> None:
+    """Raise `ValueRangeError` unless the value is positive and finite, in single precision, too."""
+    if not SMALLEST_FLOAT <= value <= LARGEST_FLOAT:
+        raise ValueRangeError(
+            f"{what} is {value:g}; expected a finite number above 0 ({SMALLEST_FLOAT:g} to "
+            f"{LARGEST_FLOAT:g})"
+        )
+
+
+def check_duration(what: str, value: float) -> None:
+    """Raise `ValueRangeError` unless a duration (s) or time scale is finite and long enough."""
+    if not MIN_DURATION <= value <= LARGEST_FLOAT:
+        raise ValueRangeError(
+            f"{what} is {value:g}; expected a finite number of at least {MIN_DURATION:g}"
+        )
+
+
+def check_byte(what: str, value: int) -> None:
+    """Raise `ValueRangeError` unless the value fits in a byte."""
+    if not 0 <= value <= 255:
+        raise ValueRangeError(f"{what} is {value}; expected 0 to 255")
+
+
+#: Returns whether a packet is sent; called in the thread that sends, right before the packet.
 MaySend = Callable[[], bool]
 
 
@@ -59,3 +104,39 @@ def elements(table: dict[str, dict[str, Element]]) -> dict[str, Element]:
         for group, names in sorted(table.items())
         for name, element in sorted(names.items())
     }
+
+
+_CHUNK = _WriteRequest.MAX_DATA_LENGTH
+
+
+def find_memory(link: Link, kind: int, what: str) -> MemoryElement:
+    """Return the vehicle's memory of one of cflib's types; `RefusedError` if it has none."""
+    memories = link.cflib.mem.get_mems(kind)
+    if not memories:
+        raise RefusedError(f"the vehicle has no memory for {what}: update its firmware")
+    return memories[0]
+
+
+def write_memory(
+    link: Link,
+    number: int,
+    begin: int,
+    data: bytes,
+    what: str,
+    check: Callable[[], None] = lambda: None,
+) -> None:
+    """Write data from an address on; blocks.
+
+    ``check()`` is called before every packet, and ends it by raising. Raises `RefusedError` if the
+    memory has no such address.
+    """
+    # cflib's own writer never ends when a reply comes twice.
+    for start in range(0, len(data), _CHUNK):
+        check()
+        where = struct.pack("<BI", number, begin + start)
+        step = f"writing {what}, byte {begin + start}"
+        request = Request(CRTPPort.MEM, CHAN_WRITE, where, step)
+        answer = link.request(where + data[start : start + _CHUNK], request)
+        status = answer[5] if len(answer) > 5 else 0
+        if status:
+            raise RefusedError(f"{step}: the vehicle refuses it (error {status})")

@@ -7,12 +7,17 @@ from typing import Self
 from cflib.crazyflie.mem import CompressedSegment, CompressedStart, MemoryElement
 from typing_extensions import override
 
-from crazyflie_link.checks import check_finite, check_positive
 from crazyflie_link.errors import ValueRangeError
 from crazyflie_link.high_level import HighLevel
 from crazyflie_link.link import Link
-from crazyflie_link.memory import find_memory, write_memory
-from crazyflie_link.subsystem import MaySend, Subsystem
+from crazyflie_link.subsystem import (
+    MaySend,
+    Subsystem,
+    check_finite,
+    check_positive,
+    find_memory,
+    write_memory,
+)
 from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, PolynomialPiece
 
 #: Duration (s), and control points of x, y, z (m) and yaw (rad).

@@ -1,0 +1,180 @@
+"""Packets to a vehicle and its answers: a thread that sends, and requests with time limits.
+
+cflib's radio driver blocks a sender for up to 2 s when the vehicle is out of range; with a thread
+of its own for each link no caller is blocked. CRTP has no request numbers: an answer is known by
+its port, its channel and its first bytes. A late answer to an earlier, equal request cannot be
+distinguished from the expected one.
+"""
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from crazyflie_link.errors import LinkLostError, NoReplyError
+
+_MOST_COMMANDS = 256
+
+_log = logging.getLogger(__name__)
+
+Send = Callable[[], None]  #: Sends something.
+
+
+class TransmitQueue:
+    """Packets to be sent: commands in their order, and the latest of each stream."""
+
+    def __init__(self) -> None:
+        self._commands: deque[Send] = deque()
+        self._streams: dict[str, Send] = {}
+        self._wake = threading.Condition()
+        self._closed = False
+        threading.Thread(target=self._run, name="crazyflie-transmit", daemon=True).start()
+
+    def put(self, send: Send, urgent: bool = False) -> None:
+        """Queue ``send()`` behind the commands before it.
+
+        An urgent one goes first, and discards all streams. `LinkLostError` if the queue is closed,
+        or full: the link is stuck.
+        """
+        with self._wake:
+            self._check_open()
+            if urgent:
+                self._streams.clear()
+                self._commands.appendleft(send)
+            elif len(self._commands) >= _MOST_COMMANDS:
+                raise LinkLostError(f"{_MOST_COMMANDS} packets wait to be sent: the link is stuck")
+            else:
+                self._commands.append(send)
+            self._wake.notify()
+
+    def put_latest(self, stream: str, send: Send) -> None:
+        """Queue ``send()`` in place of the one that still waits on this stream."""
+        with self._wake:
+            self._check_open()
+            self._streams[stream] = send
+            self._wake.notify()
+
+    def discard(self, stream: str) -> None:
+        """Remove the ``send`` that waits on a stream."""
+        with self._wake:
+            self._streams.pop(stream, None)
+
+    def close(self) -> None:
+        """Stop sending; discard the queue."""
+        with self._wake:
+            self._closed = True
+            self._wake.notify()
+
+    def _check_open(self):
+        if self._closed:
+            raise LinkLostError("the link is closed")
+
+    def _run(self):
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._closed or self._commands or self._streams)
+                if self._closed:
+                    return
+                if self._commands:
+                    send = self._commands.popleft()
+                else:
+                    send = self._streams.pop(next(iter(self._streams)))
+            try:
+                send()
+            except Exception:
+                # Whatever cflib raises, the next command must go out.
+                _log.exception("a packet could not be sent")
+
+
+REPLY_LIMIT = 1.0  #: Time limit of a reply, s.
+RESEND_PERIOD = 0.2  #: Time after which a request is sent again, s; as cflib does.
+
+
+@dataclass(frozen=True)
+class Request:
+    """A request to the vehicle, and its answer: port, channel, first bytes, time limit (s).
+
+    ``what`` names the request in errors, such as "the takeoff command". Without ``resend`` it is
+    sent once: doing it twice is different from doing it once. ``accepts(data)`` returns whether
+    data with the prefix are the answer, not that to an earlier request.
+    """
+
+    port: int
+    channel: int
+    prefix: bytes
+    what: str
+    resend: bool = True
+    limit: float = REPLY_LIMIT
+    accepts: Callable[[bytes], bool] = lambda data: True
+
+    def is_answer(self, port: int, channel: int, data: bytes) -> bool:
+        """Return whether a packet is the answer."""
+        is_same = (port, channel) == (self.port, self.channel)
+        return is_same and data.startswith(self.prefix) and self.accepts(data)
+
+
+@dataclass(eq=False)
+class _Pending:
+    request: Request
+    answer: bytes | None = None
+    done: threading.Event = field(default_factory=threading.Event)
+
+
+class RequestReply:
+    """Pair answers with pending requests."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._pending: list[_Pending] = []
+        self._closed: str | None = None
+
+    def receive(self, port: int, channel: int, data: bytes) -> None:
+        """Give a packet that arrived to the oldest request that it answers."""
+        with self._lock:
+            for pending in self._pending:
+                if pending.request.is_answer(port, channel, data):
+                    self._pending.remove(pending)
+                    pending.answer = data
+                    pending.done.set()
+                    return
+
+    def request(self, send: Send, request: Request) -> bytes:
+        """Send a request and return the data of the answer; blocks.
+
+        Raises `NoReplyError` after the limit, `LinkLostError` if the link ends meanwhile.
+        """
+        what = request.what
+        pending = _Pending(request)
+        with self._lock:
+            if self._closed is not None:
+                raise LinkLostError(f"{what}: {self._closed}")
+            self._pending.append(pending)
+        left = request.limit
+        deadline = time.monotonic() + left
+        try:
+            send()
+            while not pending.done.wait(min(RESEND_PERIOD, left) if request.resend else left):
+                left = deadline - time.monotonic()
+                if left <= 0.0:
+                    raise NoReplyError(
+                        f"{what}: the vehicle has not replied within {request.limit:g} s"
+                        + ("" if request.resend else "; it may or may not have been carried out")
+                    )
+                send()
+        finally:
+            with self._lock:
+                if pending in self._pending:
+                    self._pending.remove(pending)
+        if pending.answer is None:
+            raise LinkLostError(f"{what}: {self._closed}")
+        return pending.answer
+
+    def close(self, reason: str) -> None:
+        """Fail all pending requests, and later ones, with `LinkLostError`."""
+        with self._lock:
+            self._closed = reason
+            closed, self._pending = self._pending, []
+        for pending in closed:
+            pending.done.set()

@@ -33,7 +33,7 @@ def test_an_emergency_does_not_wait_for_the_tables_of_a_new_link(server, vehicle
     with pytest.raises(ServiceError, match="is sent when the link is back"):
         server.call("/cf1/emergency", EmptyRequest())
     crazyflie = server.node._vehicles[vehicle.uri].crazyflie
-    wait_until(lambda: crazyflie._reconnector.opening is not None, "a new attempt to connect")
+    wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
     vehicle.deaf.add((5, 0, b""))
     vehicle.received.clear()
     vehicle.is_frozen = False

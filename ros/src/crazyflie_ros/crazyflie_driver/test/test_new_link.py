@@ -88,7 +88,7 @@ def test_a_link_that_is_set_up_anew_sends_an_old_vehicle_in_the_air_nothing(serv
     wait_for_words(server, "ready")
     vehicle.is_frozen = True
     crazyflie = server.node._vehicles[vehicle.uri].crazyflie
-    wait_until(lambda: crazyflie._reconnector.opening is not None, "a new attempt to connect")
+    wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
     # Another node has it fly.
     is_(vehicle, FLYING)
     vehicle.received.clear()
@@ -155,7 +155,7 @@ def test_a_parameter_that_is_refused_later_does_not_keep_the_thrust_locked(serve
     wait_for_words(server, "ready")
     vehicle.is_frozen = True
     crazyflie = server.node._vehicles[vehicle.uri].crazyflie
-    wait_until(lambda: crazyflie._reconnector.opening is not None, "a new attempt to connect")
+    wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
     code, value, _ = vehicle.parameters["ring.effect"]
     vehicle.parameters["ring.effect"] = (code, value, READ_ONLY)
     vehicle.received.clear()

@@ -211,7 +211,7 @@ def test_a_link_that_is_lost_and_comes_back(server, vehicle):
     with pytest.raises(ServiceError, match="no link to the vehicle"):
         server.call("/cf1/takeoff", TakeoffRequest(0, 1.0, Duration(2)))
     crazyflie = server.node._vehicles[vehicle.uri].crazyflie
-    wait_until(lambda: crazyflie._reconnector.opening is not None, "a new attempt to connect")
+    wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
     vehicle.is_frozen = False
     wait_until(lambda: status(server).level == DiagnosticStatus.OK, "the link's return")
     # The vehicle stands: its thrust lock is opened again on the new link.

@@ -72,6 +72,7 @@ class FakeDashboard:
         self.emergencies = []
         self.flown = []
         self.fields = []
+        self.typed = []
         self.picture = None
         self.refusals = {}
         self.gain = ParameterInfo(
@@ -187,6 +188,7 @@ class FakeDashboard:
         )
 
     def set_parameter(self, page, parameter, text):
+        self.typed.append(text)
         try:
             value = float(text)
         except ValueError:

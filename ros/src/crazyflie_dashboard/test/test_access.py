@@ -2,10 +2,12 @@
 
 import os
 import socket
+from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
-from crazyflie_dashboard.access import Access, AccessError, expect_free_port, new_token
+from crazyflie_dashboard.access import Access, AccessError, expect_free_port, token_in
 
 TOKEN = "0123456789abcdef"
 
@@ -66,17 +68,51 @@ def test_other_computers_need_a_token(host):
     assert TOKEN in access.url
 
 
-def test_a_cookie_may_have_the_token():
+@pytest.mark.parametrize(
+    "others", ["a=b", 'x={"a": 1, "b"}; é; =', "dashboard_token_80=of another port"]
+)
+def test_a_cookie_may_have_the_token_whatever_other_sites_have_set(others):
     access = Access("0.0.0.0", 8642, TOKEN)
-    cookie = {"cookie": f"a=b; dashboard_token={TOKEN}"}
-    assert access.refusal(headers("lab:8642", "http://lab:8642", **cookie)) == ""
-    assert access.refusal(headers("lab:8642", "http://lab:8642", cookie="a=b")) != ""
+    own = f"{access.cookie}={TOKEN}"
+    for cookies in (f"{others}; {own}", f"{own}; {others}", f"{access.cookie}=wrong; {own}"):
+        asked = headers("lab:8642", "http://lab:8642", cookie=cookies)
+        assert access.refusal(asked) == ""
+    assert access.refusal(headers("lab:8642", "http://lab:8642", cookie=others)) != ""
+
+
+def fetch(site, mode="navigate", destination="document"):
+    fetched = {"sec-fetch-site": site, "sec-fetch-mode": mode, "sec-fetch-dest": destination}
+    return {"Host": "127.0.0.1:8642", **fetched}
+
+
+def test_what_another_site_loads_is_refused_and_a_link_to_the_page_is_not(access):
+    for site in ("cross-site", "same-site"):
+        assert "another site" in access.refusal(fetch(site, "no-cors", "image"))
+        assert "another site" in access.refusal(fetch(site, "navigate", "iframe"))
+        assert access.refusal(fetch(site)) == ""
+    assert access.refusal(fetch("none")) == access.refusal(fetch("same-origin", "cors", "")) == ""
+
+
+def test_the_token_is_in_a_file_of_the_user_only(tmp_path):
+    path = tmp_path / "folder" / "token"
+    token = token_in(path)
+    assert (token_in(path), len(token) >= 16) == (token, True)
+    assert path.stat().st_mode & 0o777 == 0o600
+    path.chmod(0o644)
+    with pytest.raises(AccessError, match="others may read .*; expected mode 600"):
+        token_in(path)
+
+
+def test_no_token_is_given_where_others_can_read_it():
+    # The command line of roslaunch, and the parameter server.
+    launch = ElementTree.parse(Path(__file__).parents[1] / "launch" / "dashboard.launch")
+    names = {each.get("name") for each in launch.iter() if each.tag in ("arg", "param")}
+    assert names == {"host", "port", "token_file", "folders"}
 
 
 def test_short_tokens_are_refused():
     with pytest.raises(AccessError, match="the token has 5 characters"):
         Access("0.0.0.0", 8642, "short")
-    assert len(new_token()) >= 16
 
 
 def test_who_uses_a_port_is_said():

@@ -208,3 +208,34 @@ def test_a_page_without_control_stops_motors_only(fleet):
     fleet.dashboard.emergency(None, 0.0)
     fleet.dashboard.emergency(("cf1", "/"), 0.0)
     assert fleet.lane.stopped == [None, ["/cf1/emergency", "/emergency"]]
+
+
+@pytest.mark.parametrize("height", [0.0, 0.05, 5.1, math.nan])
+def test_a_takeoff_to_no_height_of_a_room_is_refused(fleet, height):
+    with pytest.raises(RefusalError, match="take off: .*expected"):
+        fleet.command(Action.TAKEOFF, height=height)
+    assert fleet.calls == []
+
+
+def test_a_vehicle_in_flight_is_not_disarmed(fleet):
+    services = {**fleet.graph.services, "/cf1/arm": "/fleet"}
+    fleet.graph = Graph(fleet.graph.topics, fleet.graph.topics, services)
+    fleet.process.advance(2.1)
+    fleet.report("cf1", FlightStatus.FLYING)
+    assert fleet.command(Action.DISARM, ["cf1"]) == {
+        "cf1": "disarm: the vehicle is flying; expected it to be on the ground"
+    }
+
+
+def test_commands_refusals_and_control_are_logged(fleet):
+    fleet.refusals["/cf2/high_level/takeoff"] = "the battery is at 2.9 V"
+    fleet.command(Action.TAKEOFF, ["cf1", "cf2"])
+    with pytest.raises(RefusalError):
+        fleet.command(Action.LAND, age=3.0)
+    fleet.dashboard.pages.release(fleet.page)
+    info, warn = (" | ".join(fleet.process.logged(level)) for level in ("info", "warn"))
+    assert "page 1 has control" in info
+    assert "page 1: take off cf1, cf2" in info
+    assert "page 1: take off cf1, cf2 to 1 m: cf2: the battery is at 2.9 V" in warn
+    assert "page 1: land cf1, cf2, cf3: land: the command is 3.0 s old" in warn
+    assert "page 1 has given up control" in info

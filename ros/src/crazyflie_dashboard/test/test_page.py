@@ -143,6 +143,15 @@ def test_boxes_show_what_is_chosen(browser):
     wait_for(lambda: [each.is_selected() for each in boxes] == [False, True, False], "boxes")
 
 
+def test_a_takeoff_without_a_height_is_not_sent(browser, server):
+    browser.take_control()
+    browser.choose("cf1")
+    browser.find('input[aria-label="height, m"]').send_keys(Keys.CONTROL, "a", Keys.DELETE)
+    browser.press("Take off")
+    browser.has("take off: type a height")
+    assert server.dashboard.commands == []
+
+
 def test_a_refusal_is_shown_in_the_words_of_the_service(browser, server):
     server.dashboard.refusals["cf2"] = "battery at 3.05 V; expected at least 3.20 V"
     browser.take_control()
@@ -171,8 +180,12 @@ def test_parameters_right_and_wrong(browser, server):
     browser.select("node or vehicle", "/cf1/controller")
     row = '.parameter[data-name="K/gain"]'
     browser.has("float · 1/s · 0 to 2 · gain of the height", row)
+    # What was typed is sent on Enter, and not when the field is left.
+    browser.enter(f"{row} input", "0.9")
+    browser.find(".search input").click()
     browser.enter(f"{row} input", "0.75\n")
     browser.has("is 0.75 now", row)
+    assert server.dashboard.typed == ["0.75"]
     browser.enter(f"{row} input", "7\n")
     browser.has("K/gain is 7; expected 0 to 2 1/s", row)
     browser.enter(f"{row} input", "much\n")

@@ -68,3 +68,8 @@ def test_a_token_is_asked_for_and_becomes_a_cookie():
     assert "httponly" in answer.headers["set-cookie"].lower()
     assert browser.get("/").text == "the page"
     assert websocket_is_accepted(browser, f"http://{HOST}")
+
+
+def test_a_token_in_an_address_leads_to_this_page_only():
+    answer = client(TOKEN).get(f"http://{HOST}//evil.example/", params={"token": TOKEN})
+    assert (answer.status_code, answer.headers["location"]) == (303, "/")

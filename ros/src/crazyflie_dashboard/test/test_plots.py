@@ -1,6 +1,8 @@
 """Plots: the last minute, and any number of any topic."""
 
+import itertools
 import math
+import threading
 
 import pytest
 from geometry_msgs.msg import PoseStamped
@@ -89,3 +91,22 @@ def test_numbers_are_found_in_messages():
     assert number_in(message, ["values", 1]) == 2.5
     assert math.isnan(number_in(message, ["values", 2]))
     assert number_in(message, ["header", "stamp"]) == 0.0
+
+
+def test_plots_are_read_while_numbers_come():
+    ring, is_over = Ring("m"), threading.Event()
+
+    def take():
+        for k in itertools.count():
+            ring.add(k, 0.0)
+            if is_over.is_set():
+                return
+
+    source = threading.Thread(target=take)
+    source.start()
+    try:
+        for _ in range(2000):
+            ring.series("x", 0.0)
+    finally:
+        is_over.set()
+        source.join()

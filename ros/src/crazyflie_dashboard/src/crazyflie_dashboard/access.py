@@ -7,13 +7,10 @@ import os
 import secrets
 import socket
 from collections.abc import Iterator, Mapping
-from http.cookies import SimpleCookie
 from pathlib import Path
 from urllib.parse import urlsplit
 
 MIN_TOKEN_LENGTH = 16
-
-COOKIE = "dashboard_token"
 
 _LISTENING = "0A"  #: Of a socket in /proc/net/tcp.
 
@@ -44,6 +41,8 @@ class Access:
 
     def __init__(self, host: str, port: int, token: str = ""):
         self.host, self.port, self.token = host, port, token
+        #: Name of the cookie with the token: a browser sends those of all ports of a computer.
+        self.cookie = f"dashboard_token_{port}"
         if token and len(token) < MIN_TOKEN_LENGTH:
             raise AccessError(
                 f"the token has {len(token)} characters; expected at least {MIN_TOKEN_LENGTH}"
@@ -67,7 +66,7 @@ class Access:
         headers : dict
             Of the HTTP request, also of one that opens a websocket.
         token : str
-            Of its address; without one that of its cookie `COOKIE` counts.
+            Of its address; without one that of its cookie counts.
         """
         fields = {name.lower(): value for name, value in headers.items()}
         host, origin = fields.get("host", ""), fields.get("origin")
@@ -80,10 +79,23 @@ class Access:
             f"{scheme}://{host.lower()}" for scheme in ("http", "https")
         }:
             return f"the Origin is {origin!r}; expected that of the page"
-        token = token or _cookie(fields.get("cookie", ""))
-        if self.token and not hmac.compare_digest(self.token.encode(), token.encode()):
+        is_opened = (fields.get("sec-fetch-mode"), fields.get("sec-fetch-dest")) == (
+            "navigate",
+            "document",
+        )
+        if fields.get("sec-fetch-site", "none") not in ("none", "same-origin") and not is_opened:
+            return "another site has asked for it; expected the page, or a link that is followed"
+        given = [token] if token else self._cookies(fields.get("cookie", ""))
+        if self.token and not any(
+            hmac.compare_digest(self.token.encode(), each.encode()) for each in given
+        ):
             return "the token is missing or wrong; it was printed when the dashboard began"
         return ""
+
+    def _cookies(self, text):
+        # Others may hold anything, which http.cookies stops at.
+        pairs = (each.strip().partition("=") for each in text.split(";"))
+        return [value.strip('"') for name, _, value in pairs if name == self.cookie]
 
     def _is_own_host(self, text):
         try:
@@ -97,11 +109,6 @@ class Access:
         return bool(name) and (not is_loopback(self.host) or is_loopback(name))
 
 
-def _cookie(text: str) -> str:
-    found = SimpleCookie(text).get(COOKIE)
-    return found.value if found else ""
-
-
 def is_loopback(host: str) -> bool:
     """Tell whether an address or name is this computer's own, which no other one reaches."""
     if host == "localhost":
@@ -112,9 +119,25 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def new_token() -> str:
-    """Return a token that cannot be guessed."""
-    return secrets.token_urlsafe(MIN_TOKEN_LENGTH)
+def token_in(path: Path) -> str:
+    """Return the token in a file, which is made if it is not there; only its user may read it.
+
+    Raises
+    ------
+    AccessError
+        Others may read it, or it cannot be read or made.
+    """
+    try:
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+                file.write(secrets.token_urlsafe(MIN_TOKEN_LENGTH))
+        mode = path.stat().st_mode & 0o777
+        if mode & 0o077:
+            raise AccessError(f"others may read {path}, whose mode is {mode:o}; expected mode 600")
+        return path.read_text().strip()
+    except OSError as error:
+        raise AccessError(f"the token's file {path}: {error.strerror}") from None
 
 
 def expect_free_port(host: str, port: int) -> None:

@@ -32,6 +32,7 @@ _CLIMB_SPEED = 0.5  #: Mean speed of a takeoff, m/s.
 _UNKNOWN_HEIGHT = 1.0  #: From which a vehicle lands whose position is not known, m.
 _MIN_DURATION = 1.0  #: Of a move, s.
 _MAX_SPEED = 2.0  #: m/s.
+HEIGHTS = 0.1, 5.0  #: Lowest and highest of a takeoff, m.
 
 _HOLD_DURATION = 1.0  #: Of a move to where a vehicle is, s.
 _STAYS = "not all of them can go"
@@ -133,6 +134,17 @@ class Actions:
         services = () if target is None else _services(target, command.action)
         if not services:
             return failed(_why_no_service(command.action, target))
+        if command.action == Action.DISARM and target.now.is_in_flight:
+            return failed(
+                f"disarm: the vehicle is {target.now.state}; expected it to be on the ground"
+            )
+        if command.action == Action.TAKEOFF and target.fence is not None:
+            top = target.fence.upper[2]
+            if command.height > top:
+                return failed(
+                    f"take off: the height is {command.height:g} m; expected at most {top:g} m, "
+                    "where the geofence ends"
+                )
         may_move = Action.GO_TO in target.now.actions
         if command.action == Action.TAKEOFF and may_move:
             go_to = _services(target, Action.GO_TO)
@@ -301,6 +313,11 @@ def _check(command: Command) -> None:
         raise RefusalError(f"{command.action.value}: {numbers}; expected finite numbers")
     if not command.vehicles:
         raise RefusalError(f"{command.action.value}: no vehicle is chosen")
+    low, high = HEIGHTS
+    if command.action == Action.TAKEOFF and not low <= command.height <= high:
+        raise RefusalError(
+            f"take off: the height is {command.height:g} m; expected {low:g} to {high:g} m"
+        )
     if command.action != Action.GO_TO:
         return
     if command.goal is None:

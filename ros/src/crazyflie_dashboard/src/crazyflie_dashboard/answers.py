@@ -3,7 +3,7 @@
 import ast
 import contextlib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
 from typing import Any
@@ -11,6 +11,8 @@ from typing import Any
 from crazyflie_dashboard.page_data import Outcome
 from crazyflie_utils import ServiceError
 from crazyflie_utils.refusal import RefusalError
+
+_MAX_NAMES = 8  #: Of vehicles in one text.
 
 
 def settle(done: "Future[Any]", outcome: "Future[Any]") -> None:
@@ -75,3 +77,17 @@ def gathered(answers: "Mapping[str, Future[Any]]") -> "Future[tuple[Outcome, ...
     for name, answer in answers.items():
         answer.add_done_callback(partial(note, name))
     return outcomes
+
+
+def summary(outcomes: Iterable[Outcome]) -> list[str]:
+    """Return what has been refused, each text once with its vehicles."""
+    names: dict[str, list[str]] = {}
+    for each in outcomes:
+        if each.text:
+            names.setdefault(each.text, []).append(each.vehicle)
+    return [f"{listed(each)}: {text}" for text, each in names.items()]
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a text; of many their number."""
+    return ", ".join(names) if len(names) <= _MAX_NAMES else f"{len(names)} vehicles"

@@ -24,6 +24,8 @@ class PageControl:
         self.on_first: Callable[[], None] = lambda: None
         self.on_close: Callable[[int], None] = lambda page: None
         self.on_empty: Callable[[], None] = lambda: None
+        #: Is told which page has control, when that changes.
+        self.log: Callable[[str], None] = lambda text: None
         self._lock = threading.RLock()
         self._numbers = itertools.count(1)
         self._tell: dict[int, Callable[[str], None]] = {}
@@ -116,6 +118,7 @@ class PageControl:
             raise ControlError(f"page {page} is closed; load it again")
 
     def _tell_others(self, page, text, besides=None):
+        self.log(text)
         for other in self.pages:
             if other not in (page, besides):
                 self._say(other, text)

@@ -7,7 +7,7 @@ from typing import Any
 
 from crazyflie_dashboard import missions
 from crazyflie_dashboard.actions import Actions, Target, expect_fresh
-from crazyflie_dashboard.answers import settle
+from crazyflie_dashboard.answers import listed, settle, summary, words
 from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.doctor_report import examine
 from crazyflie_dashboard.emergency import EmergencyLane
@@ -69,6 +69,7 @@ class Dashboard:
         self._missions = missions.Missions()
         self._model.missions = lambda: self._missions.running
         self._open: dict[int, PageState] = {}
+        self.pages.log = handle.info
         self.pages.on_first = lambda: handle.submit(self._model.begin)
         self.pages.on_close = lambda page: handle.submit(self._close, page)
         self.pages.on_empty = lambda: handle.submit(self._model.end)
@@ -122,7 +123,7 @@ class Dashboard:
             fixed = self._model.scene.fixed_frame
             return self._actions.carry_out(command, targets, self._model.graph, fixed)
 
-        return self._do(do)
+        return self._do(do, what=f"page {page}: {command.words}")
 
     def emergency(
         self, vehicles: tuple[str, ...] | None, age: float
@@ -161,7 +162,8 @@ class Dashboard:
             self.pages.expect_control(page)
             return self._parameters.set(parameter, text)
 
-        return self._do(do)
+        what = f"page {page}: set {parameter.name} of {parameter.owner} to {text!r}"
+        return self._do(do, what=what)
 
     def mission_files(self) -> tuple[MissionFile, ...]:
         """Return what can be flown."""
@@ -194,7 +196,7 @@ class Dashboard:
             expect_fresh(mission.title, self._clock() - clicked)
             return self._missions.fly(mission, vehicles, self._places(vehicles))
 
-        return self._do(do)
+        return self._do(do, what=f"page {page}: fly {mission.path} for {listed(vehicles)}")
 
     def stop_mission(self, page: int, clicked: float) -> "Future[None]":
         """End the mission that flies; its vehicles land."""
@@ -204,7 +206,7 @@ class Dashboard:
             expect_fresh("stop", self._clock() - clicked)
             self._missions.stop()
 
-        return self._do(do)
+        return self._do(do, what=f"page {page}: stop the mission")
 
     def examine(self) -> "Future[None]":
         """Have the doctor look the graph over: its sentences are in the scene, 10 s later."""
@@ -228,8 +230,11 @@ class Dashboard:
 
     # In the node's turn.
 
-    def _do(self, work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-        """Have work done in its turn; the future has its result, or that of its future."""
+    def _do(self, work: Callable[..., Any], *arguments: Any, what: str = "") -> "Future[Any]":
+        """Have work done in its turn; the future has its result, or that of its future.
+
+        With ``what`` is logged that it was asked for, and what has become of it.
+        """
         outcome: Future[Any] = Future()
 
         def run():
@@ -243,6 +248,19 @@ class Dashboard:
             else:
                 outcome.set_result(result)
 
+        def log(done):
+            error, result = done.exception(), None if done.exception() else done.result()
+            refused = [words(error)] if error else []
+            if isinstance(result, tuple):
+                refused = summary(result)
+            if refused:
+                self._handle.warn(f"{what}: {'; '.join(refused)}")
+            else:
+                self._handle.info(f"{what}: done")
+
+        if what:
+            self._handle.info(what)
+            outcome.add_done_callback(log)
         self._handle.submit(run)
         return outcome
 

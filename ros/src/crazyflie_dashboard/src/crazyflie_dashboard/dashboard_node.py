@@ -7,7 +7,7 @@ from pathlib import Path
 import rospkg
 from typing_extensions import override
 
-from crazyflie_dashboard.access import Access, AccessError, expect_free_port, is_loopback, new_token
+from crazyflie_dashboard.access import Access, AccessError, expect_free_port, is_loopback, token_in
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.master import Master
@@ -16,15 +16,18 @@ from crazyflie_utils.parameters.types import Integer, Text
 
 _NOT_INSTALLED = "NiceGUI, which the page is made with, is not installed: ./run install dashboard"
 
+_TOKEN_FILE = "crazyflie_dashboard_token"
+
 
 class DashboardParameters(Parameters):
     """Parameters of `DashboardNode`."""
 
     host: str = parameter(Text(), "address that the page listens on", "127.0.0.1")
     port: int = parameter(Integer(1, 65535), "of the page", 8642)
-    token: str = parameter(
+    token_file: str = parameter(
         Text(may_be_empty=True),
-        "what a page has to know if `host` is not this computer's own; made anew if empty",
+        "file with what a page has to know; without one it is `crazyflie_dashboard_token` in ROS's "
+        "folder, if `host` is not this computer's own. It is made if it is not there",
         "",
     )
     folders: str = parameter(
@@ -44,8 +47,10 @@ class DashboardNode(Node):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         parameters = self._parameters = handle.load(DashboardParameters)
-        token = parameters.token or ("" if is_loopback(parameters.host) else new_token())
+        path = Path(parameters.token_file or Path(rospkg.get_ros_home(), _TOKEN_FILE)).expanduser()
+        is_needed = parameters.token_file or not is_loopback(parameters.host)
         try:
+            token = token_in(path) if is_needed else ""
             self._access = Access(parameters.host, parameters.port, token)
             expect_free_port(parameters.host, parameters.port)
         except AccessError as error:

@@ -87,7 +87,7 @@ class LiveParameters:
     def _firmware(self):
         """Return the namespaces of drivers, by vehicle."""
         services = self._model.graph.services
-        drivers = {name: model.vehicle.driver for name, model in self._model.models.items()}
+        drivers = {name: model.vehicle.driver for name, model in [*self._model.models.items()]}
         return {name: top for name, top in drivers.items() if f"{top}/update_params" in services}
 
     def _read_firmware(self, owner):

@@ -20,6 +20,16 @@ class Command:
     height: float = 1.0  #: Of a takeoff, m.
     speed: float = 0.5  #: Of go to, m/s.
 
+    @property
+    def words(self) -> str:
+        """What is asked for, as a line of the log has it."""
+        text = f"{self.action.value} {', '.join(self.vehicles)}"
+        if self.action == Action.TAKEOFF:
+            text += f" to {self.height:g} m"
+        if self.goal is not None:
+            text += f" to ({', '.join(f'{x:.2f}' for x in self.goal)}) m"
+        return text
+
 
 @dataclass(frozen=True)
 class Outcome:

@@ -40,7 +40,7 @@ class Ring:
 
     def series(self, name: str, now: float) -> Series:
         """Return the last minute before ``now``."""
-        points = [(t - now, value) for t, value in self._points if now - t <= DURATION]
+        points = [(t - now, value) for t, value in tuple(self._points) if now - t <= DURATION]
         times, values = zip(*points, strict=True) if points else ((), ())
         return Series(name, self.unit, times, values)
 
@@ -96,7 +96,7 @@ class VehiclePlots:
     def series(self) -> tuple[Series, ...]:
         """Return all plots, those of a unit together."""
         now = self._time()
-        found = (ring.series(name, now) for name, ring in self._rings.items())
+        found = (ring.series(name, now) for name, ring in list(self._rings.items()))
         return tuple(sorted(found, key=lambda each: (*_UNITS, each.unit).index(each.unit)))
 
     def _add(self, name, unit, value):

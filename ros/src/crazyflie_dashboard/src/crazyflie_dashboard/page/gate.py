@@ -5,7 +5,7 @@ from urllib.parse import parse_qs
 from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from crazyflie_dashboard.access import COOKIE, Access
+from crazyflie_dashboard.access import Access
 
 HEADERS = (
     # Nothing from the internet, no frame around the page (a click could be meant for another one).
@@ -47,8 +47,9 @@ class Gate:
         elif refusal:
             await PlainTextResponse(f"Refused: {refusal}.\n", 403)(scope, receive, send)
         elif given and scope["type"] == "http":
-            answer = RedirectResponse(scope["path"], 303)
-            answer.set_cookie(COOKIE, given, httponly=True, samesite="strict")
+            # To this page: a path such as //another.example/ would lead away.
+            answer = RedirectResponse("/", 303)
+            answer.set_cookie(self._access.cookie, given, httponly=True, samesite="strict")
             await answer(scope, receive, send)
         else:
             await self.app(scope, receive, _with_headers(send))

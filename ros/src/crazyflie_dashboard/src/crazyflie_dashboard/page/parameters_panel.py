@@ -79,7 +79,7 @@ class ParameterRow:
             field.props("dense outlined options-dense")
         else:
             field = ui.input(value=_text(parameter.value), suffix=parameter.unit or None)
-            field.props("dense outlined").on("keydown.enter", self._set).on("blur", self._set)
+            field.props("dense outlined").on("keydown.enter", self._set)
         return field
 
     async def _set(self) -> None:

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 from nicegui import Client, ui
 
+from crazyflie_dashboard.answers import summary
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action, VehicleSnapshot
@@ -96,9 +97,9 @@ class Session:
             self.say(f"{action.value}: choose a vehicle first", "warning")
             return
         future = self.dashboard.command(self.page, Command(action, names, clicked, **details))
-        for outcome in await self.result(future) or ():
-            if outcome.text:
-                self.say(f"{outcome.vehicle}: {outcome.text}", "negative")
+        outcomes = await self.result(future)
+        for text in summary(outcomes or ()):
+            self.say(text, "negative")
 
     async def take_control(self) -> None:
         """Take control; ask whether to take it over if another page has it."""

@@ -7,6 +7,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from crazyflie_dashboard.actions import HEIGHTS
 from crazyflie_dashboard.page.component import Cards
 from crazyflie_dashboard.page.scene_view import SceneView, condition
 from crazyflie_dashboard.page.session import CLICKED, Session
@@ -37,7 +38,7 @@ class VehiclesPanel:
             ui.button("None", on_click=lambda: self._choose_only(())).props("flat dense")
         with ui.element("div").classes("tools"):
             self._button("Take off", self._take_off).props("icon=flight_takeoff color=positive")
-            self._height = _number("height, m", 1.0)
+            self._height = _number("height, m", 1.0, *HEIGHTS)
             self._button("Land", self._land).props("icon=flight_land color=primary")
         with ui.element("div").classes("tools goal"):
             self._goal = [_number(f"{axis}, m") for axis in "xyz"]
@@ -73,15 +74,20 @@ class VehiclesPanel:
         self.refresh(self._session.dashboard.scene())
 
     async def _act(self, event: GenericEventArguments) -> None:
-        details = {}
+        names, clicked = [event.args["name"]], event.args["clicked"]
         if (action := Action(event.args["action"])) is Action.TAKEOFF:
-            details["height"] = self._height.value or 1.0
-        await self._session.command(action, [event.args["name"]], event.args["clicked"], **details)
+            await self._ascend(names, clicked)
+        else:
+            await self._session.command(action, names, clicked)
 
     async def _take_off(self, event: GenericEventArguments) -> None:
-        names = self._session.chosen_names
-        height = self._height.value or 1.0
-        await self._session.command(Action.TAKEOFF, names, event.args, height=height)
+        await self._ascend(self._session.chosen_names, event.args)
+
+    async def _ascend(self, names: Iterable[str], clicked: float) -> None:
+        if self._height.value is None:
+            self._session.say("take off: type a height", "warning")
+            return
+        await self._session.command(Action.TAKEOFF, names, clicked, height=self._height.value)
 
     async def _land(self, event: GenericEventArguments) -> None:
         await self._session.command(Action.LAND, self._session.chosen_names, event.args)
@@ -147,6 +153,8 @@ def _age(age: float | None) -> str:
     return "now" if age < 0.3 else f"{age:.1f} s ago" if age < 10 else f"{age:.0f} s ago"
 
 
-def _number(label: str, value: float | None = None) -> ui.number:
-    field = ui.number(label, value=value, step=0.1)
+def _number(
+    label: str, value: float | None = None, low: float | None = None, high: float | None = None
+) -> ui.number:
+    field = ui.number(label, value=value, step=0.1, min=low, max=high)
     return field.props("dense outlined hide-bottom-space").classes("number")

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import Range
 
 from crazyflie_ranging.follow_object_node import FollowObjectNode
-from crazyflie_ranging.follower import Follower
-from crazyflie_ranging.obstacle_stop import AXES, ObstacleStop
 from crazyflie_ranging.obstacle_stop_node import ObstacleStopNode
+from crazyflie_ranging.reactions import AXES, Follower, ObstacleStop
 from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils.testing import FakeProcess
 

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from crazyflie_model.angles import quaternion_from_rpy, rotate
 from crazyflie_ranging import range_sensors
-from crazyflie_ranging.range_sensors import DIRECTIONS
-from crazyflie_ranging.ranger import Ranger, cone
+from crazyflie_ranging.range_sensors import DIRECTIONS, Ranger, cone
 from crazyflie_utils import ParameterError
 from crazyflie_utils.testing.wrong_files import (
     assert_refused,

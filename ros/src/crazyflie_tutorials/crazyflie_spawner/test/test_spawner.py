@@ -7,9 +7,7 @@ from pathlib import Path
 import pytest
 import rospkg
 
-from crazyflie_spawner.names import vehicle_name
-from crazyflie_spawner.spawner_node import SpawnerNode
-from crazyflie_spawner.vehicle_process import VehicleProcess
+from crazyflie_spawner.spawner_node import SpawnerNode, VehicleProcess, vehicle_name
 from crazyflie_tutorial_msgs.srv import RemoveVehicleRequest, SpawnVehicleRequest
 from crazyflie_utils import ServiceError
 from crazyflie_utils.refusal import RefusalError
@@ -203,7 +201,7 @@ def test_a_process_is_told_to_end(tmp_path, monkeypatch):
 
 
 def test_a_process_that_does_not_end_is_killed(tmp_path, monkeypatch):
-    monkeypatch.setattr("crazyflie_spawner.vehicle_process.END_LIMIT", 0.2)
+    monkeypatch.setattr("crazyflie_spawner.spawner_node.END_LIMIT", 0.2)
     program = tmp_path / "roslaunch"
     program.write_text('#!/bin/sh\ntrap "" INT\ntouch "$1"\nwhile :; do sleep 0.05; done\n')
     program.chmod(0o755)

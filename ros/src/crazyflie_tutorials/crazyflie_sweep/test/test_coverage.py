@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from crazyflie_sweep.coverage import Coverage
 from crazyflie_sweep.sweep_parameters import Area
+from crazyflie_sweep.sweeper import Coverage
 
 AREA = Area(x_min=0.0, x_max=2.0, y_min=-1.0, y_max=0.0)
 

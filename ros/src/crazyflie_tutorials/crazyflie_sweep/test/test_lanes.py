@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_sweep.coverage import Coverage
 from crazyflie_sweep.lanes import Arc, LanePath, Line, lane_offsets, reversed_path, sweep
 from crazyflie_sweep.sweep_parameters import Area
+from crazyflie_sweep.sweeper import Coverage
 
 AREA = Area(x_min=-1.5, x_max=1.5, y_min=-1.0, y_max=1.0)
 WIDTH = st.floats(0.2, 5.0)

@@ -1,7 +1,7 @@
 """The velocity of the circle."""
 
 from crazyflie_references.velocity_reference import Velocity
-from crazyflie_teleop.circle import circle_velocity
+from crazyflie_teleop.velocities import circle_velocity
 
 
 def test_turns_by_speed_over_radius():

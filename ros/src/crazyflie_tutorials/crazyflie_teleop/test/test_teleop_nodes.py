@@ -12,10 +12,8 @@ from std_srvs.srv import EmptyResponse
 
 from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
 from crazyflie_references.velocity_reference_node import VelocityReferenceNode
-from crazyflie_teleop.circle_node import CircleNode
 from crazyflie_teleop.heading_lift_lqr_node import HeadingLiftLqrNode
-from crazyflie_teleop.joy_velocity_node import JoyVelocityNode
-from crazyflie_teleop.takeoff_caller_node import TakeoffCallerNode
+from crazyflie_teleop.nodes import CircleNode, JoyVelocityNode, TakeoffCallerNode
 from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess, launch_files
 

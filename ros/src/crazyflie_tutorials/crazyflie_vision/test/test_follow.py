@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_vision.follow import Follower, GainParameters, SpeedParameters
-from crazyflie_vision.target import Target
+from crazyflie_vision.trackers import Target
 
 F = 208.0
 CENTRE = (159.5, 119.5)

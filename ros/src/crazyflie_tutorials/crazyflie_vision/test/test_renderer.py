@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from crazyflie_vision.camera import MountParameters, Pinhole, Pose, optical_pose
-from crazyflie_vision.noise import PixelNoise
+from crazyflie_vision.camera import MountParameters, Pinhole, PixelNoise, Pose, optical_pose
 from crazyflie_vision.renderer import SKY, Renderer
 from crazyflie_world.shapes import Ball, Box, Cylinder, wall
 from crazyflie_world.world import Floor, World

@@ -8,10 +8,8 @@ from hypothesis import strategies as st
 from test_camera import CONFIG
 
 from crazyflie_vision import filters
-from crazyflie_vision.colour_tracker import ColourBounds, find
-from crazyflie_vision.face_detector import FaceDetector
-from crazyflie_vision.noise import PixelNoise
-from crazyflie_vision.target import Target, draw
+from crazyflie_vision.camera import PixelNoise
+from crazyflie_vision.trackers import ColourBounds, FaceDetector, Target, draw, find
 
 ORANGE = (13, 102, 242)
 ORANGES = ColourBounds()

@@ -12,15 +12,11 @@ from tf2_msgs.msg import TFMessage
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess, launch_files
-from crazyflie_vision.blur_node import BlurNode
 from crazyflie_vision.camera_node import CameraNode
-from crazyflie_vision.colour_tracker_node import ColourTrackerNode
-from crazyflie_vision.edges_node import EdgesNode
-from crazyflie_vision.face_detector_node import FaceDetectorNode
+from crazyflie_vision.filter_nodes import BlurNode, EdgesNode, GreyNode, ThresholdNode
 from crazyflie_vision.follow_node import FollowNode
-from crazyflie_vision.grey_node import GreyNode
 from crazyflie_vision.images import to_array
-from crazyflie_vision.threshold_node import ThresholdNode
+from crazyflie_vision.tracker_nodes import ColourTrackerNode, FaceDetectorNode
 
 WORLD = """\
 floor: {size: [6, 6]}

@@ -9,9 +9,8 @@ import pytest
 from sensor_msgs.msg import Image
 
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_vision.face_detector import FaceDetector
 from crazyflie_vision.images import to_array, to_message
-from crazyflie_vision.target import Target
+from crazyflie_vision.trackers import FaceDetector, Target
 from hide_faces.hide import hide
 from hide_faces.hide_faces_node import HideFacesNode
 

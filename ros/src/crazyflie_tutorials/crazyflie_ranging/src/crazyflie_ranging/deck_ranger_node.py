@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing_extensions import override
 
 from crazyflie_driver.msg import GenericLogData
-from crazyflie_ranging.range_publisher import RangePublisher
 from crazyflie_ranging.range_sensors import SENSOR_FILE, RangeSensor
+from crazyflie_ranging.range_topics import RangePublisher
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import FRAME, TEXT, TOPIC, ListOf
 

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from geometry_msgs.msg import Twist, Vector3
 from typing_extensions import override
 
-from crazyflie_ranging.latest_ranges import LatestRanges
-from crazyflie_ranging.obstacle_stop import AXES, ObstacleStop
+from crazyflie_ranging.range_topics import LatestRanges
+from crazyflie_ranging.reactions import AXES, ObstacleStop
 from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, ListOf, Text

@@ -8,9 +8,8 @@ import numpy as np
 from geometry_msgs.msg import TransformStamped
 from typing_extensions import override
 
-from crazyflie_ranging.range_publisher import RangePublisher
-from crazyflie_ranging.range_sensors import SENSOR_FILE, RangeSensor
-from crazyflie_ranging.ranger import Ranger
+from crazyflie_ranging.range_sensors import SENSOR_FILE, Ranger, RangeSensor
+from crazyflie_ranging.range_topics import RangePublisher
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED

@@ -1,14 +1,18 @@
-"""ROS interface of vehicles that come and go."""
+"""ROS interface of simulated vehicles that are added and removed, each a process of roslaunch."""
 
+import itertools
 import math
-from collections.abc import Callable
+import os
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Container
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 
 from typing_extensions import override
 
-from crazyflie_spawner.names import vehicle_name
-from crazyflie_spawner.vehicle_process import VehicleProcess
 from crazyflie_tutorial_msgs.srv import (
     RemoveVehicle,
     RemoveVehicleResponse,
@@ -17,6 +21,71 @@ from crazyflie_tutorial_msgs.srv import (
 )
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.types import FRAME, SERVICE, TEXT, TIME_STEP, Number, Text
+from crazyflie_utils.refusal import RefusalError
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+def vehicle_name(wanted: str, taken: Container[str]) -> str:
+    """Return the name that a vehicle gets.
+
+    Parameters
+    ----------
+    wanted : str
+        Of a namespace and a tf frame; empty for the first free one of crazyflie1, crazyflie2, ...
+    taken : container of str
+
+    Raises
+    ------
+    RefusalError
+        It is no name, or another vehicle has it.
+    """
+    if not wanted:
+        return next(name for k in itertools.count(1) if (name := f"crazyflie{k}") not in taken)
+    if not _NAME.fullmatch(wanted):
+        raise RefusalError(
+            f"{wanted!r} is no name of a vehicle; expected letters, digits and underscores, the "
+            "first a letter"
+        )
+    if wanted in taken:
+        raise RefusalError(f"there is a vehicle {wanted} already")
+    return wanted
+
+
+END_LIMIT = 15.0  #: How long, in s, roslaunch has to end its nodes; then they are killed.
+
+
+class VehicleProcess:
+    """A vehicle that is started when the object is made.
+
+    Parameters
+    ----------
+    arguments : list of str
+        Of roslaunch.
+    """
+
+    def __init__(self, arguments: list[str]):
+        # A session of its own: its nodes get no Ctrl-C but that of `end`, and are killed together.
+        self._process = subprocess.Popen(
+            ["roslaunch", *arguments], stdin=subprocess.DEVNULL, start_new_session=True
+        )
+        self._deadline: float | None = None
+
+    @property
+    def status(self) -> int | None:
+        """Exit status of roslaunch, None while it runs; it is killed if `end` had no effect."""
+        status = self._process.poll()
+        if status is None and self._deadline is not None and time.monotonic() > self._deadline:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            status = self._process.wait()
+        return status
+
+    def end(self) -> None:
+        """Have the vehicle end, without waiting for it."""
+        if self._deadline is None and self._process.poll() is None:
+            self._deadline = time.monotonic() + END_LIMIT
+            self._process.send_signal(signal.SIGINT)
+
 
 PERIOD = 0.2  #: Between two checks of the vehicles, s of the machine's clock.
 

@@ -1,8 +1,12 @@
-"""ROS interface of the sweep: takes off, flies the lanes, lands, and reports."""
+"""ROS interface of the sweep: takes off, flies the lanes, lands, reports, and shows it in RViz."""
 
+import genpy
+import numpy as np
+from geometry_msgs.msg import Point
+from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Empty, EmptyRequest, Trigger, TriggerResponse
 from typing_extensions import override
-from visualization_msgs.msg import MarkerArray
+from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_msgs.msg import (
     FlightStatus,
@@ -10,13 +14,60 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_sweep.sweep_markers import markers
 from crazyflie_sweep.sweep_parameters import SweepParameters
 from crazyflie_sweep.sweeper import Sweeper
-from crazyflie_sweep.velocity_source import VelocitySource
+from crazyflie_sweep.velocities import VelocitySource
 from crazyflie_tutorial_msgs.msg import SweepReport, Vel
 from crazyflie_tutorial_msgs.srv import VelocityAt, VelocityAtRequest
 from crazyflie_utils import Node, NodeHandle, flight_status
+
+COVERED_COLOUR = ColorRGBA(0.15, 0.65, 0.35, 0.75)
+UNCOVERED_COLOUR = ColorRGBA(0.75, 0.78, 0.82, 0.6)
+LANE_COLOUR = ColorRGBA(0.9, 0.45, 0.05, 1.0)
+
+_SPACING = 0.05  #: Between the points with which lanes and arcs are drawn, m.
+
+_LINE_WIDTH = 0.015
+_TEXT_SIZE = 0.2
+_THICKNESS = 0.002
+
+
+def markers(sweeper: Sweeper, frame: str) -> MarkerArray:
+    """Return the cells on the ground, the lanes and the share that is covered."""
+    coverage = sweeper.coverage
+    array = []
+    for name, covered, colour in (
+        ("covered", True, COVERED_COLOUR),
+        ("not covered", False, UNCOVERED_COLOUR),
+    ):
+        cells = _marker(name, Marker.CUBE_LIST, colour, frame)
+        cells.scale.x, cells.scale.y = coverage.cell_size
+        cells.scale.z = _THICKNESS
+        cells.points = [Point(x, y, 0.0) for x, y in coverage.middles(covered)]
+        if not cells.points:
+            cells.action = Marker.DELETE
+        array.append(cells)
+    path = sweeper.lanes
+    lanes = _marker("lanes", Marker.LINE_STRIP, LANE_COLOUR, frame)
+    lanes.scale.x = _LINE_WIDTH
+    count = max(2, int(path.length / _SPACING))
+    lanes.points = [Point(*path.at(s)[0]) for s in np.linspace(0.0, path.length, count)]
+    label = _marker("share", Marker.TEXT_VIEW_FACING, LANE_COLOUR, frame)
+    label.scale.z = _TEXT_SIZE
+    label.text = f"{coverage.share:.1%}"
+    end, _ = path.at(path.length)
+    label.pose.position = Point(end[0], end[1], end[2] + 2.0 * _TEXT_SIZE)
+    return MarkerArray([*array, lanes, label])
+
+
+def _marker(name, shape, colour, frame):
+    marker = Marker(ns=name, type=shape, color=colour)
+    marker.header.frame_id = frame
+    # The time 0 asks for the latest transform, also after simulated time was reset.
+    marker.header.stamp = genpy.Time()
+    marker.pose.orientation.w = 1.0
+    return marker
+
 
 TIME_STEP = 0.02  #: Between two references, s.
 ASK_PERIOD = 0.1  #: Between two questions for a velocity, s.

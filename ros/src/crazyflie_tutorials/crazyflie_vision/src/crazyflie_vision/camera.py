@@ -1,4 +1,4 @@
-"""A camera without distortion: its numbers, and how directions become pixels.
+"""A camera without distortion: its numbers, how directions become pixels, and its noise.
 
 Pixels are counted from the middle of the one at the upper left, x to the right and y down. The
 optical frame of a camera looks along z, with x to the right and y down (REP 103).
@@ -7,7 +7,9 @@ optical frame of a camera looks along z, with x to the right and y down (REP 103
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -106,3 +108,34 @@ def optical_pose(mount: MountParameters) -> Pose:
     """Return where the optical frame of a mounted camera is in the vehicle's frame."""
     turned = Rotation.from_euler("ZY", [mount.yaw, mount.pitch], degrees=True).as_matrix()
     return Pose(turned @ OPTICAL, np.array([mount.x, mount.y, mount.z]))
+
+
+_MARGIN = 64
+
+
+class PixelNoise:
+    """Normally distributed noise, the same for every pixel and colour.
+
+    Drawn once, on a larger image, of which every image gets another part: random numbers for
+    every pixel of every image would take longer than drawing it.
+
+    Parameters
+    ----------
+    width, height : int
+        Of the images.
+    deviation : float
+        Standard deviation of a value from 0 to 255.
+    seed : int
+    """
+
+    def __init__(self, width: int, height: int, deviation: float, seed: int = 0):
+        self._random = np.random.default_rng(seed)
+        shape = (height + _MARGIN, width + _MARGIN, 3)
+        self._noise = np.round(self._random.normal(0.0, deviation, shape)).astype(np.int16)
+
+    def add(self, image: NDArray[Any]) -> NDArray[Any]:
+        """Return an image with noise."""
+        height, width = image.shape[:2]
+        y, x = self._random.integers(_MARGIN, size=2)
+        part = self._noise[y : y + height, x : x + width]
+        return cv2.add(image, part, dtype=cv2.CV_8U)

@@ -19,9 +19,8 @@ from crazyflie_utils import (
     parameter,
 )
 from crazyflie_utils.parameters.types import FRAME, TOPIC, File
-from crazyflie_vision.camera import CameraParameters, Pinhole, Pose, load, optical_pose
+from crazyflie_vision.camera import CameraParameters, Pinhole, PixelNoise, Pose, load, optical_pose
 from crazyflie_vision.images import camera_info, to_message
-from crazyflie_vision.noise import PixelNoise
 from crazyflie_vision.renderer import Renderer
 from crazyflie_world.shapes import Shape
 from crazyflie_world.world import World

@@ -6,7 +6,7 @@ from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import Number
-from crazyflie_vision.target import Target
+from crazyflie_vision.trackers import Target
 
 _LENGTH = Number("m", above=0.0)
 _GAIN = Number("1/s", minimum=0.0)

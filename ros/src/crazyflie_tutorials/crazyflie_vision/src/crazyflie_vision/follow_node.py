@@ -10,7 +10,7 @@ from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_vision.follow import Follower
-from crazyflie_vision.target import Target
+from crazyflie_vision.trackers import Target
 
 
 class FollowParameters(Follower):

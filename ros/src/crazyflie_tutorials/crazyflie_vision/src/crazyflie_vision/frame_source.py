@@ -8,7 +8,7 @@ import cv2
 from numpy.typing import NDArray
 from typing_extensions import override
 
-from crazyflie_vision.faces import load_picture
+from crazyflie_vision.renderer import load_picture
 
 SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")  #: Of pictures in a folder.
 

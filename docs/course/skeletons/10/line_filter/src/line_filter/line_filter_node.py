@@ -5,7 +5,7 @@ from typing_extensions import override
 from crazyflie_utils import parameter
 from crazyflie_utils.parameters.types import Integer
 from crazyflie_vision import filters
-from crazyflie_vision.filter_node import FilterNode, FilterParameters
+from crazyflie_vision.filter_nodes import FilterNode, FilterParameters
 from line_filter.lines import draw_lines
 
 

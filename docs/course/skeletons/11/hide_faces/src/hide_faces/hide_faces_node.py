@@ -4,9 +4,8 @@ from typing_extensions import override
 
 from crazyflie_utils import parameter
 from crazyflie_vision import filters
-from crazyflie_vision.blur_node import KERNEL
-from crazyflie_vision.face_detector import FaceDetector
-from crazyflie_vision.filter_node import FilterNode, FilterParameters
+from crazyflie_vision.filter_nodes import KERNEL, FilterNode, FilterParameters
+from crazyflie_vision.trackers import FaceDetector
 from hide_faces.hide import hide
 
 

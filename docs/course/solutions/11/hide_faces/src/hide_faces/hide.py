@@ -1,7 +1,7 @@
 """The algorithm: an image and a face in, an image without it out."""
 
 from crazyflie_vision.filters import Image, blur
-from crazyflie_vision.target import Target
+from crazyflie_vision.trackers import Target
 
 
 def hide(image: Image, face: Target, size: int) -> Image:

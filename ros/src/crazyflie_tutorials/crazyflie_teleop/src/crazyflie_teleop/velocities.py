@@ -1,4 +1,4 @@
-"""Axes of a joystick, or of keys in its place, to velocities."""
+"""Velocities in the heading frame: of a circle, and of the axes of a joystick."""
 
 from collections.abc import Sequence
 
@@ -6,6 +6,24 @@ from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import Integer, Number
+
+
+def circle_velocity(radius: float, speed: float, clockwise: bool) -> Velocity:
+    """Return the velocity, in the heading frame, of a vehicle that looks along its circle.
+
+    The yaw rate is v / r; as seen from above, a clockwise turn has a negative one.
+
+    Parameters
+    ----------
+    radius : float
+        m.
+    speed : float
+        m/s.
+    clockwise : bool
+    """
+    yaw_dot = speed / radius
+    return Velocity(x=speed, yaw_dot=-yaw_dot if clockwise else yaw_dot)
+
 
 AXIS_NUMBER = Integer(0, 63)  #: Of an axis or a button of sensor_msgs/Joy.
 

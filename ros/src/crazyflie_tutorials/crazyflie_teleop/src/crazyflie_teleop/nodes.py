@@ -1,4 +1,4 @@
-"""ROS interface of flying by hand: joy to cmd_vel, buttons to takeoff and landing."""
+"""The ROS interfaces: circle and joystick to cmd_vel, and a call of takeoff."""
 
 import math
 
@@ -7,9 +7,46 @@ from sensor_msgs.msg import Joy
 from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
-from crazyflie_teleop.joy_velocity import AXIS_NUMBER, JoyVelocity
-from crazyflie_utils import Node, NodeHandle, parameter
-from crazyflie_utils.parameters.types import SERVICE, TOPIC
+from crazyflie_teleop.velocities import AXIS_NUMBER, JoyVelocity, circle_velocity
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.parameters.types import BOOLEAN, SERVICE, TIME_STEP, TOPIC, Number
+
+
+class CircleParameters(Parameters):
+    """Parameters of `CircleNode`."""
+
+    cmd_vel_topic: str = parameter(TOPIC, "where velocities go", "cmd_vel", "topics/cmd_vel")
+    time_step: float = parameter(TIME_STEP, "between two velocities", 0.1)
+    radius: float = parameter(Number("m", above=0.0), "of the circle", 0.5, live=True)
+    speed: float = parameter(Number("m/s", above=0.0), "along the circle", 0.3, live=True)
+    clockwise: bool = parameter(BOOLEAN, "direction, as seen from above", True, live=True)
+
+
+class CircleNode(Node):
+    """Publish the velocity of a circle, over and over."""
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._reconfigure(handle.load(CircleParameters, self._reconfigure))
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        self._publisher = handle.publisher(self._parameters.cmd_vel_topic, Twist)
+        handle.timer(self._parameters.time_step, self._on_timer)
+
+    @override
+    def enter_safe_state(self) -> None:
+        """Stop the vehicle."""
+        self._publisher.publish(Twist())
+
+    def _reconfigure(self, parameters):
+        self._parameters = parameters
+        velocity = circle_velocity(parameters.radius, parameters.speed, parameters.clockwise)
+        self._twist = Twist(linear=Vector3(x=velocity.x), angular=Vector3(z=velocity.yaw_dot))
+
+    def _on_timer(self):
+        self._publisher.publish(self._twist)
+
 
 FLIGHT_LIMIT = 120.0  #: The longest that takeoff or landing may take, s of the machine's clock.
 
@@ -78,3 +115,37 @@ class JoyVelocityNode(Node):
 
         future = self._handle.call_service(service, Empty, EmptyRequest(), FLIGHT_LIMIT)
         future.add_done_callback(on_reply)
+
+
+PERIOD = 0.5  #: Between two checks whether the service is offered, s of the machine's clock.
+
+
+class TakeoffCallerParameters(Parameters):
+    """Parameters of `TakeoffCallerNode`."""
+
+    service: str = parameter(SERVICE, "is called once, when it is there", "/takeoff", "srv/takeoff")
+
+
+class TakeoffCallerNode(Node):
+    """Call takeoff once, as soon as the service is offered."""
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._service = handle.resolve(handle.load(TakeoffCallerParameters).service)
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        self._timer = handle.timer(PERIOD, self._on_timer, steady=True)
+
+    def _on_timer(self):
+        if self._service not in self._handle.service_nodes():
+            return
+        self._timer.stop()
+        future = self._handle.call_service(self._service, Empty, EmptyRequest(), FLIGHT_LIMIT)
+        future.add_done_callback(self._on_reply)
+
+    def _on_reply(self, reply):
+        if reply.exception() is None:
+            self._handle.info("the vehicle flies")
+        else:
+            self._handle.error(str(reply.exception()))

@@ -1,6 +1,8 @@
-"""Topics and frames of range sensors, wherever their measurements come from."""
+"""Topics and frames of range sensors: publishing measurements, and the latest of each."""
 
+import math
 from collections.abc import Sequence
+from functools import partial
 
 import genpy
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
@@ -52,3 +54,29 @@ class RangePublisher:
         transform.transform.translation = Vector3(*sensor.position)
         transform.transform.rotation = Quaternion(*sensor.attitude)
         return transform
+
+
+class LatestRanges:
+    """Listens to range sensors.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+    topics : dict
+        Name by which a sensor is asked for -> its topic.
+    """
+
+    def __init__(self, handle: NodeHandle, topics: dict[str, str]):
+        self._handle = handle
+        self._readings: dict[str, tuple[float, float]] = {}
+        for name, topic in topics.items():
+            handle.subscribe(topic, Range, partial(self._take, name))
+
+    def _take(self, name, message):
+        if not math.isnan(message.range):
+            self._readings[name] = (message.range, self._handle.time())
+
+    def reading(self, name: str, age: float) -> float | None:
+        """Return what a sensor said in the last ``age`` seconds, m; None if it was silent."""
+        reading, time = self._readings.get(name, (math.nan, -math.inf))
+        return reading if self._handle.time() - time <= age else None

@@ -1,0 +1,114 @@
+"""Image in, target out: the ROS interfaces of the trackers."""
+
+from typing import Any
+
+from geometry_msgs.msg import Point, PointStamped
+from numpy.typing import NDArray
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+from typing_extensions import override
+
+from crazyflie_utils import NodeHandle, ParameterError, Parameters, parameter
+from crazyflie_utils.parameters.types import TEXT, TOPIC, Integer, Number
+from crazyflie_vision.images import ImageNode, to_message
+from crazyflie_vision.trackers import CASCADE, ColourBounds, FaceDetector, Target, draw, find
+
+
+class TrackerParameters(Parameters):
+    """Parameters that all trackers have."""
+
+    image_topic: str = parameter(
+        TOPIC, "images to look at", "camera/image_raw", name="topics/image"
+    )
+    target_topic: str = parameter(
+        TOPIC, "what is seen: x, y and, as z, radius in pixels", "target", name="topics/target"
+    )
+    debug_topic: str = parameter(
+        TOPIC, "images with the target marked", "~image", name="topics/debug_image"
+    )
+
+
+class TrackerNode(ImageNode):
+    """Base class: a tracker has ``parameters_type``, and `find`.
+
+    A target is published with the stamp of its image; where nothing is found, nothing is.
+    """
+
+    _parameters: TrackerParameters
+    needed_in_flight = True
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        self._target = handle.publisher(self._parameters.target_topic, PointStamped)
+        self._debug = handle.publisher(self._parameters.debug_topic, Image)
+        self.watch(handle, self._parameters.image_topic)
+
+    def find(self, image: NDArray[Any]) -> Target | None:
+        """Return what is followed; None where it is not seen."""
+        raise NotImplementedError
+
+    @override
+    def on_image(self, image: NDArray[Any], header: Header) -> None:
+        target = self.find(image)
+        if target is not None:
+            point = Point(target.x, target.y, target.radius)
+            self._target.publish(PointStamped(header, point))
+        if self._debug.has_subscribers():
+            self._debug.publish(to_message(draw(image, target), header))
+
+
+class ColourTrackerParameters(ColourBounds, TrackerParameters):
+    """Parameters of `ColourTrackerNode`."""
+
+    smallest_area: float = parameter(
+        Number("pixels", minimum=1.0), "what is smaller is no target", 30.0, live=True
+    )
+
+
+class ColourTrackerNode(TrackerNode):
+    """Publish where the largest thing of a colour is."""
+
+    parameters_type = ColourTrackerParameters
+    _parameters: ColourTrackerParameters
+
+    @override
+    def find(self, image: NDArray[Any]) -> Target | None:
+        return find(image, self._parameters, self._parameters.smallest_area)
+
+
+class FaceDetectorParameters(TrackerParameters):
+    """Parameters of `FaceDetectorNode`."""
+
+    cascade: str = parameter(TEXT, "file of the cascade", CASCADE)
+    smallest: int = parameter(
+        Integer(20, 1000, "pixels"), "width of the smallest face", 30, live=True
+    )
+    neighbours: int = parameter(
+        Integer(1, 50), "finds that make a face; more of them, fewer mistakes", 4, live=True
+    )
+
+
+class FaceDetectorNode(TrackerNode):
+    """Publish where the largest face is."""
+
+    parameters_type = FaceDetectorParameters
+    _parameters: FaceDetectorParameters
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        super().load_parameters(handle)
+        each = self._parameters
+        try:
+            self._detector = FaceDetector(each.cascade, each.smallest, each.neighbours)
+        except OSError as error:
+            raise ParameterError(f"parameter {handle.resolve('~cascade')}: {error}") from None
+
+    @override
+    def find(self, image: NDArray[Any]) -> Target | None:
+        return self._detector.find(image)
+
+    @override
+    def _reconfigure(self, parameters):
+        super()._reconfigure(parameters)
+        self._detector.smallest = parameters.smallest
+        self._detector.neighbours = parameters.neighbours

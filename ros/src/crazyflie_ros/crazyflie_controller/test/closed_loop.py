@@ -7,8 +7,7 @@ import numpy as np
 import yaml
 
 from crazyflie_controller.flight import GoToFlight
-from crazyflie_controller.go_to import GoToController, Pose
-from crazyflie_controller.pid import PidParameters
+from crazyflie_controller.go_to import GoToController, PidParameters, Pose
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import thrust_from_pwm

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_controller.pid import INTEGRATED_ERROR, PidParameters, SaturatedPid
+from crazyflie_controller.go_to import INTEGRATED_ERROR, PidParameters, SaturatedPid
 
 
 def gains(kp, kd, ki, *limits):

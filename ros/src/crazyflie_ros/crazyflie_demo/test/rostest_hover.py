@@ -6,7 +6,7 @@ import tf2_ros
 import yaml
 from flights import LIMIT, Stick, launched, node, virtual_vehicle, wait_for_service
 
-from crazyflie_demo.gamepad import LAND, PITCH, TAKEOFF
+from crazyflie_demo.joystick import LAND, PITCH, TAKEOFF
 from crazyflie_utils.testing.peer import wait_until
 from crazyflie_utils.testing.programs import free_port
 

@@ -10,7 +10,7 @@ import rospy
 from flights import LIMIT, Observer, Stick, launched, virtual_vehicle, wait_for_service
 from sensor_msgs.msg import Joy
 
-from crazyflie_demo.gamepad import EMERGENCY, HEADLIGHT, PITCH, ROLL, TAKEOFF, THRUST, YAW
+from crazyflie_demo.joystick import EMERGENCY, HEADLIGHT, PITCH, ROLL, TAKEOFF, THRUST, YAW
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils.testing.peer import listening, wait_until
 from crazyflie_utils.testing.programs import running

@@ -5,7 +5,7 @@ import math
 from flights import Stick, launched, virtual_vehicle, wait_for_service
 from rostest_hover import Positions, config, virtual_mocap
 
-from crazyflie_demo.gamepad import LAND, TAKEOFF
+from crazyflie_demo.joystick import LAND, TAKEOFF
 from crazyflie_demo.waypoint_node import Demo1Node, Demo2Node
 from crazyflie_utils.testing.programs import free_port
 

@@ -4,9 +4,8 @@ import pytest
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Header
 
-from crazyflie_demo.cmd_vel_teleop_node import CmdVelTeleopNode
-from crazyflie_demo.joy_axes import REPEATED
-from crazyflie_demo.quadrotor_teleop_node import QuadrotorTeleopNode
+from crazyflie_demo.node_parts import REPEATED
+from crazyflie_demo.teleop_nodes import CmdVelTeleopNode, QuadrotorTeleopNode
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from fake_driver import FakeDriver
 
-from crazyflie_demo.high_level_flight_node import HighLevelFlightNode
-from crazyflie_demo.trajectory_flight_node import TrajectoryFlightNode
+from crazyflie_demo.flight_plan_nodes import HighLevelFlightNode, TrajectoryFlightNode
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.testing.waiting import wait_until
 

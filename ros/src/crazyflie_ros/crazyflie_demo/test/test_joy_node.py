@@ -7,8 +7,8 @@ import pytest
 from sensor_msgs.msg import Joy
 from test_joystick import axis, button
 
-from crazyflie_demo.joy_axes import REPEATED
 from crazyflie_demo.joy_node import JoyNode
+from crazyflie_demo.node_parts import REPEATED
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 

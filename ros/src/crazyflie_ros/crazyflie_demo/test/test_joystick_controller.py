@@ -6,7 +6,7 @@ import pytest
 from fake_driver import FakeDriver
 from sensor_msgs.msg import Joy
 
-from crazyflie_demo.joystick_controller_node import JoystickControllerNode
+from crazyflie_demo.teleop_nodes import JoystickControllerNode
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.testing.waiting import wait_until
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_demo.gamepad import (
+from crazyflie_demo.joystick import (
     AXES,
     EMERGENCY,
     HEADLIGHT,

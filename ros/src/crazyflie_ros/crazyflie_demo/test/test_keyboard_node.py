@@ -6,7 +6,7 @@ import termios
 
 import pytest
 
-from crazyflie_demo.gamepad import LAND, PITCH, TAKEOFF
+from crazyflie_demo.joystick import LAND, PITCH, TAKEOFF
 from crazyflie_demo.keyboard_node import KeyboardNode
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from crazyflie_demo.trajectory_flight_node import TrajectoryFlightNode
+from crazyflie_demo.flight_plan_nodes import TrajectoryFlightNode
 from crazyflie_utils.program import load
 from crazyflie_utils.testing import FakeProcess, launch_files
 from mocap_optitrack.mocap_node import MocapNode

@@ -7,9 +7,9 @@ from geometry_msgs.msg import Twist
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Header
 
-from crazyflie_demo.const_thrust_node import ConstThrustNode
-from crazyflie_demo.joy_axes import REPEATED
+from crazyflie_demo.node_parts import REPEATED
 from crazyflie_demo.publish_pose_node import PublishPoseNode, PublishPoseTeleopNode
+from crazyflie_demo.stream_nodes import ConstThrustNode
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from fake_driver import FakeDriver
 
-from crazyflie_demo.position_flight_node import PositionFlightNode
-from crazyflie_demo.trajectory_stream_node import TrajectoryStreamNode
+from crazyflie_demo.stream_nodes import PositionFlightNode, TrajectoryStreamNode
 from crazyflie_demo.uav_trajectory import Trajectory
 from crazyflie_utils.testing import FakeProcess
 

@@ -1,4 +1,4 @@
-"""The nodes on a fake process, and the launch files."""
+"""The nodes, on a process without ROS, and their velocities."""
 
 import math
 from concurrent.futures import Future
@@ -11,11 +11,19 @@ from sensor_msgs.msg import Joy
 from std_srvs.srv import EmptyResponse
 
 from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
+from crazyflie_references.velocity_reference import Velocity
 from crazyflie_references.velocity_reference_node import VelocityReferenceNode
 from crazyflie_teleop.heading_lift_lqr_node import HeadingLiftLqrNode
 from crazyflie_teleop.nodes import CircleNode, JoyVelocityNode, TakeoffCallerNode
+from crazyflie_teleop.velocities import circle_velocity
 from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess, launch_files
+
+
+def test_turns_by_speed_over_radius():
+    assert circle_velocity(0.5, 0.3, clockwise=True) == Velocity(x=0.3, yaw_dot=-0.6)
+    assert circle_velocity(0.5, 0.3, clockwise=False) == Velocity(x=0.3, yaw_dot=0.6)
+
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_teleop")) / "launch"
 

@@ -8,8 +8,7 @@ from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
 from crazyflie_controller.flight import GoToFlight, State
-from crazyflie_controller.go_to import GoToController
-from crazyflie_controller.pid import PidParameters
+from crazyflie_controller.go_to import GoToController, PidParameters
 from crazyflie_controller.pose_source import PoseParameters, PoseSource, pose
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
 from crazyflie_utils.parameters.declaration import group

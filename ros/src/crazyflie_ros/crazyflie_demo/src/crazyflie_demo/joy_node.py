@@ -6,8 +6,8 @@ import os
 from sensor_msgs.msg import Joy
 from typing_extensions import override
 
-from crazyflie_demo.joy_axes import JOY_LIMIT, REPEATED
 from crazyflie_demo.joystick import EVENT, Joystick, JoystickState
+from crazyflie_demo.node_parts import JOY_LIMIT, REPEATED
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TEXT, Number
 

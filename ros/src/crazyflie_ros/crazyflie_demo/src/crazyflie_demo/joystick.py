@@ -1,6 +1,12 @@
-"""Events of a joystick as Linux encodes them (linux/joystick.h)."""
+"""A joystick: its events as Linux encodes them (linux/joystick.h), its axes and buttons."""
 
 import struct
+
+#: Axes, with the right stick for tilt: left, up and forward are positive.
+ROLL, PITCH, YAW, THRUST = 3, 4, 0, 1
+LAND, EMERGENCY, TAKEOFF, HEADLIGHT = 0, 1, 2, 4  #: Buttons.
+AXES, BUTTONS = 8, 11  #: How many a gamepad has.
+
 
 #: struct js_event: time in ms, value, type, number of the axis or button.
 EVENT = struct.Struct("=IhBB")

@@ -7,8 +7,8 @@ release. So a deflection lasts until the next repetition is due.
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from crazyflie_demo import gamepad
-from crazyflie_demo.gamepad import PITCH, ROLL, THRUST, YAW
+from crazyflie_demo import joystick
+from crazyflie_demo.joystick import PITCH, ROLL, THRUST, YAW
 
 FIRST_HOLD = 0.6  #: How long a key counts as held after it was pressed, s: repetition begins late.
 REPEAT_HOLD = 0.15  #: How long it does after a repetition, s.
@@ -25,10 +25,10 @@ _DEFLECTIONS = {
 }
 
 _PRESSES = {
-    "t": gamepad.TAKEOFF,
-    "l": gamepad.LAND,
-    " ": gamepad.EMERGENCY,
-    "h": gamepad.HEADLIGHT,
+    "t": joystick.TAKEOFF,
+    "l": joystick.LAND,
+    " ": joystick.EMERGENCY,
+    "h": joystick.HEADLIGHT,
 }
 
 _RELEASE = "x"
@@ -74,7 +74,7 @@ class Keyboard:
 
     def axes(self, time: float) -> list[float]:
         """Return the axes at ``time`` (s)."""
-        axes = [0.0] * gamepad.AXES
+        axes = [0.0] * joystick.AXES
         for axis, held in self._held.items():
             if time < held.until:
                 axes[axis] = held.value

@@ -11,9 +11,9 @@ from typing import Any
 from sensor_msgs.msg import Joy
 from typing_extensions import override
 
-from crazyflie_demo.gamepad import BUTTONS
-from crazyflie_demo.joy_axes import REPEATED
+from crazyflie_demo.joystick import BUTTONS
 from crazyflie_demo.keyboard import HELP, Keyboard
+from crazyflie_demo.node_parts import REPEATED
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import Number
 

@@ -3,10 +3,8 @@
 from geometry_msgs.msg import PoseStamped
 from typing_extensions import override
 
-from crazyflie_demo.gamepad import PITCH, ROLL, THRUST, YAW
-from crazyflie_demo.goals import goal_message
-from crazyflie_demo.joy_axes import JoyAxes
-from crazyflie_demo.parameters import AXIS, GoalParameters, JoyParameters
+from crazyflie_demo.joystick import PITCH, ROLL, THRUST, YAW
+from crazyflie_demo.node_parts import AXIS, GoalParameters, JoyAxes, JoyParameters, goal_message
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import METRES, TOPIC, Number
 

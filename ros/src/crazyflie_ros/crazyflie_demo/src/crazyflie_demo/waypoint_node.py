@@ -4,8 +4,7 @@ from geometry_msgs.msg import PoseStamped
 from typing_extensions import override
 
 from crazyflie_controller.pose_source import PoseParameters, PoseSource
-from crazyflie_demo.goals import goal_message
-from crazyflie_demo.parameters import GoalParameters
+from crazyflie_demo.node_parts import GoalParameters, goal_message
 from crazyflie_demo.waypoints import Waypoint, WaypointFollower, WaypointList
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import Number

@@ -1,10 +1,47 @@
-"""The latest axes of a joystick."""
+"""What several nodes share: parameters, goals, and the latest axes of a joystick."""
 
 import math
 
+from genpy import Time
+from geometry_msgs.msg import Point, PoseStamped, Quaternion
 from sensor_msgs.msg import Joy
 
-from crazyflie_utils import NodeHandle
+from crazyflie_controller.pose_source import WorldFrameParameters
+from crazyflie_model.angles import quaternion_from_rpy
+from crazyflie_utils import NodeHandle, Parameters, parameter
+from crazyflie_utils.parameters.types import TOPIC, Integer, Number
+
+AXIS = Integer(0, 255)  #: Number of a joystick's axis.
+RATE = Number("Hz", above=0.0, maximum=500.0)  #: How often something is published.
+
+
+class JoyParameters(Parameters):
+    """Of nodes that follow a joystick."""
+
+    joy_topic: str = parameter(TOPIC, "where the joystick's messages come from", "joy")
+
+
+class SetpointParameters(Parameters):
+    """Of nodes that publish cmd_vel."""
+
+    rate: float = parameter(RATE, "setpoints a second", 50.0)
+
+
+class GoalParameters(WorldFrameParameters):
+    """Of nodes that publish goals."""
+
+    rate: float = parameter(RATE, "goals a second", 30.0)
+
+
+def goal_message(stamp: Time, frame: str, x: float, y: float, z: float, yaw: float) -> PoseStamped:
+    """Return the message of a goal: position in m and heading in rad, in ``frame``."""
+    message = PoseStamped()
+    message.header.stamp = stamp
+    message.header.frame_id = frame
+    message.pose.position = Point(x, y, z)
+    message.pose.orientation = Quaternion(*quaternion_from_rpy(0.0, 0.0, yaw))
+    return message
+
 
 JOY_LIMIT = 0.5  #: Age, s, at which the last message of a joystick that repeats itself expires.
 

@@ -1,23 +1,33 @@
-"""Base class of flights by high-level commands: one service call after the other."""
+"""ROS interfaces of flights by high-level commands: there and back, and along a trajectory."""
 
 from collections import deque
 from typing import NamedTuple
 
 import genpy
+from geometry_msgs.msg import Point
 from typing_extensions import override
 
+from crazyflie_demo.trajectory_file import load, summary
+from crazyflie_driver.msg import TrajectoryPolynomialPiece
 from crazyflie_driver.srv import (
+    GoTo,
+    GoToRequest,
     Land,
     LandRequest,
+    StartTrajectory,
+    StartTrajectoryRequest,
     Stop,
     StopRequest,
     Takeoff,
     TakeoffRequest,
     UpdateParams,
     UpdateParamsRequest,
+    UploadTrajectory,
+    UploadTrajectoryRequest,
 )
+from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import Number
+from crazyflie_utils.parameters.types import BOOLEAN, METRES, File, Number
 from crazyflie_utils.parameters.writer import ParameterWriter
 
 #: Longest time of a service call, of the driver's connection before the first one, and of the
@@ -173,3 +183,73 @@ class FlightPlanNode(Node):
 def seconds(duration: float) -> genpy.Duration:
     """Return a duration (s) as a message has it."""
     return genpy.Duration.from_sec(duration)
+
+
+class HighLevelFlightParameters(FlightPlanParameters):
+    """Parameters of `HighLevelFlightNode`."""
+
+    distance: float = parameter(METRES, "how far ahead the vehicle goes", 0.5)
+
+
+class HighLevelFlightNode(FlightPlanNode):
+    """Take off, go ahead and back again, land."""
+
+    _parameters: HighLevelFlightParameters
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(HighLevelFlightParameters)
+
+    @override
+    def manoeuvres(self) -> list[Step]:
+        return [self._go(self._parameters.distance), self._go(-self._parameters.distance)]
+
+    def _go(self, x):
+        duration = self._parameters.duration
+        request = GoToRequest(relative=True, goal=Point(x, 0.0, 0.0), duration=seconds(duration))
+        return Step("go_to", GoTo, request, duration)
+
+
+class TrajectoryFlightParameters(FlightPlanParameters):
+    """Parameters of `TrajectoryFlightNode`."""
+
+    pieces: list[PolynomialPiece] = parameter(
+        File(load, "a CSV file with a trajectory"), "CSV file of the trajectory", name="file"
+    )
+    timescale: float = parameter(
+        Number(above=0.0, maximum=100.0), "2 takes twice as long as the file says", 1.0
+    )
+    reversed: bool = parameter(BOOLEAN, "fly from the end to the beginning", False)
+
+
+class TrajectoryFlightNode(FlightPlanNode):
+    """Take off, fly along the trajectory of a file from there on, land."""
+
+    _parameters: TrajectoryFlightParameters
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(TrajectoryFlightParameters)
+        asked = summary(self._parameters.pieces)
+        scale = self._parameters.timescale
+        handle.info(
+            f"the trajectory takes {asked.duration * scale:.1f} s, up to "
+            f"{asked.speed / scale:.2f} m/s and {asked.acceleration / scale**2:.2f} m/s^2"
+        )
+
+    @override
+    def preparations(self) -> list[Step]:
+        pieces = [
+            TrajectoryPolynomialPiece(*piece.axes, seconds(piece.duration))
+            for piece in self._parameters.pieces
+        ]
+        return [Step("upload_trajectory", UploadTrajectory, UploadTrajectoryRequest(pieces=pieces))]
+
+    @override
+    def manoeuvres(self) -> list[Step]:
+        parameters = self._parameters
+        request = StartTrajectoryRequest(
+            timescale=parameters.timescale, reversed=parameters.reversed, relative=True
+        )
+        duration = summary(parameters.pieces).duration * parameters.timescale
+        return [Step("start_trajectory", StartTrajectory, request, duration)]

@@ -1,18 +1,23 @@
 """Commands: what is called, and what is refused."""
 
 import math
+import threading
 
 import pytest
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.msg import Config
-from fake_fleet import FakeFleet
+from fake_fleet import FakeFleet, FakeLane
 
 from crazyflie_dashboard.control import ControlError
+from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.discovery import Graph
+from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose
+
+LIMIT = 10.0  # s.
 
 
 @pytest.fixture
@@ -239,3 +244,24 @@ def test_commands_refusals_and_control_are_logged(fleet):
     assert "page 1: take off cf1, cf2 to 1 m: cf2: the battery is at 2.9 V" in warn
     assert "page 1: land cf1, cf2, cf3: land: the command is 3.0 s old" in warn
     assert "page 1 has given up control" in info
+
+
+def test_what_a_page_asks_for_does_not_wait_for_callbacks_of_the_node(fleet):
+    handle = fleet.process.handle("/busy")
+    dashboard = Dashboard(handle, fleet.master, FakeLane(), [])
+    is_busy, goes_on = threading.Event(), threading.Event()
+
+    def callback():
+        is_busy.set()
+        goes_on.wait(LIMIT)
+
+    threading.Thread(target=handle.submit, args=(callback,), daemon=True).start()
+    assert is_busy.wait(LIMIT)
+    page = dashboard.pages.open(str)
+    dashboard.watch(page, "cf1")
+    answer = dashboard.command(page, Command(Action.LAND, ("cf1",), 0.0))
+    assert not goes_on.is_set() and not answer.done()
+    goes_on.set()
+    with pytest.raises(ControlError, match="no page has control"):
+        answer.result(LIMIT)
+    dashboard.close()

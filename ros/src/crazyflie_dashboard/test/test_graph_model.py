@@ -12,6 +12,7 @@ from geometry_msgs.msg import Point, PoseStamped
 from rosgraph_msgs.msg import Log
 from visualization_msgs.msg import Marker, MarkerArray
 
+from crazyflie_dashboard import surroundings
 from crazyflie_dashboard.discovery import Graph
 from crazyflie_msgs.msg import ControlStamped, FlightStatus
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose
@@ -238,3 +239,23 @@ def test_a_master_that_does_not_answer_is_said_until_it_does():
     fleet.graph = known
     fleet.process.advance(4.1)
     assert fleet.dashboard.scene().sentences == ()
+
+
+def test_markers_are_drawn_up_to_a_number_and_made_once(fleet, monkeypatch):
+    made = []
+    solid = surroundings._solid
+    monkeypatch.setattr(surroundings, "_solid", lambda *a: made.append(a) or solid(*a))
+    add_topic(fleet, "/world/markers", MarkerArray._type)
+    cube = Marker(type=Marker.CUBE)
+    cube.header.frame_id = "world"
+    moving = Marker(type=Marker.SPHERE)
+    moving.header.frame_id = "cf3"
+    fleet.process.publish("/world/markers", MarkerArray([moving, *(99_999 * [cube])]))
+    for k in range(20):
+        fleet.send_poses(places={"cf1": (0.0, 0.0, 1.0), "cf3": (2.0, 0.0, 0.1 * k)})
+    scene = fleet.dashboard.scene()
+    assert len(scene.solids) == 2000
+    assert sum(each.position[2] for each in scene.solids) == pytest.approx(1.9)
+    assert len(made) < 2100
+    (sentence,) = [each for each in scene.sentences if "markers" in each.text]
+    assert sentence.text == "100000 markers on /world/markers; 2000 are drawn"

@@ -1,7 +1,9 @@
 """The page in headless Chromium, with vehicles that are only numbers."""
 
-import base64
+import itertools
 import math
+import threading
+import urllib.request
 
 import cv2
 import numpy as np
@@ -53,16 +55,24 @@ def test_the_handle_of_a_goal_is_dragged_and_has_height_and_yaw(browser, server)
     assert command.yaw == pytest.approx(math.pi / 2)
 
 
-def test_the_image_of_a_camera_appears(browser, server):
-    picture = np.full((48, 64, 3), 128, np.uint8)
-    server.dashboard.picture = cv2.imencode(".jpg", picture)[1].tobytes()
+def test_the_image_of_a_camera_appears_and_is_renewed(browser, server):
+    def picture(width):
+        return cv2.imencode(".jpg", np.full((48, width, 3), 128, np.uint8))[1].tobytes()
+
     browser.tab("Cameras")
     browser.select("topic", "/cf1/image_raw")
-    image = (
-        "const i = document.querySelector('.camera img'); return i?.naturalWidth === 64 && i.src"
-    )
-    source = wait_for(lambda: browser.driver.execute_script(image), "a picture")
-    assert base64.b64decode(source.partition(",")[2]) == server.dashboard.picture
+    for width in (64, 80):
+        server.dashboard.picture = picture(width)
+        image = (
+            "const i = document.querySelector('.camera');"
+            f"return i?.naturalWidth === {width} && i.src"
+        )
+        source = wait_for(lambda image=image: browser.driver.execute_script(image), "a picture")
+    # As bytes, and not as text within a message of the page.
+    with urllib.request.urlopen(source) as answer:
+        assert answer.read() == server.dashboard.picture
+    server.dashboard.picture = "its encoding is yuv422"
+    browser.has("its encoding is yuv422", ".panels")
 
 
 def test_a_stale_vehicle_says_how_old_its_pose_is(browser):
@@ -267,3 +277,34 @@ def test_vehicles_that_hover_are_not_drawn_again_without_a_graphics_card(browser
 
     assert browser.in_scene("vehicles.isTurning")
     wait_for(is_still, "pictures that are not drawn")
+
+
+BUSY = """
+window.came = [];
+socket.on("vehicles", () => came.push(performance.now()));
+const end = performance.now() + 3000;
+while (performance.now() < end);
+"""
+
+
+def test_a_browser_that_was_busy_is_sent_the_newest_scene_and_not_all_that_it_has_missed(
+    browser, server, driver
+):
+    is_over = threading.Event()
+
+    def fly():
+        for k in itertools.count():
+            server.dashboard.change("cf1", position=(-1.0, 0.0, 0.01 * (k % 100)))
+            if is_over.wait(0.02):
+                return
+
+    source = threading.Thread(target=fly)
+    source.start()
+    try:
+        driver.execute_script(BUSY)
+        wait_for(lambda: driver.execute_script("return came.length > 20"), "a scene that goes on")
+        at_once = "return came.filter((time) => time < came[0] + 50).length"
+        assert driver.execute_script(at_once) < 8
+    finally:
+        is_over.set()
+        source.join()

@@ -1,5 +1,6 @@
 """The dashboard of the running graph."""
 
+import contextlib
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -62,6 +63,9 @@ class Dashboard:
         self.pages = PageControl()
         self._handle, self._folders, self._clock = handle, folders, clock
         self._workers = workers or ThreadPoolExecutor(8, "dashboard")
+        # Who submits work to the node while it is free does what is queued: that is this thread,
+        # and not the one that serves all pages.
+        self._turns = workers or ThreadPoolExecutor(1, "dashboard_turns")
         self._model = GraphModel(handle, self._workers, master.graph, clock)
         self._actions = Actions(handle, self._workers, master, self._model.frames, clock)
         self._lane = lane
@@ -70,15 +74,16 @@ class Dashboard:
         self._model.missions = lambda: self._missions.running
         self._open: dict[int, PageState] = {}
         self.pages.log = handle.info
-        self.pages.on_first = lambda: handle.submit(self._model.begin)
-        self.pages.on_close = lambda page: handle.submit(self._close, page)
-        self.pages.on_empty = lambda: handle.submit(self._model.end)
+        self.pages.on_first = lambda: self._submit(self._model.begin)
+        self.pages.on_close = lambda page: self._submit(self._close, page)
+        self.pages.on_empty = lambda: self._submit(self._model.end)
 
     def close(self) -> None:
         """End what was begun here and flies nothing."""
         self._actions.close()
         self._lane.close()
-        self._workers.shutdown(wait=False, cancel_futures=True)
+        for each in (self._turns, self._workers):
+            each.shutdown(wait=False, cancel_futures=True)
 
     def scene(self) -> Scene:
         """Return the newest scene, made 20 times a second while a page is open."""
@@ -91,7 +96,7 @@ class Dashboard:
             self._page(page).vehicle = vehicle
             self._update_watched()
 
-        self._handle.submit(do)
+        self._submit(do)
 
     def plots(self, page: int) -> tuple[Series, ...]:
         """Return the last minute of the chosen vehicle and of the page's own fields."""
@@ -107,7 +112,7 @@ class Dashboard:
 
     def remove_field(self, page: int, path: str) -> None:
         """Plot it no longer."""
-        self._handle.submit(lambda: self._page(page).remove_field(path))
+        self._submit(lambda: self._page(page).remove_field(path))
 
     def command(self, page: int, command: Command) -> "Future[tuple[Outcome, ...]]":
         """Carry out a command of the page that has control; each vehicle has its outcome."""
@@ -223,10 +228,15 @@ class Dashboard:
         """Choose the camera that a page shows."""
         return self._do(lambda: self._page(page).watch_image(topic, self._model.graph.topics))
 
-    def image(self, page: int) -> bytes | None:
-        """Return the newest picture of the page's camera, as JPEG or PNG."""
+    def image(self, page: int) -> bytes | str | None:
+        """Return the newest picture of the page's camera, as JPEG or PNG, or why there is none."""
         state = self._open.get(page)
         return None if state is None else state.image
+
+    def _submit(self, work: Callable[..., None], *arguments: Any) -> None:
+        # A page may be closed after the dashboard.
+        with contextlib.suppress(RuntimeError):
+            self._turns.submit(self._handle.submit, work, *arguments)
 
     # In the node's turn.
 
@@ -261,7 +271,7 @@ class Dashboard:
         if what:
             self._handle.info(what)
             outcome.add_done_callback(log)
-        self._handle.submit(run)
+        self._submit(run)
         return outcome
 
     def _places(self, names):
@@ -271,7 +281,7 @@ class Dashboard:
     def _page(self, number):
         if number not in self.pages.pages:
             raise RefusalError(f"page {number} is closed; load it again")
-        return self._open.setdefault(number, PageState(self._handle, self._clock))
+        return self._open.setdefault(number, PageState(self._handle, self._workers, self._clock))
 
     def _close(self, number):
         page = self._open.pop(number, None)

@@ -221,6 +221,8 @@ class GraphModel:
         if self._trouble:
             remedy = "new vehicles are not seen, and those that are gone stay"
             found.append(Sentence("error", "dashboard", self._trouble, remedy))
+        for text in self._surroundings.too_many:
+            found.append(Sentence("warn", "markers", text, "publish fewer, or larger ones"))
         for frame in sorted(self.frames.rejected):
             text = f"the newest pose of {frame} on /tf has no unit quaternion, or is not finite"
             found.append(Sentence("error", "dashboard", text, "an older pose is shown"))

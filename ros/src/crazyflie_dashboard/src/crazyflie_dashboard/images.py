@@ -1,6 +1,5 @@
 """Pictures of cameras as a browser shows them."""
 
-import contextlib
 from typing import Any
 
 import cv2
@@ -9,33 +8,65 @@ import numpy as np
 _MAX_WIDTH = 640  #: Larger pictures are made smaller, pixels.
 _QUALITY = 80  #: Of JPEG, percent.
 
-_CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1, "8UC1": 1, "8UC3": 3}
+#: Encoding of sensor_msgs/Image -> type of a number, and where blue, green and red are; one channel
+#: of more than a byte is shown from its least to its largest number.
+_ENCODINGS: dict[str, tuple[str, list[int]]] = {
+    "bgr8": ("u1", [0, 1, 2]),
+    "bgra8": ("u1", [0, 1, 2, 3]),
+    "rgb8": ("u1", [2, 1, 0]),
+    "rgba8": ("u1", [2, 1, 0, 3]),
+    "8UC3": ("u1", [0, 1, 2]),
+    **dict.fromkeys(("mono8", "8UC1"), ("u1", [0])),
+    **dict.fromkeys(("mono16", "16UC1"), ("u2", [0])),
+    "32FC1": ("f4", [0]),
+}
 
 
-def encoded(message: Any) -> bytes | None:
-    """Return a sensor_msgs/Image or CompressedImage as JPEG or PNG; None if it cannot be read."""
+def encoded(message: Any) -> bytes:
+    """Return a sensor_msgs/Image or CompressedImage as JPEG or PNG.
+
+    Raises
+    ------
+    ValueError
+        It cannot be shown; the text says why.
+    """
     if not hasattr(message, "encoding"):
         data = bytes(message.data)
         # What a browser shows as it is; nothing else reaches a page.
-        return data if data.startswith((b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n")) else None
-    with contextlib.suppress(ValueError, cv2.error):
-        return _encoded(message)
-    return None
-
-
-def _encoded(message):
-    channels = _CHANNELS.get(message.encoding)
-    if channels is None or message.height == 0 or message.width == 0:
-        return None
-    rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.step)
-    picture: Any = rows[:, : message.width * channels].reshape(
-        message.height, message.width, channels
-    )
-    if message.encoding.startswith("rgb"):
-        picture = picture[:, :, [2, 1, 0]]
-    scale = _MAX_WIDTH / message.width
+        if not data.startswith((b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n")):
+            raise ValueError(f"its format is {message.format}; expected JPEG or PNG")
+        return data
+    if message.encoding not in _ENCODINGS:
+        raise ValueError(
+            f"its encoding is {message.encoding}; expected one of {', '.join(_ENCODINGS)}"
+        )
+    kind, order = _ENCODINGS[message.encoding]
+    number = np.dtype(kind).newbyteorder(">" if message.is_bigendian else "<")
+    height, width, step = message.height, message.width, message.step
+    row = width * len(order) * number.itemsize
+    if len(message.data) < height * step or step < row or not height * width:
+        raise ValueError(
+            f"it has {len(message.data)} bytes for {height} rows of {width}; expected "
+            f"{height * max(step, row)}, and some"
+        )
+    rows = np.frombuffer(message.data, np.uint8, height * step).reshape(height, step)[:, :row]
+    picture: Any = np.ascontiguousarray(rows).view(number).reshape(height, width, len(order))
+    picture = picture[..., order[:3]]
+    scale = _MAX_WIDTH / width
     if scale < 1.0:
-        size = (_MAX_WIDTH, max(1, round(message.height * scale)))
-        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    is_done, data = cv2.imencode(".jpg", picture[..., :3], [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    return data.tobytes() if is_done else None
+        size = (_MAX_WIDTH, max(1, round(height * scale)))
+        native = picture.astype(number.newbyteorder("="), copy=False)
+        picture = cv2.resize(native, size, interpolation=cv2.INTER_AREA)
+    if number.itemsize > 1:
+        picture = _in_bytes(picture.astype(float))
+    is_done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    if not is_done:
+        raise ValueError(f"{width} x {height} pixels cannot be encoded as JPEG")
+    return data.tobytes()
+
+
+def _in_bytes(numbers):
+    known = numbers[np.isfinite(numbers)]
+    low, high = (known.min(), known.max()) if known.size else (0.0, 0.0)
+    scaled = (np.nan_to_num(numbers, nan=low, posinf=high, neginf=low) - low) * 255.0
+    return (scaled / max(high - low, 1e-9)).astype(np.uint8)

@@ -1,6 +1,8 @@
 """What one page has chosen to see: a vehicle, fields of topics, a camera."""
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from typing import Any
 
 import roslib.message
 
@@ -19,13 +21,16 @@ _MAX_FIELDS = 20
 class PageState:
     """What a page sees beside the scene."""
 
-    def __init__(self, handle: NodeHandle, clock: Callable[[], float]) -> None:
+    def __init__(self, handle: NodeHandle, workers: Executor, clock: Callable[[], float]) -> None:
         self.vehicle: str | None = None  #: The one whose plots it shows.
-        self.image: bytes | None = None  #: The camera's newest picture.
-        self._handle, self._clock = handle, clock
+        #: The camera's newest picture, or why it cannot be shown.
+        self.image: bytes | str | None = None
+        self._handle, self._workers, self._clock = handle, workers, clock
         self._fields: dict[str, tuple[NodeHandle, Ring]] = {}
         self._camera: NodeHandle | None = None
         self._image_at = 0.0
+        self._is_encoding = False
+        self._waiting: Any = None  # The newest message that came meanwhile.
 
     def series(self) -> tuple[Series, ...]:
         """Return the plots of fields."""
@@ -62,7 +67,7 @@ class PageState:
         """Show a camera, or none; `RefusalError` for what is no camera."""
         if self._camera is not None:
             self._camera.close()
-        self._camera, self.image = None, None
+        self._camera = self._waiting = self.image = None
         if topic is None:
             return
         kind = topics.get(topic)
@@ -80,5 +85,23 @@ class PageState:
 
     def _on_image(self, message):
         now = self._clock()
-        if now - self._image_at >= _IMAGE_PERIOD:
-            self.image, self._image_at = images.encoded(message), now
+        if self._is_encoding:
+            self._waiting = message
+        elif now - self._image_at >= _IMAGE_PERIOD:
+            self._encode(message)
+
+    def _encode(self, message):
+        self._is_encoding, self._image_at = True, self._clock()
+        camera = self._camera
+        # Not here: a large picture takes tens of milliseconds.
+        self._workers.submit(images.encoded, message).add_done_callback(
+            lambda done: self._handle.submit(self._show, camera, done)
+        )
+
+    def _show(self, camera, done):
+        self._is_encoding = False
+        if camera is self._camera is not None:
+            self.image = str(done.exception()) if done.exception() else done.result()
+        waiting, self._waiting = self._waiting, None
+        if waiting is not None:
+            self._encode(waiting)

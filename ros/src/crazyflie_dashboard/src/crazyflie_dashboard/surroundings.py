@@ -1,6 +1,7 @@
 """What is drawn around the vehicles: solids, planned paths and geofences of the graph."""
 
 import math
+from typing import Any
 
 import roslib.message
 from geometry_msgs.msg import Point
@@ -20,6 +21,7 @@ _PATH = "nav_msgs/Path"
 
 _FAR = 14.0  #: Where a wall is drawn that a fence does not have, m: the end of the floor.
 _MAX_POINTS = 1000  #: Of a path.
+_MAX_MARKERS = 2000  #: Of one topic that are drawn: a browser draws each by itself.
 
 _SHAPES = {Marker.CUBE: "box", Marker.CYLINDER: "cylinder", Marker.SPHERE: "ball"}
 
@@ -35,9 +37,12 @@ class Surroundings:
     def __init__(self, handle: NodeHandle):
         self._handle = handle
         self._topics: set[str] = set()
-        self._markers: dict[str, list[Marker]] = {}
+        # By topic: markers by their frame, and how many there are.
+        self._markers: dict[str, tuple[dict[str, list[Marker]], int]] = {}
         self._paths: dict[str, tuple[str, tuple[Triple, ...]]] = {}
         self._fences: dict[str, Box] = {}
+        # By topic and frame: markers, where the frame was, and what was made of them.
+        self._made: dict[tuple[str, str], tuple[Any, Any, tuple[Solid, ...]]] = {}
         self._solids: tuple[Solid, ...] = ()
 
     def follow(self, graph: Graph) -> None:
@@ -53,15 +58,32 @@ class Surroundings:
 
     def solids(self, frames: Frames, fixed: str) -> tuple[Solid, ...]:
         """Return walls and obstacles in the frame ``fixed``; the same object until they change."""
-        found = tuple(
-            solid
-            for row in self._markers.values()
-            for marker in row
-            if (solid := _solid(marker, frames, fixed)) is not None
-        )
-        if found != self._solids:
-            self._solids = found
+        made = {}
+        for topic, (by_frame, _) in self._markers.items():
+            for frame, markers in by_frame.items():
+                # What moves is drawn in its own frame, at its origin.
+                place = ((0.0, 0.0, 0.0),) if frame == fixed else frames.in_fixed(frame, fixed)
+                if place is None:
+                    continue
+                key, at = (topic, frame), (frame == fixed, place[0])
+                before, where, solids = self._made.get(key, (None, None, ()))
+                if before is not markers or where != at:
+                    solids = tuple(s for m in markers if (s := _solid(m, *at)) is not None)
+                made[key] = markers, at, solids
+        is_new = [each[2] for each in made.values()] != [each[2] for each in self._made.values()]
+        self._made = made
+        if is_new:
+            self._solids = tuple(each for *_, solids in made.values() for each in solids)
         return self._solids
+
+    @property
+    def too_many(self) -> tuple[str, ...]:
+        """What is not drawn, in words."""
+        return tuple(
+            f"{count} markers on {topic}; {_MAX_MARKERS} are drawn"
+            for topic, (_, count) in self._markers.items()
+            if count > _MAX_MARKERS
+        )
 
     def paths(self, frames: Frames, fixed: str) -> dict[str, tuple[Triple, ...]]:
         """Return planned paths, m, in the frame ``fixed``, by the name of the topic."""
@@ -96,10 +118,13 @@ class Surroundings:
         self._topics.add(topic)
 
     def _draw(self, topic, message):
-        self._markers[topic] = message.markers
+        by_frame: dict[str, list[Marker]] = {}
+        for marker in message.markers[:_MAX_MARKERS]:
+            by_frame.setdefault(marker.header.frame_id.strip("/"), []).append(marker)
+        self._markers[topic] = by_frame, len(message.markers)
         for key in [key for key in self._paths if key.partition(" ")[0] == topic]:
             del self._paths[key]
-        for marker in message.markers:
+        for marker in message.markers[:_MAX_MARKERS]:
             if marker.type == Marker.LINE_STRIP and marker.action == Marker.ADD:
                 key = f"{topic} {marker.ns} {marker.id}"
                 self._paths[key] = marker.header.frame_id.strip("/"), _path(marker.points)
@@ -128,17 +153,11 @@ def _moved(point, position, rotation):
     return position[0] + x, position[1] + y, position[2] + z
 
 
-def _solid(marker: Marker, frames: Frames, fixed: str) -> Solid | None:
-    shape, frame = _SHAPES.get(marker.type), marker.header.frame_id.strip("/")
+def _solid(marker: Marker, is_fixed: bool, place: Triple) -> Solid | None:
+    shape = _SHAPES.get(marker.type)
     if shape is None or marker.action != Marker.ADD:
         return None
     p, q, size, c = marker.pose.position, marker.pose.orientation, marker.scale, marker.color
-    position, rotation = (p.x, p.y, p.z), (q.x, q.y, q.z, q.w)
-    if frame != fixed:
-        # What moves is drawn in its own frame, at its origin.
-        placed = frames.in_fixed(frame, fixed)
-        if placed is None:
-            return None
-        position = placed[0]
-    colour = (c.r, c.g, c.b, c.a)
+    position = (p.x, p.y, p.z) if is_fixed else place
+    rotation, colour = (q.x, q.y, q.z, q.w), (c.r, c.g, c.b, c.a)
     return Solid(marker.ns, shape, position, rotation, (size.x, size.y, size.z), colour)

@@ -1,9 +1,10 @@
 """The image of a camera."""
 
-import base64
+from urllib.parse import quote
 
 from nicegui import ui
 
+from crazyflie_dashboard.page.component import Camera
 from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.snapshot import Scene
 
@@ -15,20 +16,20 @@ class CamerasPanel:
         self._session = session
         self._topic = ui.select([], label="topic", on_change=self._watch, clearable=True)
         self._topic.props("dense outlined options-dense")
-        self._image = ui.image().classes("camera")
+        self._camera = Camera()
         self._hint = ui.label().classes("hint")
 
     def refresh(self, scene: Scene) -> None:
-        """Show the newest image."""
+        """Show the newest image, or why there is none."""
         if self._topic.options != list(scene.images):
             self._topic.set_options(list(scene.images))
-        self._hint.text = "" if scene.images else "No node publishes images."
-        image = self._session.dashboard.image(self._session.page) if self._topic.value else None
-        self._image.set_visibility(image is not None)
-        if image is not None:
-            kind = "png" if image.startswith(b"\x89PNG") else "jpeg"
-            source = f"data:image/{kind};base64,{base64.b64encode(image).decode()}"
-            self._image.set_source(source)
+        page, topic = self._session.page, self._topic.value
+        image = self._session.dashboard.image(page) if topic else None
+        hint = "" if scene.images else "No node publishes images."
+        self._hint.text = (
+            f"The picture cannot be shown: {image}" if isinstance(image, str) else hint
+        )
+        self._camera.show(f"/camera?page={page}&topic={quote(topic)}" if topic and image else "")
 
     async def _watch(self) -> None:
         dashboard = self._session.dashboard

@@ -35,3 +35,17 @@ class Lines(ListView, component="lines.js"):  # type: ignore[call-arg]
     def __init__(self, nothing: str) -> None:
         super().__init__()
         self._props["nothing"] = nothing
+
+
+class Camera(Element, component="camera.js"):  # type: ignore[call-arg]
+    """The newest picture of a camera, which the browser fetches by itself."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._props["address"] = ""
+
+    def show(self, address: str) -> None:
+        """Show what is at an address of this server; nothing if it is empty."""
+        if self._props["address"] != address:
+            self._props["address"] = address
+            self.update()

@@ -50,7 +50,10 @@ export default {
     this.waiting = setInterval(() => {
       if (!window.socket) return;
       clearInterval(this.waiting);
-      window.socket.on("vehicles", (rows) => this.update(rows));
+      window.socket.on("vehicles", (rows, taken) => {
+        this.update(rows);
+        taken?.();
+      });
       this.$emit("ready");
     }, 20);
   },

@@ -1,6 +1,8 @@
 """The three-dimensional scene: what the browser's part, scene_view.js, is told."""
 
 import math
+import time
+from collections import deque
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -14,6 +16,8 @@ from nicegui.element import Element
 from crazyflie_dashboard.snapshot import Rotation, Scene, Triple, VehicleSnapshot
 
 FOLDER = Path(__file__).parent
+MAX_UNANSWERED = 3  #: Scenes that a browser has not taken, before no more is sent,
+ANSWER_LIMIT = 2.0  #: for so long, s.
 DIGITS = 4  #: Of positions in m and of quaternions, for the browser.
 
 ui.scene  # noqa: B018  Registers three.js.
@@ -71,20 +75,41 @@ class SceneView(
         super().__init__()
         self._props["model"] = vehicle_model()
         self._shown: dict[str, Any] = {}
-        self.on("ready", lambda: self._shown.clear())
+        self._world: tuple[Any, Any] = (None, None)
+        self._unanswered: deque[float] = deque()
+        self.on("ready", self._begin)
+
+    def _begin(self) -> None:
+        self._shown.clear()
+        self._unanswered.clear()
+        self._world = (None, None)
 
     async def show(self, scene: Scene, chosen: set[str], extra_paths: Mapping[str, Any]) -> None:
         """Draw a scene; what has not changed since the last one is not sent."""
         self._send("setNames", [list(scene.vehicles)])
-        self._send("setWorld", [[_solid(each) for each in scene.solids], scene.fences])
+        # They may be many, and are the same objects until they change.
+        if scene.solids is not self._world[0] or scene.fences != self._world[1]:
+            self._world = scene.solids, scene.fences
+            self._send("setWorld", [[_solid(each) for each in scene.solids], scene.fences])
         self._send("setPaths", [[*scene.paths.values(), *extra_paths.values()]])
         frames = [[each.name, *_pose(each.position, each.rotation)] for each in scene.frames]
         self._send("setFrames", [frames])
         rows = vehicle_rows(scene, chosen)
-        if self._shown.get("update") != rows:
+        if self._shown.get("update") != rows and self._may_send():
             self._shown["update"] = rows
+            self._unanswered.append(time.monotonic())
             # As an event: the browser would compile, and keep for long, each call of a method.
-            await core.sio.emit("vehicles", rows, room=self.client.id)
+            await core.sio.emit("vehicles", rows, room=self.client.id, callback=self._on_answer)
+
+    def _may_send(self) -> bool:
+        """Return whether the browser keeps up; what it has not taken yet, it would see too late."""
+        while self._unanswered and time.monotonic() - self._unanswered[0] > ANSWER_LIMIT:
+            self._unanswered.popleft()
+        return len(self._unanswered) < MAX_UNANSWERED
+
+    def _on_answer(self, *_: Any) -> None:
+        if self._unanswered:
+            self._unanswered.popleft()
 
     def show_goal(self, goal: dict[str, float | None] | None) -> None:
         """Draw where a go to leads: x, y, z (m) and yaw (rad, or None)."""

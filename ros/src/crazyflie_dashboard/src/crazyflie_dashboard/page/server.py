@@ -43,6 +43,16 @@ async def _emergency(dashboard: Dashboard, request: Request) -> Response:
     return JSONResponse([f"{each.vehicle}: {each.text}" for each in outcomes if each.text])
 
 
+async def _camera(dashboard: Dashboard, request: Request) -> Response:
+    """Answer with the newest picture of a page's camera."""
+    number = request.query_params.get("page", "")
+    image = dashboard.image(int(number)) if number.isdigit() else None
+    if not isinstance(image, bytes):
+        return Response(status_code=204)
+    kind = "image/png" if image.startswith(b"\x89PNG") else "image/jpeg"
+    return Response(image, media_type=kind, headers={"cache-control": "no-store"})
+
+
 class Page:
     """The server of the page; one in a process, since NiceGUI has one application in a process.
 
@@ -58,6 +68,7 @@ class Page:
         application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         Client.shared_head_html = HEAD
         application.post("/emergency")(partial(_emergency, dashboard))
+        application.get("/camera")(partial(_camera, dashboard))
 
         # Without a history of messages a page that has lost its connection is loaded anew.
         ui.page("/", title="Crazyflie mission control")(lambda: View(dashboard))

@@ -6,7 +6,7 @@ from setuptools import setup
 setup(
     **generate_distutils_setup(
         # Crazyswarm's scripts import the second name, crazyswarm2's the first.
-        packages=["crazyflie_py", "pycrazyswarm", "pycrazyswarm.cfsim"],
+        packages=["crazyflie_py", "pycrazyswarm"],
         package_dir={"": "src"},
     )
 )

@@ -22,8 +22,7 @@ from crazyflie_batch import (
     quadrotor,
     simulate,
 )
-from crazyflie_batch.elementwise import turn, yaw_from_quaternion
-from crazyflie_batch.flight import Plan
+from crazyflie_batch.flight import Plan, turn, yaw_from_quaternion
 from crazyflie_batch.symbols import Condition, Emitter, Symbol
 from crazyflie_model.angles import quaternion_from_rpy, rpy_from_quaternion
 from crazyflie_model.dynamics import NearHover

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from std_srvs.srv import EmptyRequest, EmptyResponse
 
-from crazyflie_examples.move_server_node import MoveServerNode
-from crazyflie_examples.route import DEFAULT_POINTS, Points, Route
+from crazyflie_examples.move_server_node import DEFAULT_POINTS, MoveServerNode, Points, Route
 from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_utils.vectors import to_vector

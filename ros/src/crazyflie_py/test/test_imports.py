@@ -20,6 +20,8 @@ NAMES = [
     "from pycrazyswarm.crazyflieSim import Crazyflie, CrazyflieServer, TimeHelper",
     "from pycrazyswarm.crazyswarm import Crazyswarm, build_argparser",
     "from pycrazyswarm.crazyswarm_py import Crazyswarm",
+    "import pycrazyswarm.util; pycrazyswarm.util.normalize",
+    "import pycrazyswarm.uav_trajectory as uav; uav.Trajectory",
     "from crazyflie_py.crazyswarm_py import Crazyswarm",
     "from crazyflie_py.crazyflie import Crazyflie, CrazyflieServer, TimeHelper",
     "import pycrazyswarm.cfsim.cffirmware as firm",

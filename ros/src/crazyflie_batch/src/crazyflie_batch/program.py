@@ -2,6 +2,9 @@
 
 import logging
 import threading
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 
 import numpy as np
@@ -9,7 +12,28 @@ from numpy.typing import NDArray
 
 from crazyflie_batch import flight
 from crazyflie_batch.flight import Plan
-from crazyflie_batch.formula_errors import naming_the_formula
+
+#: Modules in which a formula ends that does what it must not.
+_CALCULATES = ("crazyflie_batch.symbols", "crazyflie_model.elementwise", "numpy")
+
+
+@contextmanager
+def naming_the_formula() -> Iterator[None]:
+    """Put the name, file and line of the formula before what is wrong with it: a TypeError."""
+    try:
+        yield
+    except (AttributeError, TypeError, ValueError) as error:
+        frames = [
+            (frame.f_code, line)
+            for frame, line in traceback.walk_tb(error.__traceback__)
+            if not frame.f_globals["__name__"].startswith(_CALCULATES)
+        ]
+        code, line = frames[-1]
+        raise TypeError(
+            f"the formula {code.co_qualname} ({code.co_filename}, line {line}) cannot be "
+            f"computed for many vehicles: {error}"
+        ) from error
+
 
 try:
     from crazyflie_batch.machine_code import MachineCode

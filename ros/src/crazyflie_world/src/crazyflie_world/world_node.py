@@ -1,16 +1,46 @@
-"""ROS interface of a world: shows it in RViz, and publishes the poses of its moving objects."""
+"""ROS interface of a world: moves what has a path, and shows all in RViz."""
 
-from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Vector3
-from std_msgs.msg import String
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, TransformStamped, Vector3
+from std_msgs.msg import ColorRGBA, String
 from typing_extensions import override
-from visualization_msgs.msg import MarkerArray
+from visualization_msgs.msg import Marker, MarkerArray
 
+from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
-from crazyflie_world.markers import markers, pose
+from crazyflie_world.shapes import Ball, Box, Cylinder, Shape
 from crazyflie_world.world import World
 from crazyflie_world.world_file import WORLD_FILE
+
+_SHAPES = {Box: Marker.CUBE, Cylinder: Marker.CYLINDER, Ball: Marker.SPHERE}
+
+_FLOOR_THICKNESS = 0.001  #: m; without one, RViz would draw nothing.
+
+
+def markers(world: World) -> MarkerArray:
+    """Return a marker for each solid; what moves is drawn in its own tf frame, and so moves."""
+    return MarkerArray([_marker(each, world.frame) for each in world.solids])
+
+
+def _marker(shape: Shape, frame: str) -> Marker:
+    marker = Marker(ns=shape.name, type=_SHAPES[type(shape)])
+    marker.color = ColorRGBA(*shape.colour, 1.0)
+    marker.scale = Vector3(*(max(length, _FLOOR_THICKNESS) for length in shape.size))
+    marker.frame_locked = True
+    if shape.path is None:
+        marker.header.frame_id = frame
+        marker.pose = pose(shape)
+    else:
+        marker.header.frame_id = shape.name
+        marker.pose.orientation = pose(shape).orientation
+    return marker
+
+
+def pose(shape: Shape) -> Pose:
+    """Return where a shape is and how it is turned, in the world's frame."""
+    yaw = shape.yaw if isinstance(shape, Box) else 0.0
+    return Pose(Point(*shape.centre), Quaternion(*quaternion_from_rpy(0.0, 0.0, yaw)))
 
 
 class WorldNodeParameters(Parameters):

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from crazyflie_driver.battery import Battery, Charge
+from crazyflie_driver.monitors import Battery, Charge
 
 
 @pytest.fixture

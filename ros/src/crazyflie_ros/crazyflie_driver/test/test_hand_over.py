@@ -178,7 +178,7 @@ def test_commands_for_some_groups_are_refused_where_those_of_the_vehicle_are_not
 def test_a_takeoff_with_a_low_battery(flight):
     server, vehicle = flight
     vehicle.log["pm.vbat"] = ("f", 3.1)
-    battery = server.node._vehicles[vehicle.uri].battery
+    battery = server.node._vehicles[vehicle.uri].log.battery
     wait_until(battery.words, "the low voltage")
     with pytest.raises(ServiceError, match="battery low"):
         server.call("/cf1/takeoff", TAKEOFF)
@@ -194,12 +194,12 @@ def test_a_vehicle_that_cannot_fly(flight, name, request_):
     server, vehicle = flight
     is_(vehicle, 0x252)
     driven = server.node._vehicles[vehicle.uri]
-    wait_until(lambda: driven.flight.supervisor == 0x252, "the state")
+    wait_until(lambda: driven.log.supervisor == 0x252, "the state")
     with pytest.raises(ServiceError, match="cannot fly, its state is: armed, flying, locked"):
         server.call(f"/cf1/{name}", request_)
     assert_flies_on(server, vehicle)
     is_(vehicle, FLYING)
-    wait_until(lambda: driven.flight.supervisor == FLYING, "the state")
+    wait_until(lambda: driven.log.supervisor == FLYING, "the state")
 
 
 @pytest.mark.parametrize("answer", [b"\x08\x00\x00\x10", None])

@@ -9,10 +9,13 @@ from safety_helpers import HIGH_LEVEL, TAKEOFF, is_, wait_for_words
 from std_msgs.msg import Header
 from test_strict_vehicle import Flight
 
+from crazyflie_driver.msg import TrajectoryPolynomialPiece
 from crazyflie_driver.srv import (
     GoToRequest,
     SpiralRequest,
+    StartTrajectoryRequest,
     TakeoffRequest,
+    UploadTrajectoryRequest,
 )
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.waiting import LIMIT
@@ -143,6 +146,18 @@ def test_nothing_moves_a_vehicle_whose_battery_is_critical(weak):
             "/crazyflie_server/all/go_to",
             GoToRequest(relative=True, goal=Point(1.0, 0.0, 0.0), duration=Duration(2)),
         )
+    assert weak.touches_down() < 1.0
+    assert abs(weak.virtual.observe().position[0]) < 0.1
+
+
+def test_no_trajectory_is_started_while_the_battery_is_critical(weak):
+    axes = [[0.0, 1.0], [0.0], [0.0], [0.0]]
+    piece = TrajectoryPolynomialPiece(*axes, Duration(2))
+    weak.server.call("/cf1/upload_trajectory", UploadTrajectoryRequest(3, 0, [piece]))
+    weak.take_off()
+    weak.drain()
+    with pytest.raises(ServiceError, match=r"no start_trajectory: battery critical: \d\.\d\d V"):
+        weak.server.call("/cf1/start_trajectory", StartTrajectoryRequest(0, 3, 1.0, True, False))
     assert weak.touches_down() < 1.0
     assert abs(weak.virtual.observe().position[0]) < 0.1
 

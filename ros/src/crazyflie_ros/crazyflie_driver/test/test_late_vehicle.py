@@ -5,8 +5,8 @@ from conftest import LIMIT
 from safety_helpers import wait_for_words
 from std_msgs.msg import Bool
 
-from crazyflie_driver.connection import connect_within
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
+from crazyflie_driver.vehicle import connect_within
 from crazyflie_link.errors import AddressError, NoAnswerError, NoDongleError, SetupError
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.programs import free_port

@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_driver.lift_watch import LIMIT, LiftWatch, NoLift
+from crazyflie_driver.monitors import LIFT_LIMIT, LiftWatch, NoLift
 
 GROUND = 0.3
 """Where the vehicle stands in the frame of its estimate, m."""
@@ -37,7 +37,7 @@ def test_a_vehicle_that_stands_is_found_once():
     attempt.run(10.0)
     ((time, finding),) = attempt.findings
     assert finding == NoLift(GROUND + 0.5, is_certain=True)
-    assert LIMIT <= time - attempt.begin < LIMIT + 0.2
+    assert LIFT_LIMIT <= time - attempt.begin < LIFT_LIMIT + 0.2
 
 
 def test_noise_of_the_estimate_is_no_flight():
@@ -90,7 +90,7 @@ def test_a_stream_on_the_ground_with_motors_on_begins_no_attempt_before_it_asks_
     begin = attempt.now
     attempt.run(5.0)
     ((time, _),) = attempt.findings
-    assert LIMIT <= time - begin < LIMIT + 0.2
+    assert LIFT_LIMIT <= time - begin < LIFT_LIMIT + 0.2
 
 
 def test_a_pause_begins_a_new_attempt():

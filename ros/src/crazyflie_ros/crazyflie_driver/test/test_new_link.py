@@ -101,11 +101,11 @@ def test_a_link_that_is_set_up_anew_sends_an_old_vehicle_in_the_air_nothing(serv
 def test_the_state_from_before_a_loss_is_forgotten(server):
     vehicle = make_old_vehicle(server, READY)
     server.add(vehicle.uri)
-    flight = server.node._vehicles[vehicle.uri].flight
-    wait_until(lambda: flight.supervisor is not None, "the logged state")
+    log = server.node._vehicles[vehicle.uri].log
+    wait_until(lambda: log.supervisor is not None, "the logged state")
     vehicle.is_frozen = True
     wait_for_words(server, "lost")
-    assert flight.supervisor is None
+    assert log.supervisor is None
 
 
 @pytest.mark.parametrize("protocol", [OLD, 12])

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from crazyflie_driver import service_names
+from crazyflie_driver import services as module
 from crazyflie_driver.srv import StopRequest
 
 CONTROLLER = "/cf1/controller"
@@ -42,7 +42,7 @@ def test_names_that_have_become_free_are_taken(server):
 
 def test_a_controller_that_has_parameters_is_waited_for(server, monkeypatch):
     server.process.transport.parameters.update(GAINS)
-    monkeypatch.setattr(service_names, "LIMIT", 60.0)
+    monkeypatch.setattr(module, "CONTROLLER_LIMIT", 60.0)
     adding = server.begin_adding(server.make_vehicle().uri)
     with pytest.raises(TimeoutError):
         adding.result(timeout=0.5)
@@ -58,7 +58,7 @@ def test_a_controller_that_has_parameters_is_waited_for(server, monkeypatch):
 
 def test_a_controller_whose_services_have_other_names_takes_none_away(server, monkeypatch):
     server.process.transport.parameters.update(GAINS)
-    monkeypatch.setattr(service_names, "LIMIT", 60.0)
+    monkeypatch.setattr(module, "CONTROLLER_LIMIT", 60.0)
     server.process.transport.foreign_services.update(
         {"/cf1/controller/takeoff": CONTROLLER, "/cf1/controller/land": CONTROLLER}
     )
@@ -68,7 +68,7 @@ def test_a_controller_whose_services_have_other_names_takes_none_away(server, mo
 
 def test_parameters_that_were_left_behind_cost_a_moment_only(server, monkeypatch):
     server.process.transport.parameters.update(GAINS)
-    monkeypatch.setattr(service_names, "LIMIT", 0.3)
+    monkeypatch.setattr(module, "CONTROLLER_LIMIT", 0.3)
     begin = time.monotonic()
     server.add(server.make_vehicle().uri)
     assert time.monotonic() - begin >= 0.3
@@ -77,7 +77,7 @@ def test_parameters_that_were_left_behind_cost_a_moment_only(server, monkeypatch
 
 def test_a_vehicle_can_be_removed_while_a_controller_is_waited_for(server, monkeypatch):
     server.process.transport.parameters.update(GAINS)
-    monkeypatch.setattr(service_names, "LIMIT", 60.0)
+    monkeypatch.setattr(module, "CONTROLLER_LIMIT", 60.0)
     vehicle = server.make_vehicle()
     adding = server.begin_adding(vehicle.uri)
     vehicle.wait_for_packets(4, 0)

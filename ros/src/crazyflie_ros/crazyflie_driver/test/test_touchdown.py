@@ -11,7 +11,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:The supervisor subsystem:UserWar
 
 def logged(server, vehicle):
     """Return the state that the driver knows."""
-    return server.node._vehicles[vehicle.uri].flight.supervisor
+    return server.node._vehicles[vehicle.uri].log.supervisor
 
 
 def wait_for_log(server, vehicle):
@@ -64,8 +64,8 @@ def test_battery(landed):
     server, vehicle = landed
     vehicle.log["pm.vbat"] = ("f", 2.0)
     crazyflie = server.node._vehicles[vehicle.uri]
-    crazyflie.battery._time = 0.0
-    wait_until(lambda: "critical" in crazyflie.battery.words(), "the battery")
+    crazyflie.log.battery._time = 0.0
+    wait_until(lambda: "critical" in crazyflie.log.battery.words(), "the battery")
     vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 3)
     assert_rests(vehicle)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_driver.touchdown import (
+from crazyflie_driver.monitors import (
     HOLD,
     LEAD,
     MAX_DEPTH,

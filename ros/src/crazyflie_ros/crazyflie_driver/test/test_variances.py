@@ -7,7 +7,7 @@ from conftest import LOG, PARAMETERS
 from geometry_msgs.msg import Pose, PoseStamped, Quaternion
 from safety_helpers import TAKEOFF
 
-from crazyflie_driver.variances import FEWEST, WINDOW, Variances
+from crazyflie_driver.monitors import FEWEST, WINDOW, Variances
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.waiting import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
@@ -55,7 +55,7 @@ def add(server, estimator, log):
 def test_a_takeoff_waits_for_the_filter(server):
     vehicle = add(server, KALMAN, VARIANCES)
     vehicle.log["kalman.varPZ"] = ("f", 0.5)
-    variances = server.node._vehicles[vehicle.uri]._log.variances
+    variances = server.node._vehicles[vehicle.uri].log.variances
     wait_until(lambda: variances._samples and variances._samples[-1][2] == 0.5)
     vehicle.log["kalman.varPZ"] = ("f", 0.25)
     with pytest.raises(ServiceError, match="no takeoff, .*not converged: kalman.varPZ has changed"):
@@ -82,7 +82,7 @@ def test_a_virtual_vehicle_without_poses(server):
         server.add(uri)
         with pytest.raises(ServiceError, match="not converged: kalman.varP. has changed by"):
             server.call("/cf1/takeoff", TAKEOFF)
-        variances = server.node._vehicles[uri]._log.variances
+        variances = server.node._vehicles[uri].log.variances
 
         def is_converged():
             pose = Pose(orientation=Quaternion(w=1.0))

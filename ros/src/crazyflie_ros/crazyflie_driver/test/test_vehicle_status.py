@@ -81,7 +81,7 @@ def test_the_fields_of_crazyswarm2(make_server):
     # The vehicle counts in 16 bits.
     vehicle.log.update({"radio.numRxBc": ("H", 7), "radio.numRxUc": ("H", 4)})
     driver = server.node._vehicles[vehicle.uri]
-    wait_until(lambda: server.process.advance(0.01) or driver._log.received_broadcasts == 7)
+    wait_until(lambda: server.process.advance(0.01) or driver.log.received_broadcasts == 7)
     server.process.advance(1.0)
     first = next(status for status in reversed(published(server)) if status.num_rx_broadcast)
     assert (first.num_rx_broadcast, first.num_rx_unicast) == (7, 10)
@@ -95,7 +95,7 @@ def test_the_fields_of_crazyswarm2(make_server):
     assert any(status.num_tx_unicast for status in published(server))
     # A restart of the vehicle begins at 0.
     vehicle.log.update({"radio.numRxBc": ("H", 0)})
-    wait_until(lambda: server.process.advance(0.01) or driver._log.received_broadcasts == 0)
+    wait_until(lambda: server.process.advance(0.01) or driver.log.received_broadcasts == 0)
     server.process.advance(1.0)
     assert published(server)[-1].num_rx_broadcast == 0
 

@@ -1,20 +1,99 @@
-"""Services that command all vehicles of the server at the same moment."""
+"""The vehicles of the server by radio channel, and services that command all of them at once."""
 
+import contextlib
 import threading
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, wait
 from functools import partial
 from typing import Any
 
-from crazyflie_driver.channel import Channel
-from crazyflie_driver.command import SERVICE_TYPES, Command, requested
-from crazyflie_driver.flight_commands import Need
+from crazyflie_driver.flight_commands import SERVICE_TYPES, Command, Need, requested
+from crazyflie_driver.server_parameters import BroadcastParameters
 from crazyflie_driver.vehicle import DriverVehicle
+from crazyflie_link.address import Address
+from crazyflie_link.broadcast import Broadcaster, SharedCommand
+from crazyflie_link.errors import LinkLostError
+from crazyflie_link.link import Link
+from crazyflie_link.localization import PackedPoses
 from crazyflie_utils import NodeHandle, ServiceError
+
+
+class Channel:
+    """Broadcasts to vehicles on one channel, by the dongle of the address that it is made with.
+
+    Vehicles with links of other dongles are reached, too. External poses of vehicles on a
+    radio are packed, if they are as many as the parameters say; nobody acknowledges them, so those
+    of another dongle, which may be out of reach of this one, get their own.
+    """
+
+    def __init__(self, address: Address, parameters: BroadcastParameters):
+        self.vehicles: list[DriverVehicle] = []
+        self._dongle = address.dongle
+        self.broadcaster = Broadcaster(
+            address, self._links, parameters.repeats, parameters.repeat_period
+        )
+        self._poses = PackedPoses(self.broadcaster)
+        self._least_poses = parameters.poses
+
+    def add(self, vehicle: DriverVehicle) -> None:
+        """Add a vehicle."""
+        self.vehicles.append(vehicle)
+        vehicle.status.broadcaster = self.broadcaster
+        self._share_poses()
+
+    def remove(self, vehicle: DriverVehicle) -> None:
+        """Remove a vehicle."""
+        self.vehicles.remove(vehicle)
+        self._share_poses()
+
+    def close(self) -> None:
+        """Stop broadcasting."""
+        self.broadcaster.close()
+
+    def share(self, needs: Mapping[DriverVehicle, Need]) -> SharedCommand | None:
+        """Return a command for all vehicles with the need for one; None if each gets its own.
+
+        A broadcast reaches every vehicle of the channel: each has to be known, and to need nothing
+        else.
+        """
+        ready = [vehicle for vehicle in self.vehicles if needs.get(vehicle) is Need.COMMAND]
+        harmless = (Need.COMMAND, Need.NOT_ADDRESSED)
+        if len(ready) < 2 or any(needs.get(each) not in harmless for each in self.vehicles):
+            return None
+        # Older firmware has other forms of the commands.
+        if len({link.protocol for link in self._links()}) != 1:
+            return None
+        return SharedCommand(self.broadcaster, len(ready))
+
+    def _share_poses(self):
+        addresses = [vehicle.crazyflie.address for vehicle in self.vehicles]
+        users = Counter(address.vehicle_id for address in addresses)
+        # Each vehicle on the channel takes the poses with its id, whatever dongle speaks to it.
+        packed = {
+            vehicle: address.vehicle_id
+            for vehicle, address in zip(self.vehicles, addresses, strict=True)
+            if address.dongle == self._dongle and users[address.vehicle_id] == 1
+        }
+        shares = 0 < self._least_poses <= len(addresses)
+        self._poses.vehicles = len(packed)
+        for vehicle in self.vehicles:
+            vehicle_id = packed.get(vehicle)
+            localization = vehicle.crazyflie.localization
+            if shares and vehicle_id is not None:
+                localization.broadcast_by(self._poses, vehicle_id)
+            else:
+                localization.broadcast_by(None)
+
+    def _links(self) -> Iterator[Link]:
+        for vehicle in list(self.vehicles):
+            with contextlib.suppress(LinkLostError):
+                yield vehicle.crazyflie.link()
+
 
 _GO_TO = ("go_to", "go_to_linear")
 
-LIMIT = 5.0  #: Time in which vehicles answer, s; their own limits are shorter.
+LIMIT = 5.0  #: Time limit of the vehicles' answers, s; their own limits are shorter.
 
 
 class AllVehicles:
@@ -44,7 +123,9 @@ class AllVehicles:
             )
         command = requested(name, request)
         channels = list(self._channels.values())
-        ready = [each for channel in channels for each in channel.vehicles if each.is_ready]
+        ready = [
+            each for channel in channels for each in channel.vehicles if each.connection.is_ready()
+        ]
         if not ready:
             raise ServiceError(f"{name} of all vehicles: none is connected; expected one or more")
         # Begun here, in the order of the calls.

@@ -1,36 +1,112 @@
-"""High-level commands to one vehicle, and what keeps them from dropping it."""
+"""High-level commands to one vehicle, and the precautions against dropping it."""
 
 import contextlib
 import enum
 import time
+from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
-from crazyflie_driver.battery import Battery, Charge
-from crazyflie_driver.command import LAND, STOP, TAKEOFF, Command
-from crazyflie_driver.emergency import Emergency
+from crazyflie_driver import srv
+from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.flight_state import REPORT_LAG, FlightState
-from crazyflie_driver.jobs import Job, Jobs
-from crazyflie_driver.server_parameters import SafetyParameters
+from crazyflie_driver.jobs import Job
+from crazyflie_driver.log_topics import LogTopics
+from crazyflie_driver.monitors import Charge
 from crazyflie_driver.setpoint_gate import Event
 from crazyflie_driver.setpoint_topics import SetpointTopics
-from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.errors import (
-    AlreadyLandingError,
-    CrazyflieError,
-    LinkLostError,
-    NoReplyError,
-)
-from crazyflie_link.high_level import HighLevel
+from crazyflie_link.broadcast import SharedCommand
+from crazyflie_link.errors import AlreadyLandingError, CrazyflieError, LinkLostError, NoReplyError
+from crazyflie_link.high_level import ALL_GROUPS, HighLevel
 from crazyflie_link.supervisor import Supervisor
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils import ServiceError
 from crazyflie_utils.timers import Timer
+
+#: Commands that differ from the others, which move a vehicle in the air.
+TAKEOFF, LAND, STOP = "takeoff", "land", "stop"
+
+#: High-level command -> type of its service.
+SERVICE_TYPES = {
+    "takeoff": srv.Takeoff,
+    "land": srv.Land,
+    "stop": srv.Stop,
+    "go_to": srv.GoTo,
+    "start_trajectory": srv.StartTrajectory,
+    "go_to_linear": srv.GoTo,
+    "spiral": srv.Spiral,
+}
+
+#: High-level command -> function that sends a request of it.
+_SENDERS: dict[str, Callable[[HighLevel, Any], None]] = {
+    "takeoff": lambda high_level, r: high_level.take_off(
+        r.height, r.duration.to_sec(), r.groupMask
+    ),
+    "land": lambda high_level, r: high_level.land(r.height, r.duration.to_sec(), r.groupMask),
+    "stop": lambda high_level, r: high_level.stop(r.groupMask),
+    "go_to": lambda high_level, r: high_level.go_to(
+        (r.goal.x, r.goal.y, r.goal.z), r.yaw, r.duration.to_sec(), r.relative, r.groupMask
+    ),
+    "start_trajectory": lambda high_level, r: high_level.start_trajectory(
+        r.trajectoryId, r.timescale, r.relative, r.reversed, r.groupMask
+    ),
+    "go_to_linear": lambda high_level, r: high_level.go_to(
+        (r.goal.x, r.goal.y, r.goal.z),
+        r.yaw,
+        r.duration.to_sec(),
+        r.relative,
+        r.groupMask,
+        linear=True,
+    ),
+    "spiral": lambda high_level, r: high_level.spiral(
+        r.angle,
+        (r.initialRadius, r.finalRadius),
+        r.ascent,
+        r.duration.to_sec(),
+        r.sideways,
+        r.clockwise,
+        r.groupMask,
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Command:
+    """A high-level command: ``send(high_level)`` blocks until the vehicle has replied.
+
+    The name is that of its service, the duration how long it is carried out, s.
+    """
+
+    name: str
+    send: Callable[[HighLevel], None]
+    duration: float = 0.0
+    group_mask: int = ALL_GROUPS
+
+    def by(self, shared: SharedCommand | None) -> "Command":
+        """Return the command, sent with those to other vehicles; with None the same command."""
+        if shared is None:
+            return self
+        return replace(self, send=lambda high_level: self.send(high_level.broadcast(shared)))
+
+    @property
+    def ends_flight(self) -> bool:
+        """Whether the vehicle is on the ground afterwards, and it goes before all others."""
+        return self.name in (LAND, STOP)
+
+
+def requested(name: str, request: Any) -> Command:
+    """Return the command that a service with this name is asked for."""
+    duration = request.duration.to_sec() if hasattr(request, "duration") else 0.0
+    sender = _SENDERS[name]
+    return Command(
+        name, lambda high_level: sender(high_level, request), duration, request.groupMask
+    )
+
 
 Result = TypeVar("Result")
 
-#: Time in which a notice that setpoints stop needs the command that it belongs to, s.
+#: Time within which the notice that setpoints stop needs its command, s.
 NOTIFY_WINDOW = 0.5
 _WATCHDOG_PERIOD = 0.2  #: The firmware gives up after 1 s without being fed.
 
@@ -38,18 +114,18 @@ _WATCHDOG_PERIOD = 0.2  #: The firmware gives up after 1 s without being fed.
 #: landing (0.16 s) and every 30 s on the ground (0.08 s).
 _REARMING = 0.5
 
-#: How long a vehicle that has not answered a command is looked up before its caller is told, s; and
-#: how often. It is heard again within 1 s, or gets a new link.
+#: Time limit and period of the look-up of a vehicle that has not answered a command, s. It is heard
+#: again within 1 s, or gets a new link.
 _LOOK_UP_LIMIT, _LOOK_UP_PERIOD = 1.5, 0.05
 
 
 class Need(enum.Enum):
-    """What a vehicle needs for a command."""
+    """Packets that a vehicle has to be sent for a command."""
 
     COMMAND = enum.auto()
     SETPOINTS_STOP = enum.auto()  #: The notice that setpoints stop, right before the command.
-    ON_GROUND = enum.auto()  #: Nothing: it is to land, and the command would start its motors.
-    NOT_ADDRESSED = enum.auto()  #: Nothing: the command is for other groups.
+    ON_GROUND = enum.auto()  #: None: a landing would start the motors of a vehicle that stands.
+    NOT_ADDRESSED = enum.auto()  #: None: the command is for other groups.
 
 
 @dataclass(eq=False)
@@ -64,54 +140,50 @@ class FlightCommands:
     should it obey when it is heard again.
     """
 
-    _handle: NodeHandle
-    _name: str
-    _crazyflie: Crazyflie
+    _context: VehicleContext
+    _log: LogTopics
     _setpoints: SetpointTopics
     _flight: FlightState
-    _battery: Battery
-    _emergency: Emergency
-    _jobs: Jobs
-    _safety: SafetyParameters
-    # How long the last setpoint shall count, ms, in a notice that has not been sent yet.
+    # Validity of the last setpoint, ms, in a notice that has not been sent yet.
     _pending_notify: int | None = None
     _notify_timer: Timer | None = None
     _feeds_watchdog: bool = False
-    refusal: str = ""  #: Why the vehicle is given no command that moves it; empty if it is.
-    # Not answered, and refused to its caller; it may be carried out yet.
+    refusal: str = ""  #: Why no command may move the vehicle; empty if it may.
+    # A command that was not answered and was refused to its caller; it may still be carried out.
     _unanswered: Command | None = None
     _look_up: Future[bool] | None = None
 
     @property
     def is_high_level_flight_active(self) -> bool:
         """Whether the vehicle's log says that it flies on high-level commands."""
-        if self._emergency.is_latched or self._setpoints.is_streaming:
+        if self._context.gate.is_emergency or self._setpoints.is_streaming:
             return False
-        return self._flight.is_high_level(self._flight.supervisor)
+        return self._flight.is_high_level(self._log.supervisor)
 
     def start(self) -> None:
         """Begin to feed the watchdog, once there is a flight."""
-        if self._safety.emergency_watchdog:
-            self._handle.timer(_WATCHDOG_PERIOD, self._feed, steady=True)
+        if self._context.server.emergency_watchdog:
+            self._context.handle.timer(_WATCHDOG_PERIOD, self._feed, steady=True)
 
     def send(self, command: Command, response: Result) -> Future[Result]:
-        """Have a command sent, after the notice that setpoints stop if they were streamed.
+        """Submit a command, which follows the notice that setpoints stop if they were streamed.
 
-        All that would have it refused, or be without effect, is checked before anything is sent
-        that ends a stream. Landing and stopping supersede all commands and uploads before them. A
-        landing of a vehicle that lands already is a success. The result of the future is
-        ``response``.
+        Every cause of a refusal, and of no effect, is checked before a stream is ended. Landing and
+        stopping supersede all commands and uploads before them. A landing of a vehicle that lands
+        already is a success. The result of the future is ``response``.
         """
 
         def work(job: Job) -> Result:
             need = self._check(command, job)
             if need is Need.NOT_ADDRESSED:
-                _send(command, self._crazyflie.high_level.guarded(lambda: job.is_valid))
+                _send(command, self._context.crazyflie.high_level.guarded(job.may_send))
             elif need is not Need.ON_GROUND:
                 self._execute(command, job)
             return response
 
-        return self._jobs.submit(command.name, work, is_flight=True, urgent=command.ends_flight)
+        return self._context.jobs.submit(
+            command.name, work, is_flight=True, urgent=command.ends_flight
+        )
 
     def check(self, command: Command) -> Future["Need"]:
         """Do all that `send` does before it sends anything; a takeoff arms the vehicle.
@@ -123,17 +195,17 @@ class FlightCommands:
             return self._check(command, job)
 
         what = f"checking {command.name}"
-        return self._jobs.submit(what, work, is_flight=True, urgent=command.ends_flight)
+        return self._context.jobs.submit(what, work, is_flight=True, urgent=command.ends_flight)
 
     def check_unanswered(self) -> bool:
         """Return whether a vehicle carries out a command that was refused as not answered, once.
 
-        The vehicle is looked up for that: to be called whenever it has logged its state.
+        To be called whenever the vehicle has logged its state; the look-up is a job.
         """
         look_up = self._look_up
         if look_up is None:
             if self._unanswered is not None:
-                self._look_up = self._jobs.submit("looking up a command", self._obeys)
+                self._look_up = self._context.jobs.submit("looking up a command", self._obeys)
             return False
         if not look_up.done():
             return False
@@ -142,32 +214,32 @@ class FlightCommands:
 
     def notify(self, remain_valid_ms: int) -> None:
         """Announce that setpoints stop: at once on the ground, in flight with the next command."""
-        may_fly = self._flight.supervisor is None or self._flight.is_flying
+        may_fly = self._log.supervisor is None or self._log.is_flying
         if not (may_fly and self._setpoints.runs_motors):
             self._setpoints.notify_setpoints_stop(remain_valid_ms)
             return
         # Without a link nothing could be sent later, either.
-        self._crazyflie.link()
+        self._context.crazyflie.link()
         self._pending_notify = remain_valid_ms
         if self._notify_timer is not None:
             self._notify_timer.stop()
-        self._notify_timer = self._handle.timer(NOTIFY_WINDOW, self._end_notify_window)
+        self._notify_timer = self._context.handle.timer(NOTIFY_WINDOW, self._end_notify_window)
 
     def _end_notify_window(self):
         if self._notify_timer is not None:
             self._notify_timer.stop()
         if self._pending_notify is not None:
-            self._handle.warn(
-                f"{self._name}: notify_setpoints_stop was not sent: the vehicle flies on "
-                "setpoints, and would drop; no high-level command has come within "
-                f"{NOTIFY_WINDOW:g} s. It is sent together with the next one"
+            self._context.warn(
+                "notify_setpoints_stop was not sent: the vehicle flies on setpoints, and would "
+                f"drop; no high-level command has come within {NOTIFY_WINDOW:g} s. It is sent "
+                "together with the next one"
             )
 
     # Checks before a command.
 
     def _check(self, command, job):
-        self._emergency.refuse()
-        command.send(self._crazyflie.high_level.dry_run())
+        self._context.refuse_after_emergency()
+        command.send(self._context.crazyflie.high_level.dry_run())
         if not self._is_addressed(command):
             return Need.NOT_ADDRESSED
         if not self._is_ready(command, job):
@@ -175,7 +247,7 @@ class FlightCommands:
         return Need.SETPOINTS_STOP if self._setpoints.is_streaming else Need.COMMAND
 
     def _is_addressed(self, command):
-        is_addressed = self._crazyflie.high_level.is_addressed(command.group_mask)
+        is_addressed = self._context.crazyflie.high_level.is_addressed(command.group_mask)
         if is_addressed is None and self._setpoints.runs_motors:
             raise ServiceError(
                 f"{command.name} is for the groups {command.group_mask:#x}, and it is not known "
@@ -189,9 +261,9 @@ class FlightCommands:
             self._check_and_arm(job)
         elif command.name == LAND:
             if self._flight.is_on_ground():
-                self._handle.info(
-                    f"{self._name}: land is not sent, the vehicle is on the ground: it would "
-                    "start its motors"
+                self._context.handle.info(
+                    f"{self._context.name}: land is not sent, the vehicle is on the ground: it "
+                    "would start its motors"
                 )
                 return False
         elif command.name != STOP:
@@ -201,7 +273,7 @@ class FlightCommands:
         return True
 
     def _check_leaving_stream(self):
-        state = self._flight.supervisor
+        state = self._log.supervisor
         if state is None or not self._setpoints.runs_motors:
             return
         if state.faults or SupervisorState.CAN_FLY not in state:
@@ -209,11 +281,12 @@ class FlightCommands:
 
     def _check_and_arm(self, job: Job) -> None:
         # Arms a vehicle that is not armed; blocks.
-        if self._battery.charge >= Charge.LOW:
-            raise ServiceError(f"no takeoff, {self._battery.words()}: charge or change it")
+        battery = self._log.battery
+        if battery.charge >= Charge.LOW:
+            raise ServiceError(f"no takeoff, {battery.words()}: charge or change it")
         if problem := self._flight.estimator_problem():
             raise ServiceError(f"no takeoff, the vehicle's estimate has not converged: {problem}")
-        supervisor = self._crazyflie.supervisor.guarded(lambda: job.is_valid)
+        supervisor = self._context.crazyflie.supervisor.guarded(job.may_send)
         state = self._state_once_armed(supervisor, job)
         if state is None:
             return
@@ -242,26 +315,27 @@ class FlightCommands:
 
     def _execute(self, command, job):
         job.check()
-        number = self._setpoints.gate.high_level(self._handle.time())
+        gate, handle = self._context.gate, self._context.handle
+        number = gate.high_level(handle.time())
         try:
             self._send_and_look_up(command, job)
         except CrazyflieError:
-            self._setpoints.gate.resume(number)
+            gate.resume(number)
             job.check()
             raise
-        # One that nobody waits for any more was refused as well.
+        # A command whose caller waits no longer was refused as well.
         is_refused = job.done.cancelled() and not command.ends_flight
         self._unanswered = command if is_refused else None
-        self._setpoints.high_level_until(self._handle.time() + command.duration)
+        self._setpoints.high_level_until(handle.time() + command.duration)
         if command.ends_flight:
             self._flight.end_accepted(command.duration)
         else:
-            self._setpoints.gate.handle(Event.FLIGHT_CALLED)
+            gate.handle(Event.FLIGHT_CALLED)
             self._feeds_watchdog = True
 
     def _prepare_sending(self, command, job):
         # In the thread that sends: what is sent next is the command itself.
-        if not job.is_valid or self._emergency.is_latched:
+        if not job.is_valid or self._context.gate.is_emergency:
             return False
         if self._setpoints.is_streaming:
             try:
@@ -284,7 +358,7 @@ class FlightCommands:
             return may
 
         try:
-            _send(command, self._crazyflie.high_level.guarded(may_send))
+            _send(command, self._context.crazyflie.high_level.guarded(may_send))
         except (NoReplyError, LinkLostError) as error:
             if command.ends_flight or not is_sent:
                 raise
@@ -297,7 +371,7 @@ class FlightCommands:
             self._unanswered = None
             if not self._shows(state, command, was_at_rest):
                 raise NoReplyError(f"{error}; the vehicle's state is: {state.words()}") from None
-            self._handle.warn(f"{self._name}: {error}: the vehicle's state shows that it obeys")
+            self._context.warn(f"{error}: the vehicle's state shows that it obeys")
 
     def _state_after(self, command, job, was_at_rest):
         # The vehicle answers in the order in which it receives. It shows a command a little later.
@@ -327,7 +401,8 @@ class FlightCommands:
     def _obeys(self, job):
         # Whether it carries out what was refused. If it is not heard, it is looked up again.
         command = self._unanswered
-        if command is None or self._emergency.is_latched or self._setpoints.is_streaming:
+        is_emergency = self._context.gate.is_emergency
+        if command is None or is_emergency or self._setpoints.is_streaming:
             self._unanswered = None
             return False
         state = self._state_after(command, job, True)
@@ -339,12 +414,13 @@ class FlightCommands:
     def _feed(self):
         # Also when the reply to the first command was lost.
         self._feeds_watchdog = self._feeds_watchdog or self.is_high_level_flight_active
-        if self._feeds_watchdog and not self._emergency.is_latched:
+        context = self._context
+        if self._feeds_watchdog and not context.gate.is_emergency:
             try:
-                self._crazyflie.supervisor.feed_watchdog()
+                context.crazyflie.supervisor.feed_watchdog()
             except CrazyflieError as error:
-                key = (self._name, "watchdog")
-                self._handle.warn(f"{self._name}: watchdog not fed: {error}", 1.0, key)
+                name = context.name
+                context.handle.warn(f"{name}: watchdog not fed: {error}", 1.0, (name, "watchdog"))
 
 
 def _send(command: Command, high_level: HighLevel) -> None:

@@ -3,16 +3,15 @@
 import math
 from dataclasses import dataclass
 
+from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.setpoint_topics import SetpointTopics
-from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import LinkLostError, NoReplyError
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils import NodeHandle
 
 #: Parameter of the firmware, and its value for the extended Kalman filter.
 _ESTIMATOR, _KALMAN = "stabilizer.estimator", 2
-#: How old a state may be, s: the firmware's supervisor runs at 25 Hz, and is logged at 10 Hz.
+#: Largest age of a logged state, s: the firmware's supervisor runs at 25 Hz, its log at 10 Hz.
 REPORT_LAG = 0.2
 _LOGGED_STATE_LIMIT = 1.0  #: Time limit of log data with the state, s; they come every 0.1 s.
 
@@ -27,23 +26,11 @@ class FlightState:
     when it holds the motors off.
     """
 
-    _handle: NodeHandle
-    _crazyflie: Crazyflie
+    _context: VehicleContext
     _log: LogTopics
     _setpoints: SetpointTopics
     _planned: float = -math.inf
     _plan_end: float = math.inf
-
-    @property
-    def supervisor(self) -> SupervisorState | None:
-        """The state that was logged last; None if none was on the present link."""
-        return self._log.supervisor
-
-    @property
-    def is_flying(self) -> bool:
-        """Whether the vehicle logs that it flies; so it does for 2 s after a landing."""
-        state = self.supervisor
-        return state is not None and SupervisorState.FLYING in state
 
     def read(self) -> SupervisorState | None:
         """Return the state, from supervisor or log; None if neither reports it; blocks.
@@ -51,7 +38,7 @@ class FlightState:
         Before protocol 12 the supervisor cannot be asked; very old firmware does not log it either.
         """
         try:
-            state = self._crazyflie.supervisor.read()
+            state = self._context.crazyflie.supervisor.read()
         except NoReplyError:
             state = None
         return self._log.next_state(_LOGGED_STATE_LIMIT) if state is None else state
@@ -59,25 +46,25 @@ class FlightState:
     def estimator_problem(self) -> str:
         """Return why the vehicle's Kalman filter has not converged; empty if unknown; blocks."""
         try:
-            estimator = self._crazyflie.parameters.values().get(_ESTIMATOR)
+            estimator = self._context.crazyflie.parameters.values().get(_ESTIMATOR)
         except LinkLostError:
             return ""
         return self._log.variances.problem() if estimator == _KALMAN else ""
 
     def motion_sent(self) -> None:
-        """Take note that the planner is commanded to move."""
-        self._planned, self._plan_end = self._handle.time(), math.inf
+        """Record that the planner is commanded to move."""
+        self._planned, self._plan_end = self._context.handle.time(), math.inf
 
     def end_accepted(self, duration: float) -> None:
-        """Take note that the planner holds the motors off after a duration (s)."""
-        self._plan_end = self._handle.time() + duration
+        """Record that the planner stops the motors after a duration (s)."""
+        self._plan_end = self._context.handle.time() + duration
 
     def is_at_rest(self) -> bool:
         """Return whether the planner is known to have no motion that has not ended."""
-        state = self.supervisor
+        state = self._log.supervisor
         if state is None or not state.reports_planner:
             return False
-        is_old = self._handle.time() - self._planned >= REPORT_LAG
+        is_old = self._context.handle.time() - self._planned >= REPORT_LAG
         return is_old and not self.is_moving(state)
 
     def is_moving(self, state: SupervisorState) -> bool:
@@ -103,7 +90,7 @@ class FlightState:
         state = self.read()
         is_streamed = self._setpoints.runs_motors
         latest = max(self._planned, self._setpoints.last_time if is_streamed else -math.inf)
-        if state is None or self._handle.time() - latest < REPORT_LAG:
+        if state is None or self._context.handle.time() - latest < REPORT_LAG:
             return False
         return not (self._may_move(state) or (is_streamed and SupervisorState.FLYING in state))
 
@@ -112,4 +99,4 @@ class FlightState:
         if state.reports_planner:
             return SupervisorState.HIGH_LEVEL_ACTIVE in state
         is_latest = self._planned >= self._setpoints.last_time
-        return is_latest and self._handle.time() < self._plan_end
+        return is_latest and self._context.handle.time() < self._plan_end

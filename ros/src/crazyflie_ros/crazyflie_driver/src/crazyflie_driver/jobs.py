@@ -1,26 +1,30 @@
-"""A vehicle's jobs, one after the other, and urgent ones beside them."""
+"""A vehicle's threads: its jobs, which wait for the vehicle, and the delivery of its data."""
 
 import contextlib
+import queue
 import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, InvalidStateError
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar
 
 from crazyflie_link.errors import CrazyflieError
-from crazyflie_utils import ServiceError
+from crazyflie_utils import NodeHandle, ServiceError
 
 Result = TypeVar("Result")
 
 MOST_JOBS = 64  #: Jobs that may be queued.
+#: Data that may be queued; more are dropped. A vehicle logs some 300 packets a second.
+MAX_WAITING = 1000
 
 
 @dataclass(eq=False)
 class Job:
     """A call ``work(job)``, which takes time; an urgent job supersedes one that is for a flight.
 
-    Who waits no longer cancels `done`: the job is not begun any more, or told that it is not valid.
+    A caller that waits no longer cancels `done`: the job is not begun, or is no longer valid.
     """
 
     work: Callable[["Job"], Any]
@@ -32,6 +36,10 @@ class Job:
     def is_valid(self) -> bool:
         """Whether nothing has superseded it, and its result is awaited."""
         return not (self.superseded_by or self.done.cancelled())
+
+    def may_send(self) -> bool:
+        """Return `is_valid`, for `Subsystem.guarded`."""
+        return self.is_valid
 
     def check(self) -> None:
         """Raise `ServiceError` if it is not valid."""
@@ -54,11 +62,10 @@ class Job:
 
 
 class Jobs:
-    """Two threads that do jobs in their order, and do not outlive the process.
+    """A queue with a lane for urgent jobs; a thread for each lane does its jobs in their order.
 
-    Urgent jobs have a thread of their own. They supersede every flight job that was submitted
-    before them: a queued one is given up, a running one is marked. When a job fails,
-    ``on_error(text)`` is called in its thread.
+    Urgent jobs supersede every flight job that was submitted before them: a queued one is given up,
+    a running one is marked. When a job fails, ``on_error(text)`` is called in its thread.
     """
 
     def __init__(self, name: str, on_error: Callable[[str], None] = lambda text: None):
@@ -79,10 +86,10 @@ class Jobs:
         is_flight: bool = False,
         urgent: bool = False,
     ) -> Future[Result]:
-        """Have ``work(job)`` done after the jobs before it; return the future of its result.
+        """Queue ``work(job)`` behind the jobs before it; return the future of its result.
 
-        An urgent one is done after earlier urgent ones only. Errors of the link and
-        `ServiceError` are logged, and fail the future with `ServiceError`.
+        An urgent one waits for earlier urgent ones only. Errors of the link and `ServiceError` are
+        logged, and fail the future with `ServiceError`.
         """
 
         def run(job):
@@ -120,7 +127,7 @@ class Jobs:
             job.run()
 
     def close(self) -> None:
-        """Take no more jobs, and end after those that are queued."""
+        """Take no more jobs; the threads end once the queue is empty."""
         with self._wake:
             self._is_closed = True
             self._wake.notify_all()
@@ -137,3 +144,38 @@ class Jobs:
             job.run()
             if not urgent:
                 self._running = None
+
+
+class Delivery:
+    """A thread through which a link's threads call the node's callbacks without blocking.
+
+    `NodeHandle.submit` returns when a callback has run, and that waits for all callbacks before it.
+    A link whose thread blocks on that receives nothing meanwhile.
+    """
+
+    def __init__(self, handle: NodeHandle, name: str):
+        self._handle = handle
+        self._queue: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._is_closed = False
+        threading.Thread(target=self._run, name=f"{name}-delivery", daemon=True).start()
+
+    def submit(self, callback: Callable[..., None], *arguments: Any) -> None:
+        """Call ``callback(*arguments)`` in turn with the node's callbacks; does not block."""
+        self._queue.put(partial(callback, *arguments))
+
+    def submit_data(self, callback: Callable[..., None], *arguments: Any) -> None:
+        """Do the same with data, which are dropped when too many wait."""
+        if self._queue.qsize() < MAX_WAITING:
+            self.submit(callback, *arguments)
+
+    def close(self) -> None:
+        """Stop calling; discard the queue."""
+        self._is_closed = True
+        self._queue.put(lambda: None)
+
+    def _run(self):
+        while True:
+            callback = self._queue.get()
+            if self._is_closed:
+                return
+            self._handle.submit(callback)

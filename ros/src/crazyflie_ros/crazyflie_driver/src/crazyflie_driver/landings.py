@@ -4,22 +4,20 @@ import enum
 from concurrent.futures import Future
 from dataclasses import dataclass
 
-from crazyflie_driver.battery import Battery, Charge
-from crazyflie_driver.command import LAND, STOP, Command
-from crazyflie_driver.flight_commands import FlightCommands
+from crazyflie_driver.context import VehicleContext
+from crazyflie_driver.flight_commands import LAND, STOP, Command, FlightCommands
 from crazyflie_driver.log_topics import LogTopics
+from crazyflie_driver.monitors import STEP, STEP_TIME, Charge, Next, Touchdown, landing_duration
 from crazyflie_driver.setpoint_gate import Event
 from crazyflie_driver.setpoint_topics import Control, SetpointTopics
-from crazyflie_driver.touchdown import STEP, STEP_TIME, Next, Touchdown, landing_duration
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils import NodeHandle
 
-_MARGIN = 1.0  #: A vehicle that is active for so long after its landing, s, lands again.
-_LOG_DELAY = 0.5  #: How long the log may take to show what a command has changed, s.
+_MARGIN = 1.0  #: A vehicle that is active this long after its landing, s, lands again.
+_LOG_DELAY = 0.5  #: Time after which the log shows the effect of a command, s.
 
 
 class Reason(enum.Enum):
-    """Why the driver lands a vehicle: in words, and how long it may take, s."""
+    """Why the driver lands a vehicle: in words, and the longest duration of the landing, s."""
 
     #: At 3.0 V under the load of hover a cell of 250 mAh has some 4 % left, which is 15 s; 5 s of
     #: them have gone by before the charge is critical.
@@ -27,7 +25,7 @@ class Reason(enum.Enum):
     #: A process waits 10 s for a flight, and the last metre takes its time.
     SHUTDOWN = "the driver is to end", 7.0
     REMOVAL = "the vehicle is being removed", 7.0
-    #: Whoever sent the command believes that it failed.
+    #: Its caller believes that it failed.
     NO_ANSWER = "a command that was refused as not answered is carried out", 7.0
 
     @property
@@ -37,25 +35,22 @@ class Reason(enum.Enum):
 
     @property
     def limit(self) -> float:
-        """How long the landing may take, s."""
+        """The longest duration of the landing, s."""
         return self.value[1]
 
 
 @dataclass(eq=False)
 class Landings:
-    """Land a vehicle, and see that it comes down: no other command takes its place.
+    """Land a vehicle and follow it to the ground; no other command may replace the landing.
 
     The firmware lands at a height and stops the motors there, also without a link. With a link the
     vehicle sinks further until it stands: see `Touchdown`.
     """
 
-    _handle: NodeHandle
-    _name: str
-    _battery: Battery
+    _context: VehicleContext
     _log: LogTopics
     _setpoints: SetpointTopics
     _commands: FlightCommands
-    _least_duration: float
     _reason: Reason | None = None
     _sent: Future[None] | None = None
     # When it was sent, and when it should have been carried out, s.
@@ -70,8 +65,8 @@ class Landings:
         vehicle should be down.
         """
         if self._reason is None:
-            detail = self._battery.words() if reason is Reason.BATTERY else reason.words
-            self._handle.error(f"{self._name}: {detail}: landing")
+            detail = self._log.battery.words() if reason is Reason.BATTERY else reason.words
+            self._context.handle.error(f"{self._context.name}: {detail}: landing")
         if self._reason is not Reason.BATTERY:
             self._reason = reason
         self._commands.refusal = self._refusal()
@@ -80,37 +75,39 @@ class Landings:
             height = self._log.height
             # Beside a table it may be below 0: it never climbs.
             ground = 0.0 if height is None else min(0.0, height)
-            duration = landing_duration(height, self._least_duration, self._reason.limit)
-            self._touchdown = Touchdown(self._handle.time(), ground, duration)
+            duration = landing_duration(
+                height, self._context.server.landing_duration, self._reason.limit
+            )
+            self._touchdown = Touchdown(self._context.handle.time(), ground, duration)
             sent = self._sent = self._send(LAND, lambda h: h.land(ground, duration), duration)
         return sent
 
     def follow(self) -> None:
-        """Take the next step of a landing, after each log of the vehicle.
+        """Take the next step of a landing; to be called after each log of the vehicle.
 
         A critical battery ends a flight by high-level commands, or on setpoints with a reference
-        (thrust is the business of the node that sends it).
+        (a stream of thrust is landed by the node that sends it).
         """
         state = self._log.supervisor
         if state is None:
             return
-        is_critical = self._battery.charge is Charge.CRITICAL
+        is_critical = self._log.battery.charge is Charge.CRITICAL
         is_active = self._is_active(state)
-        is_unasked = self._commands.check_unanswered()
+        obeys_late = self._commands.check_unanswered()
         if is_active and is_critical:
             self.begin(Reason.BATTERY)
-        elif is_unasked:
+        elif obeys_late:
             self.begin(Reason.NO_ANSWER)
         elif is_active and self._reason is not None:
             self.begin(self._reason)
         elif not is_active and self._is_logged():
             self._reason = self._sent = self._touchdown = None
             if not is_critical:
-                self._setpoints.gate.handle(Event.BATTERY_RECOVERED)
+                self._context.gate.handle(Event.BATTERY_RECOVERED)
         self._commands.refusal = self._refusal()
         if self._sent is not None and _is_accepted(self._sent):
             if self._reason is Reason.BATTERY:
-                self._setpoints.gate.handle(Event.BATTERY_CRITICAL)
+                self._context.gate.handle(Event.BATTERY_CRITICAL)
             if is_active and self._touchdown is not None:
                 self._descend(self._touchdown)
 
@@ -121,23 +118,23 @@ class Landings:
         return is_flying and self._setpoints.control is Control.REFERENCE
 
     def _refusal(self):
-        if self._battery.charge is Charge.CRITICAL:
-            return self._battery.words()
+        if self._log.battery.charge is Charge.CRITICAL:
+            return self._log.battery.words()
         return "" if self._reason is None else self._reason.words
 
     def _is_logged(self):
         # Whether the log shows what was sent.
         is_sent = self._sent is None or self._sent.done()
-        return is_sent and self._handle.time() >= self._begin + _LOG_DELAY
+        return is_sent and self._context.handle.time() >= self._begin + _LOG_DELAY
 
     def _is_under_way(self, sent):
         if not sent.done():
             return True
         is_going_on = _is_accepted(sent) and not self._setpoints.is_streaming
-        return is_going_on and self._handle.time() < self._end
+        return is_going_on and self._context.handle.time() < self._end
 
     def _descend(self, touchdown):
-        log, now, height = self._log, self._handle.time(), self._log.height
+        log, now, height = self._log, self._context.handle.time(), self._log.height
         step = touchdown.sample(now, height, log.vertical_speed, log.target_height)
         if step is Next.STOP:
             self._touchdown = None
@@ -148,7 +145,7 @@ class Landings:
             self._sent = self._send(LAND, lambda h: h.land_lower(lower, STEP_TIME), STEP_TIME)
 
     def _send(self, name, send, duration):
-        self._begin = self._handle.time()
+        self._begin = self._context.handle.time()
         self._end = self._begin + duration + _MARGIN
         return self._commands.send(Command(name, send, duration), None)
 

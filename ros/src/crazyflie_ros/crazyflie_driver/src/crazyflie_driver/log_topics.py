@@ -2,27 +2,123 @@
 
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import genpy
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
+from sensor_msgs.msg import Imu, MagneticField, Temperature
 from std_msgs.msg import Float32, Header
 
-from crazyflie_driver import telemetry, variances
-from crazyflie_driver.delivery import Delivery
+from crazyflie_driver.context import VehicleContext
+from crazyflie_driver.monitors import VARIANCES, VARIANCES_PERIOD_MS, Battery, Variances
 from crazyflie_driver.msg import GenericLogData, crtpPacket
-from crazyflie_driver.variances import Variances
-from crazyflie_driver.vehicle_parameters import VehicleParameters
-from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.log import PERIOD_STEP_MS, LogBlock
+from crazyflie_link.log import PERIOD_STEP_MS, LogBlock, quaternion_from_compressed
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils import NodeHandle
+from crazyflie_model.units import GRAVITY
 from crazyflie_utils.topics import Publisher
 
-#: Period of the log block that the diagnostics rest on, ms; its absence shows a restart.
+#: Periods of imu and pose, and of the other topics, ms: those of the C++ driver.
+FAST_MS, SLOW_MS = 10, 100
+_MOST_VARIABLES = 6  #: Variables of four bytes that fit in a log packet's 26 bytes.
+_UNKNOWN = -1.0  #: First element of a covariance: there is no such measurement (sensor_msgs/Imu).
+
+
+class StandardTopic(NamedTuple):
+    """A topic that every vehicle has; ``convert(header, values)`` returns its message.
+
+    Its frame is the fixed one if it is in the world, or else the vehicle's.
+    """
+
+    name: str
+    message_type: type[genpy.Message]
+    period_ms: int
+    variables: tuple[str, ...]
+    convert: Callable[[Header, Sequence[float]], genpy.Message]
+    in_world: bool = False
+
+
+def _imu(header, values):
+    message = Imu(header=header)
+    message.orientation_covariance[0] = _UNKNOWN
+    # The firmware measures in g and degrees/s.
+    message.linear_acceleration = Vector3(*(GRAVITY * value for value in values[:3]))
+    message.angular_velocity = Vector3(*map(math.radians, values[3:]))
+    return message
+
+
+def _pose(header, values):
+    message = PoseStamped(header=header)
+    message.pose.position = Point(*values[:3])
+    message.pose.orientation = Quaternion(*quaternion_from_compressed(values[3]))
+    return message
+
+
+def _float(_, values):
+    return Float32(values[0])
+
+
+STANDARD = (
+    StandardTopic(
+        "imu", Imu, FAST_MS, ("acc.x", "acc.y", "acc.z", "gyro.x", "gyro.y", "gyro.z"), _imu
+    ),
+    StandardTopic(
+        "pose",
+        PoseStamped,
+        FAST_MS,
+        ("stateEstimate.x", "stateEstimate.y", "stateEstimate.z", "stateEstimateZ.quat"),
+        _pose,
+        in_world=True,
+    ),
+    StandardTopic(
+        "magnetic_field",
+        MagneticField,
+        SLOW_MS,
+        ("mag.x", "mag.y", "mag.z"),
+        lambda header, values: MagneticField(header=header, magnetic_field=Vector3(*values)),
+    ),
+    StandardTopic(
+        "temperature",
+        Temperature,
+        SLOW_MS,
+        ("baro.temp",),
+        lambda header, values: Temperature(header=header, temperature=values[0]),
+    ),
+    StandardTopic("pressure", Float32, SLOW_MS, ("baro.pressure",), _float),
+    StandardTopic("battery", Float32, SLOW_MS, ("pm.vbat",), _float),
+)
+
+
+def packed(
+    topics: list[StandardTopic], known: Container[str]
+) -> tuple[list[list[StandardTopic]], dict[str, list[str]]]:
+    """Put the variables of topics that have the same period into common log blocks.
+
+    Returns groups of topics that fit in a log packet each, and for every topic that the vehicle
+    cannot fill the variables that it lacks.
+    """
+    missing: dict[str, list[str]] = {}
+    groups: list[list[StandardTopic]] = []
+    for topic in topics:
+        lacking = [variable for variable in topic.variables if variable not in known]
+        if lacking:
+            missing[topic.name] = lacking
+            continue
+        for group in groups:
+            size = sum(len(other.variables) for other in group) + len(topic.variables)
+            if group[0].period_ms == topic.period_ms and size <= _MOST_VARIABLES:
+                group.append(topic)
+                break
+        else:
+            groups.append([topic])
+    return groups, missing
+
+
+#: Period of the log block with the vehicle's status, ms; its absence shows a restart.
 STATUS_PERIOD_MS = 100
 
-#: What is in it, as far as the firmware has it: all of the 26 bytes of a packet.
+#: Variables in it, as far as the firmware has them: all 26 bytes of a packet.
 STATUS_VARIABLES = (
     "pm.vbat",
     "radio.rssi",
@@ -39,8 +135,8 @@ STATUS_VARIABLES = (
 _MOST_DATA = 30
 _LINK = 3 << 2  #: Bits of the header that belong to the link; cflib sets them.
 
-#: Ports of console, parameters, memory, log, high-level commands, supervisor and pings: what comes
-#: from there is for the driver.
+#: Ports of console, parameters, memory, log, high-level commands, supervisor and pings, whose
+#: packets are for the driver.
 _OWN_PORTS = frozenset({0, 2, 4, 5, 8, 9, 15})
 
 
@@ -48,15 +144,10 @@ _OWN_PORTS = frozenset({0, 2, 4, 5, 8, 9, 15})
 class LogTopics:
     """Start a vehicle's log blocks and publish them."""
 
-    _handle: NodeHandle
-    _parameters: VehicleParameters
-    _crazyflie: Crazyflie
-    _delivery: Delivery
-    _fixed_frame: str
+    _context: VehicleContext
     _on_status: Callable[[], None]
-    #: voltage, rssi: Latest values of the battery (V) and the vehicle's reception (-dBm).
-    voltage: float | None = None
-    rssi: float | None = None
+    battery: Battery = field(init=False)
+    rssi: float | None = None  #: Latest strength of the vehicle's reception (-dBm).
     power_state: int | None = None  #: The firmware's pm.state.
     #: received_broadcasts, received_unicasts: Packets that the vehicle has counted, modulo 2^16.
     received_broadcasts: int = 0
@@ -77,29 +168,43 @@ class LogTopics:
     _states: int = 0
     _state_came: threading.Condition = field(default_factory=threading.Condition)
 
+    def __post_init__(self) -> None:
+        server = self._context.server
+        self.battery = Battery(
+            server.battery_low, server.battery_critical, server.battery_critical_time
+        )
+
+    @property
+    def is_flying(self) -> bool:
+        """Whether the vehicle logs that it flies; so it does for 2 s after a landing."""
+        return self.supervisor is not None and SupervisorState.FLYING in self.supervisor
+
     def start(self) -> None:
         """Announce the topics and start the log blocks; blocks.
 
         Raises `CrazyflieError` if a custom block is not possible.
         """
-        parameters = self._parameters
+        parameters = self._context.parameters
         if "packets" in parameters.topics:
             self._packets = self._publisher("packets", crtpPacket)
-        known = self._crazyflie.log.variables()
+        known = self._context.crazyflie.log.variables()
         self._heading = self._publisher("heading", Float32)
         self._start_status(known, self._publisher("rssi", Float32))
         self._start_variances(known)
-        selected = [topic for topic in telemetry.STANDARD if topic.name in parameters.topics]
-        groups, missing = telemetry.packed(selected, known)
+        selected = [topic for topic in STANDARD if topic.name in parameters.topics]
+        groups, missing = packed(selected, known)
         for name, variables in missing.items():
-            self._handle.warn(
-                f"{parameters.name}: no topic {name}: the firmware has no " + ", ".join(variables)
-            )
+            self._context.warn(f"no topic {name}: the firmware has no " + ", ".join(variables))
         for group in groups:
             self._start_standard(group)
         if parameters.enable_logging:
             for block in parameters.log_blocks:
                 self._start_custom(block)
+
+    def forget_state(self) -> None:
+        """Forget the state and the variances: those from before a loss are not those of now."""
+        self.supervisor = None
+        self.variances.clear()
 
     def next_state(self, limit: float) -> SupervisorState | None:
         """Return the state that comes next within a limit (s); None if none comes; blocks.
@@ -114,7 +219,7 @@ class LogTopics:
             return self.supervisor if is_there else None
 
     def publish_packet(self, port: int, channel: int, data: bytes) -> None:
-        """Publish a packet from the vehicle, if it is not one of the driver's own."""
+        """Publish a packet from the vehicle, unless it is for the driver; from any thread."""
         publisher = self._packets
         if publisher is None or port in _OWN_PORTS:
             return
@@ -123,7 +228,7 @@ class LogTopics:
             header=port << 4 | _LINK | channel,
             data=data[:_MOST_DATA].ljust(_MOST_DATA, b"\0"),
         )
-        self._delivery.submit_data(publisher.publish, message)
+        self._context.delivery.submit_data(publisher.publish, message)
 
     def _start_status(self, known, rssi_publisher):
         variables = tuple(variable for variable in STATUS_VARIABLES if variable in known)
@@ -134,21 +239,21 @@ class LogTopics:
         def deliver(_, values):
             latest = dict(zip(variables, values, strict=True))
             self._note_state(latest)
-            self._delivery.submit_data(self._note_status, latest, rssi_publisher)
+            self._context.delivery.submit_data(self._note_status, latest, rssi_publisher)
 
-        self._crazyflie.add_log_block(LogBlock("status", STATUS_PERIOD_MS, variables, deliver))
+        self._context.crazyflie.add_log_block(
+            LogBlock("status", STATUS_PERIOD_MS, variables, deliver)
+        )
 
     def _start_variances(self, known):
-        self.variances.is_logged = all(name in known for name in variances.VARIABLES)
+        self.variances.is_logged = all(name in known for name in VARIANCES)
         if self.variances.is_logged:
-            self._crazyflie.add_log_block(
-                LogBlock(
-                    "variances",
-                    variances.PERIOD_MS,
-                    variances.VARIABLES,
-                    lambda _, values: self.variances.add(tuple(values)),
-                )
+            self._context.crazyflie.add_log_block(
+                LogBlock("variances", VARIANCES_PERIOD_MS, VARIANCES, self._note_variances)
             )
+
+    def _note_variances(self, _, values):
+        self.variances.add(values)
 
     def _note_state(self, latest):
         # In the link's thread: the state is waited for where no callback has its turn.
@@ -159,7 +264,8 @@ class LogTopics:
                 self._state_came.notify_all()
 
     def _note_status(self, latest, rssi_publisher):
-        self.voltage = latest.get("pm.vbat")
+        if "pm.vbat" in latest:
+            self.battery.update(latest["pm.vbat"], self._context.handle.time())
         self.power_state = latest.get("pm.state")
         self.received_broadcasts = latest.get("radio.numRxBc", 0)
         self.received_unicasts = latest.get("radio.numRxUc", 0)
@@ -171,7 +277,7 @@ class LogTopics:
         if self.heading is not None:
             self._heading.publish(Float32(math.radians(self.heading)))
         # The Crazyradio's figure is the same, and comes without the firmware's help.
-        self.rssi = self._crazyflie.rssi
+        self.rssi = self._context.crazyflie.rssi
         if self.rssi is None:
             self.rssi = latest.get("radio.rssi")
         if self.rssi is not None:
@@ -203,27 +309,27 @@ class LogTopics:
         # The field is called frequency, and is a period.
         period = block.frequency - block.frequency % PERIOD_STEP_MS
         if period != block.frequency:
-            self._handle.warn(
-                f"{self._parameters.name}: log block {block.topic_name}: its period is "
-                f"{block.frequency} ms; the firmware counts in steps of {PERIOD_STEP_MS} ms: it "
-                f"comes every {period} ms"
+            self._context.warn(
+                f"log block {block.topic_name}: its period is {block.frequency} ms; the firmware "
+                f"counts in steps of {PERIOD_STEP_MS} ms: it comes every {period} ms"
             )
         self._add(block.topic_name, period, tuple(block.variables), publish)
 
     def _add(self, name, period_ms, variables, publish):
         def deliver(time_ms, values):
-            self._delivery.submit_data(publish, self._stamp(time_ms), values)
+            self._context.delivery.submit_data(publish, self._stamp(time_ms), values)
 
-        self._crazyflie.add_log_block(LogBlock(name, period_ms, variables, deliver))
+        self._context.crazyflie.add_log_block(LogBlock(name, period_ms, variables, deliver))
 
     def _publisher(self, name, message_type):
-        return self._handle.publisher(f"{self._parameters.prefix}/{name}", message_type)
+        return self._context.handle.publisher(f"{self._context.prefix}/{name}", message_type)
 
     def _stamp(self, time_ms):
-        if self._parameters.use_ros_time:
-            return self._handle.stamp()
+        if self._context.parameters.use_ros_time:
+            return self._context.handle.stamp()
         return genpy.Time(*divmod(time_ms * 1_000_000, 1_000_000_000))
 
     def _header(self, stamp, in_world):
-        frame = self._fixed_frame if in_world else self._parameters.frame
+        context = self._context
+        frame = context.server.fixed_frame if in_world else context.parameters.frame
         return Header(stamp=stamp, frame_id=frame)

@@ -11,7 +11,7 @@ from crazyflie_utils.parameters.types import ParameterType
 
 _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 
-#: Parameters that do something once instead of keeping a value: not for a vehicle in the air.
+#: Parameters that trigger an action instead of keeping a value: not for a vehicle in the air.
 _COMMANDS = ("kalman.resetEstimation",)
 
 
@@ -73,7 +73,7 @@ class ParameterMirror:
         full_name = f"{self._prefix}/{firmware_name.replace('.', '/')}"
         self.set(firmware_name, self._handle.get_param(full_name, _FirmwareValue()))
 
-    def set(self, name: str, value: int | float) -> None:
+    def set(self, name: str, value: float) -> None:
         """Write a parameter, named GROUP.NAME; the ROS parameter is then what is confirmed."""
         confirmed = self._crazyflie.parameters.write(name, value)
         self._written[name] = value

@@ -9,8 +9,7 @@ from std_msgs.msg import Empty, Header
 from std_srvs import srv as std_srvs
 from typing_extensions import override
 
-from crazyflie_driver.all_vehicles import AllVehicles
-from crazyflie_driver.channel import Channel
+from crazyflie_driver.all_vehicles import AllVehicles, Channel
 from crazyflie_driver.landings import Reason
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_driver.srv import (
@@ -31,8 +30,8 @@ ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"  #: Services of the server.
 
 _DIAGNOSTICS_PERIOD = 1.0
 _FLIGHTS_PERIOD = 0.2
-#: How long, in s, the end of the server waits for its vehicles to be removed, and each of these for
-#: the end of a landing, which it flies without a link, too.
+#: Time limit of the removal of all vehicles at the end of the server, and of a landing in it, s: a
+#: vehicle goes on landing without a link.
 _SHUTDOWN_LIMIT, _LANDING_LIMIT = 1.5, 0.5
 
 
@@ -70,7 +69,7 @@ class CrazyflieServerNode(Node):
         self._follow_flights()
 
     def shutdown(self) -> None:
-        """Have vehicles in the air land, stop the motors of all others, disconnect from all."""
+        """Land vehicles in the air, stop the motors of all others, disconnect from all."""
         wait(
             [vehicle.remove(_LANDING_LIMIT) for vehicle in list(self._vehicles.values())],
             _SHUTDOWN_LIMIT,
@@ -126,7 +125,7 @@ class CrazyflieServerNode(Node):
         if vehicle is None:
             known = ", ".join(each.parameters.uri for each in self._vehicles.values()) or "none"
             raise ServiceError(f"no vehicle {request.uri!r} has been added; known: {known}")
-        if vehicle.is_closing:
+        if vehicle.connection.is_closing():
             raise ServiceError(f"{request.uri} is being removed already")
         removed = vehicle.remove(self._parameters.landing_limit)
         return self._when_done(removed, self._finish_removing, vehicle)
@@ -139,13 +138,13 @@ class CrazyflieServerNode(Node):
         return RemoveCrazyflieResponse()
 
     def _on_emergency(self, _):
-        # To all at once, and then until each has obeyed.
+        # A broadcast reaches all at once; then each is sent its own until it has obeyed.
         for channel in self._channels.values():
             channel.broadcaster.send(BROADCAST_STOP, urgent=True)
         for vehicle in self._vehicles.values():
             name = vehicle.parameters.name
             try:
-                vehicle.emergency.latch()
+                vehicle.latch_emergency()
             except CrazyflieError as error:
                 self._handle.error(f"{name}: emergency stop, sent when there is a link: {error}")
             else:

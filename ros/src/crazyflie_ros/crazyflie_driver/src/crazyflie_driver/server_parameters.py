@@ -45,7 +45,7 @@ class SafetyParameters(Parameters):
 
 
 class LinkLimits(Parameters):
-    """With what the diagnostics warn of a link."""
+    """Limits of a link, beyond which the diagnostics warn."""
 
     min_quality: float = parameter(_SHARE, "with less of the pings answered they warn", 0.8)
     max_latency: float | None = parameter(

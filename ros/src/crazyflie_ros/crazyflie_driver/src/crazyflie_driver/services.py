@@ -1,27 +1,34 @@
-"""Services of one vehicle."""
+"""Services of one vehicle, and their names."""
 
-from collections.abc import Callable
+import math
+import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
+from typing_extensions import override
 
 from crazyflie_driver import srv
-from crazyflie_driver.command import SERVICE_TYPES, requested
-from crazyflie_driver.emergency import Emergency
-from crazyflie_driver.flight_commands import FlightCommands
+from crazyflie_driver.context import VehicleContext
+from crazyflie_driver.flight_commands import SERVICE_TYPES, FlightCommands, requested
 from crazyflie_driver.flight_state import FlightState
-from crazyflie_driver.jobs import Jobs
-from crazyflie_driver.parameter_mirror import ParameterMirror
-from crazyflie_driver.service_names import ServiceNames
-from crazyflie_driver.setpoint_gate import Event, SetpointGate
-from crazyflie_driver.setup_services import SetupServices
-from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_driver.jobs import Job
+from crazyflie_driver.parameter_mirror import ParameterMirror, parsed_name
+from crazyflie_driver.setpoint_gate import Event
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils import NodeHandle, ParameterError, ServiceError
+from crazyflie_utils.parameters.types import ParameterType
+
+#: Period and limit of the wait for a controller that has parameters, s.
+CONTROLLER_PERIOD, CONTROLLER_LIMIT = 0.1, 3.0
+#: Namespace, below the vehicle's, of services whose names belong to other nodes.
+ASIDE = "driver"
+_SHARED = {"takeoff", "land"}  #: Services of controllers, unless they are remapped.
+_SOLID_COLOR = 7  #: The firmware's ring.effect for a given color.
 
 
 @dataclass(eq=False)
@@ -32,31 +39,26 @@ class VehicleServices:
     before; all else is done at once.
     """
 
-    _handle: NodeHandle
-    _name: str
-    _prefix: str
-    _crazyflie: Crazyflie
-    _jobs: Jobs
-    _gate: SetpointGate
+    _context: VehicleContext
     _flight: FlightState
     _commands: FlightCommands
-    _emergency: Emergency
     _mirror: ParameterMirror
+    _latch_emergency: Callable[[], None]
 
     def __post_init__(self) -> None:
-        self._names = ServiceNames(self._handle, self._prefix)
+        self._names = ServiceNames(self._context.handle, self._context.prefix)
 
-    def wait_for_names(self, is_over: Callable[[], bool]) -> None:
+    def wait_for_names(self) -> None:
         """Wait for controllers whose services have these names; see `ServiceNames`."""
-        self._names.wait_for_controllers(is_over)
+        self._names.wait_for_controllers(self._context.connection.is_closing)
 
     def advertise(self) -> None:
         """Offer all services that the vehicle has."""
         offered: dict[str, tuple[type, Callable[[Any], Any]]] = {
             "emergency": (Empty, self._on_emergency),
             "arm": (SetBool, self._on_arm),
-            "update_params": (srv.UpdateParams, self._on_update_params),
-            "set_group_mask": (srv.SetGroupMask, self._on_set_group_mask),
+            "update_params": (srv.UpdateParams, self._job("update_params", self._update_params)),
+            "set_group_mask": (srv.SetGroupMask, self._job("set_group_mask", self._set_group_mask)),
             "upload_trajectory": (srv.UploadTrajectory, self._on_upload_trajectory),
             "upload_compressed_trajectory": (
                 srv.UploadCompressedTrajectory,
@@ -64,31 +66,36 @@ class VehicleServices:
             ),
             "notify_setpoints_stop": (srv.NotifySetpointsStop, self._on_notify_setpoints_stop),
             "send_packet": (srv.sendPacket, self._on_send_packet),
+            "recover": (Empty, self._job("recovery", self._recover)),
+            "set_led_color": (srv.SetLedColor, self._job("set_led_color", self._set_led_color)),
+            "store_params": (srv.UpdateParams, self._job("store_params", self._store)),
+            "clear_params": (srv.UpdateParams, self._job("clear_params", self._clear)),
+            "param_state": (srv.ParamState, self._job("param_state", self._state)),
+            "write_lighthouse": (
+                srv.WriteLighthouse,
+                self._job("write_lighthouse", self._write_lighthouse),
+            ),
         }
-        setup = SetupServices(
-            self._crazyflie, self._jobs, self._flight, self._emergency, self._mirror
-        )
-        offered.update(setup.services())
         for name, service_type in SERVICE_TYPES.items():
             offered[name] = service_type, partial(self._on_command, name, service_type)
-        if self._crazyflie.address.is_radio:
-            offered["reboot"] = Empty, self._on_reboot
+        if self._context.crazyflie.address.is_radio:
+            offered["reboot"] = Empty, self._job("reboot", self._reboot)
         names = self._names.free(offered)
         for name, (service_type, callback) in offered.items():
-            self._handle.advertise_service(names[name], service_type, callback)
+            self._context.handle.advertise_service(names[name], service_type, callback)
 
     # At once.
 
     def _on_emergency(self, _):
         try:
-            self._emergency.latch()
+            self._latch_emergency()
         except CrazyflieError as error:
             text = f"emergency stop may not have arrived, is sent when the link is back: {error}"
-            self._handle.error(f"{self._name}: {text}")
+            self._context.handle.error(f"{self._context.name}: {text}")
             raise ServiceError(text) from None
-        self._handle.error(
-            f"{self._name}: emergency stop; to fly again remove the vehicle, restart it and add "
-            "it again"
+        self._context.handle.error(
+            f"{self._context.name}: emergency stop; to fly again remove the vehicle, restart it "
+            "and add it again"
         )
         return EmptyResponse()
 
@@ -106,7 +113,7 @@ class VehicleServices:
             raise ServiceError(f"size is {packet.size}; a packet has at most {len(data)} bytes")
         port, channel = packet.header >> 4, packet.header & 3
         try:
-            self._crazyflie.send_packet(port, channel, data[: packet.size])
+            self._context.crazyflie.send_packet(port, channel, data[: packet.size])
         except CrazyflieError as error:
             raise ServiceError(str(error)) from None
         return srv.sendPacketResponse()
@@ -117,35 +124,20 @@ class VehicleServices:
         return self._commands.send(requested(name, request), service_type._response_class())
 
     def _on_arm(self, request):
+        context = self._context
+
         def work(_):
             try:
                 if request.data:
-                    self._emergency.refuse()
-                self._crazyflie.supervisor.arm(request.data)
+                    context.refuse_after_emergency()
+                context.crazyflie.supervisor.arm(request.data)
                 if request.data:
-                    self._gate.handle(Event.FLIGHT_CALLED)
+                    context.gate.handle(Event.FLIGHT_CALLED)
             except (CrazyflieError, ServiceError) as error:
                 return SetBoolResponse(False, str(error))
             return SetBoolResponse(True, "armed" if request.data else "disarmed")
 
-        return self._jobs.submit("arming", work)
-
-    def _on_update_params(self, request):
-        return self._submit("update_params", srv.UpdateParams, self._mirror.write, request.params)
-
-    def _on_set_group_mask(self, request):
-        set_mask = self._crazyflie.high_level.set_group_mask
-        return self._submit("set_group_mask", srv.SetGroupMask, set_mask, request.groupMask)
-
-    def _on_reboot(self, _):
-        return self._submit("reboot", Empty, self._reboot)
-
-    def _submit(self, name, service_type, call, *arguments):
-        def work(_):
-            call(*arguments)
-            return service_type._response_class()
-
-        return self._jobs.submit(name, work)
+        return context.jobs.submit("arming", work)
 
     def _on_upload_trajectory(self, request):
         pieces = [
@@ -156,11 +148,11 @@ class VehicleServices:
         ]
 
         def work(job):
-            trajectories = self._crazyflie.trajectories.guarded(lambda: job.is_valid)
+            trajectories = self._context.crazyflie.trajectories.guarded(job.may_send)
             trajectories.upload(request.trajectoryId, request.pieceOffset, pieces, job.check)
             return srv.UploadTrajectoryResponse()
 
-        return self._jobs.submit("upload_trajectory", work, is_flight=True)
+        return self._context.jobs.submit("upload_trajectory", work, is_flight=True)
 
     def _on_upload_compressed(self, request):
         start = (request.start.x, request.start.y, request.start.z, request.startYaw)
@@ -169,15 +161,80 @@ class VehicleServices:
         ]
 
         def work(job):
-            trajectories = self._crazyflie.trajectories.guarded(lambda: job.is_valid)
+            trajectories = self._context.crazyflie.trajectories.guarded(job.may_send)
             trajectories.upload_compressed(
                 request.trajectoryId, request.offset, start, segments, job.check
             )
             return srv.UploadCompressedTrajectoryResponse()
 
-        return self._jobs.submit("upload_compressed_trajectory", work, is_flight=True)
+        return self._context.jobs.submit("upload_compressed_trajectory", work, is_flight=True)
 
-    def _reboot(self):
+    def _job(self, name: str, work: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        def callback(request):
+            def run(_: Job) -> Any:
+                try:
+                    return work(request)
+                except ParameterError as error:
+                    raise ServiceError(str(error)) from None
+
+            return self._context.jobs.submit(name, run)
+
+        return callback
+
+    def _recover(self, _):
+        self._context.refuse_after_emergency()
+        self._context.crazyflie.supervisor.recover()
+        return EmptyResponse()
+
+    def _set_led_color(self, request):
+        color = request.color
+        parts = {"Red": color.r, "Green": color.g, "Blue": color.b}
+        for name, value in parts.items():
+            # One that is not a number is refused as well.
+            if not 0.0 <= value <= 1.0:
+                raise ServiceError(f"color: {name.lower()} is {value:g}; expected 0 to 1")
+        for name, value in parts.items():
+            self._mirror.set(f"ring.solid{name}", round(255 * value))
+        self._mirror.set("ring.effect", _SOLID_COLOR)
+        return srv.SetLedColorResponse()
+
+    def _store(self, request):
+        for name in map(parsed_name, request.params):
+            self._context.crazyflie.parameters.store(name)
+        return srv.UpdateParamsResponse()
+
+    def _clear(self, request):
+        for name in map(parsed_name, request.params):
+            self._context.crazyflie.parameters.clear(name)
+        return srv.UpdateParamsResponse()
+
+    def _state(self, request):
+        state = self._context.crazyflie.parameters.stored(parsed_name(request.param))
+        stored = math.nan if state.stored_value is None else state.stored_value
+        return srv.ParamStateResponse(state.is_stored, state.default_value, stored)
+
+    def _write_lighthouse(self, request):
+        state = self._flight.read()
+        if state is None or SupervisorState.FLYING in state:
+            words = "unknown" if state is None else state.words()
+            raise ServiceError(
+                "write_lighthouse moves the vehicle's estimate: expected it on the ground (2 s "
+                f"after a landing); its state is: {words}"
+            )
+        self._context.crazyflie.lighthouse.write_file(
+            request.file, self._context.crazyflie.parameters
+        )
+        return srv.WriteLighthouseResponse()
+
+    def _update_params(self, request):
+        self._mirror.write(request.params)
+        return srv.UpdateParamsResponse()
+
+    def _set_group_mask(self, request):
+        self._context.crazyflie.high_level.set_group_mask(request.groupMask)
+        return srv.SetGroupMaskResponse()
+
+    def _reboot(self, _):
         try:
             state = self._flight.read()
         except LinkLostError:
@@ -186,11 +243,78 @@ class VehicleServices:
             raise ServiceError(
                 "no reboot: it is not known whether the vehicle flies, and it would fall; on the "
                 "ground, remove the vehicle and call `rosrun crazyflie_tools reboot --uri "
-                f"{self._crazyflie.address.uri}`"
+                f"{self._context.parameters.uri}`"
             )
         if state & (SupervisorState.FLYING | SupervisorState.HIGH_LEVEL_ACTIVE):
             raise ServiceError(
                 "no reboot: the vehicle flies (until 2 s after a landing it says so) and would "
                 f"fall; its state is: {state.words()}"
             )
-        self._crazyflie.reboot()
+        self._context.crazyflie.reboot()
+        return EmptyResponse()
+
+
+@dataclass(eq=False)
+class ServiceNames:
+    """Names for a vehicle's services that belong to no other node; all methods block.
+
+    rosmaster gives a name to the node that registers it last, and callers of the other node get an
+    error about md5 sums. A controller in the vehicle's namespace, such as crazyflie_controller, has
+    services takeoff and land as well.
+    """
+
+    _handle: NodeHandle
+    _prefix: str
+
+    def wait_for_controllers(self, is_over: Callable[[], bool]) -> None:
+        """Wait for the services of controllers that are about to come, until ``is_over()``.
+
+        Their parameters are set before they start. They may also have been left by controllers that
+        ended long ago: therefore the wait has a limit.
+        """
+        names = self._handle.get_param(self._prefix or "/", _Controllers(), frozenset())
+        awaited = {f"{self._prefix}/{name}" for name in names}
+        end = time.monotonic() + CONTROLLER_LIMIT
+        while awaited and not is_over() and time.monotonic() < end:
+            awaited = {node for node in awaited if not self._is_ready(node)}
+            if awaited:
+                time.sleep(CONTROLLER_PERIOD)
+
+    def _is_ready(self, node):
+        offered = {
+            service.rpartition("/")[2]
+            for service, owner in self._handle.service_nodes().items()
+            if owner == node
+        }
+        return _SHARED <= offered
+
+    def free(self, names: Iterable[str]) -> dict[str, str]:
+        """Return the name, such as "takeoff", of each service -> a free absolute name."""
+        nodes = self._handle.service_nodes()
+        found = {}
+        for name in names:
+            desired = found[name] = f"{self._prefix}/{name}"
+            if desired in nodes:
+                found[name] = f"{self._prefix}/{ASIDE}/{name}"
+                self._handle.warn(
+                    f"{desired} is a service of {nodes[desired]}: the driver's is {found[name]}"
+                )
+        return found
+
+
+class _Controllers(ParameterType):
+    """A namespace; as a value, the names of the nodes in it that have gains of controllers."""
+
+    label = "dictionary"
+
+    @override
+    def __call__(self, value: object) -> frozenset[str]:
+        if not isinstance(value, dict):
+            raise ValueError
+        return frozenset(
+            name for name, below in value.items() if isinstance(below, dict) and "PIDs" in below
+        )
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return "a namespace"

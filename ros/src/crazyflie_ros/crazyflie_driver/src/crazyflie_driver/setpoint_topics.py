@@ -4,36 +4,103 @@ import contextlib
 import enum
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any, NamedTuple
 
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Point, PointStamped, PoseStamped, Quaternion, Twist, Vector3
 from std_msgs.msg import Empty
 
-from crazyflie_driver.lift_watch import LIMIT, MAX_TURN, LiftWatch
+from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.log_topics import LogTopics
-from crazyflie_driver.setpoint_gate import Event, SetpointGate
-from crazyflie_driver.setpoint_messages import EXTERNAL, SETPOINTS, Sender
-from crazyflie_driver.vehicle_parameters import VehicleParameters
+from crazyflie_driver.monitors import LIFT_LIMIT, MAX_TURN, LiftWatch
+from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
+from crazyflie_driver.setpoint_gate import Event
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils import NodeHandle
 
 CMD_VEL, CMD_STOP = "cmd_vel", "cmd_stop"
 
 _THROTTLE = 1.0
 _RATE_WINDOW = 1.0
 
-#: After zero thrust, silence of so long is the end of a stream, s; how often that is checked.
+#: Silence after zero thrust that ends a stream, s, and the period of the check, s.
 _REST, _REST_PERIOD = 0.5, 0.1
 
 
-class Control(enum.Enum):
-    """What the vehicle was sent last."""
+class Sender(NamedTuple):
+    """How the messages of a topic are sent, by ``send(crazyflie, message)``.
 
-    HIGH_LEVEL = enum.auto()
+    ``height_and_yaw(message)`` returns the height (m) and the yaw (degrees) that a setpoint asks
+    for; None for none.
+    """
+
+    message_type: type
+    send: Callable[[Crazyflie, Any], None]
+    height_and_yaw: Callable[[Any], tuple[float | None, float | None]] = lambda _: (None, None)
+
+
+def _full_state(crazyflie, message):
+    crazyflie.setpoints.full_state(
+        _xyz(message.pose.position),
+        _xyz(message.twist.linear),
+        _xyz(message.acc),
+        _xyzw(message.pose.orientation),
+        _xyz(message.twist.angular),
+    )
+
+
+def _external_pose(crazyflie, message):
+    pose = message.pose
+    crazyflie.localization.pose(_xyz(pose.position), _xyzw(pose.orientation))
+
+
+#: Topic -> how its messages are sent.
+SETPOINTS = {
+    "cmd_full_state": Sender(
+        FullState, _full_state, lambda m: (m.pose.position.z, _yaw(m.pose.orientation))
+    ),
+    "cmd_velocity_world": Sender(
+        VelocityWorld, lambda c, m: c.setpoints.velocity_world(*_xyz(m.vel), m.yawRate)
+    ),
+    "cmd_hover": Sender(
+        Hover,
+        lambda c, m: c.setpoints.hover(m.vx, m.vy, m.yawrate, m.zDistance),
+        lambda m: (m.zDistance, None),
+    ),
+    "cmd_position": Sender(
+        Position, lambda c, m: c.setpoints.position(m.x, m.y, m.z, m.yaw), lambda m: (m.z, m.yaw)
+    ),
+}
+
+#: The same of measured positions.
+EXTERNAL = {
+    "external_position": Sender(PointStamped, lambda c, m: c.localization.position(*_xyz(m.point))),
+    "external_pose": Sender(PoseStamped, _external_pose),
+}
+
+
+def _xyz(vector: Point | Vector3) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z
+
+
+def _xyzw(orientation: Quaternion) -> tuple[float, float, float, float]:
+    return orientation.x, orientation.y, orientation.z, orientation.w
+
+
+def _yaw(orientation: Quaternion) -> float:
+    # For quaternions of any norm.
+    x, y, z, w = _xyzw(orientation)
+    return math.degrees(math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z))
+
+
+class Control(enum.Enum):
+    """Kind of the command that the vehicle was sent last."""
+
+    HIGH_LEVEL = enum.auto()  #: Or the notice that setpoints stop.
     ZERO_THRUST = enum.auto()
     THRUST = enum.auto()
     REFERENCE = enum.auto()
@@ -48,12 +115,9 @@ class SetpointTopics:
     vehicle would be locked 2 s later.
     """
 
-    _handle: NodeHandle
-    _parameters: VehicleParameters
-    _crazyflie: Crazyflie
+    _context: VehicleContext
     _log: LogTopics
-    gate: SetpointGate
-    #: What the vehicle was sent last: setpoints, or the notice that they stop.
+    #: The kind of command that the vehicle was sent last.
     control: Control = Control.HIGH_LEVEL
     ignored: int = 0  #: Setpoints that were not sent.
     _times: deque[float] = field(default_factory=lambda: deque(maxlen=1000))
@@ -74,7 +138,7 @@ class SetpointTopics:
             self._subscribe(name, sender, self._on_setpoint)
         for name, sender in EXTERNAL.items():
             self._subscribe(name, sender, self._on_external)
-        self._handle.timer(_REST_PERIOD, self._end_stream_at_rest)
+        self._context.handle.timer(_REST_PERIOD, self._end_stream_at_rest)
 
     @property
     def is_streaming(self) -> bool:
@@ -93,18 +157,18 @@ class SetpointTopics:
 
     def rate(self) -> float:
         """Return how many setpoints were sent in the last second."""
-        now = self._handle.time()
+        now = self._context.handle.time()
         return sum(1 for time in self._times if now - time <= _RATE_WINDOW) / _RATE_WINDOW
 
     def can_land_autonomously(self) -> bool:
         """Return whether the vehicle's planner can land it, as far as its inputs show."""
         fed = self._external_time
-        is_fed = fed is not None and self._handle.time() - fed <= _RATE_WINDOW
+        is_fed = fed is not None and self._context.handle.time() - fed <= _RATE_WINDOW
         return is_fed or self.control is not Control.THRUST
 
     def send_zero_thrust(self) -> None:
         """Send zero thrust a hundred times, and that setpoints stop; blocks."""
-        self._crazyflie.setpoints.send_zero_thrust()
+        self._context.crazyflie.setpoints.send_zero_thrust()
         self._setpoints_stopped()
 
     def open_thrust_lock(self, state: SupervisorState | None) -> None:
@@ -114,9 +178,9 @@ class SetpointTopics:
         link was lost.
         """
         if state is None or SupervisorState.FLYING in state:
-            self._handle.warn(
-                f"{self._parameters.name}: the vehicle may be flying: its thrust stays locked "
-                "until a setpoint of zero thrust comes"
+            self._context.warn(
+                "the vehicle may be flying: its thrust stays locked until a setpoint of zero "
+                "thrust comes"
             )
         else:
             self.send_zero_thrust()
@@ -127,7 +191,7 @@ class SetpointTopics:
         The last setpoint still counts for some ms. At once means in the calling thread, which has
         to be the one that sends: see `Subsystem.guarded`.
         """
-        self._crazyflie.setpoints.notify_setpoints_stop(remain_valid_ms, at_once)
+        self._context.crazyflie.setpoints.notify_setpoints_stop(remain_valid_ms, at_once)
         self._setpoints_stopped()
 
     def _setpoints_stopped(self):
@@ -142,7 +206,9 @@ class SetpointTopics:
         """
         log, state = self._log, self._log.supervisor
         is_flying = None if state is None else SupervisorState.FLYING in state
-        finding = self._lift.sample(self._handle.time(), is_flying, log.height, log.vertical_speed)
+        finding = self._lift.sample(
+            self._context.handle.time(), is_flying, log.height, log.vertical_speed
+        )
         if finding is None or state is None:
             return
         words = [f"state: {state.words()}"]
@@ -155,14 +221,14 @@ class SetpointTopics:
             command += f", yaw {self._commanded_yaw:.0f} degrees"
         advice = "is it free, do all propellers turn, and is its own yaw commanded?"
         if finding.is_certain:
-            self.gate.handle(Event.NOT_LIFTED)
+            self._context.gate.handle(Event.NOT_LIFTED)
             # Without a link, which its state shows, the firmware stops the motors.
             with contextlib.suppress(CrazyflieError):
                 self.notify_setpoints_stop()
             advice += " Its motors are stopped, since it might leap; pause the stream to try again"
-        self._handle.warn(
-            f"{self._parameters.name}: was commanded to fly ({command}), and has not lifted off "
-            f"within {LIMIT:g} s ({', '.join(words)}): {advice}"
+        self._context.warn(
+            f"was commanded to fly ({command}), and has not lifted off within {LIFT_LIMIT:g} s "
+            f"({', '.join(words)}): {advice}"
         )
 
     def _check_heading(self):
@@ -177,25 +243,25 @@ class SetpointTopics:
         )
 
     def high_level_until(self, moment: float) -> None:
-        """Take note that a high-level command is carried out until a moment (s)."""
+        """Warn of setpoints until a high-level command has been carried out, at a time (s)."""
         self._high_level_end = moment
 
     def _subscribe(self, name, sender, callback):
-        topic = f"{self._parameters.prefix}/{name}"
-        self._handle.subscribe(topic, sender.message_type, partial(callback, name, sender))
+        topic = f"{self._context.prefix}/{name}"
+        self._context.handle.subscribe(topic, sender.message_type, partial(callback, name, sender))
 
     def _on_external(self, name, sender, message):
-        self._external_time = self._handle.time()
+        self._external_time = self._context.handle.time()
         self._send(name, sender, message)
 
     def _on_setpoint(self, name, sender, message):
-        now = self._handle.time()
+        now = self._context.handle.time()
         at_rest = name == CMD_STOP or (name == CMD_VEL and message.linear.z <= 0.0)
-        with self.gate.passing(now, at_rest) as refusal:
+        with self._context.gate.passing(now, at_rest) as refusal:
             is_sent = not refusal and self._send(name, sender, message)
             if is_sent:
                 if name == CMD_STOP:
-                    self.gate.stop(now)
+                    self._context.gate.stop(now)
                 self._times.append(now)
                 self.control, self._topic = _control(name, at_rest), name
         if refusal:
@@ -211,35 +277,38 @@ class SetpointTopics:
 
     def _send(self, name, sender, message):
         try:
-            sender.send(self._crazyflie, message)
+            sender.send(self._context.crazyflie, message)
         except CrazyflieError as error:
             self._warn(f"ignoring {name}: {error}", key=name)
             return False
         return True
 
     def _end_stream_at_rest(self):
-        if self.control is Control.ZERO_THRUST and self._handle.time() - self._times[-1] > _REST:
+        if (
+            self.control is Control.ZERO_THRUST
+            and self._context.handle.time() - self._times[-1] > _REST
+        ):
             # Without a link, which its state shows; it is tried again.
             with contextlib.suppress(CrazyflieError):
                 self.notify_setpoints_stop()
 
     def _warn(self, text, key):
-        name = self._parameters.name
-        self._handle.warn(f"{name}: {text}", throttle=_THROTTLE, key=(name, key))
+        name = self._context.name
+        self._context.handle.warn(f"{name}: {text}", throttle=_THROTTLE, key=(name, key))
 
     def _cmd_vel(self, message):
         # The link's pitch is the negative of cmd_vel's, and cflib negates it; tests compare bytes.
         # In this order a NaN stays one, and is refused.
         thrust = min(max(message.linear.z, 0.0), MAX_SETPOINT_PWM)
-        state = self._log.supervisor
+        parameters, state = self._context.parameters, self._log.supervisor
         if thrust > 0.0 and state is not None:
             if state & (SupervisorState.LOCKED | SupervisorState.CRASHED):
                 self._warn(f"cannot fly ({state.words()}): restart the vehicle", key="locked")
             elif SupervisorState.ARMED not in state:
-                self._warn(f"not armed, call {self._parameters.prefix}/arm", key="armed")
-        self._crazyflie.setpoints.attitude(
-            message.linear.y + self._parameters.roll_trim,
-            message.linear.x + self._parameters.pitch_trim,
+                self._warn(f"not armed, call {parameters.prefix}/arm", key="armed")
+        self._context.crazyflie.setpoints.attitude(
+            message.linear.y + parameters.roll_trim,
+            message.linear.x + parameters.pitch_trim,
             message.angular.z,
             thrust,
         )

@@ -1,15 +1,24 @@
-"""The state of a vehicle and its link, in a sentence and as diagnostics."""
+"""The state of a vehicle and its link: as topics, in a sentence and as diagnostics."""
 
+import contextlib
 import math
+from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from std_msgs.msg import Bool, Header, String
 
-from crazyflie_driver import battery
+from crazyflie_driver.context import VehicleContext
+from crazyflie_driver.log_topics import LogTopics
+from crazyflie_driver.monitors import Charge, battery_words
 from crazyflie_driver.server_parameters import LinkLimits
+from crazyflie_driver.setpoint_topics import SetpointTopics
+from crazyflie_driver.vehicle_parameters import CONNECTED_TOPIC, STATUS_TOPIC, VEHICLE_STATUS_TOPIC
+from crazyflie_link.broadcast import Broadcaster
+from crazyflie_link.errors import LinkLostError
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import VehicleStatus
 
-_FEW_PACKETS = 10  #: Of so few packets in a second the share that is received means nothing.
+_FEW_PACKETS = 10  #: With fewer packets in a second the share that is received means nothing.
 
 _DEFAULTS = LinkLimits.from_mapping({})
 
@@ -38,8 +47,8 @@ def findings(status: VehicleStatus, limits: LinkLimits = _DEFAULTS) -> list[tupl
         found.append((error, f"cannot fly: {faults.words()}"))
     if status.battery >= VehicleStatus.BATTERY_LOW:
         level = error if status.battery == VehicleStatus.BATTERY_CRITICAL else warn
-        charge = battery.Charge(status.battery)
-        found.append((level, battery.words(charge, status.battery_voltage)))
+        text = battery_words(Charge(status.battery), status.battery_voltage)
+        found.append((level, text))
     if status.link == VehicleStatus.CONNECTED and status.are_setpoints_blocked:
         found.append((warn, _BLOCKED))
     found += [(warn, f"poor link: {text}") for text in _link_faults(status, limits)]
@@ -84,7 +93,7 @@ def words(status: VehicleStatus) -> str:
     if status.are_setpoints_blocked:
         reasons.append(_BLOCKED)
     if status.battery >= VehicleStatus.BATTERY_LOW:
-        reasons.append(f"battery {battery.Charge(status.battery).name.lower()}")
+        reasons.append(f"battery {Charge(status.battery).name.lower()}")
     if status.is_link_poor:
         reasons.append("poor link")
     if status.restarts:
@@ -124,3 +133,125 @@ def diagnostics(
 
 def _number(value, factor, digits):
     return "unknown" if math.isnan(value) else f"{factor * value:.{digits}f}"
+
+
+PERIOD = 1.0  #: Period at which both are repeated, s: their absence shows that the driver is gone.
+
+_LINKS = {name: value for value, name in LINK_NAMES.items()}
+
+#: Fields of which a change is published at once.
+_STATES = ("text", "link", "supervisor", "has_supervisor", "is_emergency", "battery", "is_streamed")
+_MOST = 1 << 15  #: Packets in a second. The vehicle counts in 16 bits; more is its restart.
+
+
+@dataclass(eq=False)
+class StatusPublisher:
+    """Publish the status of a vehicle, in words and typed, and whether it is connected."""
+
+    _context: VehicleContext
+    _log: LogTopics
+    _setpoints: SetpointTopics
+    broadcaster: Broadcaster | None = None  #: Counts what is sent to all vehicles of its channel.
+    # Counts of received and sent broadcasts, received and sent unicasts; and in the last period.
+    _counts: tuple[int, ...] = (0, 0, 0, 0)
+    _in_period: tuple[int, ...] = (0, 0, 0, 0)
+    _published: VehicleStatus | None = None
+    _is_connected: bool = False
+
+    def __post_init__(self) -> None:
+        handle, prefix = self._context.handle, self._context.prefix
+        self._text = handle.publisher(f"{prefix}/{STATUS_TOPIC}", String, latch=True)
+        self._typed = handle.publisher(
+            f"{prefix}/{VEHICLE_STATUS_TOPIC}", VehicleStatus, latch=True
+        )
+        self._connected = handle.publisher(f"{prefix}/{CONNECTED_TOPIC}", Bool, latch=True)
+        self._connected.publish(Bool(False))
+        handle.timer(PERIOD, self._repeat)
+
+    def status(self) -> VehicleStatus:
+        """Return what is known of the vehicle now."""
+        context, battery = self._context, self._log.battery
+        crazyflie, state = context.crazyflie, self._log.supervisor
+        message = VehicleStatus(
+            header=Header(stamp=context.handle.stamp()),
+            link=_LINKS[crazyflie.state.value],
+            link_text=context.connection.text,
+            supervisor=int(state or 0),
+            has_supervisor=state is not None,
+            is_emergency=context.gate.is_emergency,
+            battery=int(battery.charge),
+            battery_voltage=_or_nan(battery.voltage),
+            link_quality=math.nan,
+            latency=math.nan,
+            last_heard=math.nan,
+            rssi=_or_nan(self._log.rssi),
+            is_streamed=self._setpoints.is_streaming,
+            setpoint_rate=self._setpoints.rate(),
+            setpoints_ignored=self._setpoints.ignored,
+            are_setpoints_blocked=context.gate.is_blocking(context.handle.time()),
+            restarts=crazyflie.restarts,
+            pm_state=_power_state(self._log.power_state),
+            supervisor_info=int(state or 0),
+        )
+        (
+            message.num_rx_broadcast,
+            message.num_tx_broadcast,
+            message.num_rx_unicast,
+            message.num_tx_unicast,
+        ) = self._in_period
+        # Without a link there are no figures.
+        with contextlib.suppress(LinkLostError):
+            message.link_quality = crazyflie.quality()
+            message.is_link_poor = crazyflie.is_poor()
+            message.latency = crazyflie.latency()
+            message.latency_unicast = _milliseconds(message.latency)
+            message.last_heard = crazyflie.age()
+        message.text = words(message)
+        return message
+
+    def publish(self) -> None:
+        """Publish what is new."""
+        message = self.status()
+        before, self._published = self._published, message
+        if any(getattr(message, name) != getattr(before, name, None) for name in _STATES):
+            self._typed.publish(message)
+        if before is None or message.text != before.text:
+            self._text.publish(String(message.text))
+        is_connected = message.link == VehicleStatus.CONNECTED
+        self.publish_connected(is_connected and self._context.connection.is_ready())
+
+    def publish_connected(self, is_connected: bool) -> None:
+        """Publish whether the vehicle is connected, if that is new."""
+        if is_connected != self._is_connected:
+            self._is_connected = is_connected
+            self._connected.publish(Bool(is_connected))
+
+    def _count_packets(self):
+        log, broadcaster = self._log, self.broadcaster
+        sent = 0 if broadcaster is None else broadcaster.sent
+        counts = (
+            log.received_broadcasts,
+            sent,
+            log.received_unicasts,
+            self._context.crazyflie.sent,
+        )
+        new = [(now - before) & 0xFFFF for now, before in zip(counts, self._counts, strict=True)]
+        self._counts = counts
+        self._in_period = tuple(count if count < _MOST else 0 for count in new)
+
+    def _repeat(self):
+        self._count_packets()
+        self._typed.publish(self.status())
+        self._connected.publish(Bool(self._is_connected))
+
+
+def _or_nan(value):
+    return math.nan if value is None else value
+
+
+def _power_state(state):
+    return VehicleStatus.PM_STATE_UNKNOWN if state is None else state & 0xFF
+
+
+def _milliseconds(latency):
+    return min(round(1000.0 * latency), 0xFFFF) if math.isfinite(latency) else 0

@@ -1,108 +1,107 @@
 """One vehicle of the server: its link, topics and services, from adding to removing."""
 
+import threading
+import time
+from collections.abc import Callable
 from concurrent.futures import Future
 
-from crazyflie_driver.battery import Battery
-from crazyflie_driver.connection import Connection
-from crazyflie_driver.delivery import Delivery
-from crazyflie_driver.emergency import Emergency
+from crazyflie_driver.context import Connection, ConnectionEvent, ConnectionState, VehicleContext
 from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.flight_state import FlightState
-from crazyflie_driver.jobs import Jobs
-from crazyflie_driver.landings import Landings
-from crazyflie_driver.lifecycle import Lifecycle
+from crazyflie_driver.jobs import Delivery, Job, Jobs
+from crazyflie_driver.landings import Landings, Reason
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_driver.services import VehicleServices
-from crazyflie_driver.setpoint_gate import SetpointGate
+from crazyflie_driver.setpoint_gate import Event, SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
-from crazyflie_driver.shutdown import Shutdown
-from crazyflie_driver.status_publisher import StatusPublisher
+from crazyflie_driver.status import StatusPublisher
 from crazyflie_driver.vehicle_parameters import VehicleParameters
-from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_utils import NodeHandle
+from crazyflie_link.crazyflie import Crazyflie, LinkState
+from crazyflie_link.errors import CrazyflieError, NoAnswerError
+from crazyflie_link.transmission import REPLY_LIMIT
+from crazyflie_model.supervisor import SupervisorState
+from crazyflie_utils import NodeHandle, ServiceError
+
+PAUSE = 0.2  #: Between two attempts to connect, s.
+
+_EMERGENCY_LIMIT = 1.0  #: Time limit of the vehicle's confirmation of an emergency stop, s.
+_LOOK_PERIOD = 0.1
+_REACTION_TIME = 0.3  #: Time after which the vehicle has begun to land, s.
+
+
+def connect_within(
+    limit: float,
+    connect: Callable[[], None],
+    is_closing: Callable[[], bool],
+    clock: Callable[[], float] = time.monotonic,
+    sleep: Callable[[float], None] = time.sleep,
+) -> None:
+    """Call ``connect()`` repeatedly while the vehicle does not answer; blocks.
+
+    Raises the last `NoAnswerError` after a limit (s) or once ``is_closing()``; other errors at
+    once.
+    """
+    end = clock() + limit
+    while True:
+        try:
+            return connect()
+        except NoAnswerError:
+            if is_closing() or clock() >= end:
+                raise
+        sleep(PAUSE)
 
 
 class DriverVehicle:
     """A vehicle that is being connected, is connected, or has lost its link.
 
-    What takes time are jobs of the vehicle's own, so that no vehicle blocks another. Raises
+    Calls that take time are jobs of the vehicle, so that no vehicle blocks another. Raises
     `CrazyflieError` if the address is malformed.
     """
 
     def __init__(
-        self,
-        handle: NodeHandle,
-        parameters: VehicleParameters,
-        server: CrazyflieServerParameters,
+        self, handle: NodeHandle, parameters: VehicleParameters, server: CrazyflieServerParameters
     ):
-        name, prefix = parameters.name, parameters.prefix
+        # Of the server: messages go out through it after the vehicle's own is closed, too.
+        self._handle = handle
         self.parameters = parameters
-        self._limit = server.connect_limit
-        own = handle.child()
-        self.crazyflie = crazyflie = Crazyflie(
+        self.crazyflie = Crazyflie(
             parameters.uri,
             reconnect=True,
-            on_state=lambda state, text: self._lifecycle.on_link_state(state, text),
-            on_console=lambda line: own.info(f"{name}: {line}"),
-            on_packet=lambda *packet: self._lifecycle.on_packet(*packet),
+            on_state=self._on_link_state,
+            on_console=self._on_console,
+            on_packet=self._on_packet,
         )
-        gate = SetpointGate()
-        self.jobs = jobs = Jobs(name, lambda text: handle.error(f"{name}: {text}"))
-        self.battery = battery = Battery(
-            server.battery_low, server.battery_critical, server.battery_critical_time
-        )
-        delivery = Delivery(own, name)
-        self._connection = connection = Connection(
-            handle, own, name, crazyflie, gate, jobs, delivery, lambda: self.status.publish()
-        )
-        frame = server.fixed_frame
-        self._log = log = LogTopics(
-            own, parameters, crazyflie, delivery, frame, lambda: self._lifecycle.on_log()
-        )
-        self.setpoints = setpoints = SetpointTopics(own, parameters, crazyflie, log, gate)
-        self.flight = flight = FlightState(own, crazyflie, log, setpoints)
-        self.status = status = StatusPublisher(
-            own, prefix, crazyflie, log, setpoints, battery, connection
-        )
-        self.emergency = emergency = Emergency(crazyflie, gate, jobs, status.publish)
-        self.commands = commands = FlightCommands(
-            own, name, crazyflie, setpoints, flight, battery, emergency, jobs, server
-        )
-        self.landings = landings = Landings(
-            own, name, battery, log, setpoints, commands, server.landing_duration
-        )
-        mirror = ParameterMirror(own, prefix, crazyflie)
-        services = VehicleServices(
-            own, name, prefix, crazyflie, jobs, gate, flight, commands, emergency, mirror
-        )
-        self._lifecycle = Lifecycle(
+        name, own = parameters.name, handle.child()
+        self.gate = SetpointGate()
+        self.jobs = Jobs(name, self._on_failed_job)
+        self.connection = Connection(f"connecting to {parameters.uri}")
+        self._context = context = VehicleContext(
             own,
             parameters,
-            connection,
-            log,
-            setpoints,
-            flight,
-            battery,
-            commands,
-            landings,
-            mirror,
-            services,
-            status,
+            server,
+            self.crazyflie,
+            self.gate,
+            self.jobs,
+            Delivery(own, name),
+            self.connection,
         )
-        self._shutdown = Shutdown(own, name, crazyflie, emergency, flight, setpoints, landings)
-        status.publish()
-
-    @property
-    def is_closing(self) -> bool:
-        """Whether the vehicle is being removed."""
-        return self._connection.is_closing
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether the vehicle has been connected, and its services are there."""
-        return self._connection.is_established and not self.is_closing
+        self.log = LogTopics(context, self._on_log)
+        self.setpoints = SetpointTopics(context, self.log)
+        self.flight = FlightState(context, self.log, self.setpoints)
+        self.status = StatusPublisher(context, self.log, self.setpoints)
+        self.commands = FlightCommands(context, self.log, self.setpoints, self.flight)
+        self.landings = Landings(context, self.log, self.setpoints, self.commands)
+        self._mirror = ParameterMirror(own, parameters.prefix, self.crazyflie)
+        self._services = VehicleServices(
+            context, self.flight, self.commands, self._mirror, self.latch_emergency
+        )
+        # Held while topics and services are announced, or taken down.
+        self._announcing = threading.Lock()
+        # Number of the link on which the vehicle was set up last.
+        self._connection_count = 0
+        self.status.publish()
 
     def connect(self) -> Future[None]:
         """Connect and announce all topics and services; the result is None.
@@ -110,15 +109,196 @@ class DriverVehicle:
         The future fails with `ServiceError` when that is not possible; then nothing
         remains of the vehicle.
         """
-        return self.jobs.submit("connecting", lambda _: self._lifecycle.connect(self._limit))
+        return self.jobs.submit("connecting", self._connect)
+
+    def latch_emergency(self) -> None:
+        """Stop the motors at once, until the vehicle is removed; does not block.
+
+        Raises `LinkLostError` if the vehicle is not heard; the stop is repeated until it arrives.
+        """
+        self.gate.handle(Event.EMERGENCY_STOP)
+        self.crazyflie.supervisor.emergency_stop()
+        self.jobs.supersede("the emergency stop")
+        self.status.publish()
+        self.crazyflie.link()
 
     def remove(self, limit: float) -> Future[str]:
-        """Land, stop the motors, end the link, take topics and services down.
+        """Land, stop the motors, end the link, take topics and services down; does not block.
 
         Also while the vehicle is being connected, or its jobs are blocked by it. The limit (s) is
-        that of a landing: the vehicle lands without its link, too. The result is what could not be
-        done.
+        that of a landing: the vehicle lands without its link, too. The result says what could not
+        be done, and is empty after a success.
         """
-        self._connection.is_closing = True
+        self.connection.handle(ConnectionEvent.REMOVAL)
         self.status.publish_connected(False)
-        return self._connection.close(lambda: self._shutdown.land_or_stop(limit))
+        self.gate.handle(Event.REMOVAL)
+        self.jobs.supersede("the removal")
+        done: Future[str] = Future()
+        name = f"{self.parameters.name}-close"
+        threading.Thread(target=self._remove, args=(limit, done), name=name, daemon=True).start()
+        return done
+
+    # Connecting and the end, in threads that may block.
+
+    def _connect(self, _: Job) -> None:
+        limit = self._context.server.connect_limit
+        try:
+            connect_within(limit, self.crazyflie.connect, self.connection.is_closing)
+            self.connection.handle(ConnectionEvent.LINK_OPENED)
+            self._services.wait_for_names()
+            with self._announcing:
+                if self.connection.is_closing():
+                    raise ServiceError("removed while connecting")
+                self._connection_count = self.crazyflie.connection_count
+                self._announce()
+                self.connection.handle(ConnectionEvent.ANNOUNCED)
+        except BaseException:
+            self.connection.handle(ConnectionEvent.REMOVAL)
+            self._end()
+            raise
+        self._context.delivery.submit(self.status.publish)
+        self._handle.info(f"{self.parameters.name}: connected to {self.parameters.uri}")
+
+    def _announce(self):
+        self.log.start()
+        if self.parameters.enable_parameters:
+            self._mirror.publish()
+        if not self.gate.is_emergency:
+            self.setpoints.open_thrust_lock(self.flight.read())
+        self._services.advertise()
+        self.setpoints.subscribe()
+        self.commands.start()
+
+    def _resume(self, _: Job) -> None:
+        # On a new link the vehicle is set up again, once.
+        count = self.crazyflie.connection_count
+        try:
+            if self.gate.is_emergency or self._connection_count == count:
+                return
+            self._connection_count = count
+            for problem in self._mirror.reapply_parameters():
+                self._context.warn(f"not written again: {problem}")
+            if self.parameters.enable_parameters:
+                self._mirror.publish()
+            self.setpoints.open_thrust_lock(self.flight.read())
+        finally:
+            self.connection.handle(ConnectionEvent.RESUMED)
+
+    def _remove(self, limit, done):
+        try:
+            problem = self._land_or_stop(limit)
+            self._end()
+        except BaseException as error:
+            done.set_exception(error)
+        else:
+            done.set_result(problem)
+
+    def _end(self):
+        # First the link: its end ends the wait for answers in `_connect`.
+        self.crazyflie.close()
+        with self._announcing:
+            self._context.handle.close()
+        self._context.delivery.close()
+        self.jobs.close()
+        self.connection.handle(ConnectionEvent.REMOVED)
+
+    def _land_or_stop(self, limit):
+        # Land a vehicle that flies and can land by itself, stop the motors of any other. The
+        # firmware lands without a link, too; zero thrust would stop it in the air: so nothing is
+        # sent to a vehicle of which neither supervisor nor log report whether it flies.
+        problem = ""
+        try:
+            if self.gate.is_emergency:
+                wait = self.crazyflie.supervisor.wait_for_emergency_stop
+                if not wait(min(limit, _EMERGENCY_LIMIT)):
+                    problem = "the emergency stop is not confirmed"
+            elif self.crazyflie.connection_count:
+                state = self.flight.read()
+                if state is not None:
+                    self._leave(state, limit)
+                else:
+                    # Raises if the link has been lost meanwhile.
+                    self.crazyflie.link()
+                    self._context.warn("it is not known whether the vehicle flies: nothing is sent")
+        except (CrazyflieError, ServiceError, TimeoutError) as error:
+            problem = f"its motors could not be stopped: {error}"
+        if problem:
+            self._context.warn(problem)
+        return problem
+
+    def _leave(self, state, limit):
+        setpoints = self.setpoints
+        is_flying = SupervisorState.FLYING in state
+        on_setpoints = is_flying and setpoints.runs_motors and setpoints.can_land_autonomously()
+        if self.flight.is_high_level(state) or on_setpoints:
+            end = time.monotonic() + limit
+            self.landings.begin(Reason.REMOVAL).result(REPLY_LIMIT + limit)
+            if not self._has_landed(end):
+                return
+        elif is_flying and not setpoints.is_streaming:
+            # It has landed less than 2 s ago, and is not locked by silence; or another client
+            # flies it.
+            return
+        # Otherwise the vehicle would be locked 2 s after the last setpoint.
+        setpoints.send_zero_thrust()
+
+    def _has_landed(self, end):
+        time.sleep(min(_REACTION_TIME, max(0.0, end - time.monotonic())))
+        while True:
+            state = self.flight.read()
+            if state is not None:
+                # FLYING holds until 2 s after the motors have stopped.
+                reported = SupervisorState.HIGH_LEVEL_ACTIVE
+                if (reported if state.reports_planner else SupervisorState.FLYING) not in state:
+                    return True
+            if time.monotonic() > end:
+                return False
+            time.sleep(_LOOK_PERIOD)
+
+    # Events of the link, in its own threads, where nothing may wait for the callbacks' turn: at the
+    # end the node waits for the end of the link.
+
+    def _on_link_state(self, state: LinkState, text: str) -> None:
+        connection = self.connection
+        connection.text = text
+        if state is LinkState.LOST:
+            self.log.forget_state()
+            self.gate.handle(Event.LINK_LOST)
+            connection.handle(ConnectionEvent.LINK_LOST)
+        elif state is LinkState.CONNECTED:
+            self.gate.handle(Event.LINK_BACK)
+            is_known = self.crazyflie.connection_count == self._connection_count
+            connection.handle(
+                ConnectionEvent.LINK_HEARD if is_known else ConnectionEvent.LINK_RENEWED
+            )
+        if not connection.is_closing():
+            self._context.delivery.submit(self._report, state, text)
+
+    def _on_packet(self, port, channel, data):
+        if not self.connection.is_closing():
+            self.log.publish_packet(port, channel, data)
+
+    def _on_console(self, line):
+        self._handle.info(f"{self.parameters.name}: {line}")
+
+    def _on_failed_job(self, text):
+        self._handle.error(f"{self.parameters.name}: {text}")
+
+    # In turn with the callbacks of the node.
+
+    def _report(self, state, text):
+        self.status.publish()
+        name = self.parameters.name
+        if state is LinkState.LOST:
+            self._handle.error(f"{name}: {text}; trying to connect again")
+        elif state is LinkState.CONNECTED and self.connection.is_ready():
+            self._handle.warn(f"{name}: {text}")
+            if self.connection.state is ConnectionState.RESUMING:
+                self.jobs.submit("taking up the link again", self._resume)
+
+    def _on_log(self):
+        self.landings.follow()
+        if self.log.is_flying and self.crazyflie.state is LinkState.CONNECTED:
+            self.gate.handle(Event.FLIGHT_REPORTED)
+        self.setpoints.check_lift()
+        self.status.publish()

@@ -11,14 +11,7 @@ from crazyflie_driver.srv import AddCrazyflieRequest
 from crazyflie_link.log import LONGEST_PERIOD_MS, SHORTEST_PERIOD_MS
 from crazyflie_utils import ParameterError, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, read_parameter
-from crazyflie_utils.parameters.types import (
-    BOOLEAN,
-    TEXT,
-    Integer,
-    ListOf,
-    Number,
-    ParameterType,
-)
+from crazyflie_utils.parameters.types import BOOLEAN, TEXT, Integer, ListOf, Number, ParameterType
 
 STATUS_TOPIC = "status"  #: Topic with the state of a vehicle in words.
 #: The same with more details, as crazyflie_msgs/VehicleStatus.

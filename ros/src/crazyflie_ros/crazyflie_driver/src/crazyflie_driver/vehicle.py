@@ -219,7 +219,9 @@ class DriverVehicle:
                 else:
                     # Raises if the link has been lost meanwhile.
                     self.crazyflie.link()
-                    self._context.warn("it is not known whether the vehicle flies: nothing is sent")
+                    self._context.warn(
+                        "it is not known whether the vehicle flies: it is left as it is"
+                    )
         except (CrazyflieError, ServiceError, TimeoutError) as error:
             problem = f"its motors could not be stopped: {error}"
         if problem:

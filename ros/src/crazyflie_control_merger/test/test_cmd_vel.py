@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_control_merger.cmd_vel import cmd_vel_from_control
+from crazyflie_control_merger.cmd_vel_converter_node import cmd_vel_from_control
 
 values = st.floats(-10.0, 10.0)
 

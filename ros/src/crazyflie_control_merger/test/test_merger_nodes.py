@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from crazyflie_control_merger.no_yaw_merger_node import NoYawMergerNode
-from crazyflie_control_merger.regular_control_merger_node import RegularControlMergerNode
+from crazyflie_control_merger.merger_nodes import NoYawMergerNode, RegularControlMergerNode
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import rospkg
 
-from crazyflie_control_merger.regular_control_merger_node import RegularControlMergerNode
+from crazyflie_control_merger.merger_nodes import RegularControlMergerNode
 from crazyflie_geofence.geofence import Braking, Geofence
 from crazyflie_geofence.geofence_node import GeofenceNode
 from crazyflie_msgs.msg import (

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from crazyflie_package_generator.command import main
-from crazyflie_package_generator.generator import GeneratorError, Package, check_name
+from crazyflie_package_generator.generator import GeneratorError, Package, check_name, main
 from crazyflie_utils.parameters.tables import with_tables
 
 BUILD_LIMIT = 900.0

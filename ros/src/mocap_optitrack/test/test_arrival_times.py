@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from mocap_optitrack.arrival_times import ArrivalTimes
+from mocap_optitrack.frame_times import ArrivalTimes
 
 READING = 0.0001
 """How long it takes to read a frame that is there, s."""

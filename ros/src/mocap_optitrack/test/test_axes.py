@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mocap_optitrack.axes import heading, normalized, to_z_up
+from mocap_optitrack.frames import heading, normalized, to_z_up
 
 COMPONENT = st.floats(-1.0, 1.0)
 QUATERNIONS = (

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mocap_optitrack.clock_offset import ClockOffset, FrameOrder
+from mocap_optitrack.frame_times import ClockOffset, FrameOrder
 
 PERIOD = 0.01
 

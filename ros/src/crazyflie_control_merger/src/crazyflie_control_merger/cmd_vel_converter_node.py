@@ -1,13 +1,31 @@
-"""ROS interface of the conversion to cmd_vel."""
+"""Controls in the form that the radio driver expects on cmd_vel, and its ROS interface."""
+
+import math
 
 from geometry_msgs.msg import Twist, Vector3
 from typing_extensions import override
 
-from crazyflie_control_merger.cmd_vel import cmd_vel_from_control
+from crazyflie_model.units import pwm_from_thrust
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TOPIC
 from crazyflie_utils.vectors import to_vector
+
+Vector = tuple[float, float, float]
+
+
+def cmd_vel_from_control(
+    roll: float, pitch: float, yaw_dot: float, thrust: float
+) -> tuple[Vector, Vector]:
+    """Return the two vectors of the twist that carries a control.
+
+    From rad, rad/s (counter-clockwise) and m/s^2 to linear (pitch in degrees, roll in degrees,
+    thrust in PWM, which the driver limits) and angular (0, 0, yaw rate in deg/s, clockwise).
+    """
+    return (
+        (math.degrees(pitch), math.degrees(roll), float(pwm_from_thrust(thrust))),
+        (0.0, 0.0, -math.degrees(yaw_dot)),
+    )
 
 
 class CmdVelConverterParameters(Parameters):

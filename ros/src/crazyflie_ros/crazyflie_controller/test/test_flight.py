@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from closed_loop import PERIOD, Loop, control_from_cmd_vel
 
-from crazyflie_control_merger.cmd_vel import cmd_vel_from_control
+from crazyflie_control_merger.cmd_vel_converter_node import cmd_vel_from_control
 from crazyflie_controller.flight import HOLD_LIMIT, OFF_AGE, State
 from crazyflie_controller.go_to import Pose, Setpoint
 from crazyflie_utils.refusal import RefusalError

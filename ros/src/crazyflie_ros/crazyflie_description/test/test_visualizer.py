@@ -10,8 +10,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
 from crazyflie_description import visualizer_node
-from crazyflie_description.flown_path import FlownPath, circle
-from crazyflie_description.visualizer_node import PERIOD, SPACING, VisualizerNode
+from crazyflie_description.visualizer_node import PERIOD, SPACING, FlownPath, VisualizerNode, circle
 from crazyflie_msgs.msg import (
     PositionVelocityState,
     PositionVelocityStateStamped,

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing_extensions import override
 
 from mocap_optitrack import library_worker
-from mocap_optitrack.arrival_times import ArrivalTimes
+from mocap_optitrack.frame_times import ArrivalTimes
 from mocap_optitrack.frames import Body, Frame
 from mocap_optitrack.source import Source, SourceError
 

@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mocap_optitrack.frames import Vector3
-from mocap_optitrack.marker_assignment import assign
-from mocap_optitrack.marker_motion import MarkerMotion, MotionLimits
+from mocap_optitrack.marker_motion import MarkerMotion, MotionLimits, assign
 from mocap_optitrack.marker_vehicle import (
     FORGET_TIME,
     SEPARATION,

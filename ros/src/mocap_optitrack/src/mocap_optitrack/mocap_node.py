@@ -21,8 +21,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 from typing_extensions import override
 
 from crazyflie_utils import Node, NodeHandle
-from mocap_optitrack.axes import heading
-from mocap_optitrack.frames import Frame
+from mocap_optitrack.frames import Frame, heading
 from mocap_optitrack.health import ERROR, Health
 from mocap_optitrack.library_source import LibrarySource
 from mocap_optitrack.natnet_source import NatNetSource

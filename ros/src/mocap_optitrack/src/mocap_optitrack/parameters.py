@@ -17,7 +17,6 @@ from crazyflie_utils.parameters.types import (
     ParameterType,
     Text,
 )
-from mocap_optitrack.axes import UP_AXES
 from mocap_optitrack.bodies import (
     Bodies,
     Body,
@@ -26,6 +25,7 @@ from mocap_optitrack.bodies import (
     SingleMarkerDictionary,
     shared_outputs,
 )
+from mocap_optitrack.frames import UP_AXES
 from mocap_optitrack.library_source import SYSTEMS
 
 NATNET = "natnet"  #: Backend of OptiTrack; the others are `library_source.SYSTEMS`.

@@ -4,10 +4,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from mocap_optitrack.axes import normalized, to_z_up
 from mocap_optitrack.bodies import Body, SingleMarker
-from mocap_optitrack.clock_offset import ClockOffset, FrameOrder
-from mocap_optitrack.frames import Frame, Quaternion, Vector3
+from mocap_optitrack.frame_times import ClockOffset, FrameOrder
+from mocap_optitrack.frames import Frame, Quaternion, Vector3, normalized, to_z_up
 from mocap_optitrack.health import Event, Health
 from mocap_optitrack.marker_tracker import MarkerTracker
 

@@ -1,11 +1,18 @@
-"""ROS interface of every merger of two controls."""
+"""ROS interfaces of the mergers of two controls."""
 
 import genpy
 from numpy.typing import ArrayLike
 from typing_extensions import override
 
-from crazyflie_control_merger.merging import ALL_ENTRIES, MODES, Merger
-from crazyflie_msgs.msg import Control, ControlStamped
+from crazyflie_control_merger.merging import ALL_ENTRIES, MODES, NO_YAW_ENTRIES, Merger
+from crazyflie_msgs.msg import (
+    Control,
+    ControlStamped,
+    NoYawControl,
+    NoYawControlStamped,
+    PrioritizedControl,
+    PrioritizedControlStamped,
+)
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TOPIC, Text
 from crazyflie_utils.vectors import from_vector, to_vector
@@ -77,3 +84,25 @@ class MergerNode(Node):
         merged = ControlStamped(control=from_vector(Control, u))
         merged.header.stamp = message.header.stamp
         self._publisher.publish(merged)
+
+
+class NoYawMergerNode(MergerNode):
+    """Mix roll, pitch and thrust; the yaw rate is always the regular one."""
+
+    prioritized_type = NoYawControlStamped
+    entries = NO_YAW_ENTRIES
+
+    @override
+    def split(self, prioritized: NoYawControl) -> tuple[ArrayLike, float]:
+        *control, priority = to_vector(prioritized)
+        return control, priority
+
+
+class RegularControlMergerNode(MergerNode):
+    """Mix roll, pitch, yaw rate and thrust."""
+
+    prioritized_type = PrioritizedControlStamped
+
+    @override
+    def split(self, prioritized: PrioritizedControl) -> tuple[ArrayLike, float]:
+        return to_vector(prioritized.control), prioritized.priority

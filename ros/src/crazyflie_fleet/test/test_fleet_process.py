@@ -6,8 +6,11 @@ from geometry_msgs.msg import Point
 from simulated_fleet import GAINS, NODES, Swarm
 
 from crazyflie_driver.srv import GoToRequest
+from crazyflie_fleet.fleet_process import make_nodes
+from crazyflie_fleet.vectorized_simulator_node import VectorizedSimulatorNode
 from crazyflie_utils import Node, ParameterError, ServiceError
 from crazyflie_utils.parameters.types import FRAME, Number
+from crazyflie_utils.testing import FakeProcess
 
 
 class Waver(Node):
@@ -132,6 +135,18 @@ def test_more_nodes_of_every_vehicle():
     swarm = Swarm(nodes, fleet={"n": 2}, further={"waver": f"{__name__}:Waver"})
     assert swarm.nodes["/cf2/waver"].frames == ["world", "cf2"]
     assert swarm.nodes["/cf1/waver"].tilt == 0.1
+
+
+def test_controls_of_another_launch_fly_none_of_these_vehicles():
+    swarm = Swarm()
+    process = FakeProcess()
+    process.transport.foreign_services["/cf1/control/final/vehicle"] = "/driver"
+    process.transport.set_param("/fleet", {"simulated": True, "nodes": NODES})
+    nodes = make_nodes(process.handle("/fleet"))
+    (name,) = (n for n, node in nodes.items() if isinstance(node, VectorizedSimulatorNode))
+    assert not process.launch(nodes[name], name)
+    assert "/cf1/control/final fly a vehicle of /driver already" in process.logged("error")[0]
+    assert "/cf1/control/final/vehicle" in swarm.process.transport.services
 
 
 @pytest.mark.parametrize(

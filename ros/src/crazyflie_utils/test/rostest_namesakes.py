@@ -63,3 +63,17 @@ def test_a_node_among_others_of_a_process_is_one_as_well(first):
         assert second.wait() == 1
     assert "/group/both: /group/first runs already: process" in second.output
     assert is_alive(first)
+
+
+def test_a_second_vehicle_of_the_same_controls_ends_after_a_pause():
+    """Otherwise respawn would take the processor from the nodes that fly."""
+    controls = "_topics/control:=/controls"
+    with small_node("Flown", "one", controls):
+        rospy.wait_for_service("/controls/vehicle", timeout=LIMIT)
+        # As roslaunch starts it.
+        with small_node("Flown", "two", controls, "__log:=/tmp/two.log") as second:
+            wait_until(lambda: "not initialized" in second.output, "the refusal")
+            assert second.is_running()
+            second.signal(signal.SIGINT)
+            assert second.wait() == 1
+    assert "the controls of /controls fly a vehicle of /one already" in second.output

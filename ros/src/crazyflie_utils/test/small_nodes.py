@@ -39,6 +39,16 @@ class Relay(Node):
         self._publisher.publish(Int64(message.data + self._parameters.offset))
 
 
+class Flown(Node):
+    """Has its vehicle be the only one that flies by a topic."""
+
+    def load_parameters(self, handle):
+        self._topic = handle.get_param("~topics/control", TOPIC)
+
+    def register_callbacks(self, handle):
+        handle.claim_controls(self._topic, "simulated")
+
+
 class Ledger(Node):
     """Writes down every number; ~report tells them."""
 

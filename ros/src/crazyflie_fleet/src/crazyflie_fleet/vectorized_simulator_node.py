@@ -196,6 +196,7 @@ class VectorizedSimulatorNode(Node):
             handle.warn(below + SAFE_REFERENCE + ": " + text, throttle=1.0, key=(below, "jump"))
 
         parameters = self._parameters
+        handle.claim_controls(below + FINAL_CONTROL, "simulated")
         reference = GuardedReference(YAW, parameters.max_jump, warn, parameters.max_speed)
         self._references.append(reference)
         self._states.append(handle.publisher(below + STATE, PositionVelocityYawStateStamped))

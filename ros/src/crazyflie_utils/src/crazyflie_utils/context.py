@@ -47,6 +47,7 @@ class ProcessContext:
         self._inhibitors: list[ShutdownInhibitor] = []
         #: With which the process is to end; None while it is not.
         self.exit_status: int | None = None
+        self.is_refused = False  #: Whether another process flies the vehicle of this one's nodes.
         if isinstance(self.clock, SimulatedClock):
             self.clock.on_change(self._run_simulated)
             self.topics.subscribe("/clock", Clock, partial(self._on_clock, self.clock))

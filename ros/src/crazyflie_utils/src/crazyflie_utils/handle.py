@@ -190,6 +190,7 @@ class NodeHandle:
         owner = self.service_nodes().get(name)
         place = None if owner is None else self._process.transport.living_node(owner)
         if place is not None:
+            self._process.is_refused = True
             raise ParameterError(
                 f"{self.name}: the controls of {self.resolve(topic)} fly a vehicle of {owner} "
                 f"already ({place}, see {name}); expected no second one. End its launch first, or "

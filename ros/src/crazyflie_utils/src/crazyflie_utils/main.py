@@ -129,17 +129,18 @@ def begin(default_name: str, signals: list[int] | None = None) -> Process:
     refusal = namesake({rosgraph.names.resolve_name(own_name, rospy.get_name())})
     if refusal:
         print(refusal, file=sys.stderr, flush=True)
-        _end_refused("__log" in mappings, signals)
+        _pause_refused(signals)
+        sys.exit(1)
     rospy.init_node(default_name, disable_signals=signals is not None)
     return ros_process()
 
 
-def _end_refused(is_launched, signals):
-    """Exit with status 1, after a while if roslaunch may start the node again."""
+def _pause_refused(signals):
+    """Wait until a refused node may end, if roslaunch may start it again."""
+    is_launched = "__log" in rospy.names.get_mappings()
     end = time.monotonic() + (_REFUSED_TIME if is_launched else 0.0)
     while not signals and time.monotonic() < end:
         time.sleep(0.05)
-    sys.exit(1)
 
 
 def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
@@ -208,6 +209,8 @@ def _run(process, make_nodes, signals):
             for name, node in nodes.items():
                 if not node.initialize(process.handle(name)):
                     process.transport.log("fatal", f"{name}: not initialized; the process exits")
+                    if process.is_refused:
+                        _pause_refused(signals)
                     fail()
             shutdown = Shutdown(process, nodes, signals)
     except ParameterError as error:

@@ -55,7 +55,8 @@ class Executor:
     def start(self) -> None:
         """Begin to run work, first what has been submitted so far."""
         self._started = True
-        self._drain()
+        if not self.is_running_here:
+            self._drain()
 
     @property
     def is_running_here(self) -> bool:
@@ -69,10 +70,11 @@ class Executor:
         and before `start`, returns at once.
         """
         self._queue.append(work)
-        self._drain()
+        if self._runner != threading.get_ident():
+            self._drain()
 
     def _drain(self) -> None:
-        if not self._started or self._runner == threading.get_ident():
+        if not self._started:
             return
         with self._running:
             self._runner = threading.get_ident()

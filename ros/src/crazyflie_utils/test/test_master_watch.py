@@ -45,7 +45,7 @@ class World:
         monkeypatch.setattr("rosgraph.Master", lambda name: self.master)
         monkeypatch.setattr("rospy.logwarn", self.said.append)
         monkeypatch.setattr("rospy.core.is_shutdown_requested", lambda: self.is_ending)
-        monkeypatch.setattr(master_watch.registering, "register", self._register)
+        monkeypatch.setattr(master_watch, "register", self._register)
         self.watch = MasterWatch()
 
     def _register(self):

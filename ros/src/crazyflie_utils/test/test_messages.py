@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_utils.messages import shortened, shown
+from crazyflie_utils.text import shortened, shown
 
 NESTED: list = []
 for _ in range(100):

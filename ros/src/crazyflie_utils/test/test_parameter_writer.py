@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from crazyflie_utils.parameters.writer import ParameterWriter
+from crazyflie_utils.parameters.server import ParameterWriter
 from crazyflie_utils.testing.waiting import wait_until
 
 

@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_utils.messages import shown
 from crazyflie_utils.parameters.declaration import ParameterError
 from crazyflie_utils.parameters.types import (
     BOOLEAN,
@@ -24,6 +23,7 @@ from crazyflie_utils.parameters.types import (
     Text,
 )
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.text import shown
 
 NUMBERS = [FINITE, METRES, POSITIVE, DURATION, TIME_STEP, Number(minimum=-1.0, maximum=1.0)]
 NOT_NUMBERS = ["1.0", "", True, False, None, [1.0], {"x": 1.0}, math.nan, math.inf, -math.inf]

@@ -4,7 +4,7 @@ import logging
 
 import pytest
 
-from crazyflie_utils.ros1.screen_log import ROSOUT, shield_screen_log
+from crazyflie_utils.ros1.patches import ROSOUT, shield_screen_log
 
 
 class FullDisk(logging.Handler):

@@ -36,7 +36,7 @@ def test_stamps_come_back_to_the_nanosecond(seconds, nanoseconds):
 
 
 def test_transforms_of_many_threads(process, lookup, monkeypatch):
-    monkeypatch.setattr("crazyflie_utils.tf.buffer._MAX_STAMPS", 3)
+    monkeypatch.setattr("crazyflie_utils.tf.frame_tree._MAX_STAMPS", 3)
     process.clock.set(103.0)
     failures = []
 

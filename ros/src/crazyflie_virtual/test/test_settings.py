@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from crazyflie_utils.parameters.command_line import parse_arguments
+from crazyflie_utils.parameters.declaration import parse_arguments
 from crazyflie_virtual.mocap import MocapSettings
 from crazyflie_virtual.settings import FaultSwitches, VehicleSettings
 

@@ -15,11 +15,11 @@ from crazyflie_lqr.gain_file import GainFileError, load_matrix
 from crazyflie_model.limits import CRASH_TILT
 from crazyflie_state_estimator import kalman
 from crazyflie_utils import ParameterError, Parameters, parameter
-from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameters.declaration import Declaration
 from crazyflie_utils.parameters.types import DURATION, METRES, TEXT, Integer, Number, Text
 from crazyflie_utils.parameters.types import FINITE as ANY
 from crazyflie_utils.parameters.yaml_file import Entry, load
+from crazyflie_utils.text import shortened, shown
 
 MODELS = ("near_hover", "coupled_7d", "quadrotor")
 ESTIMATORS = ("finite_difference", "kalman")

@@ -9,7 +9,7 @@ from dynamic_reconfigure.msg import Config, ConfigDescription
 
 from crazyflie_dashboard.page_data import ParameterInfo
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.text_input import number_from_text
+from crazyflie_utils.text import number_from_text
 
 _KINDS = {"double": "float", "int": "int", "bool": "bool", "str": "str"}
 

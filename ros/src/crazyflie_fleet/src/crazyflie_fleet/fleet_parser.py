@@ -24,9 +24,9 @@ from crazyflie_fleet.settings import (
     vehicle_key,
 )
 from crazyflie_utils import ParameterError
-from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameters.types import BOOLEAN, ParameterType
 from crazyflie_utils.parameters.yaml_file import Entry
+from crazyflie_utils.text import shortened, shown
 
 #: How much an unknown key resembles a known one that it is a misspelling of, 0 to 1.
 _SIMILAR = 0.8

@@ -20,7 +20,7 @@ from crazyflie_utils.parameters.types import (
     ParameterType,
     Text,
 )
-from crazyflie_utils.text_input import number_from_text
+from crazyflie_utils.text import number_from_text
 
 #: Help of settings that are read, and of which a remark is made.
 WITHOUT_EFFECT = "crazyswarm2's; has no effect here"

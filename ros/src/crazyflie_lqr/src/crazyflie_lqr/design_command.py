@@ -13,7 +13,7 @@ from crazyflie_lqr.design import Design, DesignError, Weights, design_gains
 from crazyflie_lqr.gain_file import save_matrix
 from crazyflie_lqr.margins import FLOWN_PERIOD, Margins, flown, loop_margins
 from crazyflie_lqr.models import CONTROLS, MODELS, LinearModel
-from crazyflie_utils.text_input import number_from_text
+from crazyflie_utils.text import number_from_text
 
 _DESCRIPTION = """
 Design the gains K of u = u_ref + K (x - x_ref) that cost least, where the cost is the

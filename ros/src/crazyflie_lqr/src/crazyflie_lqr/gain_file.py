@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 
-from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameters.types import TEXT, ParameterType
-from crazyflie_utils.text_input import number_from_text
+from crazyflie_utils.text import number_from_text, shortened, shown
 
 
 class GainFileError(ValueError):

@@ -13,7 +13,7 @@ import numpy as np
 
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
-from crazyflie_utils.messages import shown
+from crazyflie_utils.text import shown
 
 
 def number(

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from crazyflie_utils.parameters.declaration import Parameters as Parameters
     from crazyflie_utils.parameters.declaration import parameter as parameter
     from crazyflie_utils.program import run_program as run_program
-    from crazyflie_utils.tf.buffer import TransformError as TransformError
+    from crazyflie_utils.tf.frame_tree import TransformError as TransformError
     from crazyflie_utils.tf.poses import StampedPose as StampedPose
     from crazyflie_utils.transport import ServiceError as ServiceError
 
@@ -28,7 +28,7 @@ _HOME = {
     "Parameters": "crazyflie_utils.parameters.declaration",
     "ServiceError": "crazyflie_utils.transport",
     "StampedPose": "crazyflie_utils.tf.poses",
-    "TransformError": "crazyflie_utils.tf.buffer",
+    "TransformError": "crazyflie_utils.tf.frame_tree",
     "parameter": "crazyflie_utils.parameters.declaration",
     "run": "crazyflie_utils.main",
     "run_composed": "crazyflie_utils.main",

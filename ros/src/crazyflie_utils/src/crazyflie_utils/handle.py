@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
@@ -10,6 +11,7 @@ from typing import Any, TypeVar
 import genpy
 import rosgraph.names
 from std_srvs.srv import Trigger, TriggerResponse
+from typing_extensions import override
 
 from crazyflie_utils.context import ProcessContext
 from crazyflie_utils.log import FaultHandler, NodeLog
@@ -20,10 +22,10 @@ from crazyflie_utils.parameters.declaration import (
     Parameters,
     read_parameter,
 )
-from crazyflie_utils.parameters.private import PrivateParameters
 from crazyflie_utils.parameters.reconfigure import Reconfiguration
+from crazyflie_utils.parameters.server import PrivateParameters
 from crazyflie_utils.parameters.types import ParameterType
-from crazyflie_utils.services import Reply, forward, serve
+from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.tf.poses import StampedPose
 from crazyflie_utils.timers import Timer, VaryingTimer
 from crazyflie_utils.topics import LatestMessage, Publisher, Subscriber, finite_only
@@ -313,3 +315,60 @@ class NodeHandle:
                 self.report_fault(callback, error)
 
         return guarded
+
+
+def serve(
+    callback: Callable[[Any], Any], request: Any, answer: Future[Any], handle: NodeHandle
+) -> None:
+    """Give ``answer`` the response to a request, or a `ServiceError`.
+
+    That is now, or when the future that the callback returns is done; see
+    `NodeHandle.advertise_service`.
+    """
+    if handle.is_closed:
+        answer.set_exception(ServiceError(f"{handle.name} has ended this service"))
+        return
+    try:
+        response = callback(request)
+    except (ServiceError, RefusalError) as reason:
+        answer.set_exception(ServiceError(str(reason)))
+    except Exception as error:
+        handle.report_fault(callback, error)
+        answer.set_exception(ServiceError(f"{handle.name}: {error!r}"))
+    else:
+        if isinstance(response, Future):
+            response.add_done_callback(lambda done: forward(done, answer, handle))
+        else:
+            answer.set_result(response)
+
+
+class Reply(Future[Any]):
+    """The response to a call; what is added to it is a callback of the node.
+
+    A plain future would only log what that raises, and the node would not be made safe.
+    """
+
+    def __init__(self, handle: NodeHandle):
+        super().__init__()
+        self._guard = handle.guard
+
+    @override
+    def add_done_callback(self, fn: Callable[[Future[Any]], object]) -> None:
+        super().add_done_callback(self._guard(fn))
+
+
+def forward(done: Future[Any], to: Future[Any], handle: NodeHandle) -> None:
+    """Let one future have the outcome of another, any error as a `ServiceError`."""
+    if not to.set_running_or_notify_cancel():
+        return
+    if done.cancelled():
+        to.set_exception(ServiceError(f"{handle.name}: cancelled"))
+        return
+    error = done.exception()
+    if error is None:
+        to.set_result(done.result())
+    elif isinstance(error, (ServiceError, RefusalError)):
+        to.set_exception(ServiceError(str(error)))
+    else:
+        handle.error(f"a service failed\n{''.join(traceback.format_exception(error))}")
+        to.set_exception(ServiceError(f"{handle.name}: {error!r}"))

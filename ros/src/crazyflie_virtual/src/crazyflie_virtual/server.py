@@ -21,8 +21,7 @@ from typing import Any
 from typing_extensions import override
 
 import crazyflie_utils
-from crazyflie_utils.parameters.command_line import parse_arguments
-from crazyflie_utils.parameters.declaration import ParameterError, Parameters
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parse_arguments
 from crazyflie_virtual.crtp import is_broadcast
 from crazyflie_virtual.observer import Observation
 from crazyflie_virtual.settings import FIRST_PORT, FaultSwitches, VehicleSettings

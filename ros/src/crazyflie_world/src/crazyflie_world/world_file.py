@@ -10,7 +10,6 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_utils import ParameterError, Parameters, parameter
-from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import (
@@ -24,6 +23,7 @@ from crazyflie_utils.parameters.types import (
     ParameterType,
 )
 from crazyflie_utils.parameters.yaml_file import Entry
+from crazyflie_utils.text import shortened, shown
 from crazyflie_world.paths import Circle, Path, Waypoints
 from crazyflie_world.shapes import COLOUR, WALL_COLOUR, Ball, Box, Cylinder, Shape, wall
 from crazyflie_world.world import FLOOR, Floor, World

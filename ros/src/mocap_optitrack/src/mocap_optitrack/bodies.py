@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from typing_extensions import override
 
-from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import (
     FRAME,
@@ -18,6 +17,7 @@ from crazyflie_utils.parameters.types import (
     Number,
     ParameterType,
 )
+from crazyflie_utils.text import shortened, shown
 from mocap_optitrack.frames import Vector3
 from mocap_optitrack.marker_motion import MotionLimits
 from mocap_optitrack.marker_vehicle import SEPARATION, MarkerVehicle

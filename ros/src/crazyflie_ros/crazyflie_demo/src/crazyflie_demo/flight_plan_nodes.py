@@ -27,8 +27,8 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.parameters.server import ParameterWriter
 from crazyflie_utils.parameters.types import BOOLEAN, METRES, File, Number
-from crazyflie_utils.parameters.writer import ParameterWriter
 
 #: Longest time of a service call, of the driver's connection before the first one, and of the
 #: master's answer, s.

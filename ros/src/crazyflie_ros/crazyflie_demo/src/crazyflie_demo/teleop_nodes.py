@@ -12,8 +12,8 @@ from crazyflie_demo.node_parts import AXIS, JoyAxes, JoyParameters, SetpointPara
 from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
 from crazyflie_model.limits import FULL_PWM, MAX_SETPOINT_PWM
 from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameters.server import ParameterWriter
 from crazyflie_utils.parameters.types import BOOLEAN, Integer, Number
-from crazyflie_utils.parameters.writer import ParameterWriter
 
 #: Four joystick axes, numbered from 0, and what they are multiplied by.
 Sticks = tuple[tuple[int, float], ...]

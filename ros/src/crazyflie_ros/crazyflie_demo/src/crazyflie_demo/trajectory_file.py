@@ -10,8 +10,7 @@ import numpy as np
 
 from crazyflie_model.elementwise import join
 from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
-from crazyflie_utils.messages import shortened, shown
-from crazyflie_utils.text_input import TextFileError, number_from_text, read_text
+from crazyflie_utils.text import TextFileError, number_from_text, read_text, shortened, shown
 
 #: Of a line in a file: duration, then the coefficients of x, y, z and yaw.
 COLUMNS = 1 + 4 * COEFFICIENTS

@@ -6,8 +6,8 @@ from typing import NamedTuple
 from typing_extensions import override
 
 from crazyflie_model.angles import wrap_to_pi
-from crazyflie_utils.messages import shown
 from crazyflie_utils.parameters.types import DURATION, FINITE, ParameterType
+from crazyflie_utils.text import shown
 
 
 class Waypoint(NamedTuple):

@@ -11,9 +11,9 @@ from typing_extensions import override
 
 from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
 from crazyflie_utils import ParameterError, Parameters, parameter
-from crazyflie_utils.messages import shown
 from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.types import FRAME, POSITION, TOPIC, File, Integer, Number, Text
+from crazyflie_utils.text import shown
 from crazyflie_world.world import World
 
 LASER, ULTRASONIC = "laser", "ultrasonic"  #: Types of sensors.

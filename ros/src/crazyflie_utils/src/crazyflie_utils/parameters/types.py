@@ -7,7 +7,7 @@ from typing import Any
 
 from typing_extensions import override
 
-from crazyflie_utils.text_input import number_from_text
+from crazyflie_utils.text import number_from_text
 
 
 class ParameterType:

@@ -10,7 +10,7 @@ import genpy
 import rospy
 from typing_extensions import override
 
-from crazyflie_utils.ros1 import registering
+from crazyflie_utils.ros1 import master_watch
 from crazyflie_utils.ros1.receiving import Report, harden
 from crazyflie_utils.ros1.sending import NonBlockingConnection, serialized
 
@@ -72,7 +72,7 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
     def add_callback(self, cb: Callable[..., None], cb_args: Any) -> None:
         super().add_callback(cb, cb_args)
         if not isinstance(cb, OwnCallback) and self._is_handed_over():
-            registering.update_publishers(self.resolved_name, [rospy.get_node_uri()])
+            master_watch.update_publishers(self.resolved_name, [rospy.get_node_uri()])
 
     @override
     def add_connection(self, c: Any) -> bool:

@@ -17,6 +17,7 @@ with CRAZYFLIE_ROSPY_PATCHES set or not; see the README for how they were measur
 import contextlib
 import functools
 import importlib
+import logging
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -24,12 +25,56 @@ from dataclasses import dataclass
 import genpy
 import rospy
 from rospy import rostime
-from rospy.impl import registration, simtime, tcpros_base
+from rospy.impl import paramserver, registration, simtime, tcpros_base
 
-from crazyflie_utils.ros1 import registering
-from crazyflie_utils.ros1.accepting import MAX_PENDING, Acceptor
+from crazyflie_utils.ros1 import master_watch
 from crazyflie_utils.ros1.own_topics import OwnPublication, OwnSubscription
-from crazyflie_utils.ros1.receiving import Report
+from crazyflie_utils.ros1.receiving import MAX_PENDING, Acceptor, Report
+
+_NO_TOPICS = "/rosout_disable_topics_generation"
+
+ROSOUT = "rosout"  #: The logger behind rospy.loginfo and its like.
+
+
+class Shielded(logging.Handler):
+    """Hands records on to another handler, and handles its errors as Python's own handlers do.
+
+    rospy's, which writes to the screen, does not. Under roslaunch the "screen" may be a file.
+    """
+
+    def __init__(self, handler: logging.Handler) -> None:
+        super().__init__(handler.level)
+        self._handler = handler
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Have the other handler write a record."""
+        try:
+            self._handler.emit(record)
+        except OSError:
+            self.handleError(record)
+
+
+def shield_screen_log() -> None:
+    """Put a `Shielded` around each handler of rospy's logger, once."""
+    logger = logging.getLogger(ROSOUT)
+    for handler in list(logger.handlers):
+        if not isinstance(handler, Shielded):
+            logger.removeHandler(handler)
+            logger.addHandler(Shielded(handler))
+
+
+def log_without_master() -> None:
+    """Read the parameter with which rospy leaves topics out of /rosout, once.
+
+    rospy caches no parameter that is not set: it asked the master at each line, and waited for one
+    that was frozen, in the middle of an emergency.
+    """
+    value = False
+    # A master that has just gone is in no process's way.
+    with contextlib.suppress(OSError):
+        value = rospy.get_param(_NO_TOPICS, False)
+    paramserver.get_param_server_cache().set(_NO_TOPICS, value)
+
 
 SWITCH = "CRAZYFLIE_ROSPY_PATCHES"
 
@@ -215,7 +260,7 @@ def registering_together() -> Iterator[None]:
         yield
     finally:
         del listeners.notify_added
-    registering.register()
+    master_watch.register()
 
 
 def take_over_clock() -> bool:

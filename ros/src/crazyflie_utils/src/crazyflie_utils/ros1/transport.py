@@ -15,7 +15,7 @@ import rospy
 from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.log import Throttle
-from crazyflie_utils.parameters.writer import ParameterWriter
+from crazyflie_utils.parameters.server import ParameterWriter
 from crazyflie_utils.ros1 import patches
 from crazyflie_utils.ros1.calls import (
     ServiceCaller,
@@ -25,7 +25,7 @@ from crazyflie_utils.ros1.calls import (
 )
 from crazyflie_utils.ros1.master_watch import living_node
 from crazyflie_utils.ros1.own_topics import OwnCallback, publish
-from crazyflie_utils.ros1.screen_log import log_without_master, shield_screen_log
+from crazyflie_utils.ros1.patches import log_without_master, shield_screen_log
 from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
 
 #: Messages kept for a listener that does not keep up: a simulation that runs as fast as it can

@@ -14,8 +14,7 @@ from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_simulator.motion_capture import MotionCapture
 from crazyflie_simulator.vehicle import SimulatedVehicle
 from crazyflie_state_estimator.kalman import ConstantAccelerationFilter
-from crazyflie_state_estimator.motion import MotionEstimator
-from crazyflie_state_estimator.rate_filter import FiniteDifference
+from crazyflie_state_estimator.motion import FiniteDifference, MotionEstimator
 
 _YAW = 6
 _FILTERS: dict[Any, Any] = {FiniteDifferences: FiniteDifference, Kalman: ConstantAccelerationFilter}

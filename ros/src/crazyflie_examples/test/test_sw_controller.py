@@ -7,11 +7,11 @@ import rospkg
 from roslaunch.core import RLException
 
 from crazyflie_examples.reference_converter_node import ReferenceConverterNode
-from crazyflie_lqr.full_state_lqr_node import FullStateLqrNode
-from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
+from crazyflie_lqr.lqr_nodes import (
+    FullStateLqrNode,
     PositionVelocityYawStateLiftLqrNode,
+    PositionVelocityYawStateLqrNode,
 )
-from crazyflie_lqr.position_velocity_yaw_state_lqr_node import PositionVelocityYawStateLqrNode
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess, launch_files

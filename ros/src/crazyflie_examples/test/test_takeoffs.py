@@ -6,7 +6,7 @@ import pytest
 from rospkg import RosPack
 from std_srvs.srv import EmptyRequest
 
-from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
+from crazyflie_lqr.lqr_nodes import (
     PositionVelocityYawStateLiftLqrNode,
 )
 from crazyflie_reports.flight_report import OVERSHOOT_LIMIT

@@ -3,7 +3,7 @@
 from std_msgs.msg import Float32
 
 from crazyflie_fleet import fleet_file
-from crazyflie_fleet.battery_report_node import BatteryReportNode
+from crazyflie_fleet.connect_node import BatteryReportNode
 from crazyflie_utils.testing import FakeProcess
 
 FLEET = fleet_file.parse(

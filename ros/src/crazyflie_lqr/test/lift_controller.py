@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
+from crazyflie_lqr.lqr_nodes import (
     PositionVelocityYawStateLiftLqrNode,
 )
 from crazyflie_msgs.msg import (

@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crazyflie_lqr.full_state_lqr_node import FullStateLqrNode
 from crazyflie_lqr.gain_file import save_matrix
-from crazyflie_lqr.position_velocity_yaw_state_lqr_node import PositionVelocityYawStateLqrNode
+from crazyflie_lqr.lqr_nodes import FullStateLqrNode, PositionVelocityYawStateLqrNode
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import from_vector, to_vector
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from lift_controller import PARAMETERS, answer, launch, publish_flight_state, refer
 
-from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
+from crazyflie_lqr.lqr_nodes import (
     PositionVelocityYawStateLiftLqrNode,
 )
 from crazyflie_msgs.msg import (

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_lqr.reference import GuardedReference
-from crazyflie_lqr.reference_velocity import VELOCITY_LIMIT
+from crazyflie_lqr.reference import VELOCITY_LIMIT, GuardedReference
 
 HERE = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
 

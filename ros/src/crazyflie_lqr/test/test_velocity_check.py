@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from crazyflie_lqr.reference_velocity import VelocityCheck, limited
+from crazyflie_lqr.reference import VelocityCheck, limited
 
 ZERO = (0.0, 0.0, 0.0)
 

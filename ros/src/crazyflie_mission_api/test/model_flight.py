@@ -7,8 +7,7 @@ from scipy.spatial.distance import pdist
 
 from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_mission_api import DryRun
-from crazyflie_model.dynamics import Coupled7D
-from crazyflie_model.integrators import rk4_step
+from crazyflie_model.dynamics import Coupled7D, rk4_step
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 

@@ -15,9 +15,9 @@ from crazyflie_model.dynamics import (
     Coupled7D,
     NearHover,
     coupled_acceleration,
+    rk4_step,
 )
 from crazyflie_model.elementwise import join, split
-from crazyflie_model.integrators import rk4_step
 from crazyflie_model.limits import MAX_TILT
 from crazyflie_model.units import GRAVITY
 

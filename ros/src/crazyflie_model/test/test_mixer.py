@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from crazyflie_model.inner_loops import limit, mix
 from crazyflie_model.limits import FULL_PWM
-from crazyflie_model.mixer import limit, mix
 
 NUMBERS = st.floats(-1e5, 2e5)
 OUTPUTS = st.tuples(*[st.floats(-5000.0, 5000.0)] * 3)

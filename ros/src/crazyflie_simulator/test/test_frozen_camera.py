@@ -18,8 +18,7 @@ from crazyflie_simulator.wind import Wind
 from crazyflie_state_estimator.control_input import ControlInput
 from crazyflie_state_estimator.frozen_poses import FrozenPoseMonitor
 from crazyflie_state_estimator.kalman import ConstantAccelerationFilter
-from crazyflie_state_estimator.motion import MotionEstimator
-from crazyflie_state_estimator.rate_filter import FiniteDifference
+from crazyflie_state_estimator.motion import FiniteDifference, MotionEstimator
 
 PERIOD = 0.01
 LIFT_OFF, CLIMB = 0.3, 1.0

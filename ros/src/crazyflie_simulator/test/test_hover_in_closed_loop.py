@@ -20,8 +20,7 @@ from crazyflie_model.units import GRAVITY
 from crazyflie_simulator.motion_capture import MotionCapture
 from crazyflie_simulator.vehicle import SimulatedVehicle
 from crazyflie_simulator.wind import Wind
-from crazyflie_state_estimator.motion import MotionEstimator
-from crazyflie_state_estimator.rate_filter import FiniteDifference
+from crazyflie_state_estimator.motion import FiniteDifference, MotionEstimator
 
 PERIOD = 0.01
 GOAL = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])

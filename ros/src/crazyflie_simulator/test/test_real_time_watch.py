@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_simulator.real_time_watch import LATE_TICKS, LATENESS, RealTimeWatch
+from crazyflie_simulator.simulator_node import LATE_TICKS, LATENESS, RealTimeWatch
 
 PERIOD = 0.01
 

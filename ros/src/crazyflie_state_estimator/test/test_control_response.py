@@ -137,8 +137,8 @@ def test_a_prediction_is_the_module_s_formula(t):
     monitor = ResponseMonitor()
     monitor._speed, monitor._way, monitor._noise = speed_now, way_now, 0.002
     start = _Estimate(1.0, p, v, d, P.tolist(), a, speed, way)
-    monitor._stay = _Stay(0.0, (1.0, 2.0, 3.0), 100)
-    departure = monitor._predicted(t, start, monitor._offset(t, start))
+    place = (1.0, 2.0, 3.0)
+    departure = monitor._predicted(t, start, monitor._offset(t, start, place), place)
     np.testing.assert_allclose(
         departure.position, p + v * t + d * t**2 / 2 + way_now - way - speed * t
     )

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_state_estimator.motion import MotionEstimator
-from crazyflie_state_estimator.rate_filter import FiniteDifference
+from crazyflie_state_estimator.motion import FiniteDifference, MotionEstimator
 
 MS = 1_000_000
 DAY = 1_700_000_000_000_000_000

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_model.pid import Gains
+from crazyflie_model.inner_loops import Gains
 from crazyflie_virtual.body import Sensors
 from crazyflie_virtual.firmware.controllers import (
     AttitudeController,

@@ -45,7 +45,7 @@ class Estimator(ABC):
 
 @dataclass(frozen=True)
 class FiniteDifferences(Estimator):
-    """See `crazyflie_state_estimator.rate_filter.FiniteDifference`."""
+    """See `crazyflie_state_estimator.motion.FiniteDifference`."""
 
     memory_dim = 3
 

@@ -19,7 +19,7 @@ from crazyflie_lqr import control_law
 from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Number, Vector, functions, where
-from crazyflie_model.watchdog import watchdog_control
+from crazyflie_model.supervisor import watchdog_control
 
 _SMALLEST_COSINE = 1e-6  #: Of a pitch at which roll and yaw are distinct.
 

@@ -8,8 +8,8 @@ from typing_extensions import override
 
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.messages import shown
 from crazyflie_utils.parameters.types import METRES, SERVICE, TOPIC, ParameterType
+from crazyflie_utils.text import shown
 
 Point = tuple[float, float, float]  #: x, y, z in m.
 

@@ -10,7 +10,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_fleet.conversions import reference_message
 from crazyflie_fleet.follower import Follower, Velocity
-from crazyflie_fleet.high_level_parameters import HighLevelParameters
+from crazyflie_fleet.high_level_services import HighLevelParameters
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_model.trajectory import Trajectory
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from crazyflie_fleet.battery_report_node import BatteryReportNode
+from crazyflie_fleet.connect_node import BatteryReportNode
 from crazyflie_fleet.fleet_config import BUFFER, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FlyParameters
 from crazyflie_fleet.fleet_services_node import FleetServicesNode
 from crazyflie_fleet.high_level_node import HighLevelNode
-from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
+from crazyflie_fleet.high_level_services import HIGH_LEVEL
 from crazyflie_fleet.lander import SafeDescentsNode
 from crazyflie_fleet.placement_node import PlacementNode
 from crazyflie_fleet.references_node import ReferencesNode

@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import FleetConfig
-from crazyflie_fleet.high_level_parameters import HIGH_LEVEL, START_TOPIC
+from crazyflie_fleet.high_level_services import HIGH_LEVEL, START_TOPIC
 from crazyflie_fleet.lander import SERVICE_TIMEOUT, Lander, Refusals
 from crazyflie_fleet.mission_watch import MISSION_TIMEOUT, MissionWatch
 from crazyflie_fleet.vehicle_states import VehicleStates

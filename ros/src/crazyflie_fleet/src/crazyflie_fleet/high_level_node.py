@@ -14,8 +14,12 @@ from crazyflie_driver import srv
 from crazyflie_fleet.commanded_references import CommandedReferences
 from crazyflie_fleet.conversions import from_message
 from crazyflie_fleet.follower import Follower
-from crazyflie_fleet.high_level_parameters import HighLevelParameters
-from crazyflie_fleet.high_level_services import Groups, SetpointSubscribers, relay
+from crazyflie_fleet.high_level_services import (
+    Groups,
+    HighLevelParameters,
+    SetpointSubscribers,
+    relay,
+)
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, ServiceError, flight_status

@@ -33,8 +33,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_simulator.real_time_watch import RealTimeWatch
-from crazyflie_simulator.simulator_node import MAX_CATCH_UP
+from crazyflie_simulator.simulator_node import MAX_CATCH_UP, RealTimeWatch
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, Number
 from crazyflie_utils.tf.poses import StampedPose

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_model.dynamics import STEP, SevenDimensional
-from crazyflie_model.watchdog import watchdog_control
+from crazyflie_model.supervisor import watchdog_control
 
 _NEVER = np.iinfo(np.int64).max
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from crazyflie_control_merger.cmd_vel_converter_node import CmdVelConverterNode
 from crazyflie_fleet.fleet_config import VehicleConfig
-from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
+from crazyflie_lqr.lqr_nodes import (
     PositionVelocityYawStateLiftLqrNode,
 )
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode

@@ -50,7 +50,7 @@ def flown(
     """Return gains and plant as the nodes close the loop.
 
     Poses are sampled every ``period`` (s); rates are the differences of two poses
-    (`crazyflie_state_estimator.rate_filter.FiniteDifference`); each control is held until the next,
+    (`crazyflie_state_estimator.motion.FiniteDifference`); each control is held until the next,
     and acts ``delay`` (s) after its pose.
 
     Parameters

@@ -1,11 +1,67 @@
 """The reference a controller follows while its sources may fail."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from crazyflie_lqr.linear_feedback import Components, at_rest
-from crazyflie_lqr.reference_velocity import VELOCITY_LIMIT, VelocityCheck, limited
 from crazyflie_utils.last_valid import LastValid
+
+#: How long the velocity of a reference counts that is not followed by another, s.
+VELOCITY_LIMIT = 0.5
+MAX_LEAD = 0.5  #: By how much velocities may have led further than the points have moved, m.
+_MEMORY = 2.0  #: Time constant at which such a lead is forgotten, s.
+#: A point that is further than this, m, from where its velocity led to did not move there.
+_JUMP = 0.1
+_FASTEST = 100.0  #: Larger velocities are taken as of this size, m/s, in order not to overflow.
+
+_HERE = (0.0, 0.0, 0.0)
+
+Vector = Sequence[float]  #: Three components, fixed frame.
+
+
+class VelocityCheck:
+    """Compares the velocity of a sequence of references with the motion of their points.
+
+    A controller adds gain times velocity to gain times position: where the point of references
+    stays while they have a velocity, the vehicle comes to rest beside it, by velocity gain over
+    position gain times that velocity. What is compared is the integral of the velocity, less
+    the way of the points. It does not grow where both agree, however irregularly they come.
+    """
+
+    def __init__(self) -> None:
+        self._last: tuple[Vector, Vector, float] | None = None
+        self._lead: Vector = _HERE
+
+    def update(self, position: Vector, velocity: Vector, time: float) -> bool:
+        """Take a reference (m, m/s) at ``time`` (s); return whether its velocity counts."""
+        velocity = limited(velocity, _FASTEST)
+        if self._last is not None and time >= self._last[2]:
+            self._advance(*self._last, position, time)
+        else:
+            self._lead = _HERE
+        self._last = position, velocity, time
+        ahead = sum(a * b for a, b in zip(self._lead, velocity, strict=True))
+        return ahead <= MAX_LEAD * math.hypot(*velocity)
+
+    def _advance(self, last_position, last_velocity, last_time, position, time):
+        elapsed = time - last_time
+        dt = min(elapsed, VELOCITY_LIMIT)
+        led = [dt * part for part in last_velocity]
+        moved: Vector = [b - a for a, b in zip(last_position, position, strict=True)]
+        if math.dist(moved, led) > _JUMP + math.hypot(*led):
+            moved = _HERE
+        keep = math.exp(-elapsed / _MEMORY)
+        lead = [keep * a + b - c for a, b, c in zip(self._lead, led, moved, strict=True)]
+        # Bounded, so that it does not take long until velocities that are right count again.
+        self._lead = limited(lead, 2.0 * MAX_LEAD)
+
+
+def limited(vector: Vector, size: float) -> list[float]:
+    """Return a vector, made shorter if it is longer than ``size``; 0 if its length overflows."""
+    length = math.hypot(*vector)
+    scale = size / length if length > size else 1.0
+    return [scale * part for part in vector]
+
 
 DESCENT_LIMIT = 0.3  #: How long the reference of a descent counts, and it alone, s.
 

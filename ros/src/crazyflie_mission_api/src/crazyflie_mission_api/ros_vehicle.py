@@ -14,7 +14,7 @@ from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_fleet.conversions import heading, to_message
-from crazyflie_fleet.high_level_parameters import HIGH_LEVEL, START_TOPIC
+from crazyflie_fleet.high_level_services import HIGH_LEVEL, START_TOPIC
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.mission_vehicle import MEMORY, MissionVehicle, done, forward, in_turn
 from crazyflie_mission_api.stream import SetpointStream

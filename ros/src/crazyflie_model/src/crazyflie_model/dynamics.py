@@ -8,15 +8,37 @@ and rad. Control u = (roll, pitch, yaw_dot, thrust) in rad, rad/s and m/s^2
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
 from crazyflie_model.elementwise import Number, Vector, functions, join, nowhere, split, where
-from crazyflie_model.integrators import rk4_step
 from crazyflie_model.units import GRAVITY
+
+Rates = Callable[[float, Vector[Number], Vector[Number]], Vector[Number]]
+
+
+def rk4_step(
+    rates: Rates[Number], t: float, x: Vector[Number], u: Vector[Number], dt: float
+) -> Vector[Number]:
+    """Return the state one classical Runge-Kutta step (4th order) of ``dt`` (s) later.
+
+    ``rates(t, x, u)`` is the time derivative of every component of the state x at time t (s); the
+    control u is constant over the step.
+    """
+    half = dt / 2.0
+    sixth = dt / 6.0
+    k1 = rates(t, x, u)
+    k2 = rates(t + half, [xi + half * ki for xi, ki in zip(x, k1, strict=True)], u)
+    k3 = rates(t + half, [xi + half * ki for xi, ki in zip(x, k2, strict=True)], u)
+    k4 = rates(t + dt, [xi + dt * ki for xi, ki in zip(x, k3, strict=True)], u)
+    return [
+        xi + sixth * (a + 2.0 * (b + c) + d)
+        for xi, a, b, c, d in zip(x, k1, k2, k3, k4, strict=True)
+    ]
+
 
 STEP = 0.001  #: Integration step of every model, s.
 

@@ -11,12 +11,66 @@ unlike the firmware, positive pitch is nose down (accelerates forward).
 """
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from crazyflie_model.elementwise import Number, Vector, clip, functions, where
-from crazyflie_model.mixer import limit, mix
-from crazyflie_model.pid import Gains, terms
+from crazyflie_model.limits import FULL_PWM
 from crazyflie_model.units import pwm_from_thrust
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of a PID controller whose derivative is that of the measurement."""
+
+    #: kp, ki, kd: Output per error, per integral of the error, per rate of change of the
+    #: measurement.
+    kp: float
+    ki: float
+    kd: float
+    #: Of the integral's magnitude, unit of the error times s. The default is the firmware's.
+    limit: float = 5000.0
+
+
+def terms(
+    gains: Gains, error: Number, integral: Number, slope: Number, dt: float
+) -> tuple[Number, Number, Number, Number]:
+    """Return the proportional, integral and derivative part of the output, and the integral.
+
+    ``error`` is the desired minus the measured value, ``integral`` the error's, as returned by the
+    last update ``dt`` s ago, ``slope`` the rate of change of the measurement. Any object with the
+    attributes of `Gains` does.
+    """
+    integral = clip(integral + error * dt, -gains.limit, gains.limit)
+    return gains.kp * error, gains.ki * integral, -gains.kd * slope, integral
+
+
+def mix(thrust: Number, about_x: Number, about_y: Number, about_z: Number) -> Vector[Number]:
+    """Return the requests to motors 1 to 4, PWM, not limited.
+
+    From the thrust of each motor and the outputs of the rate controllers about forward, left and
+    up, PWM.
+    """
+    x, y, z = about_x / 2.0, about_y / 2.0, about_z
+    return [
+        thrust - x - y - z,
+        thrust - x + y + z,
+        thrust + x + y - z,
+        thrust + x - y + z,
+    ]
+
+
+def limit(requested: Sequence[Number], idle: float = 0.0) -> Vector[Number]:
+    """Return commands from ``idle`` to `FULL_PWM` for four requested ones, PWM.
+
+    Where one would exceed `FULL_PWM`, all are lowered alike: attitude comes before height.
+    """
+    highest = requested[0]
+    for request in requested[1:]:
+        highest = where(request > highest, request, highest)
+    excess = clip(highest - FULL_PWM, 0.0, math.inf)
+    return [clip(request - excess, idle, FULL_PWM) for request in requested]
+
 
 PERIOD = 0.002  #: Time between two samples, s.
 OUTPUT_LIMIT = 32767.0  #: Largest output of a rate controller, PWM: 16 bits in the firmware.

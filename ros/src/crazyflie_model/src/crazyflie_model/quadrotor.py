@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from crazyflie_model.angles import Triple
+from crazyflie_model.dynamics import rk4_step
 from crazyflie_model.elementwise import Number, Vector, clip, functions, where
-from crazyflie_model.integrators import rk4_step
 from crazyflie_model.limits import FULL_PWM
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 

@@ -14,7 +14,7 @@ from std_srvs.srv import Empty
 from typing_extensions import override
 
 from crazyflie_driver import srv
-from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
+from crazyflie_fleet.high_level_services import HIGH_LEVEL
 from crazyflie_fleet.settings import RobotSettings
 from crazyflie_mission_api import Fleet, MissionError
 from crazyflie_mission_api.fleet import catch_signals

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Any
 
-from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
+from crazyflie_fleet.high_level_services import HIGH_LEVEL
 from crazyflie_fleet.vehicle_nodes import PLACE
 from crazyflie_mission_api import Fleet, MissionError
 from crazyflie_mission_api.mission_vehicle import never

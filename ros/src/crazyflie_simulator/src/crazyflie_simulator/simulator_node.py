@@ -2,6 +2,7 @@
 
 import math
 import zlib
+from collections import deque
 from typing import Any
 
 from std_srvs.srv import Empty, EmptyResponse
@@ -10,7 +11,6 @@ from typing_extensions import override
 from crazyflie_model.dynamics import Coupled7D, Dynamics, NearHover
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_simulator.motion_capture import MotionCapture
-from crazyflie_simulator.real_time_watch import RealTimeWatch
 from crazyflie_simulator.vehicle import SimulatedVehicle
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, StampedPose, parameter
 from crazyflie_utils.parameters.declaration import group
@@ -24,6 +24,38 @@ from crazyflie_utils.parameters.types import (
     Number,
 )
 from crazyflie_utils.vectors import to_tuple
+
+LATENESS = 0.1
+"""A tick that comes later than this is late, s: poses of the time before are left out."""
+
+LATE_TICKS, WINDOW = 5, 10.0
+"""So many late ticks within so many seconds are reported."""
+
+
+class RealTimeWatch:
+    """Warns when ticks of a timer in real time often come late."""
+
+    def __init__(self, handle: NodeHandle):
+        self._handle = handle
+        self._last = math.inf
+        self._late: deque[float] = deque(maxlen=LATE_TICKS)
+
+    def tick(self, period: float) -> None:
+        """Note a tick that was due ``period`` (s) after the one before."""
+        now = self._handle.time()
+        interval, self._last = now - self._last, now
+        if interval <= period + LATENESS:
+            return
+        self._late.append(now)
+        if len(self._late) == LATE_TICKS and now - self._late[0] < WINDOW:
+            self._handle.warn(
+                f"this computer is too busy: {LATE_TICKS} times in {now - self._late[0]:.1f} s the "
+                f"simulator had to wait more than {LATENESS:g} s. The flight will not be as it "
+                "should; with sim_time:=true real_time_factor:=0 it does not depend on that",
+                throttle=WINDOW,
+                key="busy",
+            )
+
 
 #: Longest time that is integrated at once, s; more, after a jump of the clock, is skipped.
 MAX_CATCH_UP = 1.0

@@ -187,7 +187,7 @@ class ResponseMonitor:
     def _departure(self, time):
         if self._stay is None:
             return None
-        settled = self._stay.begin + SETTLING
+        place, settled = self._stay.mean, self._stay.begin + SETTLING
         estimates = [each for each in self._estimates if each.time > settled]
         if self._before is not None and time - self._before.time < 2.0 * WINDOW:
             estimates.insert(0, self._before)
@@ -195,22 +195,22 @@ class ResponseMonitor:
         best, most = None, 1.0
         for start in estimates:
             duration = time - start.time
-            offset = self._offset(duration, start)
+            offset = self._offset(duration, start, place)
             # Nearly all predictions of a flight that nothing disturbs end nearer than that.
             if math.hypot(*offset) > tolerated:
                 deviation = self._deviation(duration, start)
                 significance = _significance(duration, offset, deviation)
                 if significance > most:
                     best, most = (start, offset), significance
-        return None if best is None else self._predicted(time - best[0].time, *best)
+        return None if best is None else self._predicted(time - best[0].time, *best, place)
 
     @property
     def _place_error(self):
         return PLACE_ERROR + TOLERANCE_FACTOR * self._noise / math.sqrt(BLOCK_POSES)
 
-    def _offset(self, t, start):
-        """Return where an estimate leads within ``t`` (s), less the place of the stay (m)."""
-        x, y, z = self._stay.mean
+    def _offset(self, t, start, place):
+        """Return where an estimate leads within ``t`` (s), less the ``place`` of the stay (m)."""
+        x, y, z = place
         (px, py, pz), (vx, vy, vz), (dx, dy, dz) = start.position, start.velocity, start.disturbance
         (wx, wy, wz), (ux, uy, uz), (sx, sy, sz) = self._way, start.way, start.speed
         return (
@@ -231,8 +231,8 @@ class ResponseMonitor:
         variance += LAG_ERROR**2 * sum(each * each for each in changes)
         return math.sqrt(variance + self._place_error**2)
 
-    def _predicted(self, t, start, offset):
-        position = [a + b for a, b in zip(self._stay.mean, offset, strict=True)]
+    def _predicted(self, t, start, offset, place):
+        position = [a + b for a, b in zip(place, offset, strict=True)]
         velocity = [
             v + disturbance * t + end - begin
             for v, disturbance, begin, end in zip(

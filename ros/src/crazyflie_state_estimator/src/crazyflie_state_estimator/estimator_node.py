@@ -14,7 +14,12 @@ from crazyflie_msgs.msg import (
 from crazyflie_state_estimator import kalman
 from crazyflie_state_estimator.control_input import ControlInput
 from crazyflie_state_estimator.frozen_poses import FrozenPoseMonitor
-from crazyflie_state_estimator.motion import ClockStepMonitor, Motion, MotionEstimator
+from crazyflie_state_estimator.motion import (
+    ClockStepMonitor,
+    FiniteDifference,
+    Motion,
+    MotionEstimator,
+)
 from crazyflie_state_estimator.parameters import (
     KALMAN,
     KalmanParameters,
@@ -22,7 +27,6 @@ from crazyflie_state_estimator.parameters import (
     StateEstimatorParameters,
 )
 from crazyflie_state_estimator.pose_gate import Classification, PoseGate, TiltMonitor
-from crazyflie_state_estimator.rate_filter import FiniteDifference
 from crazyflie_utils import Node, NodeHandle, TransformError, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters.types import Integer

@@ -2,7 +2,7 @@
 
 from typing_extensions import override
 
-from crazyflie_state_estimator.rate_filter import Components, RateFilter
+from crazyflie_state_estimator.motion import Components, RateFilter
 
 #: Default noise of poses, m and rad: a motion capture system that is not at its best.
 POSITION_NOISE, ANGLE_NOISE = 0.001, 0.005

@@ -1,6 +1,6 @@
 """The controller of the hover examples, with limits and integrator, at a heading of choice."""
 
-from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
+from crazyflie_lqr.lqr_nodes import (
     PositionVelocityYawStateLiftLqrNode,
 )
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped

@@ -11,9 +11,17 @@ import math
 from math import isnan
 
 from crazyflie_model.angles import Triple
-from crazyflie_model.inner_loops import HEADING, HEADING_RATE, OUTPUT_LIMIT, PERIOD, TILT, TILT_RATE
+from crazyflie_model.inner_loops import (
+    HEADING,
+    HEADING_RATE,
+    OUTPUT_LIMIT,
+    PERIOD,
+    TILT,
+    TILT_RATE,
+    Gains,
+    terms,
+)
 from crazyflie_model.limits import FULL_PWM
-from crazyflie_model.pid import Gains, terms
 from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Setpoint
 
 

@@ -3,8 +3,7 @@
 import math
 
 from crazyflie_model.angles import zyx_from_quaternion
-from crazyflie_model.inner_loops import PERIOD
-from crazyflie_model.mixer import limit, mix
+from crazyflie_model.inner_loops import PERIOD, limit, mix
 from crazyflie_virtual.body import OFF, MotorCommands, Sensors
 from crazyflie_virtual.firmware.controllers import (
     AttitudeController,

@@ -1,13 +1,29 @@
-"""Position, velocity and yaw state; a reference without yaw."""
+"""LQR controllers by the state that they take: position, velocity and yaw; lift; the full state."""
 
+import numpy as np
+from numpy.typing import NDArray
 from typing_extensions import override
 
+from crazyflie_lqr.gain_file import MatrixFile
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode, LinearFeedbackParameters
-from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    FullStateStamped,
+    PositionVelocityStateStamped,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import Number
+from crazyflie_utils.parameters.types import Integer, Number
+
+
+class PositionVelocityYawStateLqrNode(LinearFeedbackNode):
+    """Linear feedback to a position, velocity and yaw."""
+
+    state_type = PositionVelocityYawStateStamped
+    reference_type = PositionVelocityYawStateStamped
+    yaw_index = 6
+
 
 _TILT_GAIN = Number("rad/(m s)")
 _LIMIT = Number("m s", minimum=0.0)
@@ -56,3 +72,25 @@ class PositionVelocityYawStateLiftLqrNode(LinearFeedbackNode):
             (k.x, k.y, k.z),
             (limit.x, limit.y, limit.z),
         )
+
+
+class FullStateLqrParameters(LinearFeedbackParameters):
+    """Parameters of `FullStateLqrNode`."""
+
+    x_dim: int = parameter(Integer(12, 12), "length of the state")
+    K: NDArray[np.float64] = parameter(
+        MatrixFile(4, 12), "gain file, `u_dim` rows of `x_dim` numbers", name="K_file", live=True
+    )
+
+
+class FullStateLqrNode(LinearFeedbackNode):
+    """Linear feedback to a full state.
+
+    Roll and pitch are taken as the state has them, about the axes of the fixed
+    frame; see the package's README for what that means for the gains.
+    """
+
+    state_type = FullStateStamped
+    reference_type = FullStateStamped
+    parameters_type = FullStateLqrParameters
+    yaw_index = 8

@@ -17,14 +17,14 @@ from tqdm import tqdm
 from crazyflie_reports import bag_log, report_page
 from crazyflie_reports.bag_events import concerning
 from crazyflie_reports.bag_file import BagError
-from crazyflie_reports.bag_flights import Flight, flights
+from crazyflie_reports.bag_flights import Flight, flights, vehicle_namespaces, vehicles
 from crazyflie_reports.bag_topics import ROLES
-from crazyflie_reports.bag_vehicles import vehicle_namespaces, vehicles
 from crazyflie_reports.figures import Figure, figures
 
 PAGE, FIGURES, EVENTS, DATA = "report.html", "figures.csv", "events.csv", "report.json"
 
-SIMULATED = 1e8  #: Times of ROS before this one, of 1973, count from the start of a simulation, s.
+#: A cell that begins with one of these is a formula for spreadsheets.
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 class ReportError(Exception):
@@ -68,7 +68,7 @@ class Report:
         self.recordings.append(
             {
                 "name": log.name,
-                "start": start if log.start > SIMULATED else "in simulated time",
+                "start": start if log.start > bag_log.SIMULATED else "in simulated time",
                 "duration": round(log.end - log.start, 3),
                 "remarks": log.remarks if data else [*log.remarks, *_why_there_is_no_flight(log)],
                 "flights": data,
@@ -77,7 +77,11 @@ class Report:
 
     def write(self, folder: Path) -> None:
         """Write page and tables into a folder, which is made if it is not there."""
-        names = [[f.name, f.unit] for f in self._flights[0][1]] if self._flights else []
+        names = (
+            [[f.name, f.unit, f.needs, f.note] for f in self._flights[0][1]]
+            if self._flights
+            else []
+        )
         folder.mkdir(parents=True, exist_ok=True)
         (folder / PAGE).write_text(report_page.page(self.recordings, names))
         keys = ("recording", "vehicle", "flight")
@@ -133,14 +137,15 @@ def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -
         with tempfile.TemporaryDirectory(dir=folder) as place:
             for number, path in enumerate(paths):
                 try:
-                    log = _read(path, Path(place, str(number)), names)
+                    logs = _read(path, Path(place, str(number)), names)
                 except BagError as error:
                     problems.append(str(error))
                     continue
-                # Bags of several folders may have the same name.
-                if [each.name for each in paths].count(path.name) > 1:
-                    log.name = str(path)
-                report.add(log)
+                for log in logs:
+                    # Bags of several folders may have the same name.
+                    if [each.name for each in paths].count(path.name) > 1:
+                        log.name = str(path) + log.name.removeprefix(path.name)
+                    report.add(log)
         if not report.recordings:
             raise ReportError("\n".join(problems))
         report.write(folder)
@@ -208,4 +213,10 @@ def _number(value):
 
 def _write_csv(path, header, rows):
     with path.open("w", newline="") as file:
-        csv.writer(file).writerows([header, *rows])
+        csv.writer(file).writerows([header, *([_cell(each) for each in row] for row in rows)])
+
+
+def _cell(value):
+    """Return a value, or text that a spreadsheet takes for text."""
+    is_formula = isinstance(value, str) and value.startswith(_FORMULA)
+    return f"'{value}" if is_formula else value

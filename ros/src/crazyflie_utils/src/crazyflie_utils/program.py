@@ -14,6 +14,7 @@ PACKAGES = {
     "cv_bridge": ("vision", "python3-cv-bridge"),
     "distributed": ("batch", "python3-distributed"),
     "libusb_package": ("demo", "libusb-package"),
+    "lz4": ("demo", "lz4"),
     "llvmlite": ("batch", "python3-llvmlite"),
     "matplotlib": ("vehicles", "python3-matplotlib"),
     "motioncapture": ("demo", "motioncapture"),

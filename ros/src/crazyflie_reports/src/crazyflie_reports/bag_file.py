@@ -11,9 +11,10 @@ import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, ClassVar
 
 import lz4.frame
+import roslib.message
 
 MAGIC = b"#ROSBAG V2.0\n"
 
@@ -71,6 +72,10 @@ class Expansion:
             yield piece
 
 
+class TopicError(Exception):
+    """A topic that cannot be read; the text names it and what was expected."""
+
+
 class _BrokenOffError(Exception):
     """The file ends, or is damaged, within a record."""
 
@@ -83,6 +88,24 @@ class Connection:
     topic: str
     datatype: str
     md5sum: str
+
+    encoding: ClassVar[str] = "ros1"  #: Of its messages.
+
+    def deserializer(self) -> Callable[[bytes], Any]:
+        """Return what makes a message of its data.
+
+        `TopicError`: its type is not defined here, or differently.
+        """
+        # The definition in the bag is text of whoever wrote it: a class made of it would run it.
+        message_type = roslib.message.get_message_class(self.datatype)
+        if message_type is None:
+            raise TopicError(f"{self.topic} is left out: no package here defines {self.datatype}")
+        if message_type._md5sum != self.md5sum:
+            raise TopicError(
+                f"{self.topic} is left out: its {self.datatype} has the md5 sum "
+                f"{self.md5sum}, expected {message_type._md5sum}"
+            )
+        return lambda data: message_type().deserialize(data)
 
 
 class BagFile:

@@ -50,6 +50,7 @@ class Vehicle:
     is_driven: bool  #: A driver has sent its controls: it is no simulated one.
     #: state, reference: STATE_FIELDS; velocities and yaw may be NaN.
     state: Rows
+    stamps: Rows  #: Of the states, s; 0 for a state without.
     reference: Rows
     control: Rows  #: CONTROL_FIELDS.
     attitude: Rows  #: POSE_FIELDS.
@@ -136,6 +137,7 @@ def _vehicle(namespace, sources, frame, frames, link):
         namespace=namespace,
         is_driven=is_driven,
         state=_without_header(state),
+        stamps=state[:, [_TIME, _STAMP]],
         reference=_without_header(rows("reference", len(STATE_FIELDS))),
         control=_without_header(control),
         attitude=_without_header(pose),

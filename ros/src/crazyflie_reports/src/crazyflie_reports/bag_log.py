@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_reports.bag_events import EventLog
-from crazyflie_reports.bag_file import BagError, BagFile, Connection
+from crazyflie_reports.bag_file import BagError, BagFile, Connection, TopicError
+from crazyflie_reports.bag_ros2 import SUFFIXES, Ros2BagFile
 from crazyflie_reports.bag_topics import (
     POSE_FIELDS,
     Role,
     Topic,
-    TopicError,
     expected,
+    pose_row,
+    seconds,
     topic_of,
     transform_row,
 )
@@ -99,14 +101,15 @@ def files_of(path: Path) -> list[Path]:
         return [path]
     if not path.is_dir():
         raise BagError(f"{path} does not exist; expected a bag or a folder of bags")
+    names = (".bag", ".bag.active", *SUFFIXES)
     # flight_10.bag comes after flight_9.bag.
     bags = sorted(
-        (each for each in path.iterdir() if each.name.endswith((".bag", ".bag.active"))),
+        (each for each in path.iterdir() if each.name.endswith(names)),
         key=lambda each: (len(each.name.partition(".")[0]), each.name),
     )
     if not bags:
         raise BagError(
-            f"{path} has no files *.bag or *.bag.active; expected the folder of a recording"
+            f"{path} has no files *{', *'.join(names)}; expected the folder of a recording"
         )
     return bags
 
@@ -125,7 +128,10 @@ def read(
     numbers of bytes. `BagError`: it cannot be read, or has none of the topics.
     """
     reader = _Reader(path.name, folder, names or {})
-    files = [BagFile(each) for each in files_of(path)]
+    files = [
+        Ros2BagFile(each, folder) if each.name.endswith(SUFFIXES) else BagFile(each)
+        for each in files_of(path)
+    ]
     remarks = []
     for file in files:
         for connection, time, data in file.messages(reader.is_wanted, progress):
@@ -190,10 +196,12 @@ class _Reader:
             stamp, number, content = topic.decode(data)
             if topic.role is not None:
                 self._spool(connection.topic, topic).append(time, stamp, number, content)
-            elif connection.datatype.startswith("tf"):
+            elif hasattr(content, "transforms") or hasattr(content, "poses"):
                 self._add_transforms(time, content)
             else:
-                log.events.add(time, connection.topic, topic.namespace, content)
+                log.events.add(
+                    time, connection.topic, topic.namespace, connection.datatype, content
+                )
         except Exception as error:  # Whatever a bag's own fields raise.
             self._errors.setdefault(connection.topic, f"{connection.topic}: {error}")
             self._bad[connection.topic] = self._bad.get(connection.topic, 0) + 1
@@ -213,16 +221,24 @@ class _Reader:
         return sources[name].spool
 
     def _add_transforms(self, time, message):
-        for each in message.transforms:
-            frame = each.child_frame_id.strip("/")
+        for frame, stamp, row in _poses_of(message):
             frames = self.logs[-1].frames
             if frame not in frames:
                 frames[frame] = self._new_spool(POSE_FIELDS)
             spool = frames[frame]
             if time - spool.last_time >= POSE_PERIOD:
-                row = transform_row(each.transform)
-                spool.append(time, each.header.stamp.to_sec(), 0, row)
+                spool.append(time, seconds(stamp), 0, row)
 
     def _new_spool(self, fields):
         number = sum(len(each.sources) + len(each.frames) for each in self.logs)
         return Spool(self._folder / f"{number}.doubles", fields)
+
+
+def _poses_of(message):
+    """Yield frame, stamp and row of each pose in a message of /tf, or of motion capture."""
+    if hasattr(message, "poses"):
+        for each in message.poses:
+            yield each.name, message.header.stamp, pose_row(each.pose)
+        return
+    for each in message.transforms:
+        yield each.child_frame_id.strip("/"), each.header.stamp, transform_row(each.transform)

@@ -5,6 +5,7 @@ import csv
 import json
 import math
 import re
+import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -14,7 +15,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from crazyflie_reports import bag_log, report_page
+from crazyflie_reports import bag_log, bag_mcap, report_page
 from crazyflie_reports.bag_events import concerning
 from crazyflie_reports.bag_file import BagError
 from crazyflie_reports.bag_flights import Flight, flights, vehicle_namespaces, vehicles
@@ -22,6 +23,7 @@ from crazyflie_reports.bag_topics import ROLES
 from crazyflie_reports.figures import Figure, figures
 
 PAGE, FIGURES, EVENTS, DATA = "report.html", "figures.csv", "events.csv", "report.json"
+MCAP = "mcap"  #: Folder of the recordings as MCAP.
 
 #: A cell that begins with one of these is a formula for spreadsheets.
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -124,13 +126,19 @@ class Report:
         return "\n".join(lines)
 
 
-def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -> list[str]:
+def make(
+    paths: list[Path],
+    folder: Path,
+    names: dict[str, str] | None = None,
+    has_mcap: bool = False,
+) -> list[str]:
     """Write a report on recordings; return what went wrong with any of them.
 
     A path is a bag, or a folder of bags that follow each other; for ``names`` see `bag_log.read`.
+    With ``has_mcap`` each recording is written as MCAP, too.
     `ReportError`: none of the recordings can be read, or the folder cannot be written.
     """
-    report, problems = Report(), []
+    report, problems, written = Report(), [], []
     try:
         folder.mkdir(parents=True, exist_ok=True)
         # Beside the report, since /tmp may be in memory.
@@ -146,6 +154,8 @@ def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -
                     if [each.name for each in paths].count(path.name) > 1:
                         log.name = str(path) + log.name.removeprefix(path.name)
                     report.add(log)
+                    if has_mcap:
+                        written.append(bag_mcap.write(log, _new_folder(folder / MCAP, log.name)))
         if not report.recordings:
             raise ReportError("\n".join(problems))
         report.write(folder)
@@ -154,7 +164,7 @@ def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -
     print(report.table())
     for recording in report.recordings:
         print("".join(f"{remark}\n" for remark in recording["remarks"]), end="")
-    print(f"report: {folder / PAGE}")
+    print(*(f"mcap: {each}" for each in written), f"report: {folder / PAGE}", sep="\n")
     return problems
 
 
@@ -167,7 +177,7 @@ def main() -> int:
         nargs="+",
         type=Path,
         metavar="BAG",
-        help="or a folder of bags that follow each other",
+        help="of ROS 1, or of ROS 2 (*.mcap, *.db3), or a folder of bags that follow each other",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("flight_report"), help="folder of the report (%(default)s)"
@@ -176,6 +186,9 @@ def main() -> int:
         "--topic", action="append", default=[], metavar="ROLE=NAME",
         help=f"a topic of another name, below the vehicle's namespace; roles: {', '.join(roles)}",
     )  # fmt: skip
+    parser.add_argument(
+        "--mcap", action="store_true", help="also write recordings for Foxglove and Lichtblick"
+    )
     options = parser.parse_args()
     names = dict(each.partition("=")[::2] for each in options.topic)
     if unknown := [each for each in names if each not in roles or not names[each]]:
@@ -186,7 +199,7 @@ def main() -> int:
         except re.error as error:
             parser.error(f"--topic {role}={name}: expected a regular expression; {error}")
     try:
-        problems = make(options.bags, options.out, names)
+        problems = make(options.bags, options.out, names, options.mcap)
     except ReportError as error:
         problems = [str(error)]
     print(*problems, sep="\n", file=sys.stderr, end="\n" if problems else "")
@@ -199,6 +212,14 @@ def _read(path, folder, names):
     size = sum(each.stat().st_size for each in bag_log.files_of(path))
     with tqdm(total=size, unit="B", unit_scale=True, desc=path.name, disable=None) as bar:
         return bag_log.read(path, folder, names, bar.update)
+
+
+def _new_folder(top, name):
+    """Return the folder of a recording's name, without what was in it."""
+    folder = top / re.sub(r"[^\w.-]+", "_", name).strip("._")
+    if folder.exists():
+        shutil.rmtree(folder)
+    return folder
 
 
 def _why_there_is_no_flight(log):

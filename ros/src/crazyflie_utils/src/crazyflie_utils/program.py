@@ -23,6 +23,7 @@ PACKAGES = {
     "numpy": ("demo", "python3-numpy"),
     "PIL": ("rviz", "python3-pil"),
     "pytest": ("tests", "python3-pytest"),
+    "rosbags": ("demo", "rosbags"),
     "scipy": ("vehicles", "python3-scipy"),
     "tqdm": ("demo", "python3-tqdm"),
     "usb": ("vehicles", "python3-usb"),

@@ -7,10 +7,12 @@ Formats: https://mcap.dev/spec, https://github.com/ros2/rosbag2.
 """
 
 import struct
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any, BinaryIO, ClassVar
 
@@ -30,10 +32,8 @@ from crazyflie_reports.bag_file import (
     TopicError,
 )
 
-try:
-    from compression import zstd
-except ModuleNotFoundError:  # Before Python 3.14.
-    from backports import zstd
+#: Of Python from 3.14 on.
+zstd = import_module("compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd")
 
 SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
 

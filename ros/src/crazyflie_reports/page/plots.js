@@ -17,6 +17,13 @@ function indexAt(times, time) {
   return times.findLastIndex((each) => each <= time);
 }
 
+// Return the limits of an axis for values from low to high.
+function padded(low, high) {
+  if (low === null) return [0, 1];
+  const margin = Math.max((high - low) * 0.08, 1e-3);
+  return [low - margin, high + margin];
+}
+
 // A plot; `view` = {from, to, all} is shared by the plots of a column, `seek(time)` sets the time of
 // the replay, `zoomed()` is called when the view has changed.
 class Plot {
@@ -24,9 +31,11 @@ class Plot {
     Object.assign(this, { data, flight, view, seek, zoomed, time: 0 });
     this.parent = added(parent, "div", "", "plot");
     added(this.parent, "h3", `${data.title} (${data.unit})`);
-    // Curves have times of their own: where one has no value, its line goes on; a gap is null.
-    this.uplot = new uPlot(this.options(), uPlot.join(data.curves.map(({ name, t, v }) =>
-      name.endsWith("reference") ? [[...t, view.all.to], [...v, v.at(-1)]] : [t, v])), this.parent);
+    // Curves have times of their own: where one has no value, its line goes on. A gap is null from
+    // the last value before it to the first one behind it (2).
+    const tables = data.curves.map(({ name, t, v }) =>
+      name.endsWith("reference") ? [[...t, view.all.to], [...v, v.at(-1)]] : [t, v]);
+    this.uplot = new uPlot(this.options(), uPlot.join(tables, tables.map(() => [2, 2])), this.parent);
     this.line = added(this.uplot.over, "div", "", "now");
     this.bind(this.uplot.over);
   }
@@ -35,12 +44,13 @@ class Plot {
     const { view, data } = this;
     return {
       width: this.parent.clientWidth, height: HEIGHT,
-      scales: { x: { time: false, range: () => [view.from, view.to] } },
+      scales: { x: { time: false, range: () => [view.from, view.to] }, y: { range: (_, low, high) => padded(low, high) } },
       axes: [
         { size: 24, gap: 2, values: (_, ticks) => ticks.map((each) => `${each} s`), grid: { stroke: "#e4e7ec" }, ticks: { show: false } },
         { size: 44, gap: 2, grid: { stroke: "#e4e7ec" }, ticks: { show: false } },
       ],
-      series: [{ value: (_, time) => time === null ? "" : `${time.toFixed(2)} s`, label: "time" },
+      // Under the mouse it is the time of the nearest sample.
+      series: [{ value: (u, time) => `${(u.over.matches(":hover") ? time ?? this.time : this.time).toFixed(2)} s`, label: "time" },
         ...data.curves.map((curve, k) => this.series(curve, k))],
       cursor: { y: false, drag: { setScale: false }, dataIdx: (u, k, index) => this.known(u, k, index), bind: { dblclick: () => null } },
       hooks: {
@@ -57,7 +67,7 @@ class Plot {
       label: name, stroke: COLORS[(first < 0 ? k : first) % COLORS.length], width: 1.4,
       dash: name.includes(" ") ? [5, 3] : undefined,
       paths: name.endsWith("reference") ? uPlot.paths.stepped({ align: 1 }) : undefined,
-      points: v.length === 1 ? { show: true } : { size: 4 },
+      points: name.endsWith("reference") ? { show: false } : { size: 4 },
       value: (_, value) => value === null || value === undefined ? "–" : value.toFixed(2),
     };
   }

@@ -120,7 +120,7 @@ class Replay {
     this.context.fillText(this.said, 10, this.height - 10);
     this.context.fillStyle = "#667085";
     const size = this.arm > 1.05 * ARM ? `; the vehicle is drawn ${(this.arm / ARM).toFixed(1)} times as large` : "";
-    this.context.fillText(`grid ${this.step} m; bold propellers: front; cross: reference${size}`, 10, 16);
+    this.context.fillText(`grid ${this.step} m; bold propellers: front; cross: reference${size}`, 10, this.height - 26);
   }
 
   ground() {

@@ -48,9 +48,9 @@ def narrow():
         yield browser
 
 
-def open_report(browser, folder, bag, moment=5.0):
-    """Show the report of a bag at a time of its replay (s)."""
-    make([bag], folder / "out")
+def open_report(browser, folder, bag, moment=5.0, *others):
+    """Show the report of a bag, and of others beside it, at a time of its replay (s)."""
+    make([bag, *others], folder / "out")
     browser.get_log("browser")
     browser.get("about:blank")
     browser.get_log("performance")
@@ -151,6 +151,21 @@ def test_the_replay_does_not_fly_through_a_gap(wide, tmp_path):
     assert tell(wide, pose) == "x 0.00  y 0.00  z 0.25 m"
 
 
+def test_no_line_is_drawn_in_a_gap(wide, tmp_path):
+    # Controls come 5 ms later than states, in the same plot.
+    open_report(wide, tmp_path, bags.flight_bag(tmp_path / "a.bag", gap=(2.0, 6.0)))
+    unknown = tell(
+        wide,
+        """column.plots.map(p => p.uplot.data.slice(1).map((values, k) => {
+          const times = p.uplot.data[0], inside = (_, i) => times[i] > 1.02 && times[i] < 4.98;
+          return [p.data.curves[k].name, values.filter(inside).every(v => v === null)];
+        }))""",
+    )
+    found = dict(each for plot in unknown for each in plot)
+    assert found == {name: not name.endswith("reference") for name in found}
+    assert {"z", "z reference", "yaw", "roll commanded", "thrust", "distance"} <= set(found)
+
+
 def test_a_flight_with_one_state_is_drawn(wide, tmp_path):
     with bags.written(tmp_path / "a.bag") as bag:
         for k in range(3):
@@ -167,11 +182,29 @@ def test_a_flight_with_one_state_is_drawn(wide, tmp_path):
 def test_the_legend_shows_the_values_of_the_time_of_the_replay(wide, tmp_path):
     open_report(wide, tmp_path, bags.flight_bag(tmp_path / "a.bag"), 1.0)
     values = """[...column.plots[0].parent.querySelectorAll(".u-value")].map(v => v.textContent)"""
-    assert tell(wide, values)[3] == "0.50"
+    assert tell(wide, values)[0:4:3] == ["1.00 s", "0.50"]
     wide.execute_script("seek(5)")
     assert tell(wide, values)[3] == "1.00"
     # A reference is one until the next.
     assert tell(wide, values)[6] == "1.00"
+
+
+def test_nothing_of_the_list_is_cut_off_where_two_recordings_share_the_width(wide, tmp_path):
+    bags.flight_bag(tmp_path / "b.bag")
+    open_report(wide, tmp_path, bags.flight_bag(tmp_path / "a.bag"), 5.0, tmp_path / "b.bag")
+    lists = """columns.map(each => each.section.querySelector(".scroll"))
+      .map(each => each.scrollWidth - each.clientWidth)"""
+    assert tell(wide, lists) == [0, 0]
+
+
+def test_values_that_are_all_zero_have_an_axis_around_zero(wide, tmp_path):
+    open_report(wide, tmp_path, bags.flight_bag(tmp_path / "a.bag"))
+    low, high = tell(
+        wide,
+        """(({ min, max }) => [min, max])(
+          column.plots.find(p => p.data.title === "attitude").uplot.scales.y)""",
+    )
+    assert -0.1 < low < 0.0 < high < 0.1
 
 
 def test_plots_of_a_column_show_the_same_part_of_time(wide, tmp_path):

@@ -174,7 +174,8 @@ class Ros2BagFile:
             ValueError,
             zstd.ZstdError,
         ) as error:
-            hint = "; mcap recover mends one that was not closed" if "mcap" in path.name else ""
+            is_open = self._source.suffix == ".mcap" and not isinstance(error, ExpansionError)
+            hint = "; mcap recover mends a file that was not closed" if is_open else ""
             raise BagError(f"{path} cannot be read: {error}{hint}") from None
         self._originals = {}
         for each in self._reader.connections:

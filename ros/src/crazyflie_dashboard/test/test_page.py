@@ -3,6 +3,7 @@
 import itertools
 import math
 import threading
+import time
 import urllib.request
 
 import cv2
@@ -88,6 +89,20 @@ def test_the_bar_says_that_the_scene_is_not_what_it_was(browser, server):
     sentence = Sentence("error", "dashboard", "no graph: the master does not answer")
     server.dashboard.set_vehicles(vehicle("cf1", 0.0), sentences=(sentence,))
     browser.has("no graph: the master does not answer", ".summary.bad")
+
+
+def test_a_scene_that_is_not_renewed_is_shown_as_old(browser, server):
+    browser.has("3 vehicles", ".summary")
+    server.dashboard.set_vehicles(vehicle("cf1", 0.0), made=time.monotonic() - 5.0)
+    browser.has("the dashboard is held up", ".summary.bad")
+    stale = "vehicles.poses.every((pose) => pose[7] === 2)"
+    wait_for(lambda: browser.in_scene(stale), "a vehicle that is drawn as stale")
+
+
+def test_a_server_that_sends_nothing_is_said_by_the_page_itself(browser, driver):
+    driver.execute_script("window.setBeat = () => {}")
+    wait_for(lambda: browser.find("body.old"), "a page that says that it is old")
+    assert "nothing comes from the dashboard" in browser.find("body").get_attribute("data-age")
 
 
 def test_a_vehicle_that_is_clicked_in_the_scene_is_chosen(browser):

@@ -3,6 +3,7 @@
 Lengths are in m, angles in rad, times in s, in the fixed frame; None is "not known".
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -132,6 +133,8 @@ class LogLine:
 class Scene:
     """All that there is at one moment."""
 
+    #: When it was made, s of time.monotonic(); inf before the first one.
+    made: float = math.inf
     fixed_frame: str = "world"
     #: By name, in the order in which they are shown.
     vehicles: Mapping[str, VehicleSnapshot] = field(default_factory=dict)

@@ -10,6 +10,7 @@ from fake_fleet import STATE, FakeFleet
 from genpy.dynamic import generate_dynamic
 from geometry_msgs.msg import Point, PoseStamped
 from rosgraph_msgs.msg import Log
+from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard import surroundings
@@ -240,6 +241,16 @@ def test_clocks_that_are_not_set_alike_are_said(fleet, offset, text):
     (sentence,) = [each for each in fleet.dashboard.scene().sentences if text in each.text]
     assert "cf2" in sentence.text
     assert "set the clocks of both computers" in sentence.remedy
+
+
+def test_vehicles_that_a_fleet_holds_are_marked(fleet):
+    add_topic(fleet, "/fleet/waiting", "std_msgs/String")
+    fleet.process.publish("/fleet/waiting", String("cf1 cf3"))
+    fleet.process.advance(0.05)
+    assert [each.is_held for each in fleet.vehicles.values()] == [True, False, True]
+    fleet.process.publish("/fleet/waiting", String(""))
+    fleet.process.advance(0.05)
+    assert not any(each.is_held for each in fleet.vehicles.values())
 
 
 def test_a_heading_that_is_infinite_marks_its_own_vehicle_and_no_other(fleet):

@@ -7,6 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
+from dataclasses import replace
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Log
@@ -232,7 +233,8 @@ class GraphModel:
     def _snapshot(self, name, fixed):
         """Return what is known of a vehicle; one that cannot be drawn holds up no other."""
         try:
-            return self.models[name].snapshot(self.frames, fixed)
+            now = self.models[name].snapshot(self.frames, fixed)
+            return replace(now, is_held=True) if name in self._surroundings.held else now
         except Exception as error:
             self._parent.warn(f"{name} cannot be shown: {error}", throttle=10.0, key=name)
             return VehicleSnapshot(name, state="cannot be shown", reason=str(error))

@@ -68,6 +68,7 @@ class VehicleSnapshot:
     takeoff_refusal: str = ""  #: Why a takeoff would be refused.
     is_in_flight: bool = False
     is_emergency: bool = False
+    is_held: bool = False  #: A fleet holds it: it is too near to another vehicle.
     battery: float | None = None  #: V.
     is_battery_low: bool = False
     link_quality: float | None = None  #: 0 to 1.

@@ -53,10 +53,11 @@ class View:
         self._take = ui.button("Take control", on_click=self._take_or_release)
         self._take.props("outline").classes("take")
         emergency = ui.button("Emergency").props("unelevated color=negative icon=dangerous")
+        # No tooltip: it would stay, and cover the tabs.
+        emergency.props('aria-label="Emergency: stop the motors of all vehicles"')
         emergency.classes("emergency-all").on("click", js_handler="(event) => emergency(event)")
         with emergency:
             ui.label("Esc Esc").classes("key")
-            ui.tooltip("Stops the motors of all vehicles, also from a page without control")
 
     def _build_views(self) -> None:
         with ui.element("div").classes("views"):

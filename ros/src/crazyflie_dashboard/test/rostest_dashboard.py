@@ -105,8 +105,8 @@ def test_vehicles_fly_and_land(dashboard, operator):
         LIMIT,
     )
     shown = {series.name: series for series in dashboard.plots(operator)}
-    assert max(shown["z"].values) > 1.1
-    assert {"error", "velocity x", "roll", "thrust", "reference z"} <= shown.keys()
+    assert max(shown["position z"].values) > 1.1
+    assert {"error", "velocity x", "roll", "thrust", "reference position z"} <= shown.keys()
     assert shown["thrust"].values[-1] == pytest.approx(9.81, abs=3.0)
     assert dashboard.scene().vehicles["cf1"].control_age < 1.0
     assert command(dashboard, operator, Action.LAND) == dict.fromkeys(NAMES, "")

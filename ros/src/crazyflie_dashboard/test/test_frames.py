@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from crazyflie_dashboard.frames import Frames
@@ -28,7 +29,7 @@ def clock():
 
 @pytest.fixture
 def frames(clock):
-    return Frames(clock.time, clock.nanoseconds)
+    return Frames(clock.time, clock.nanoseconds, 0.2)
 
 
 def send(frames, *poses):
@@ -56,7 +57,7 @@ def test_a_frame_below_others_is_in_the_fixed_frame(frames):
     )
     position, rotation = frames.in_fixed("cf1", "world")
     assert position == pytest.approx((1.0, 1.0, 0.5))
-    assert rotation == pytest.approx((0.0, 0.0, 1.0, 0.0), abs=1e-12)
+    assert np.abs(rotation) == pytest.approx((0.0, 0.0, 1.0, 0.0), abs=1e-12)
     assert frames.root("cf1") == "world"
 
 
@@ -86,3 +87,14 @@ def test_rates_are_those_of_messages(frames, clock):
     clock.now += 2.0
     frames.update()
     assert frames.poses["cf1"].rate == pytest.approx(25.0)
+
+
+def test_a_frame_that_has_gone_is_forgotten_and_one_that_holds_for_ever_is_not(frames, clock):
+    frames.read_static(StampedPose("world", "table", 1, (0.0, 0.0, 0.0), LEVEL))
+    send(frames, StampedPose("world", "wand", 10_000_000_000, (0.0, 0.0, 0.0), LEVEL))
+    for _ in range(31):
+        clock.now += 1.0
+        frames.update()
+    assert list(frames.poses) == ["table"]
+    send(frames, StampedPose("world", "wand", 41_000_000_000, (0.0, 0.0, 0.0), LEVEL))
+    assert frames.age("wand") == 0.0

@@ -6,15 +6,16 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.msg import Config
-from fake_fleet import FakeFleet
+from fake_fleet import STATE, FakeFleet
 from genpy.dynamic import generate_dynamic
 from geometry_msgs.msg import Point, PoseStamped
 from rosgraph_msgs.msg import Log
+from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard import surroundings
 from crazyflie_dashboard.discovery import Graph
-from crazyflie_msgs.msg import ControlStamped, FlightStatus
+from crazyflie_msgs.msg import ControlStamped, FlightStatus, PositionVelocityYawStateStamped
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose
 
 
@@ -226,6 +227,43 @@ def test_a_pose_that_is_none_makes_its_own_vehicle_old_and_no_other(rotation):
     assert fleet.vehicles["cf3"].position[2] == 2.0
     (sentence,) = [each for each in fleet.dashboard.scene().sentences if "cf1" in each.text]
     assert (sentence.level, sentence.source) == ("error", "dashboard")
+
+
+@pytest.mark.parametrize(
+    ("offset", "text"), [(3.0, "is stamped in the future"), (-3.0, "s after their stamps")]
+)
+def test_clocks_that_are_not_set_alike_are_said(fleet, offset, text):
+    for _ in range(5):
+        stamp = fleet.process.clock.nanoseconds() + round(offset * 1e9)
+        pose = StampedPose("world", "cf2", stamp, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))
+        fleet.process.publish("/tf", PoseCodec().encode([pose]))
+        fleet.process.advance(0.05)
+    (sentence,) = [each for each in fleet.dashboard.scene().sentences if text in each.text]
+    assert "cf2" in sentence.text
+    assert "set the clocks of both computers" in sentence.remedy
+
+
+def test_vehicles_that_a_fleet_holds_are_marked(fleet):
+    add_topic(fleet, "/fleet/waiting", "std_msgs/String")
+    fleet.process.publish("/fleet/waiting", String("cf1 cf3"))
+    fleet.process.advance(0.05)
+    assert [each.is_held for each in fleet.vehicles.values()] == [True, False, True]
+    fleet.process.publish("/fleet/waiting", String(""))
+    fleet.process.advance(0.05)
+    assert not any(each.is_held for each in fleet.vehicles.values())
+
+
+def test_a_heading_that_is_infinite_marks_its_own_vehicle_and_no_other(fleet):
+    topics = {**fleet.graph.topics, "/bird/state": STATE}
+    fleet.graph = Graph(topics, topics, fleet.graph.services)
+    fleet.process.advance(8.0)
+    message = PositionVelocityYawStateStamped()
+    message.state.yaw = math.inf
+    fleet.process.publish("/bird/state", message)
+    fleet.send_poses()
+    assert fleet.vehicles["bird"].state == "cannot be shown"
+    assert fleet.vehicles["bird"].is_stale
+    assert not fleet.vehicles["cf3"].is_stale
 
 
 def test_a_master_that_does_not_answer_is_said_until_it_does():

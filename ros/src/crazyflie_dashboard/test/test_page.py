@@ -3,6 +3,7 @@
 import itertools
 import math
 import threading
+import time
 import urllib.request
 
 import cv2
@@ -12,7 +13,7 @@ from fake_dashboard import vehicle
 from pages import wait_for
 from selenium.webdriver.common.keys import Keys
 
-from crazyflie_dashboard.snapshot import Action, Sentence
+from crazyflie_dashboard.snapshot import Action, LogLine, Sentence
 
 
 def test_vehicles_take_off_go_where_the_floor_is_clicked_and_land(browser, server):
@@ -88,6 +89,85 @@ def test_the_bar_says_that_the_scene_is_not_what_it_was(browser, server):
     sentence = Sentence("error", "dashboard", "no graph: the master does not answer")
     server.dashboard.set_vehicles(vehicle("cf1", 0.0), sentences=(sentence,))
     browser.has("no graph: the master does not answer", ".summary.bad")
+
+
+def test_a_scene_that_is_not_renewed_is_shown_as_old(browser, server):
+    browser.has("3 vehicles", ".summary")
+    server.dashboard.set_vehicles(vehicle("cf1", 0.0), made=time.monotonic() - 5.0)
+    browser.has("the dashboard is held up", ".summary.bad")
+    stale = "vehicles.poses.every((pose) => pose[7] === 2)"
+    wait_for(lambda: browser.in_scene(stale), "a vehicle that is drawn as stale")
+
+
+def test_a_server_that_sends_nothing_is_said_by_the_page_itself(browser, driver):
+    driver.execute_script("window.setBeat = () => {}")
+    wait_for(lambda: browser.find("body.old"), "a page that says that it is old")
+    assert "nothing comes from the dashboard" in browser.find("body").get_attribute("data-age")
+
+
+def acts(browser, name):
+    return browser.find(f"{browser.card(name)} .acts").text.split("\n")
+
+
+def test_cards_offer_what_can_be_done_now_and_say_what_comes_next(browser, server):
+    browser.has("3 vehicles")
+    assert acts(browser, "cf1") == ["take off", "land", "emergency"]
+    server.dashboard.change("cf1", is_in_flight=True, state="hovering")
+    browser.has("hovering", browser.card("cf1"))
+    assert acts(browser, "cf1") == ["land", "emergency"]
+    browser.choose("cf1")
+    wait_for(lambda: not browser.button("Take off").is_enabled(), "no takeoff in flight")
+    server.dashboard.change("cf1", is_in_flight=False, is_emergency=True, state="emergency")
+    browser.has("to fly again, press reset first", browser.card("cf1"))
+    assert acts(browser, "cf1") == ["reset", "emergency"]
+    assert not browser.button("Take off").is_enabled()
+    server.dashboard.change("cf1", is_emergency=False, is_held=True, is_in_flight=True)
+    browser.has("held by the fleet: too near to another vehicle", browser.card("cf1"))
+    browser.has("cf1 · held", ".scene")
+
+
+def test_the_goal_goes_when_it_is_reached(browser, server):
+    browser.take_control()
+    browser.choose("cf1")
+    browser.press("Take off")
+    browser.has("hovering", browser.card("cf1"))
+    browser.click_floor(0.5, -0.5)
+    wait_for(lambda: browser.in_scene("goal.visible"), "the goal")
+    browser.press("Go")
+    wait_for(lambda: not browser.in_scene("goal.visible"), "no goal")
+
+
+def test_what_is_said_again_and_again_is_one_line(browser, server):
+    log = tuple(
+        LogLine(k, 12.0 + k, "warn", "/fleet", f"cf1 and cf2 are 0.{30 + k} m apart")
+        for k in range(1, 41)
+    )
+    server.dashboard.set_vehicles(vehicle("cf1", 0.0), log=log, sentences=())
+    browser.tab("Messages")
+    browser.has("cf1 and cf2 are 0.70 m apart")
+    browser.has("warn 52.0 s /fleet, 40 times since 13.0 s")
+    assert browser.count(".line") == 1
+
+
+def test_all_vehicles_are_in_a_window_that_is_small(browser, driver, server):
+    size = driver.get_window_size()
+    driver.set_window_size(900, 700)
+    try:
+        server.dashboard.set_vehicles(*(vehicle(f"cf{k}", 1.0 * k, z=1.0) for k in range(5)))
+        browser.press("Overview")
+
+        def is_seen(name, k):
+            left, top, right, bottom = driver.execute_script(
+                "const r = document.querySelector('.scene').getBoundingClientRect();"
+                "return [r.left, r.top, r.right, r.bottom]"
+            )
+            x, y = browser.in_scene(f"screen({k}, 0, 1)")
+            return left < x < right and top < y < bottom
+
+        for k in range(5):
+            wait_for(lambda k=k: is_seen(f"cf{k}", k), f"cf{k} in the window")
+    finally:
+        driver.set_window_size(size["width"], size["height"])
 
 
 def test_a_vehicle_that_is_clicked_in_the_scene_is_chosen(browser):

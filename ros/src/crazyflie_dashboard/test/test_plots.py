@@ -49,7 +49,7 @@ def test_attitudes_are_in_degrees_and_positions_of_poses_without_states():
     plots.take_pose(now, has_state=False)
     values = {series.name: series.values[-1] for series in plots.series()}
     assert values["yaw"] == pytest.approx(45.0)
-    assert values["z"] == 3.0
+    assert values["position z"] == 3.0
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import rospy
 
-from crazyflie_reports.flight_report import FlightReport
+from crazyflie_reports.flight_record import FlightReport
 
 HOVER = (0.0, 0.0, 1.0)
 CONTROLLERS = {

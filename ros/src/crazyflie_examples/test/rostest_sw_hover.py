@@ -6,7 +6,7 @@ import rospy
 
 from crazyflie_model.units import GRAVITY
 from crazyflie_reports.flight_operator import FlightError, ready_operator
-from crazyflie_reports.flight_report import FlightReport
+from crazyflie_reports.flight_record import FlightReport
 
 HOVER = (0.0, 0.0, 1.0)
 

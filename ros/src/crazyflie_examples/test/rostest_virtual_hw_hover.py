@@ -3,7 +3,7 @@
 import pytest
 
 from crazyflie_reports.flight_operator import ready_operator
-from crazyflie_reports.flight_report import OVERSHOOT_LIMIT, TOUCHDOWN_LIMIT
+from crazyflie_reports.flight_record import OVERSHOOT_LIMIT, TOUCHDOWN_LIMIT
 
 HOVER = (0.0, 0.0, 1.0)
 SETTLING = 10.0

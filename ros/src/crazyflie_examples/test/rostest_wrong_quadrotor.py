@@ -4,7 +4,7 @@ import fleet
 import numpy as np
 import pytest
 
-from crazyflie_reports.flight_report import FlightReport
+from crazyflie_reports.flight_record import FlightReport
 
 HOVER = (0.0, 0.0, 1.0)
 TOLERANCE = 0.02

@@ -9,7 +9,7 @@ from std_srvs.srv import EmptyRequest
 from crazyflie_lqr.lqr_nodes import (
     PositionVelocityYawStateLiftLqrNode,
 )
-from crazyflie_reports.flight_report import OVERSHOOT_LIMIT
+from crazyflie_reports.flight_record import OVERSHOOT_LIMIT
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_state_estimator.estimator_node import PositionVelocityYawStateEstimatorNode
 from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode

@@ -1,181 +1,151 @@
-// Plots of numbers over time: curves, phases as bands, events as ticks, a cursor; wheel to zoom,
-// drag to move, double click for all.
+// Plots of numbers over time, by uPlot: phases as bands, events as ticks, the time of the replay as a
+// line; wheel or drag to zoom, click to set the time, double click for all.
 
-const COLORS = ["#2563eb", "#dc2626", "#059669", "#9333ea", "#d97706", "#475569"];
+// None is red, which is for what is not normal; they can be told apart by those who see no red or green.
+const COLORS = ["#0072b2", "#d98200", "#009e73", "#7b3fa0", "#475569"];
 const BANDS = { "taking off": "#e3f2e6", "flying": "#ffffff", "descending": "#fdf1dc", "landing": "#fbe3d4" };
 const KINDS = {
-  "refusal": "#d97706", "pose rejected": "#9333ea", "hold": "#0891b2", "emergency": "#b42318",
-  "link": "#be185d", "battery": "#a16207", "parameter": "#2563eb", "warning": "#ca8a04", "error": "#b42318",
+  "refusal": "#b45309", "pose rejected": "#9333ea", "hold": "#0891b2", "emergency": "#b42318",
+  "link": "#be185d", "battery": "#a16207", "parameter": "#2563eb", "warning": "#a16207", "error": "#b42318",
 };
-const LEFT = 52, RIGHT = 16, TOP = 22, BOTTOM = 20;
-
-// Return the drawing context of a canvas whose pixels fit the screen's.
-function fitted(canvas) {
-  const scale = window.devicePixelRatio || 1, box = canvas.getBoundingClientRect();
-  canvas.width = Math.max(1, box.width * scale);
-  canvas.height = Math.max(1, box.height * scale);
-  const context = canvas.getContext("2d");
-  context.scale(scale, scale);
-  context.font = "11px system-ui, sans-serif";
-  return [context, box.width, box.height];
-}
-
-// Return round numbers from low to high, about `count` of them.
-function ticks(low, high, count) {
-  const raw = (high - low) / count, power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map((each) => each * power).find((each) => each >= raw);
-  const result = [];
-  for (let k = Math.ceil(low / step); k * step <= high; k++) result.push(Number((k * step).toPrecision(6)));
-  return result;
-}
+const HEIGHT = 150;       // Of a plot, px of CSS.
+const SHORTEST = 0.02;    // Time that can be zoomed to, s.
+const CLICK = 3;          // A pointer that moves further, px, has not clicked.
 
 // Return the index of the last time that is not after `time`, or -1.
 function indexAt(times, time) {
-  let low = 0, high = times.length;
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (times[middle] <= time) low = middle + 1; else high = middle;
-  }
-  return low - 1;
+  return times.findLastIndex((each) => each <= time);
 }
 
-// A plot; `view` = {from, to} is shared by the plots of a column, `seek(time)` moves the cursor,
-// `redraw()` draws all that share the view.
+// Return the limits of an axis for values from low to high.
+function padded(low, high) {
+  if (low === null) return [0, 1];
+  const margin = Math.max((high - low) * 0.08, 1e-3);
+  return [low - margin, high + margin];
+}
+
+// A plot; `view` = {from, to, all} is shared by the plots of a column, `seek(time)` sets the time of
+// the replay, `zoomed()` is called when the view has changed.
 class Plot {
-  constructor(canvas, data, flight, view, seek, redraw) {
-    Object.assign(this, { canvas, data, flight, view, seek, redraw });
-    canvas.addEventListener("wheel", (event) => this.zoom(event), { passive: false });
-    canvas.addEventListener("pointerdown", (event) => {
-      canvas.setPointerCapture(event.pointerId);
-      this.grip = [event.offsetX, { ...view }];
-      this.moved = false;
-    });
-    canvas.addEventListener("pointermove", (event) => this.move(event));
-    canvas.addEventListener("pointerup", () => { this.grip = null; });
-    canvas.addEventListener("click", (event) => { if (!this.moved) seek(this.timeAt(event.offsetX)); });
-    canvas.addEventListener("dblclick", () => { Object.assign(view, view.all); redraw(); });
+  constructor(parent, data, flight, view, seek, zoomed) {
+    Object.assign(this, { data, flight, view, seek, zoomed, time: 0 });
+    this.parent = added(parent, "div", "", "plot");
+    added(this.parent, "h3", `${data.title} (${data.unit})`);
+    // Curves have times of their own: where one has no value, its line goes on. A gap is null from
+    // the last value before it to the first one behind it (2).
+    const tables = data.curves.map(({ name, t, v }) =>
+      name.endsWith("reference") ? [[...t, view.all.to], [...v, v.at(-1)]] : [t, v]);
+    this.uplot = new uPlot(this.options(), uPlot.join(tables, tables.map(() => [2, 2])), this.parent);
+    this.line = added(this.uplot.over, "div", "", "now");
+    this.bind(this.uplot.over);
   }
 
-  get width() { return this.canvas.clientWidth - LEFT - RIGHT; }
-  timeAt(x) { return this.view.from + (x - LEFT) / this.width * (this.view.to - this.view.from); }
-
-  zoom(event) {
-    event.preventDefault();
-    const center = this.timeAt(event.offsetX), factor = Math.exp(event.deltaY * 0.0015);
-    const { view } = this;
-    if ((view.to - view.from) * factor < 0.02) return;
-    view.from = Math.max(view.all.from, center + (view.from - center) * factor);
-    view.to = Math.min(view.all.to, center + (view.to - center) * factor);
-    this.redraw();
+  options() {
+    const { view, data } = this;
+    return {
+      width: this.parent.clientWidth, height: HEIGHT,
+      scales: { x: { time: false, range: () => [view.from, view.to] }, y: { range: (_, low, high) => padded(low, high) } },
+      axes: [
+        { size: 24, gap: 2, values: (_, ticks) => ticks.map((each) => `${each} s`), grid: { stroke: "#e4e7ec" }, ticks: { show: false } },
+        { size: 44, gap: 2, grid: { stroke: "#e4e7ec" }, ticks: { show: false } },
+      ],
+      // Under the mouse it is the time of the nearest sample.
+      series: [{ value: (u, time) => `${(u.over.matches(":hover") ? time ?? this.time : this.time).toFixed(2)} s`, label: "time" },
+        ...data.curves.map((curve, k) => this.series(curve, k))],
+      cursor: { y: false, drag: { setScale: false }, dataIdx: (u, k, index) => this.known(u, k, index), bind: { dblclick: () => null } },
+      hooks: {
+        drawClear: [(u) => this.bands(u)], draw: [(u) => this.ticks(u)], setLegend: [(u) => this.legend(u)],
+        setSelect: [(u) => { if (u.select.width > CLICK) this.zoom(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")); }],
+      },
+    };
   }
 
-  move(event) {
-    if (!this.grip) return;
-    const [x, old] = this.grip, { view } = this;
-    this.moved = this.moved || Math.abs(event.offsetX - x) > 3;
-    const span = old.to - old.from, shift = (x - event.offsetX) / this.width * span;
-    view.from = Math.min(Math.max(view.all.from, old.from + shift), view.all.to - span);
-    view.to = view.from + span;
-    this.redraw();
-  }
-
-  // Draw with the cursor at a time, s.
-  draw(time) {
-    const [context, width, height] = fitted(this.canvas), { view } = this;
-    const [low, high] = this.limits();
-    const x = (t) => LEFT + (t - view.from) / (view.to - view.from) * (width - LEFT - RIGHT);
-    const y = (v) => height - BOTTOM - (v - low) / (high - low) * (height - TOP - BOTTOM);
-    this.axes(context, x, y, width, height, low, high);
-    context.save();
-    context.beginPath();
-    context.rect(LEFT, TOP, width - LEFT - RIGHT, height - TOP - BOTTOM);
-    context.clip();
-    this.data.curves.forEach((curve, k) => this.curve(context, curve, k, x, y));
-    for (const [when, kind] of this.flight.events) {
-      context.fillStyle = KINDS[kind] || "#000";
-      context.fillRect(x(when) - 1, TOP, 2, 9);
-    }
-    context.strokeStyle = "#111";
-    context.beginPath();
-    context.moveTo(x(time), TOP);
-    context.lineTo(x(time), height - BOTTOM);
-    context.stroke();
-    context.restore();
-    this.legend(context, time);
-  }
-
-  limits() {
-    let low = Infinity, high = -Infinity;
-    for (const { t, v } of this.data.curves)
-      for (let k = Math.max(0, indexAt(t, this.view.from)); k < t.length && t[k] <= this.view.to; k++) {
-        low = Math.min(low, v[k]);
-        high = Math.max(high, v[k]);
-      }
-    if (low > high) [low, high] = [0, 1];
-    const margin = Math.max((high - low) * 0.08, 1e-3);
-    return [low - margin, high + margin];
-  }
-
-  axes(context, x, y, width, height, low, high) {
-    for (const [name, from, to] of this.flight.phases) {
-      const left = Math.max(LEFT, x(from)), right = Math.min(width - RIGHT, x(to));
-      if (right <= left) continue;
-      context.fillStyle = BANDS[name] || "#f1f5f9";
-      context.fillRect(left, TOP, right - left, height - TOP - BOTTOM);
-      context.fillStyle = "#98a2b3";
-      if (right - left > context.measureText(name).width) context.fillText(name, left + 3, TOP + 20);
-    }
-    context.strokeStyle = "#e4e7ec";
-    context.fillStyle = "#475467";
-    context.beginPath();
-    context.textAlign = "right";
-    for (const value of ticks(low, high, 4)) {
-      context.moveTo(LEFT, y(value));
-      context.lineTo(width - RIGHT, y(value));
-      context.fillText(value, LEFT - 5, y(value) + 4);
-    }
-    context.textAlign = "center";
-    for (const value of ticks(this.view.from, this.view.to, width / 90)) {
-      context.moveTo(x(value), TOP);
-      context.lineTo(x(value), height - BOTTOM);
-      context.fillText(`${value} s`, x(value), height - 6);
-    }
-    context.stroke();
-    context.textAlign = "left";
-  }
-
-  curve(context, { name, t, v }, k, x, y) {
-    const isStep = name.endsWith("reference");
-    context.strokeStyle = this.color(name, k);
-    context.setLineDash(name.includes(" ") ? [5, 3] : []);
-    context.lineWidth = 1.4;
-    context.beginPath();
-    for (let i = Math.max(0, indexAt(t, this.view.from)); i < t.length; i++) {
-      if (isStep && i > 0) context.lineTo(x(t[i]), y(v[i - 1]));
-      context.lineTo(x(t[i]), y(v[i]));
-      if (t[i] > this.view.to) break;
-    }
-    context.stroke();
-    context.setLineDash([]);
-    context.lineWidth = 1;
-  }
-
-  // A commanded or reference value has the color of what follows it.
-  color(name, k) {
+  series({ name, v }, k) {
     const first = this.data.curves.findIndex((each) => each.name === name.split(" ")[0]);
-    return COLORS[(first < 0 ? k : first) % COLORS.length];
+    return {
+      // A commanded or reference value has the color of what follows it.
+      label: name, stroke: COLORS[(first < 0 ? k : first) % COLORS.length], width: 1.4,
+      dash: name.includes(" ") ? [5, 3] : undefined,
+      paths: name.endsWith("reference") ? uPlot.paths.stepped({ align: 1 }) : undefined,
+      points: name.endsWith("reference") ? { show: false } : { size: 4 },
+      value: (_, value) => value === null || value === undefined ? "–" : value.toFixed(2),
+    };
   }
 
-  legend(context, time) {
-    context.fillStyle = "#1c2330";
-    context.fillText(`${this.data.title} (${this.data.unit})`, 4, 13);
-    let left = 14 + context.measureText(`${this.data.title} (${this.data.unit})`).width;
-    this.data.curves.forEach(({ name, t, v }, k) => {
-      const index = indexAt(t, time), value = index < 0 ? "–" : v[index].toFixed(2);
-      const text = name.includes(" ") ? `- - ${name}` : `${name} ${value}`;
-      context.fillStyle = this.color(name, k);
-      context.fillText(text, left, 13);
-      left += context.measureText(text).width + 10;
+  // Return the last index until `index` at which curve `k` has a value or a gap.
+  known(u, k, index) {
+    const values = u.data[k];
+    while (index > 0 && values[index] === undefined) index--;
+    return index;
+  }
+
+  bind(over) {
+    let pressed = 0;
+    over.addEventListener("pointerdown", (event) => { pressed = event.clientX; });
+    over.addEventListener("click", (event) => {
+      if (Math.abs(event.clientX - pressed) <= CLICK) this.seek(this.uplot.posToVal(event.offsetX, "x"));
     });
+    over.addEventListener("dblclick", () => this.zoom(this.view.all.from, this.view.all.to));
+    over.addEventListener("mouseleave", () => this.draw(this.time));
+    over.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const { view } = this, center = this.uplot.posToVal(event.offsetX, "x"), factor = Math.exp(event.deltaY * 0.0015);
+      this.zoom(center + (view.from - center) * factor, center + (view.to - center) * factor);
+    }, { passive: false });
+  }
+
+  zoom(from, to) {
+    this.uplot.setSelect({ left: 0, width: 0 }, false);
+    if (to - from < SHORTEST) return;
+    const { view } = this;
+    Object.assign(view, { from: Math.max(view.all.from, from), to: Math.min(view.all.to, to) });
+    this.zoomed();
+  }
+
+  // Show the part of time that the view has, at the width that there is.
+  update() {
+    this.uplot.setSize({ width: this.parent.clientWidth, height: HEIGHT });
+    this.uplot.setScale("x", { min: this.view.from, max: this.view.to });
+    this.draw(this.time);
+  }
+
+  // Show the values at a time of the replay, s; under the mouse are those of there.
+  draw(time) {
+    const { uplot, view } = this;
+    this.time = time;
+    this.line.style.left = `${uplot.valToPos(time, "x")}px`;
+    this.line.hidden = time < view.from || time > view.to;
+    this.legend(uplot);
+  }
+
+  legend(u) {
+    if (u.over.matches(":hover")) return;
+    const index = indexAt(u.data[0], this.time);
+    u.setLegend({ idxs: u.data.map((_, k) => index < 0 ? null : this.known(u, k, index)) }, false);
+  }
+
+  bands(u) {
+    const { ctx, bbox } = u, scale = devicePixelRatio;
+    ctx.save();
+    ctx.font = `${11 * scale}px system-ui, sans-serif`;
+    for (const [name, from, to] of this.flight.phases) {
+      const left = Math.max(bbox.left, u.valToPos(from, "x", true));
+      const width = Math.min(bbox.left + bbox.width, u.valToPos(to, "x", true)) - left;
+      if (width <= 0) continue;
+      ctx.fillStyle = BANDS[name] || "#f1f5f9";
+      ctx.fillRect(left, bbox.top, width, bbox.height);
+      ctx.fillStyle = "#98a2b3";
+      if (width > ctx.measureText(name).width) ctx.fillText(name, left + 3 * scale, bbox.top + 22 * scale);
+    }
+    ctx.restore();
+  }
+
+  ticks(u) {
+    for (const [time, kind] of this.flight.events) {
+      const left = u.valToPos(time, "x", true);
+      if (left < u.bbox.left || left > u.bbox.left + u.bbox.width) continue;
+      u.ctx.fillStyle = KINDS[kind] || "#000";
+      u.ctx.fillRect(left - devicePixelRatio, u.bbox.top, 2 * devicePixelRatio, 9 * devicePixelRatio);
+    }
   }
 }

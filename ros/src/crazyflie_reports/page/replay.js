@@ -1,16 +1,37 @@
 // The replay: vehicles, their paths and references in three dimensions; drag to turn, wheel to zoom.
 
 const ARM = 0.046, ROTOR = 0.023;  // Of a Crazyflie, m: half of its diagonal, radius of a propeller.
-const SMALLEST = 0.055;            // Smallest arm that is drawn, as a fraction of what is seen.
+const SMALLEST = 0.13;             // Smallest arm that is drawn, as a fraction of what is seen.
+const OLD = 0.1;                   // s; a pose that is older is not where the vehicle is.
 const MANY = 25;                   // More vehicles are drawn smaller; only the chosen one has its name.
 
-// Return the pose of a path at a time, between two rows, as [x, y, z, roll, pitch, yaw, ...].
-function poseAt(path, time) {
-  const last = path.rows.length - 1;
-  const place = Math.min(Math.max((time - path.start) / path.period, 0), last);
-  const k = Math.min(Math.floor(place), Math.max(0, last - 1)), share = place - k;
-  const a = path.rows[k], b = path.rows[Math.min(k + 1, last)];
-  return a.map((value, i) => value + share * (b[i] - value));
+// Return the drawing context of a canvas whose pixels fit the screen's, and its size, px of CSS.
+function fitted(canvas) {
+  const scale = window.devicePixelRatio || 1, box = canvas.getBoundingClientRect();
+  canvas.width = Math.max(1, box.width * scale);
+  canvas.height = Math.max(1, box.height * scale);
+  const context = canvas.getContext("2d");
+  context.scale(scale, scale);
+  context.font = "11px system-ui, sans-serif";
+  return [context, box.width, box.height];
+}
+
+// Return the pose of a path at a time, as [x, y, z, roll, pitch, yaw, ...], and its age, s. It is
+// between two rows; in a gap, and at the path's end, the last one. Before the first it is that one.
+function poseAt({ rows, start, period }, time) {
+  const place = Math.max((time - start) / period, 0), next = Math.floor(place) + 1;
+  let k = Math.min(next - 1, rows.length - 1);
+  if (rows[k] && rows[next]) return [rows[k].map((value, i) => value + (place - k) * (rows[next][i] - value)), 0];
+  while (k > 0 && !rows[k]) k--;
+  return [rows[k], (place - k) * period];
+}
+
+// Return the rows of a path until a place, in parts without gaps.
+function partsOf(rows, count = rows.length) {
+  const parts = [[]];
+  for (const row of rows.slice(0, Math.max(0, count)))
+    if (row) parts.at(-1).push(row); else if (parts.at(-1).length) parts.push([]);
+  return parts;
 }
 
 // R = Rx(roll) Ry(pitch) Rz(yaw), times a vector.
@@ -42,7 +63,7 @@ class Replay {
     this.others = this.recording.flights.filter((each) => each !== flight && each.path
       && each.vehicle !== flight.vehicle && each.start < flight.start + flight.duration
       && each.start + each.duration > flight.start);
-    const rows = [flight, ...this.others].flatMap((each) => each.path ? each.path.rows : []);
+    const rows = [flight, ...this.others].flatMap((each) => each.path ? each.path.rows.filter(Boolean) : []);
     const low = [0, 1, 2].map((k) => rows.reduce((best, row) => Math.min(best, row[k]), Infinity));
     const high = [0, 1, 2].map((k) => rows.reduce((best, row) => Math.max(best, row[k]), -Infinity));
     this.floor = Math.min(0, low[2]);
@@ -79,37 +100,47 @@ class Replay {
     this.ground();
     for (const other of this.others) {
       const at = time + this.flight.start - other.start;
-      this.line(other.path.rows, "#d0d5dd", 1);
-      this.vehicle(other, poseAt(other.path, at), "#98a2b3");
+      for (const part of partsOf(other.path.rows)) this.line(part, "#d0d5dd", 1);
+      this.vehicle(other, poseAt(other.path, at)[0], "#98a2b3");
     }
     const { path } = this.flight, done = Math.ceil((time - path.start) / path.period);
-    this.line(path.rows, "#bfd3fb", 1.2);
-    this.line(path.rows.slice(0, Math.max(0, done)), "#2563eb", 2.2);
-    const pose = poseAt(path, time);
+    for (const part of partsOf(path.rows)) this.line(part, "#bfd3fb", 1.2);
+    for (const part of partsOf(path.rows, done)) this.line(part, "#2563eb", 2.2);
+    const [pose, age] = poseAt(path, time);
     if (pose.length > 6) this.cross(pose.slice(6));
     this.line([pose, [pose[0], pose[1], this.floor]], "#98a2b3", 1, [3, 3]);
-    this.vehicle(this.flight, pose, "#1c2330");
-    context.fillStyle = "#475467";
-    context.fillText(`x ${pose[0].toFixed(2)}  y ${pose[1].toFixed(2)}  z ${pose[2].toFixed(2)} m`, 10, height - 10);
+    this.vehicle(this.flight, pose, age > OLD ? "#98a2b3" : "#1c2330");
+    this.words(pose, age);
+  }
+
+  words(pose, age) {
+    const where = ["x", "y", "z"].map((name, k) => `${name} ${pose[k].toFixed(2)}`).join("  ");
+    this.said = age > OLD ? `no state for ${age.toFixed(1)} s; the last one: ${where} m` : `${where} m`;
+    this.context.fillStyle = age > OLD ? "#b42318" : "#475467";
+    this.context.fillText(this.said, 10, this.height - 10);
+    this.context.fillStyle = "#667085";
+    const size = this.arm > 1.05 * ARM ? `; the vehicle is drawn ${(this.arm / ARM).toFixed(1)} times as large` : "";
+    this.context.fillText(`grid ${this.step} m; bold propellers: front; cross: reference${size}`, 10, this.height - 26);
   }
 
   ground() {
     const step = this.radius > 8 ? 5 : this.radius > 2.5 ? 1 : 0.5;
+    this.step = step;
     const reach = Math.ceil(this.radius / step) * step;
     const [cx, cy] = this.center.map((each) => Math.round(each / step) * step);
     for (let d = -reach; d <= reach + 1e-9; d += step) {
       this.line([[cx + d, cy - reach, this.floor], [cx + d, cy + reach, this.floor]], "#e4e7ec", 1);
       this.line([[cx - reach, cy + d, this.floor], [cx + reach, cy + d, this.floor]], "#e4e7ec", 1);
     }
-    [["x", "#dc2626"], ["y", "#059669"], ["z", "#2563eb"]].forEach(([name, color], k) => {
+    // The colors of x, y and z in the plots.
+    ["x", "y", "z"].forEach((name, k) => {
+      const color = COLORS[k];
       const tip = [0, 0, this.floor];
       tip[k] += step / 2;
       this.line([[0, 0, this.floor], tip], color, 2);
       this.context.fillStyle = color;
       this.context.fillText(name, ...this.project(tip));
     });
-    this.context.fillStyle = "#98a2b3";
-    this.context.fillText(`grid ${step} m`, 10, 16);
   }
 
   line(points, color, width, dash = []) {
@@ -130,14 +161,15 @@ class Replay {
       const [a, b] = [[...point], [...point]];
       a[k] -= size;
       b[k] += size;
-      this.line([a, b], "#d97706", 1.5);
+      this.line([a, b], "#7b3fa0", 2);
     }
   }
 
-  // A Crazyflie: two arms, four propellers, of which those in front are red.
+  // A Crazyflie: two arms, four propellers, of which those in front are bold.
   vehicle(flight, pose, color) {
     const crowd = Math.max(1, this.others.length / MANY);
     const arm = Math.max(ARM, SMALLEST * this.radius / this.zoom / Math.sqrt(crowd)), size = arm / ARM * ROTOR;
+    if (flight === this.flight) this.arm = arm;
     const at = (vector) => rotated(vector, pose[3], pose[4], pose[5]).map((value, k) => value + pose[k]);
     for (const quarter of [1, 3, 5, 7]) {
       const angle = quarter * Math.PI / 4, [x, y] = [Math.cos(angle) * arm, Math.sin(angle) * arm];
@@ -147,11 +179,11 @@ class Replay {
         const turn = k * Math.PI / 8;
         ring.push(at([x + size * Math.cos(turn), y + size * Math.sin(turn), 0.006]));
       }
-      this.line(ring, x > 0 && color === "#1c2330" ? "#dc2626" : color, 1.3);
+      this.line(ring, color, x > 0 ? 3.2 : 1.2);
     }
     if (crowd > 1 && flight !== this.flight) return;
-    const [left, top] = this.project(pose);
+    const [left, top] = this.project([pose[0], pose[1], pose[2] + 1.4 * arm]);
     this.context.fillStyle = color;
-    this.context.fillText(flight.vehicle, left + 10, top - 10);
+    this.context.fillText(flight.vehicle, left + 10, top);
   }
 }

@@ -47,7 +47,7 @@ class Column {
       added(row, "td", `${flight.vehicle} ${flight.number}`);
       added(row, "td", `${(flight.start - this.recording.flights[0].start).toFixed(1)} s`, "number");
       added(row, "td", `${flight.duration.toFixed(1)} s`, "number");
-      for (const k of picked) figureCell(row, flight.figures[k]);
+      for (const k of picked) figureCell(row, flight.figures[k], k);
       row.addEventListener("click", () => { this.choose(flight); begin(); });
       return row;
     });
@@ -61,9 +61,10 @@ class Column {
     this.replay = new Replay(scene, this.recording, () => draw());
     this.replay.choose(flight);
     const all = { from: -1, to: flight.duration + 1 };
-    const view = { ...all, all }, grid = added(added(this.body, "div", "", "card"), "div", "", "two");
-    this.plots = flight.plots.map((data) =>
-      new Plot(added(grid, "canvas", "", "plot"), data, flight, view, seek, () => draw()));
+    const view = { ...all, all }, grid = added(added(this.body, "div", "", "card"), "div", "", "plots");
+    this.plots = flight.plots.map((data) => new Plot(grid, data, flight, view, seek, () => this.update()));
+    // Only now it is known how wide they are.
+    this.update();
     this.events();
   }
 
@@ -82,6 +83,10 @@ class Column {
     if (more_events) added(card, "div", `and ${more_events} more, see events.csv`, "quiet");
   }
 
+  update() {
+    for (const plot of this.plots) plot.update();
+  }
+
   draw(time) {
     if (!this.flight) return;
     this.replay.draw(time);
@@ -89,8 +94,13 @@ class Column {
   }
 }
 
-function figureCell(row, [value, isNormal]) {
-  added(row, "td", shown(value), isNormal ? "number" : "number abnormal");
+function figureCell(row, [value, isNormal], k) {
+  const cell = added(row, "td", shown(value), isNormal ? "number" : "number abnormal");
+  if (value === null) cell.title = unknown(k);
+}
+
+function unknown(k) {
+  return `not known: it needs ${REPORT.figures[k][2]}`;
 }
 
 function drawFigures() {
@@ -102,13 +112,14 @@ function drawFigures() {
     added(head, "th", `${recording.name}: ${flight.vehicle} ${flight.number}`, "number");
     added(head, "th", "normal");
   }
-  REPORT.figures.forEach(([name, unit], k) => {
+  REPORT.figures.forEach(([name, unit, , note], k) => {
     const row = added(table, "tr");
     added(row, "td", name);
     added(row, "td", unit);
     for (const { flight } of chosen) {
-      figureCell(row, flight.figures[k]);
-      added(row, "td", flight.figures[k][2], "quiet");
+      const [value, , normal] = flight.figures[k];
+      figureCell(row, flight.figures[k], k);
+      added(row, "td", value === null ? unknown(k) : [normal, note].filter(Boolean).join(", "), "quiet");
     }
   });
 }
@@ -124,7 +135,7 @@ function seek(time) {
   draw();
 }
 
-// Begin anew with the flights that are chosen.
+// Start the replay of the flights that are chosen.
 function begin() {
   const lasts = columns.filter((each) => each.flight).map((each) => each.flight.duration);
   slider.min = -1;
@@ -149,13 +160,17 @@ play.addEventListener("click", () => {
   requestAnimationFrame(step);
 });
 slider.addEventListener("input", draw);
-window.addEventListener("resize", draw);
+window.addEventListener("resize", () => {
+  for (const column of columns) if (column.flight) column.update();
+  draw();
+});
 
 const columns = REPORT.recordings.map((each) => new Column(each, document.getElementById("columns")));
 const count = REPORT.recordings.reduce((sum, each) => sum + each.flights.length, 0);
 added(document.getElementById("summary"), "div",
-  `${counted(count, "flight")} in ${counted(columns.length, "recording")}. Times count from each takeoff, s. Red: not normal. `
-  + "Drag the scene to turn it; on plots: click to set the time, wheel to zoom, double click for all.", "quiet");
+  `${counted(count, "flight")} in ${counted(columns.length, "recording")}. Times count from each takeoff, s. “!”: not normal; “–”: not known. `
+  + "Drag the scene to turn it; on plots: click to set the time, drag or wheel to zoom, double click for all. "
+  + "Dashed: reference or command; a line that is broken: nothing was recorded there.", "quiet");
 for (const column of columns) if (column.recording.flights.length) column.choose(column.recording.flights[0]);
 begin();
 seek(Number(location.hash.slice(1)) || 0);  // report.html#7.5 begins at 7.5 s.

@@ -8,6 +8,7 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from dynamic_reconfigure.msg import Config, DoubleParameter
 from geometry_msgs.msg import PoseStamped, TransformStamped, Twist
+from rosbags.rosbag2 import StoragePlugin, Writer
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import Empty, Float32, Header
 from tf2_msgs.msg import TFMessage
@@ -22,6 +23,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_reports import bag_ros2
 
 START = 1000.0
 TAKEOFF, FLYING, LAND, LANDED, END = 1.0, 4.0, 9.0, 13.0, 15.0
@@ -142,3 +144,66 @@ def flight_bag(path, compression="none", **options):
     with written(path, compression) as bag:
         write_flight(bag, **options)
     return path
+
+
+@contextlib.contextmanager
+def ros2_bag(folder, storage=StoragePlugin.MCAP, compression=None, definitions=None):
+    """Yield a function that writes topic, type ("package/Name"), message and time of the flight.
+
+    ``compression``: mode and format; ``definitions``: by type, other ones than the messages have.
+    """
+    writer = Writer(folder, version=9, storage_plugin=storage)
+    if compression:
+        writer.set_compression(*compression)
+    connections = {}
+    with writer:
+
+        def write(topic, datatype, message, time):
+            name = bag_ros2.ros2_name(datatype)
+            if topic not in connections:
+                other = (
+                    {"msgdef": definitions[datatype], "rihs01": "RIHS01_0"}
+                    if (datatype in (definitions or {}))
+                    else {"typestore": bag_ros2.types()}
+                )
+                connections[topic] = writer.add_connection(topic, name, **other)
+            data = bag_ros2.types().serialize_cdr(message, name)
+            writer.write(connections[topic], round((START + time) * 1e9), data)
+
+        yield write
+
+
+def ros2_header(time, frame=""):
+    """Return a header of ROS 2."""
+    stamp = bag_ros2.message("builtin_interfaces/Time", sec=int(START + time))
+    return bag_ros2.message("std_msgs/Header", stamp=stamp, frame_id=frame)
+
+
+def ros2_pose(z):
+    """Return a pose of ROS 2 at a height (m)."""
+    pose = bag_ros2.message("geometry_msgs/Pose")
+    pose.position.z, pose.orientation.w = z, 1.0
+    return pose
+
+
+def write_crazyswarm2(write, name="cf1", poses="pose"):
+    """Write what crazyswarm2 has of the flight; poses on "pose" or on motion capture's "poses"."""
+    message = bag_ros2.message
+    for _, time in steps():
+        z, _ = height(time)
+        if poses == "pose":
+            pose = message("geometry_msgs/PoseStamped", header=ros2_header(time), pose=ros2_pose(z))
+            write(f"/{name}/pose", "geometry_msgs/PoseStamped", pose, time)
+        else:
+            mocap = "motion_capture_tracking_interfaces"
+            body = message(f"{mocap}/NamedPose", name=name, pose=ros2_pose(z))
+            array = message(f"{mocap}/NamedPoseArray", header=ros2_header(time), poses=[body])
+            write("/poses", f"{mocap}/NamedPoseArray", array, time)
+    goal = message(
+        "crazyflie_interfaces/FullState", header=ros2_header(TAKEOFF), pose=ros2_pose(1.0)
+    )
+    write(f"/{name}/cmd_full_state", "crazyflie_interfaces/FullState", goal, TAKEOFF)
+    status = message("crazyflie_interfaces/Status", battery_voltage=3.9)
+    write(f"/{name}/status", "crazyflie_interfaces/Status", status, 5.0)
+    line = message("rcl_interfaces/Log", level=30, name=f"{name}.link", msg="latency is high")
+    write("/rosout", "rcl_interfaces/Log", line, 6.0)

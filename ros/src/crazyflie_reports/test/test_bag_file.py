@@ -9,6 +9,7 @@ import rosbag
 from std_msgs.msg import Float32, String
 
 from crazyflie_msgs.msg import ControlStamped
+from crazyflie_reports import bag_file
 from crazyflie_reports.bag_file import MAGIC, BagError, BagFile
 from crazyflie_reports.bag_log import Spool, read
 from crazyflie_reports.bag_report import ReportError, make
@@ -79,6 +80,27 @@ def test_damage(tmp_path):
     assert "breaks off" in reason
 
 
+@pytest.mark.parametrize("compression", ["bz2", "lz4"])
+@pytest.mark.parametrize(
+    ("limits", "text"),
+    [
+        ({"LARGEST_CHUNK": 50_000}, "a chunk expands to more than"),
+        ({"LEAST_TOTAL": 0, "LARGEST_RATIO": 1}, "its chunks expand to more than"),
+    ],
+)
+def test_chunks_that_expand_to_more_than_memory_or_disk_hold(
+    tmp_path, monkeypatch, compression, limits, text
+):
+    whole = bags.flight_bag(tmp_path / "whole.bag", compression)
+    every, _ = times(whole)
+    for name, value in limits.items():
+        monkeypatch.setattr(bag_file, name, value, raising=False)
+    some, reason = times(whole)
+    assert len(some) < len(every)
+    assert some == every[: len(some)]
+    assert text in reason
+
+
 def other_md5(bag):
     """Write controls of another definition."""
 
@@ -123,7 +145,7 @@ def test_a_definition_in_a_bag_runs_nothing(tmp_path):
     path = bags.flight_bag(tmp_path / "a.bag")
     with rosbag.Bag(str(path), "a") as bag:
         bag.write("/battery", Hostile(data=3.7), bags.stamp(5.0))
-    log = read(path, tmp_path)
+    (log,) = read(path, tmp_path)
     assert log.sources["/battery"].spool.rows()[0, -1] == pytest.approx(3.7)
     assert not trace.exists()
 
@@ -136,7 +158,7 @@ def test_a_type_without_a_local_definition_is_left_out(tmp_path):
     path = bags.flight_bag(tmp_path / "a.bag")
     with rosbag.Bag(str(path), "a") as bag:
         bag.write("/lqr_controller/parameter_updates", Unknown(), bags.stamp(5.0))
-    log = read(path, tmp_path)
+    (log,) = read(path, tmp_path)
     assert any("/lqr_controller/parameter_updates is left out" in each for each in log.remarks)
 
 

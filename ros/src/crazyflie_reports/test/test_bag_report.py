@@ -99,6 +99,98 @@ def test_a_gap(run):
     assert "state gap, longest 200 ms (≤ 100 ms)" in output
 
 
+def test_a_gap_is_not_interpolated(run):
+    run(bags.flight_bag(run.folder / "a.bag", gap=(2.0, 6.0)))
+    (flight,) = page(run.folder)[1]["recordings"][0]["flights"]
+    (z,) = [each for each in flight["plots"][0]["curves"] if each["name"] == "z"]
+    assert [value for time, value in zip(z["t"], z["v"], strict=True) if 1.01 < time < 4.99] == [
+        None
+    ]
+    assert len([value for value in z["v"] if value is None]) == 1
+    path = flight["path"]
+    at = {path["start"] + k * path["period"]: row for k, row in enumerate(path["rows"])}
+    assert {row is None for time, row in at.items() if 1.01 < time < 4.99} == {True}
+    assert {row is None for time, row in at.items() if not 0.99 < time < 5.01} == {False}
+    # Controls are as frequent as states here, a reference is one until the next.
+    curves = {c["name"]: c["v"] for plot in flight["plots"] for c in plot["curves"]}
+    assert None in curves["thrust"]
+    assert None not in curves["z reference"]
+
+
+def test_no_velocity_is_known_of_a_pose_between_two_gaps(run):
+    with bags.written(run.folder / "a.bag") as bag:
+        for time, x in [*((0.01 * k, 0.0) for k in range(200)), (2.5, 5.0),
+                        *((3.0 + 0.01 * k, 10.0) for k in range(200))]:  # fmt: skip
+            pose = bags.PoseStamped(header=bags.header(time))
+            pose.pose.position.x, pose.pose.position.z = x, 1.0 if 1.0 < time < 4.0 else 0.0
+            pose.pose.orientation.w = 1.0
+            bag.write("/cf1/pose", pose, bags.stamp(time))
+    _, _, (flight,) = run(run.folder / "a.bag")
+    (recorded,) = page(run.folder)[1]["recordings"][0]["flights"]
+    (x_dot,) = [c for p in recorded["plots"] for c in p["curves"] if c["name"] == "x_dot"]
+    assert {value for value in x_dot["v"] if value is not None} == {0.0}
+
+
+def test_a_flight_with_one_state(run):
+    with bags.written(run.folder / "a.bag") as bag:
+        bags.write_flight(bag, gap=(-1.0, 99.0))
+        for time in (1.0, 2.0, 3.0):
+            control = bags.ControlStamped(bags.header(time), bags.Control(thrust=9.81))
+            bag.write("/control/final", control, bags.stamp(time))
+        state = bags.PositionVelocityYawState(z=0.5)
+        message = bags.PositionVelocityYawStateStamped(header=bags.header(2.0), state=state)
+        bag.write("/state", message, bags.stamp(2.0))
+    status, _, (flight,) = run(run.folder / "a.bag")
+    assert status == 0
+    assert values(flight)["height, maximum"] == pytest.approx(0.5)
+    (recorded,) = page(run.folder)[1]["recordings"][0]["flights"]
+    assert [row[:3] for row in recorded["path"]["rows"]] == [[0.0, 0.0, 0.5]]
+
+
+def test_simulated_time_that_starts_again_begins_another_recording(run):
+    with bags.written(run.folder / "a.bag") as bag:
+        bags.write_flight(bag)
+        bags.write_flight(bag, tilt=0.1)
+    status, _, flights = run(run.folder / "a.bag")
+    assert status == 0
+    assert [each["recording"] for each in flights] == [
+        "a.bag, start 1 of 2", "a.bag, start 2 of 2",
+    ]  # fmt: skip
+    first, second = (values(each) for each in flights)
+    assert first["state rate"] == second["state rate"] == pytest.approx(100.0, rel=0.01)
+    assert first["tilt commanded, maximum"] == 0.0
+    assert second["tilt commanded, maximum"] == pytest.approx(5.73, abs=0.01)
+
+
+def test_bags_that_were_merged_out_of_order_are_one_recording_in_real_time(run, monkeypatch):
+    monkeypatch.setattr(bags, "START", 1.7e9)
+    with bags.written(run.folder / "a.bag") as bag:
+        for begin, end in ((7.0, 99.0), (-1.0, 7.0)):
+            for number, time in bags.steps():
+                if begin <= time < end:
+                    state = bags.PositionVelocityYawState(z=bags.height(time)[0])
+                    header = bags.header(time, number)
+                    message = bags.PositionVelocityYawStateStamped(header=header, state=state)
+                    bag.write("/state", message, bags.stamp(time))
+    _, _, (flight,) = run(run.folder / "a.bag")
+    assert flight["recording"] == "a.bag"
+    assert values(flight)["state rate"] == pytest.approx(100.0, rel=0.01)
+
+
+def test_no_cell_of_a_table_is_a_formula(run):
+    with bags.written(run.folder / "=1+1.bag") as bag:
+        bags.write_flight(bag, "@a")
+        bags.write_events(bag, "@a")
+    run(run.folder / "=1+1.bag")
+    for name in ("figures.csv", "events.csv"):
+        with (run.folder / "out" / name).open() as file:
+            rows = list(csv.reader(file))[1:]
+        assert {row[0] for row in rows} == {"'=1+1.bag"}
+        assert {row[1] for row in rows} == {"'@a"}
+        cells = [cell for row in rows for cell in row]
+        assert not [c for c in cells if re.match(r"[=+@\t\r]|-(?![\d.]+$)", c)]
+
+
 def test_states_that_stop_in_flight(run):
     _, _, (flight,) = run(bags.flight_bag(run.folder / "a.bag", gap=(6.0, 99.0)))
     assert values(flight)["state gap, longest"] == pytest.approx(7000.0, abs=20.0)

@@ -6,8 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from crazyflie_reports.flight_record import FlightRecord
-from crazyflie_reports.flight_report import FlightReport
+from crazyflie_reports.flight_record import FlightRecord, FlightReport
 
 HOVER = (0.0, 0.0, 1.0)
 

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from crazyflie_reports.flight_operator import FlightError, FlightOperator
-from crazyflie_reports.flight_report import FlightReport
+from crazyflie_reports.flight_record import FlightReport
 from crazyflie_utils.main import begin
 from crazyflie_utils.testing.launching import roslaunch
 

@@ -5,7 +5,7 @@ import pytest
 
 from crazyflie_model.units import GRAVITY
 from crazyflie_reports.flight_operator import ready_operator
-from crazyflie_reports.flight_report import HOVER_TOLERANCE, FlightReport
+from crazyflie_reports.flight_record import HOVER_TOLERANCE, FlightReport
 
 HOVER = (0.0, 0.0, 1.0)
 

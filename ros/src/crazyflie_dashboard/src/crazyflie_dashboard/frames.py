@@ -1,19 +1,17 @@
 """Poses of all frames of /tf, decoded as often as they are shown and not as often as they come."""
 
-import math
 import struct
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
 from crazyflie_dashboard.snapshot import Rotation, Triple
-from crazyflie_model.angles import rotate
-from crazyflie_utils.tf.poses import PoseCodec, entries
-
-_MAX_DEPTH = 10  #: Frames above a frame that are followed: a loop has no end.
+from crazyflie_utils import TransformError
+from crazyflie_utils.tf.frame_tree import FrameTree
+from crazyflie_utils.tf.poses import PoseCodec, StampedPose, entries
 
 _MAX_FRAMES = 1000
-_MIN_SQUARE, _MAX_SQUARE = 0.8, 1.2  #: Of the length of a quaternion, squared.
+_FORGET_AFTER = 30.0  #: A frame that moves, and has had no pose for so long, s, is not shown.
 
 
 @dataclass
@@ -24,18 +22,16 @@ class Pose:
     old the stamp was then. ``velocity`` (m/s) is the mean since the pose before.
     """
 
-    parent: str
-    position: Triple
-    rotation: Rotation
-    stamp: int
+    stamped: StampedPose
     arrival: float
     delay: float
     velocity: Triple = (0.0, 0.0, 0.0)
     rate: float = 0.0
+    is_static: bool = False
 
 
 class Frames:
-    """The frames of /tf.
+    """The frames of /tf and /tf_static, as nodes take them.
 
     Parameters
     ----------
@@ -43,22 +39,26 @@ class Frames:
         The machine's time, s.
     nanoseconds : callable
         ROS time, ns.
+    ahead : float
+        How far a stamp may be ahead of now, s.
     """
 
-    def __init__(self, time: Callable[[], float], nanoseconds: Callable[[], int]):
+    def __init__(self, time: Callable[[], float], nanoseconds: Callable[[], int], ahead: float):
         self.poses: dict[str, Pose] = {}
-        #: Frames whose newest pose is no pose -> when it came, s.
-        self.rejected: dict[str, float] = {}
-        self._time, self._nanoseconds = time, nanoseconds
+        #: Frames whose newest pose was not taken -> why.
+        self.rejected: dict[str, str] = {}
+        self._time, self._nanoseconds, self._ahead = time, nanoseconds, ahead
         self._codec = PoseCodec()
         self._latest: dict[bytes, tuple[bytes, int, int]] = {}
         self._counts: Counter[bytes] = Counter()
         self._counted_since = time()
+        self.clear()
 
     def clear(self) -> None:
         """Forget all frames."""
         for known in (self.poses, self.rejected, self._latest, self._counts):
             known.clear()
+        self._tree = FrameTree(self._codec, self._on_rejected, self._ahead, self._on_new)
 
     def read(self, raw: bytes) -> None:
         """Take a serialized tf2_msgs/TFMessage."""
@@ -71,34 +71,31 @@ class Frames:
             # The doctor says so; a display has nothing to do about it.
             return
 
+    def read_static(self, pose: StampedPose) -> None:
+        """Take a pose that holds for ever."""
+        self._tree.take_static(pose, self._nanoseconds())
+        self.poses[pose.child] = Pose(pose, self._time(), 0.0, is_static=True)
+
     def update(self) -> None:
         """Decode what has come since the last time."""
         now = self._time()
         elapsed = now - self._counted_since
         for child, (raw, start, end) in self._latest.items():
             try:
-                parent, name, stamp, position, rotation = self._codec.decode(raw, start, end)
+                pose = self._codec.decode(raw, start, end)
             except (UnicodeDecodeError, struct.error):
                 continue
-            known = self.poses.get(name)
-            if known is not None and known.stamp == stamp:
-                continue
-            if not _is_pose(position, rotation):
-                # The pose before stays, and grows old.
-                self.rejected[name] = now
-                continue
-            self.rejected.pop(name, None)
-            delay = max(self._nanoseconds() - stamp, 0) * 1e-9
-            pose = Pose(parent, position, rotation, stamp, now, delay)
-            if known is not None:
-                pose.velocity, pose.rate = _velocity(known, pose), known.rate
-            self.poses[name] = pose
-            if elapsed >= 1.0:
-                pose.rate = self._counts[child] / elapsed
+            self._tree.take(pose, self._nanoseconds())
+            if elapsed >= 1.0 and pose.child in self.poses:
+                self.poses[pose.child].rate = self._counts[child] / elapsed
         self._latest.clear()
         if elapsed >= 1.0:
             self._counts.clear()
             self._counted_since = now
+            old = now - _FORGET_AFTER
+            for name in [n for n, p in self.poses.items() if p.arrival < old and not p.is_static]:
+                del self.poses[name]
+                self.rejected.pop(name, None)
 
     def age(self, name: str) -> float:
         """Return how old the pose of a frame is, s."""
@@ -108,54 +105,43 @@ class Frames:
     def parent(self, name: str | None) -> str | None:
         """Return the frame right above a frame; None if it is not known."""
         pose = None if name is None else self.poses.get(name)
-        return None if pose is None else pose.parent
+        return None if pose is None else pose.stamped.parent
 
     def root(self, name: str) -> str:
         """Return the frame at the top of a frame's tree."""
-        for _ in range(_MAX_DEPTH):
-            if name not in self.poses:
-                break
-            name = self.poses[name].parent
-        return name
+        *_, top = self._tree.chain(name)
+        return top
 
     def in_fixed(self, name: str, fixed: str) -> tuple[Triple, Rotation] | None:
-        """Return position and rotation of a frame in another above it; None if it is not."""
-        pose = self.poses.get(name)
-        if pose is None:
+        """Return position and rotation of a frame in another one; None if that is not known."""
+        if name not in self.poses:
             return None
-        position, rotation = pose.position, pose.rotation
-        for _ in range(_MAX_DEPTH):
-            if pose.parent == fixed:
-                return position, rotation
-            pose = self.poses.get(pose.parent)
-            if pose is None:
+        pose = self._tree.latest(fixed, name)
+        if pose is None:
+            try:
+                pose = self._tree.lookup(fixed, name)
+            except TransformError:
                 return None
-            x, y, z = rotate(pose.rotation, position)
-            a, b, c = pose.position
-            position, rotation = (a + x, b + y, c + z), _product(pose.rotation, rotation)
-        return None
+        return pose.position, pose.rotation
 
+    def _on_new(self, stamped):
+        now, known = self._time(), self.poses.get(stamped.child)
+        delay = max(self._nanoseconds() - stamped.stamp, 0) * 1e-9
+        pose = Pose(stamped, now, delay)
+        if known is not None:
+            pose.velocity, pose.rate = _velocity(known, pose), known.rate
+        self.poses[stamped.child] = pose
+        self.rejected.pop(stamped.child, None)
 
-def _is_pose(position: Triple, rotation: Rotation) -> bool:
-    """Tell whether a position is finite and a quaternion has a length near 1."""
-    square = sum(each * each for each in rotation)
-    return all(map(math.isfinite, position)) and _MIN_SQUARE < square < _MAX_SQUARE
+    def _on_rejected(self, text: str, key: Hashable) -> None:
+        if isinstance(key, tuple):
+            _, child, reason = key
+            self.rejected[child] = reason
 
 
 def _velocity(before: Pose, now: Pose) -> Triple:
-    elapsed = (now.stamp - before.stamp) * 1e-9
+    elapsed = (now.stamped.stamp - before.stamped.stamp) * 1e-9
     if elapsed <= 0.0:
         return before.velocity
-    (x, y, z), (a, b, c) = now.position, before.position
+    (x, y, z), (a, b, c) = now.stamped.position, before.stamped.position
     return (x - a) / elapsed, (y - b) / elapsed, (z - c) / elapsed
-
-
-def _product(one: Rotation, two: Rotation) -> Rotation:
-    """Return the Hamilton product of two quaternions (x, y, z, w)."""
-    (a, b, c, d), (x, y, z, w) = one, two
-    return (
-        d * x + a * w + b * z - c * y,
-        d * y - a * z + b * w + c * x,
-        d * z + a * y - b * x + c * w,
-        d * w - a * x - b * y - c * z,
-    )

@@ -7,21 +7,33 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
+from dataclasses import replace
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Log
+from tf2_msgs.msg import TFMessage
 
+from crazyflie_dashboard.answers import listed
 from crazyflie_dashboard.discovery import Graph, Vehicle, vehicles
 from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.messages import Diagnostics, log_line
 from crazyflie_dashboard.page_state import IMAGES
 from crazyflie_dashboard.plots import VehiclePlots
-from crazyflie_dashboard.snapshot import Frame, LogLine, Scene, Sentence, Triple, VehicleSnapshot
+from crazyflie_dashboard.snapshot import (
+    STALE_AGE,
+    Frame,
+    LogLine,
+    Scene,
+    Sentence,
+    Triple,
+    VehicleSnapshot,
+)
 from crazyflie_dashboard.surroundings import Surroundings
 from crazyflie_dashboard.vehicle_model import VehicleModel, frame_of
 from crazyflie_takeoff.limits import Box
 from crazyflie_utils import NodeHandle
-from crazyflie_utils.tf.poses import RawTransforms
+from crazyflie_utils.tf.poses import RawTransforms, StampedPose
+from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED
 
 SCENE_PERIOD = 0.05  #: From one scene to the next, s.
 _POLL_PERIOD = 2.0  #: From one look at the master to the next, s; longer where it takes long:
@@ -29,6 +41,10 @@ _POLL_SHARE = 0.02  #: of the time at most.
 _FORGET_AFTER = 30.0  #: A vehicle whose topics are gone is shown for so long, s.
 _FEW = 10  #: With more vehicles references and controls of watched ones are received only.
 _MAX_LINES = 500  #: Of the log.
+
+_OLDER = "an older pose is shown"
+_CLOCKS = "set the clocks of both computers, or look for what is slow"
+_REMEDIES = {"is stamped in the future": f"{_OLDER}; {_CLOCKS}"}
 
 
 class GraphModel:
@@ -61,7 +77,8 @@ class GraphModel:
         self._parent, self._workers, self._read_graph = handle, workers, read_graph
         self._clock = clock
         self._handle: NodeHandle | None = None
-        self.frames = Frames(clock, handle.nanoseconds)
+        ahead = MAX_FUTURE_STAMP_SIMULATED if handle.uses_sim_time else MAX_FUTURE_STAMP
+        self.frames = Frames(clock, handle.nanoseconds, ahead)
         self._diagnostics = Diagnostics(clock)
         self._surroundings = Surroundings(handle)
         self._log: deque[LogLine] = deque(maxlen=_MAX_LINES)
@@ -80,8 +97,8 @@ class GraphModel:
         self.frames.clear()
         self._surroundings = Surroundings(handle)
         self._poll_at = 0.0
-        for topic in ("/tf", "/tf_static"):
-            handle.subscribe(topic, RawTransforms, lambda message: self.frames.read(message.raw))
+        handle.subscribe("/tf", RawTransforms, lambda message: self.frames.read(message.raw))
+        handle.subscribe("/tf_static", TFMessage, self._on_static)
         handle.subscribe("/rosout_agg", Log, self._on_log)
         handle.subscribe("/diagnostics", DiagnosticArray, self._diagnostics.take)
         handle.timer(SCENE_PERIOD, self._on_timer, steady=True)
@@ -176,6 +193,10 @@ class GraphModel:
 
         return take
 
+    def _on_static(self, message):
+        for transform in message.transforms:
+            self.frames.read_static(StampedPose.of(transform))
+
     def _on_log(self, message):
         self._lines += 1
         self._log.append(log_line(self._lines, message))
@@ -193,9 +214,10 @@ class GraphModel:
         others = []
         for name in frames.poses.keys() - own:
             pose = frames.in_fixed(name, fixed)
-            if pose is not None and frames.poses[name].parent not in own:
+            if pose is not None and frames.parent(name) not in own:
                 others.append(Frame(name, *pose))
         return Scene(
+            made=self._clock(),
             fixed_frame=fixed,
             vehicles=snapshots,
             solids=self._surroundings.solids(frames, fixed),
@@ -211,7 +233,8 @@ class GraphModel:
     def _snapshot(self, name, fixed):
         """Return what is known of a vehicle; one that cannot be drawn holds up no other."""
         try:
-            return self.models[name].snapshot(self.frames, fixed)
+            now = self.models[name].snapshot(self.frames, fixed)
+            return replace(now, is_held=True) if name in self._surroundings.held else now
         except Exception as error:
             self._parent.warn(f"{name} cannot be shown: {error}", throttle=10.0, key=name)
             return VehicleSnapshot(name, state="cannot be shown", reason=str(error))
@@ -223,9 +246,14 @@ class GraphModel:
             found.append(Sentence("error", "dashboard", self._trouble, remedy))
         for text in self._surroundings.too_many:
             found.append(Sentence("warn", "markers", text, "publish fewer, or larger ones"))
-        for frame in sorted(self.frames.rejected):
-            text = f"the newest pose of {frame} on /tf has no unit quaternion, or is not finite"
-            found.append(Sentence("error", "dashboard", text, "an older pose is shown"))
+        for frame, reason in sorted(self.frames.rejected.items()):
+            text = f"the newest pose of {frame} on /tf {reason}"
+            found.append(Sentence("error", "dashboard", text, _REMEDIES.get(reason, _OLDER)))
+        late = [n for n, p in self.frames.poses.items() if p.delay > STALE_AGE and not p.is_static]
+        if late:
+            delay = max(self.frames.poses[name].delay for name in late)
+            text = f"poses of {listed(sorted(late))} come {delay:.1f} s after their stamps"
+            found.append(Sentence("error", "dashboard", text, _CLOCKS))
         return tuple(found)
 
 

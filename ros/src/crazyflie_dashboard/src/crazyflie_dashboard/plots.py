@@ -63,10 +63,10 @@ class VehiclePlots:
         """Take a row of a topic, by its role in `bag_topics.ROLES`."""
         if role == "reference":
             self._reference = row
-            self._add("reference z", "m", row[2])
+            self._add("reference position z", "m", row[2])
         elif role == "state":
             for name, unit, value in zip(
-                ("x", "y", "z", "velocity x", "velocity y", "velocity z"),
+                [f"{what} {axis}" for what in ("position", "velocity") for axis in "xyz"],
                 ("m", "m", "m", "m/s", "m/s", "m/s"),
                 row,
                 strict=False,

@@ -3,6 +3,7 @@
 Lengths are in m, angles in rad, times in s, in the fixed frame; None is "not known".
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -67,6 +68,7 @@ class VehicleSnapshot:
     takeoff_refusal: str = ""  #: Why a takeoff would be refused.
     is_in_flight: bool = False
     is_emergency: bool = False
+    is_held: bool = False  #: A fleet holds it: it is too near to another vehicle.
     battery: float | None = None  #: V.
     is_battery_low: bool = False
     link_quality: float | None = None  #: 0 to 1.
@@ -132,6 +134,8 @@ class LogLine:
 class Scene:
     """All that there is at one moment."""
 
+    #: When it was made, s of time.monotonic(); inf before the first one.
+    made: float = math.inf
     fixed_frame: str = "world"
     #: By name, in the order in which they are shown.
     vehicles: Mapping[str, VehicleSnapshot] = field(default_factory=dict)

@@ -5,6 +5,7 @@ from typing import Any
 
 import roslib.message
 from geometry_msgs.msg import Point
+from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard.discovery import Graph
@@ -18,6 +19,7 @@ from crazyflie_utils import NodeHandle
 _MARKERS = ("world/markers", "sweep/markers", "plan/markers")  #: How the topics of markers end.
 _FENCES = "geofence/parameter_updates"  #: How a topic with the live parameters of a geofence ends.
 _PATH = "nav_msgs/Path"
+_HELD = "fleet/waiting"  #: How the topic with the names of vehicles that a fleet holds apart ends.
 
 _FAR = 14.0  #: Where a wall is drawn that a fence does not have, m: the end of the floor.
 _MAX_POINTS = 1000  #: Of a path.
@@ -41,6 +43,7 @@ class Surroundings:
         self._markers: dict[str, tuple[dict[str, list[Marker]], int]] = {}
         self._paths: dict[str, tuple[str, tuple[Triple, ...]]] = {}
         self._fences: dict[str, Box] = {}
+        self._held: dict[str, frozenset[str]] = {}
         # By topic and frame: markers, where the frame was, and what was made of them.
         self._made: dict[tuple[str, str], tuple[Any, Any, tuple[Solid, ...]]] = {}
         self._solids: tuple[Solid, ...] = ()
@@ -48,7 +51,7 @@ class Surroundings:
     def follow(self, graph: Graph) -> None:
         """Subscribe to topics that are new on the graph; forget those that are gone."""
         gone = self._topics - graph.topics.keys()
-        for known in (self._markers, self._paths, self._fences):
+        for known in (self._markers, self._paths, self._fences, self._held):
             for key in [key for key in known if key.partition(" ")[0] in gone]:
                 del known[key]
         # A subscription outlives its publisher, and says what the next one has latched.
@@ -75,6 +78,11 @@ class Surroundings:
         if is_new:
             self._solids = tuple(each for *_, solids in made.values() for each in solids)
         return self._solids
+
+    @property
+    def held(self) -> frozenset[str]:
+        """Names of the vehicles that a fleet holds, since they are too near to others."""
+        return frozenset().union(*self._held.values())
 
     @property
     def too_many(self) -> tuple[str, ...]:
@@ -111,6 +119,10 @@ class Surroundings:
             self._handle.subscribe(topic, MarkerArray, lambda message: self._draw(topic, message))
         elif topic.endswith(_FENCES):
             follow_box(self._handle, topic, lambda box: self._fences.update({topic: box}))
+        elif topic.endswith(_HELD) and kind == String._type:
+            self._handle.subscribe(
+                topic, String, lambda m: self._held.update({topic: frozenset(m.data.split())})
+            )
         elif kind == _PATH and (path_type := roslib.message.get_message_class(_PATH)):
             self._handle.subscribe(topic, path_type, lambda message: self._plan(topic, message))
         else:

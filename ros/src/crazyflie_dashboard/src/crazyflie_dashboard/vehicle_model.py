@@ -267,7 +267,7 @@ def frame_of(vehicle: Vehicle, frames: Frames, is_alone: bool) -> str | None:
     """
     name = vehicle.namespace.rpartition("/")[2] or vehicle.driver.rpartition("/")[2]
     named = [each for each in frames.poses if name and name in each.split("/")]
-    moving = [each for each, pose in frames.poses.items() if any(pose.position)]
+    moving = [each for each, pose in frames.poses.items() if any(pose.stamped.position)]
     candidates = named or (moving or list(frames.poses) if is_alone else [])
     # The vehicle's own, and not that of its model.
     return min(candidates, key=lambda each: (each.endswith("base_link"), len(each)), default=None)

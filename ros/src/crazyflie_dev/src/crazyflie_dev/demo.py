@@ -14,7 +14,7 @@ from crazyflie_demo import figure8
 from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
 from crazyflie_reports import bag_log, bag_report
 from crazyflie_reports.flight_operator import FlightError, FlightOperator
-from crazyflie_reports.flight_report import FlightReport
+from crazyflie_reports.flight_record import FlightReport
 from crazyflie_utils.main import begin
 from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
 
@@ -132,7 +132,7 @@ def report(recording: Path, folder: Path, log: Path) -> int:
     """Print the table of a flight, write page and data; return the exit status."""
     page = bag_report.Report()
     with tempfile.TemporaryDirectory(dir=folder) as series:
-        recorded = bag_log.read(recording, Path(series))
+        (recorded,) = bag_log.read(recording, Path(series))
         page.add(recorded)
         (flight,) = bag_report.flights_of(recorded)
     page.write(folder)

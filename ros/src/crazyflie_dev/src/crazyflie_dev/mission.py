@@ -67,7 +67,7 @@ def report(recording: Path, folder: Path) -> None:
     """Write report and picture of a recording into a folder."""
     page = bag_report.Report()
     with tempfile.TemporaryDirectory(dir=folder) as series:
-        recorded = bag_log.read(recording, Path(series))
+        (recorded,) = bag_log.read(recording, Path(series))
         page.add(recorded)
         picture = draw_from_above(list(bag_report.flights_of(recorded)))
     page.write(folder)

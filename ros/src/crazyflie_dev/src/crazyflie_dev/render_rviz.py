@@ -19,7 +19,7 @@ from crazyflie_description.visualizer_node import PATH_COLOUR, REFERENCE_COLOUR
 from crazyflie_dev.demo import HOVER
 from crazyflie_dev.virtual_display import DisplayError, screenshot, virtual_display
 from crazyflie_reports.flight_operator import FlightError, FlightOperator
-from crazyflie_reports.flight_report import HOVER_TOLERANCE
+from crazyflie_reports.flight_record import HOVER_TOLERANCE
 from crazyflie_utils.main import begin
 from crazyflie_utils.testing.launching import roslaunch
 

@@ -16,6 +16,7 @@ MERGE_TIME = 1.0  #: The same event within this time of the last counts as one, 
 MAX_EVENTS = 20_000  #: Of a bag; more are only counted.
 
 _WARN, _ERROR = 4, 8  # Levels of rosgraph_msgs/Log.
+_ROS2_LEVELS = {30: _WARN, 40: _ERROR, 50: _ERROR}  # Of rcl_interfaces/Log.
 
 
 class Kind(Enum):
@@ -57,11 +58,9 @@ class EventLog:
         self._last: dict[Any, Any] = {}
         self._latest: dict[tuple[str, Kind, str], tuple[float, Event]] = {}
 
-    def add(self, time: float, topic: str, namespace: str, message: Any) -> None:
-        """Add the events in a message of one of `bag_topics.EVENT_TYPES` but tf's."""
-        for source, kind, text in self._READERS[message._type](
-            self, time, topic, namespace, message
-        ):
+    def add(self, time: float, topic: str, namespace: str, datatype: str, message: Any) -> None:
+        """Add the events in a message of a type of `bag_topics.EVENT_TYPES` but tf's."""
+        for source, kind, text in self._READERS[datatype](self, time, topic, namespace, message):
             self._add(time, source, kind, text)
 
     def _add(self, time, namespace, kind, text):
@@ -125,20 +124,12 @@ class EventLog:
 
     def _rosout(self, time, topic, namespace, message):
         # The same message comes on /rosout and on /rosout_agg.
-        if not self._changes(("log", message.name, message.msg), message.header.stamp.to_nsec()):
-            return
-        own_name = re.match(r"(/\S+): ", message.msg)
-        node = own_name[1] if own_name else message.name
-        kind = None
-        if "refused" in message.msg:
-            kind = Kind.REFUSAL
-        elif "rejected" in message.msg:
-            kind = Kind.REJECTED
-        elif message.level >= _WARN:
-            kind = Kind.ERROR if message.level >= _ERROR else Kind.WARNING
-        if kind is not None:
-            text = message.msg if own_name else f"{node}: {message.msg}"
-            yield _parent(node), kind, text
+        if self._changes(("log", message.name, message.msg), message.header.stamp.to_nsec()):
+            yield from _line_of_log(message.name, message.msg, message.level)
+
+    def _ros2_rosout(self, time, topic, namespace, message):
+        name = f"/{message.name.replace('.', '/')}"
+        yield from _line_of_log(name, message.msg, _ROS2_LEVELS.get(message.level, 0))
 
     def _diagnostics(self, time, topic, namespace, message):
         for status in message.status:
@@ -164,6 +155,7 @@ class EventLog:
         "crazyflie_msgs/VehicleStatus": _vehicle_status,
         "dynamic_reconfigure/Config": _parameters,
         "rosgraph_msgs/Log": _rosout,
+        "rcl_interfaces/Log": _ros2_rosout,
         "diagnostic_msgs/DiagnosticArray": _diagnostics,
     }
 
@@ -174,6 +166,21 @@ def concerning(events: list[Event], name: str, others: set[str]) -> Iterator[Eve
         words = {word.strip("/").split("/")[0] for word in re.findall(r"[\w/]+", event.text)}
         if event.namespace == name or not (event.namespace in others or words & others):
             yield event
+
+
+def _line_of_log(name, line, level):
+    """Yield the event of a line of a log, if it is one."""
+    own_name = re.match(r"(/\S+): ", line)
+    node = own_name[1] if own_name else name
+    kind = None
+    if "refused" in line:
+        kind = Kind.REFUSAL
+    elif "rejected" in line:
+        kind = Kind.REJECTED
+    elif level >= _WARN:
+        kind = Kind.ERROR if level >= _ERROR else Kind.WARNING
+    if kind is not None:
+        yield _parent(node), kind, line if own_name else f"{node}: {line}"
 
 
 def _constant(message_type, value, names):

@@ -11,15 +11,25 @@ import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, ClassVar
 
-import roslz4
+import lz4.frame
+import roslib.message
 
 MAGIC = b"#ROSBAG V2.0\n"
 
 _MESSAGE, _BAG_HEADER, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
 
+LARGEST_CHUNK = 1 << 28  #: Of a chunk when it is decompressed, bytes; rosbag's have 768 kB.
+#: Of all chunks together: this many bytes, and this many times the size of the file. Flights are
+#: compressed to a third.
+LEAST_TOTAL, LARGEST_RATIO = 1 << 30, 100
+
 _LARGEST_HEADER = 1 << 20  #: Longer headers of records, bytes, are no headers: the file is damaged.
+
+_PIECE = 1 << 20  # Of decompressed data, bytes.
+
+DECOMPRESSORS = {b"bz2": bz2.BZ2Decompressor, b"lz4": lz4.frame.LZ4FrameDecompressor}
 
 _UINT32 = struct.Struct("<I")
 _UINT64 = struct.Struct("<Q")
@@ -28,6 +38,42 @@ _TIME = struct.Struct("<II")
 
 class BagError(Exception):
     """The file cannot be read at all; the text names it and says why."""
+
+
+class ExpansionError(Exception):
+    """Compressed data become too large; the text says how large."""
+
+
+class Expansion:
+    """Decompresses a file's chunks, as long as they do not become too large.
+
+    A stranger's file of some kilobytes may expand to more than memory or disk hold.
+    """
+
+    def __init__(self, size: int):
+        """Limit what a file of ``size`` bytes may expand to."""
+        self._left = LEAST_TOTAL + LARGEST_RATIO * size
+
+    def pieces(self, decompressor: Any, data: bytes) -> Iterator[bytes]:
+        """Yield a chunk's content, with a decompressor as those of bz2, in pieces.
+
+        `ExpansionError`: it has more than `LARGEST_CHUNK` bytes, or all chunks have too many.
+        """
+        total, piece = 0, b"\0"
+        while piece and not decompressor.eof:
+            piece = decompressor.decompress(data, max_length=_PIECE)
+            data = b""
+            total += len(piece)
+            self._left -= len(piece)
+            if total > LARGEST_CHUNK:
+                raise ExpansionError(f"a chunk expands to more than {LARGEST_CHUNK / 1e6:.0f} MB")
+            if self._left < 0:
+                raise ExpansionError("its chunks expand to more than a hundred times its size")
+            yield piece
+
+
+class TopicError(Exception):
+    """A topic that cannot be read; the text names it and what was expected."""
 
 
 class _BrokenOffError(Exception):
@@ -42,6 +88,24 @@ class Connection:
     topic: str
     datatype: str
     md5sum: str
+
+    encoding: ClassVar[str] = "ros1"  #: Of its messages.
+
+    def deserializer(self) -> Callable[[bytes], Any]:
+        """Return what makes a message of its data.
+
+        `TopicError`: its type is not defined here, or differently.
+        """
+        # The definition in the bag is text of whoever wrote it: a class made of it would run it.
+        message_type = roslib.message.get_message_class(self.datatype)
+        if message_type is None:
+            raise TopicError(f"{self.topic} is left out: no package here defines {self.datatype}")
+        if message_type._md5sum != self.md5sum:
+            raise TopicError(
+                f"{self.topic} is left out: its {self.datatype} has the md5 sum "
+                f"{self.md5sum}, expected {message_type._md5sum}"
+            )
+        return lambda data: message_type().deserialize(data)
 
 
 class BagFile:
@@ -61,6 +125,7 @@ class BagFile:
             self.size = path.stat().st_size
         except OSError as error:
             raise BagError(f"{path}: {error.strerror}") from None
+        self._expansion = Expansion(self.size)
         if not start:
             raise BagError(f"{path} is empty; expected a bag, as rosbag record writes")
         if start.startswith(b"#ROSBAG V1"):
@@ -87,6 +152,8 @@ class BagFile:
                     done = file.tell()
             except _BrokenOffError as error:
                 self.interruption = self._broken_off(file.tell(), error)
+            except ExpansionError as error:
+                self.interruption = f"{self._path} is read up to {done / 1e6:.2f} MB: {error}"
             except (struct.error, KeyError, ValueError, EOFError):
                 self.interruption = self._broken_off(file.tell(), "it is damaged")
 
@@ -97,7 +164,8 @@ class BagFile:
         if op == _CHUNK:
             # The size of a chunk that was not closed is 0: it is what remains.
             content = file.read(size or -1)
-            yield from self._messages_of(_decompressed(content, fields[b"compression"]), is_wanted)
+            chunk = self._decompressed(content, fields[b"compression"])
+            yield from self._messages_of(chunk, is_wanted)
             if len(content) != size:
                 raise _BrokenOffError("its last chunk was not closed")
             return
@@ -136,6 +204,17 @@ class BagFile:
                 if (connection := wanted[key]) is not None:
                     seconds, nanoseconds = _TIME.unpack(fields[b"time"])
                     yield connection, seconds + nanoseconds * 1e-9, data
+
+    def _decompressed(self, data, compression):
+        if compression == b"none":
+            return data
+        if compression not in DECOMPRESSORS:
+            raise _BrokenOffError(f"its compression is {compression.decode(errors='replace')}")
+        try:
+            # Of a chunk that breaks off, as far as it goes.
+            return b"".join(self._expansion.pieces(DECOMPRESSORS[compression](), data))
+        except (OSError, RuntimeError) as error:
+            raise _BrokenOffError(str(error)) from None
 
     def _connect(self, key, fields, data):
         if key in self._by_id:
@@ -182,17 +261,3 @@ def _fields(header: bytes) -> dict[bytes, bytes]:
         fields[name] = value
         offset += 4 + size
     return fields
-
-
-def _decompressed(data, compression):
-    if compression == b"none":
-        return data
-    if compression == b"lz4":
-        return roslz4.decompress(data)
-    if compression == b"bz2":
-        try:
-            # Of a chunk that breaks off, what there is.
-            return bz2.BZ2Decompressor().decompress(data)
-        except OSError as error:
-            raise _BrokenOffError(str(error)) from None
-    raise _BrokenOffError(f"its compression is {compression.decode(errors='replace')}")

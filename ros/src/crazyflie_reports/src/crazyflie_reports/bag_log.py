@@ -10,18 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_reports.bag_events import EventLog
-from crazyflie_reports.bag_file import BagError, BagFile, Connection
+from crazyflie_reports.bag_file import BagError, BagFile, Connection, TopicError
+from crazyflie_reports.bag_ros2 import SUFFIXES, Ros2BagFile
 from crazyflie_reports.bag_topics import (
     POSE_FIELDS,
     Role,
     Topic,
-    TopicError,
     expected,
+    pose_row,
+    seconds,
     topic_of,
     transform_row,
 )
 
 POSE_PERIOD = 0.009  #: Of transforms, which may come at 1 kHz, one in this time is kept, s.
+
+#: Times of ROS before this one, of 1973, count from the start of a simulation, s.
+SIMULATED = 1e8
+
+RESTART = 0.5  #: Simulated time that steps back by more than this, s, has started again.
 
 _BUFFER = 8192  # Numbers.
 
@@ -94,14 +101,15 @@ def files_of(path: Path) -> list[Path]:
         return [path]
     if not path.is_dir():
         raise BagError(f"{path} does not exist; expected a bag or a folder of bags")
+    names = (".bag", ".bag.active", *SUFFIXES)
     # flight_10.bag comes after flight_9.bag.
     bags = sorted(
-        (each for each in path.iterdir() if each.name.endswith((".bag", ".bag.active"))),
+        (each for each in path.iterdir() if each.name.endswith(names)),
         key=lambda each: (len(each.name.partition(".")[0]), each.name),
     )
     if not bags:
         raise BagError(
-            f"{path} has no files *.bag or *.bag.active; expected the folder of a recording"
+            f"{path} has no files *{', *'.join(names)}; expected the folder of a recording"
         )
     return bags
 
@@ -111,42 +119,53 @@ def read(
     folder: Path,
     names: dict[str, str] | None = None,
     progress: Callable[[int], Any] = lambda size: None,
-) -> BagLog:
+) -> list[BagLog]:
     """Read a recording: a bag, or a folder of bags that follow each other.
 
-    Series that are too long for memory are kept in ``folder`` as long as the log is used. ``names``
-    has, by role, regular expressions of topics in place of the documented ones; ``progress`` is
-    called with numbers of bytes. `BagError`: it cannot be read, or has none of the topics.
+    There is one log, or, where simulated time starts again, one for each start. Series that are too
+    long for memory are kept in ``folder`` as long as the logs are used. ``names`` has, by role,
+    regular expressions of topics in place of the documented ones; ``progress`` is called with
+    numbers of bytes. `BagError`: it cannot be read, or has none of the topics.
     """
-    log = BagLog(path.name)
-    reader = _Reader(log, folder, names or {})
-    files = [BagFile(each) for each in files_of(path)]
+    reader = _Reader(path.name, folder, names or {})
+    files = [
+        Ros2BagFile(each, folder) if each.name.endswith(SUFFIXES) else BagFile(each)
+        for each in files_of(path)
+    ]
+    remarks = []
     for file in files:
         for connection, time, data in file.messages(reader.is_wanted, progress):
             reader.add(connection, time, data)
         if file.interruption:
-            log.remarks.append(file.interruption)
-    log.remarks += reader.remarks()
+            remarks.append(file.interruption)
+    remarks += reader.remarks()
     connections = [each for file in files for each in file.connections]
     if not connections:
         text = f"{path} has no messages; expected {expected()}"
-        raise BagError("\n".join([text, *log.remarks]))
-    if not log.sources and not log.frames:
+        raise BagError("\n".join([text, *remarks]))
+    logs = [each for each in reader.logs if each.sources or each.frames]
+    if not logs:
         there = sorted({f"{each.topic} ({each.datatype})" for each in connections})
         raise BagError(
             "\n".join(
                 [f"{path} has no topics of a flight; expected {expected()}, or /tf.",
-                 f"There are: {', '.join(there)}", *log.remarks]
+                 f"There are: {', '.join(there)}", *remarks]
             )
         )  # fmt: skip
-    return log
+    logs[0].remarks += remarks
+    for number, log in enumerate(logs, 1):
+        if len(logs) > 1:
+            log.name = f"{path.name}, start {number} of {len(logs)}"
+    return logs
 
 
 class _Reader:
     """Puts messages where they belong."""
 
-    def __init__(self, log: BagLog, folder: Path, names: dict[str, str]):
-        self._log, self._folder, self._names = log, folder, names
+    def __init__(self, name: str, folder: Path, names: dict[str, str]):
+        self._name, self._folder, self._names = name, folder, names
+        self.logs = [BagLog(name)]
+        self._newest: dict[str, float] = {}  # By topic, s.
         self._topics: dict[Connection, Topic] = {}
         self._errors: dict[str, str] = {}
         self._bad: dict[str, int] = {}
@@ -164,16 +183,25 @@ class _Reader:
         return True
 
     def add(self, connection, time, data):
-        topic, log = self._topics[connection], self._log
+        topic = self._topics[connection]
+        # Each topic by itself: bags that were merged may have one after the other.
+        newest = self._newest.get(connection.topic, time)
+        if time < newest - RESTART and newest < SIMULATED:
+            self.logs.append(BagLog(self._name))
+            self._newest = {}
+        self._newest[connection.topic] = max(time, self._newest.get(connection.topic, time))
+        log = self.logs[-1]
         log.start, log.end = min(log.start, time), max(log.end, time)
         try:
             stamp, number, content = topic.decode(data)
             if topic.role is not None:
                 self._spool(connection.topic, topic).append(time, stamp, number, content)
-            elif connection.datatype.startswith("tf"):
+            elif hasattr(content, "transforms") or hasattr(content, "poses"):
                 self._add_transforms(time, content)
             else:
-                log.events.add(time, connection.topic, topic.namespace, content)
+                log.events.add(
+                    time, connection.topic, topic.namespace, connection.datatype, content
+                )
         except Exception as error:  # Whatever a bag's own fields raise.
             self._errors.setdefault(connection.topic, f"{connection.topic}: {error}")
             self._bad[connection.topic] = self._bad.get(connection.topic, 0) + 1
@@ -182,25 +210,35 @@ class _Reader:
         for topic, text in self._errors.items():
             count = self._bad.get(topic)
             yield f"{count} messages of {text}" if count else text
-        if self._log.events.dropped:
-            yield f"{self._log.events.dropped} more events are left out"
+        if dropped := sum(each.events.dropped for each in self.logs):
+            yield f"{dropped} more events are left out"
 
     def _spool(self, name, topic):
-        if name not in self._log.sources:
+        sources = self.logs[-1].sources
+        if name not in sources:
             spool = self._new_spool(topic.role.fields)
-            self._log.sources[name] = Source(name, topic.namespace, topic.role, spool)
-        return self._log.sources[name].spool
+            sources[name] = Source(name, topic.namespace, topic.role, spool)
+        return sources[name].spool
 
     def _add_transforms(self, time, message):
-        for each in message.transforms:
-            frame = each.child_frame_id.strip("/")
-            if frame not in self._log.frames:
-                self._log.frames[frame] = self._new_spool(POSE_FIELDS)
-            spool = self._log.frames[frame]
+        for frame, stamp, row in _poses_of(message):
+            frames = self.logs[-1].frames
+            if frame not in frames:
+                frames[frame] = self._new_spool(POSE_FIELDS)
+            spool = frames[frame]
             if time - spool.last_time >= POSE_PERIOD:
-                row = transform_row(each.transform)
-                spool.append(time, each.header.stamp.to_sec(), 0, row)
+                spool.append(time, seconds(stamp), 0, row)
 
     def _new_spool(self, fields):
-        number = len(self._log.sources) + len(self._log.frames)
+        number = sum(len(each.sources) + len(each.frames) for each in self.logs)
         return Spool(self._folder / f"{number}.doubles", fields)
+
+
+def _poses_of(message):
+    """Yield frame, stamp and row of each pose in a message of /tf, or of motion capture."""
+    if hasattr(message, "poses"):
+        for each in message.poses:
+            yield each.name, message.header.stamp, pose_row(each.pose)
+        return
+    for each in message.transforms:
+        yield each.child_frame_id.strip("/"), each.header.stamp, transform_row(each.transform)

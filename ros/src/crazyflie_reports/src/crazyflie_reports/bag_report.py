@@ -5,6 +5,7 @@ import csv
 import json
 import math
 import re
+import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -14,17 +15,18 @@ from typing import Any
 
 from tqdm import tqdm
 
-from crazyflie_reports import bag_log, report_page
+from crazyflie_reports import bag_log, bag_mcap, report_page
 from crazyflie_reports.bag_events import concerning
 from crazyflie_reports.bag_file import BagError
-from crazyflie_reports.bag_flights import Flight, flights
+from crazyflie_reports.bag_flights import Flight, flights, vehicle_namespaces, vehicles
 from crazyflie_reports.bag_topics import ROLES
-from crazyflie_reports.bag_vehicles import vehicle_namespaces, vehicles
 from crazyflie_reports.figures import Figure, figures
 
 PAGE, FIGURES, EVENTS, DATA = "report.html", "figures.csv", "events.csv", "report.json"
+MCAP = "mcap"  #: Folder of the recordings as MCAP.
 
-SIMULATED = 1e8  #: Times of ROS before this one, of 1973, count from the start of a simulation, s.
+#: A cell that begins with one of these is a formula for spreadsheets.
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 class ReportError(Exception):
@@ -68,7 +70,7 @@ class Report:
         self.recordings.append(
             {
                 "name": log.name,
-                "start": start if log.start > SIMULATED else "in simulated time",
+                "start": start if log.start > bag_log.SIMULATED else "in simulated time",
                 "duration": round(log.end - log.start, 3),
                 "remarks": log.remarks if data else [*log.remarks, *_why_there_is_no_flight(log)],
                 "flights": data,
@@ -77,7 +79,11 @@ class Report:
 
     def write(self, folder: Path) -> None:
         """Write page and tables into a folder, which is made if it is not there."""
-        names = [[f.name, f.unit] for f in self._flights[0][1]] if self._flights else []
+        names = (
+            [[f.name, f.unit, f.needs, f.note] for f in self._flights[0][1]]
+            if self._flights
+            else []
+        )
         folder.mkdir(parents=True, exist_ok=True)
         (folder / PAGE).write_text(report_page.page(self.recordings, names))
         keys = ("recording", "vehicle", "flight")
@@ -120,27 +126,36 @@ class Report:
         return "\n".join(lines)
 
 
-def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -> list[str]:
+def make(
+    paths: list[Path],
+    folder: Path,
+    names: dict[str, str] | None = None,
+    has_mcap: bool = False,
+) -> list[str]:
     """Write a report on recordings; return what went wrong with any of them.
 
     A path is a bag, or a folder of bags that follow each other; for ``names`` see `bag_log.read`.
+    With ``has_mcap`` each recording is written as MCAP, too.
     `ReportError`: none of the recordings can be read, or the folder cannot be written.
     """
-    report, problems = Report(), []
+    report, problems, written = Report(), [], []
     try:
         folder.mkdir(parents=True, exist_ok=True)
         # Beside the report, since /tmp may be in memory.
         with tempfile.TemporaryDirectory(dir=folder) as place:
             for number, path in enumerate(paths):
                 try:
-                    log = _read(path, Path(place, str(number)), names)
+                    logs = _read(path, Path(place, str(number)), names)
                 except BagError as error:
                     problems.append(str(error))
                     continue
-                # Bags of several folders may have the same name.
-                if [each.name for each in paths].count(path.name) > 1:
-                    log.name = str(path)
-                report.add(log)
+                for log in logs:
+                    # Bags of several folders may have the same name.
+                    if [each.name for each in paths].count(path.name) > 1:
+                        log.name = str(path) + log.name.removeprefix(path.name)
+                    report.add(log)
+                    if has_mcap:
+                        written.append(bag_mcap.write(log, _new_folder(folder / MCAP, log.name)))
         if not report.recordings:
             raise ReportError("\n".join(problems))
         report.write(folder)
@@ -149,7 +164,7 @@ def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -
     print(report.table())
     for recording in report.recordings:
         print("".join(f"{remark}\n" for remark in recording["remarks"]), end="")
-    print(f"report: {folder / PAGE}")
+    print(*(f"mcap: {each}" for each in written), f"report: {folder / PAGE}", sep="\n")
     return problems
 
 
@@ -162,7 +177,7 @@ def main() -> int:
         nargs="+",
         type=Path,
         metavar="BAG",
-        help="or a folder of bags that follow each other",
+        help="of ROS 1, or of ROS 2 (*.mcap, *.db3), or a folder of bags that follow each other",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("flight_report"), help="folder of the report (%(default)s)"
@@ -171,6 +186,9 @@ def main() -> int:
         "--topic", action="append", default=[], metavar="ROLE=NAME",
         help=f"a topic of another name, below the vehicle's namespace; roles: {', '.join(roles)}",
     )  # fmt: skip
+    parser.add_argument(
+        "--mcap", action="store_true", help="also write recordings for Foxglove and Lichtblick"
+    )
     options = parser.parse_args()
     names = dict(each.partition("=")[::2] for each in options.topic)
     if unknown := [each for each in names if each not in roles or not names[each]]:
@@ -181,7 +199,7 @@ def main() -> int:
         except re.error as error:
             parser.error(f"--topic {role}={name}: expected a regular expression; {error}")
     try:
-        problems = make(options.bags, options.out, names)
+        problems = make(options.bags, options.out, names, options.mcap)
     except ReportError as error:
         problems = [str(error)]
     print(*problems, sep="\n", file=sys.stderr, end="\n" if problems else "")
@@ -196,6 +214,14 @@ def _read(path, folder, names):
         return bag_log.read(path, folder, names, bar.update)
 
 
+def _new_folder(top, name):
+    """Return the folder of a recording's name, without what was in it."""
+    folder = top / re.sub(r"[^\w.-]+", "_", name).strip("._")
+    if folder.exists():
+        shutil.rmtree(folder)
+    return folder
+
+
 def _why_there_is_no_flight(log):
     yield "It has no flight."
     for event in log.events.events[: report_page.MAX_EVENTS]:
@@ -208,4 +234,10 @@ def _number(value):
 
 def _write_csv(path, header, rows):
     with path.open("w", newline="") as file:
-        csv.writer(file).writerows([header, *rows])
+        csv.writer(file).writerows([header, *([_cell(each) for each in row] for row in rows)])
+
+
+def _cell(value):
+    """Return a value, or text that a spreadsheet takes for text."""
+    is_formula = isinstance(value, str) and value.startswith(_FORMULA)
+    return f"'{value}" if is_formula else value

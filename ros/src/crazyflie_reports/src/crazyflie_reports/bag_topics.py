@@ -10,8 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import roslib.message
-
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.units import thrust_from_pwm
 from crazyflie_reports.bag_file import Connection
@@ -32,7 +30,8 @@ class Role:
     rows: dict[str, Callable[[Any], Row]]  #: By type, what makes a row of a message.
 
 
-def _of_pose(pose):
+def pose_row(pose: Any) -> Row:
+    """Return `POSE_FIELDS` (m, rad) of a geometry_msgs/Pose."""
     position, q = pose.position, pose.orientation
     return (position.x, position.y, position.z, *rpy_from_quaternion(q.x, q.y, q.z, q.w))
 
@@ -58,13 +57,18 @@ def _at_rest(x, y, z, yaw):
 
 def _of_full_state(message):
     velocity = message.twist.linear
-    *position, _, _, yaw = _of_pose(message.pose)
+    *position, _, _, yaw = pose_row(message.pose)
     return (*position, velocity.x, velocity.y, velocity.z, yaw)
 
 
 def _at_rest_at_pose(message):
-    x, y, z, _, _, yaw = _of_pose(message.pose)
+    x, y, z, _, _, yaw = pose_row(message.pose)
     return _at_rest(x, y, z, yaw)
+
+
+def _of_position(message):
+    # The yaw is in degrees.
+    return _at_rest(message.x, message.y, message.z, math.radians(message.yaw))
 
 
 _STATES: dict[str, Callable[[Any], Row]] = {
@@ -84,10 +88,7 @@ ROLES = (
         {
             "geometry_msgs/PoseStamped": _at_rest_at_pose,
             "crazyflie_driver/FullState": _of_full_state,
-            # The yaw is in degrees.
-            "crazyflie_driver/Position": lambda message: _at_rest(
-                message.x, message.y, message.z, math.radians(message.yaw)
-            ),
+            "crazyflie_driver/Position": _of_position,
         },
     ),
     Role("final_control", "control/final", CONTROL_FIELDS, _CONTROLS),
@@ -96,7 +97,7 @@ ROLES = (
         "pose",
         "pose",
         POSE_FIELDS,
-        {"geometry_msgs/PoseStamped": lambda message: _of_pose(message.pose)},
+        {"geometry_msgs/PoseStamped": lambda message: pose_row(message.pose)},
     ),
     Role("battery", "battery", ("voltage",), {"std_msgs/Float32": lambda m: (m.data,)}),
     Role("toggle", "in_flight", (), {"std_msgs/Empty": lambda message: ()}),
@@ -122,6 +123,30 @@ FLOATS = {
     "crazyflie_msgs/FullStateStamped": 12,
 }
 
+#: Of ROS 2 alone: those of crazyswarm2.
+_ROS2_ROLES = (
+    Role(
+        "reference",
+        "cmd_full_state|cmd_position",
+        STATE_FIELDS,
+        {
+            "crazyflie_interfaces/FullState": _of_full_state,
+            "crazyflie_interfaces/Position": _of_position,
+        },
+    ),
+    Role("cmd_vel", "cmd_vel_legacy", CONTROL_FIELDS, {"geometry_msgs/Twist": _of_cmd_vel}),
+    Role(
+        "battery",
+        "status",
+        ("voltage",),
+        {"crazyflie_interfaces/Status": lambda message: (message.battery_voltage,)},
+    ),
+)
+_ROS2_EVENT_TYPES = {
+    "rcl_interfaces/Log": r"rosout",
+    "motion_capture_tracking_interfaces/NamedPoseArray": r"poses",
+}
+
 _HEADER = struct.Struct("<III")
 
 
@@ -136,22 +161,20 @@ class Topic:
     decode: Callable[[bytes], tuple[float, int, Any]]
 
 
-class TopicError(Exception):
-    """A topic that cannot be read; the text names it and what was expected."""
-
-
 def topic_of(connection: Connection, names: dict[str, str]) -> Topic | None:
     """Return how a connection is read; None if a report does not need it.
 
     For ``names`` see `bag_log.read`. `TopicError`: its type is not defined here, or differently.
     """
-    for role in ROLES:
+    is_ros2 = connection.encoding == "cdr"
+    events = EVENT_TYPES | (_ROS2_EVENT_TYPES if is_ros2 else {})
+    for role in (*ROLES, *_ROS2_ROLES) if is_ros2 else ROLES:
         namespace = _namespace(connection.topic, names.get(role.name, role.topics))
         if namespace is not None and connection.datatype in role.rows:
             row = role.rows[connection.datatype]
             return Topic(namespace, role, _decoder(connection, row))
-    if connection.datatype in EVENT_TYPES:
-        namespace = _namespace(connection.topic, EVENT_TYPES[connection.datatype])
+    if connection.datatype in events:
+        namespace = _namespace(connection.topic, events[connection.datatype])
         if namespace is not None:
             return Topic(namespace, None, _decoder(connection, lambda message: message))
     return None
@@ -171,30 +194,34 @@ def _namespace(topic, names):
     return match and (match[1] or "").strip("/")
 
 
+def seconds(stamp: Any) -> float:
+    """Return a time of a message, of ROS 1 or 2, in s."""
+    return stamp.to_sec() if hasattr(stamp, "to_sec") else stamp.sec + 1e-9 * stamp.nanosec
+
+
 def _decoder(connection, convert):
-    # The definition in the bag is text of whoever wrote it: a class generated from it would run it.
-    message_type = roslib.message.get_message_class(connection.datatype)
-    if message_type is None:
-        raise TopicError(
-            f"{connection.topic} is left out: no package here defines {connection.datatype}"
-        )
-    if message_type._md5sum != connection.md5sum:
-        raise TopicError(
-            f"{connection.topic} is left out: its {connection.datatype} has the md5 sum "
-            f"{connection.md5sum}, expected {message_type._md5sum}"
-        )
-    if connection.datatype in FLOATS:
+    deserialize = connection.deserializer()
+    is_flat = connection.datatype in FLOATS
+    if is_flat and connection.encoding == "ros1":
         numbers = struct.Struct(f"<{FLOATS[connection.datatype]}d")
         return lambda data: _decode_floats(data, numbers, convert)
 
     def decode(data):
-        message = message_type()
-        message.deserialize(data)
+        message = deserialize(data)
         header = getattr(message, "header", None)
-        stamp, number = (header.stamp.to_sec(), header.seq) if header else (0.0, 0)
-        return stamp, number, convert(message)
+        stamp = seconds(header.stamp) if header else 0.0
+        if is_flat:
+            # A header, and a message of nothing but numbers.
+            _, message = _values(message)
+            message = _values(message)
+        return stamp, getattr(header, "seq", 0), convert(message)
 
     return decode
+
+
+def _values(message):
+    """Return the fields of a message of rosbags: its type and constants are attributes, too."""
+    return tuple(v for name, v in vars(message).items() if name[0] != "_" and name.islower())
 
 
 def _decode_floats(data, numbers, convert):

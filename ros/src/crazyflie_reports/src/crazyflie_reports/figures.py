@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 from crazyflie_reports.bag_flights import Flight
-from crazyflie_reports.flight_record import Series
-from crazyflie_reports.flight_report import (
+from crazyflie_reports.flight_record import (
+    GAP_LIMIT,
     HOVER_TOLERANCE,
     HOVER_WINDOW,
     OVERSHOOT_LIMIT,
     TOUCHDOWN_LIMIT,
+    Series,
 )
 
 #: Largest distance of a real or virtual vehicle from its hover point, m: motion capture, trim and
@@ -31,10 +32,14 @@ LEAST_RATE = 50.0  #: Of states and controls, Hz; at lower ones velocities are p
 #: those at the limit of stability reach ten times as much.
 CHANGE_LIMIT, HARDWARE_CHANGE_LIMIT = 0.01, 0.03
 SATURATED_LIMIT = 0.01  #: Share of controls that are at a limit.
-GAP_LIMIT = 0.1  #: Without a new state for longer than this the vehicle is not controlled, s.
 _ROUNDING = 1e-6  #: Of a control that was in degrees on its way (rad).
 _NO_TILT = np.empty((0, 2))  #: Roll and pitch of no control.
 LEAST_VOLTAGE = 3.2  #: Of one lithium polymer cell under load, V.
+
+_HOVER = "a takeoff, and a hover of 1 s at its reference"
+_TRACKING = "states and references while the controller flies"
+_CONTROL, _STATE, _BATTERY = "controls in flight", "states in flight", "battery voltages"
+_STATUS = "vehicle_status, which a driver publishes"
 
 
 @dataclass(frozen=True)
@@ -44,9 +49,11 @@ class Figure:
     name: str
     unit: str
     value: float  #: NaN if it is not known.
+    needs: str  #: What has to be recorded, or flown, for it to be known.
     #: minimum, maximum: What is normal, if that is limited.
     minimum: float = -math.inf
     maximum: float = math.inf
+    note: str = ""  #: What a reader may wonder about.
 
     @property
     def is_normal(self) -> bool:
@@ -95,10 +102,10 @@ def _hover(flight: Flight) -> Iterator[Figure]:
             mean, largest = record.hover_error(point, min(HOVER_WINDOW, end - begin))
         except ValueError:
             pass  # The states had ended.
-    yield Figure("time to hover", "s", time, maximum=HOVER_TIME_LIMIT)
-    yield Figure("overshoot", "mm", 1e3 * over, maximum=1e3 * OVERSHOOT_LIMIT)
-    yield Figure("hover error, mean", "mm", 1e3 * mean, maximum=1e3 * tolerance)
-    yield Figure("hover error, maximum", "mm", 1e3 * largest, maximum=1e3 * tolerance)
+    yield Figure("time to hover", "s", time, _HOVER, maximum=HOVER_TIME_LIMIT)
+    yield Figure("overshoot", "mm", 1e3 * over, _HOVER, maximum=1e3 * OVERSHOOT_LIMIT)
+    yield Figure("hover error, mean", "mm", 1e3 * mean, _HOVER, maximum=1e3 * tolerance)
+    yield Figure("hover error, maximum", "mm", 1e3 * largest, _HOVER, maximum=1e3 * tolerance)
 
 
 def _tracking(flight: Flight) -> Iterator[Figure]:
@@ -111,9 +118,9 @@ def _tracking(flight: Flight) -> Iterator[Figure]:
     rms = float(np.sqrt(np.mean(errors**2))) if known else math.nan
     share = float(np.percentile(errors, 95)) if known else math.nan
     largest = float(errors.max()) if known else math.nan
-    yield Figure("error in flight, rms", "mm", rms, maximum=500.0 * TRACKING_LIMIT)
-    yield Figure("error in flight, 95 %", "mm", share, maximum=1e3 * TRACKING_LIMIT)
-    yield Figure("error in flight, maximum", "mm", largest)
+    yield Figure("error in flight, rms", "mm", rms, _TRACKING, maximum=500.0 * TRACKING_LIMIT)
+    yield Figure("error in flight, 95 %", "mm", share, _TRACKING, maximum=1e3 * TRACKING_LIMIT)
+    yield Figure("error in flight, maximum", "mm", largest, _TRACKING)
 
 
 def _motion(flight: Flight) -> Iterator[Figure]:
@@ -128,15 +135,28 @@ def _motion(flight: Flight) -> Iterator[Figure]:
     tilt = np.abs(control[:, 1:3]).max(axis=1, initial=-math.inf)
     seconds = np.diff(control[:, 0])
     impulse = float(seconds @ control[:-1, 4]) / GRAVITY if len(control) > 1 else math.nan
-    yield Figure("touchdown speed", "m/s", touchdown, maximum=TOUCHDOWN_LIMIT)
-    yield Figure("duration", "s", flight.end - flight.start)
-    yield Figure("height, maximum", "m", _max(state[:, 2]))
-    yield Figure("speed, maximum", "m/s", _max(speed))
+    yield Figure(
+        "touchdown speed",
+        "m/s",
+        touchdown,
+        "a landing on the ground at z = 0",
+        maximum=TOUCHDOWN_LIMIT,
+    )
+    yield Figure("duration", "s", flight.end - flight.start, "a flight")
+    yield Figure("height, maximum", "m", _max(state[:, 2]), _STATE)
+    yield Figure("speed, maximum", "m/s", _max(speed), "velocities in flight")
     # Of roll or pitch; a control that is limited has the limit itself.
     degrees, limit = (round(math.degrees(each), 3) for each in (_max(tilt), MAX_TILT))
-    yield Figure("tilt commanded, maximum", "deg", degrees, maximum=limit)
-    yield Figure("thrust used, as time of hover", "s", impulse)
-    yield Figure("thrust, mean", "m/s²", impulse * GRAVITY / (flight.end - flight.start))
+    yield Figure(
+        "tilt commanded, maximum",
+        "deg",
+        degrees,
+        _CONTROL,
+        maximum=limit,
+        note="the limit to which every control is cut",
+    )
+    yield Figure("thrust used, as time of hover", "s", impulse, _CONTROL)
+    yield Figure("thrust, mean", "m/s²", impulse * GRAVITY / (flight.end - flight.start), _CONTROL)
 
 
 def _controls(flight: Flight) -> Iterator[Figure]:
@@ -151,25 +171,36 @@ def _controls(flight: Flight) -> Iterator[Figure]:
     change = float(changes.mean()) if len(changes) else math.nan
     share = 100.0 * float(saturated.mean()) if len(saturated) else math.nan
     limit = HARDWARE_CHANGE_LIMIT if flight.is_driven else CHANGE_LIMIT
-    yield Figure("roll and pitch, mean change per control", "rad", change, maximum=limit)
-    yield Figure("controls saturated", "%", share, maximum=100.0 * SATURATED_LIMIT)
+    yield Figure("roll and pitch, mean change per control", "rad", change, _CONTROL, maximum=limit)
+    yield Figure("controls saturated", "%", share, _CONTROL, maximum=100.0 * SATURATED_LIMIT)
 
 
 def _loop(flight: Flight) -> Iterator[Figure]:
     delays = 1e3 * flight.delays[:, 1]
-    for name, share, limit in (("median", 50, math.inf), ("95 %", 95, 1e3 * DELAY_LIMIT),
+    for part, share, limit in (("median", 50, math.inf), ("95 %", 95, 1e3 * DELAY_LIMIT),
                                ("maximum", 100, math.inf)):  # fmt: skip
+        name = f"delay pose to control, {part}"
         delay = float(np.percentile(delays, share)) if len(delays) else math.nan
-        yield Figure(f"delay pose to control, {name}", "ms", delay, maximum=limit)
+        yield Figure(
+            name, "ms", delay, "states with stamps of the recording's clock", maximum=limit
+        )
     for name, series in (("state", flight.record.state), ("control", flight.record.final_control)):
         times = _part(series, flight)[:, 0]
         # From the first one to the end of the flight, whether it came until then or not.
         steps = np.diff([*times, flight.end]) if len(times) else times
         rate = 1.0 / float(steps.mean()) if steps.any() else math.nan
-        yield Figure(f"{name} rate", "Hz", rate, minimum=LEAST_RATE)
-        yield Figure(f"{name} gap, longest", "ms", 1e3 * _max(steps), maximum=1e3 * GAP_LIMIT)
+        yield Figure(f"{name} rate", "Hz", rate, f"{name}s in flight", minimum=LEAST_RATE)
+        yield Figure(
+            f"{name} gap, longest",
+            "ms",
+            1e3 * _max(steps),
+            f"{name}s in flight",
+            maximum=1e3 * GAP_LIMIT,
+        )
     lost = math.nan if flight.lost is None else float(flight.lost)
-    yield Figure("states not recorded", "", lost, maximum=0.0)
+    yield Figure(
+        "states not recorded", "", lost, "numbers in sequence in the states' headers", maximum=0.0
+    )
 
 
 def _link(flight: Flight) -> Iterator[Figure]:
@@ -177,12 +208,14 @@ def _link(flight: Flight) -> Iterator[Figure]:
     quality = link[~np.isnan(link[:, 1]), 1]
     unanswered = 100.0 * float(1.0 - quality.mean()) if len(quality) else math.nan
     blocked = float(link[-1, 2] - link[0, 2]) if len(link) else math.nan
-    yield Figure("packets lost", "%", unanswered, maximum=5.0)
-    yield Figure("setpoints not sent", "", blocked, maximum=0.0)
+    yield Figure("packets lost", "%", unanswered, _STATUS, maximum=5.0)
+    yield Figure("setpoints not sent", "", blocked, _STATUS, maximum=0.0)
     inside = (flight.battery[:, 0] >= flight.start) & (flight.battery[:, 0] <= flight.end)
     volts = flight.battery[inside, 1]
-    yield Figure("battery, lowest", "V", -_max(-volts), minimum=LEAST_VOLTAGE)
-    yield Figure("battery, drop", "V", float(volts[0] - volts[-1]) if len(volts) else math.nan)
+    yield Figure("battery, lowest", "V", -_max(-volts), _BATTERY, minimum=LEAST_VOLTAGE)
+    yield Figure(
+        "battery, drop", "V", float(volts[0] - volts[-1]) if len(volts) else math.nan, _BATTERY
+    )
 
 
 def _part(series: Series, flight: Flight) -> NDArray[np.float64]:

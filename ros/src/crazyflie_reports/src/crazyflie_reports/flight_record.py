@@ -1,6 +1,7 @@
-"""Recorded topics and events of a flight as arrays, and figures of merit."""
+"""Recorded topics and events of a flight as arrays, figures of merit, and their limits."""
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,7 +12,23 @@ STATE_FIELDS = ("x", "y", "z", "x_dot", "y_dot", "z_dot", "yaw")
 CONTROL_FIELDS = ("roll", "pitch", "yaw_dot", "thrust")
 
 GROUND_TOLERANCE = 0.01  #: A vehicle below this height stands on the ground, m.
+GAP_LIMIT = 0.1  #: Without a new state for longer than this the vehicle is not controlled, s.
+_LONG = 3.0  # A series with fewer samples has a gap where it pauses for this many periods.
 AT_POINT = 0.001  #: References closer to a point than this lead to it, m.
+
+HOVER_TOLERANCE = 0.01  #: Largest distance from the hover point of a good flight, m.
+HOVER_WINDOW = 5.0  #: Time before the end of the hover from which its error is taken, s.
+OVERSHOOT_LIMIT = 0.1  #: How far a good flight may rise above the hover point, m.
+TOUCHDOWN_LIMIT = 0.5  #: Fastest touchdown of a good flight, m/s.
+
+
+def gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which steps of times (s), shape (n,), are gaps; shape (n - 1,), or (0,) without times.
+
+    Nothing is known of what was in a gap. It is longer than `GAP_LIMIT` and than three usual steps.
+    """
+    steps = np.diff(times)
+    return steps > max(GAP_LIMIT, _LONG * float(np.median(steps)) if len(steps) else 0.0)
 
 
 class Series:
@@ -149,7 +166,7 @@ class FlightRecord:
         """Return the downward speed at which the vehicle met the ground (m/s).
 
         The fastest of the last tenth of a second above `GROUND_TOLERANCE`. ValueError: it did not
-        come down.
+        come down, or no velocity is known there.
         """
         times, heights = self.state.times, self.state.column("z")
         descending = np.flatnonzero((times >= self.events["land"]) & (heights > GROUND_TOLERANCE))
@@ -157,7 +174,11 @@ class FlightRecord:
             raise ValueError("the vehicle did not reach the ground")
         contact = times[descending[-1] + 1]
         window = (times >= contact - 0.1) & (times <= contact)
-        return float(max(0.0, -self.state.column("z_dot")[window].min()))
+        speeds = -self.state.column("z_dot")[window]
+        speeds = speeds[np.isfinite(speeds)]
+        if not speeds.size:
+            raise ValueError("no velocity is known at the touchdown")
+        return float(max(0.0, speeds.max()))
 
     def save_csv(self, path: Path) -> None:
         """Write state and control, one row for every state, times from the call of /takeoff."""
@@ -175,3 +196,78 @@ class FlightRecord:
         times = self.state.times
         hover = (times >= self.events["takeoff"]) & (times <= self.hover_interval(point)[1])
         return times[hover], self.position_error(point)[hover]
+
+
+@dataclass(frozen=True)
+class FlightReport:
+    """Figures of one flight from /takeoff to /land; NaN if it has no hover or no touchdown."""
+
+    time_to_hover: float  #: From the call of /takeoff until it stayed within `HOVER_TOLERANCE`, s.
+    overshoot: float  #: Above the hover height, m.
+    #: hover_error_mean, hover_error_max: Distance from the hover point at the end of the hover, m.
+    hover_error_mean: float
+    hover_error_max: float
+    touchdown_speed: float  #: m/s.
+    final_height: float  #: m.
+    final_thrust: float  #: m/s^2.
+
+    @classmethod
+    def of(
+        cls, record: FlightRecord, point: Sequence[float], window: float = HOVER_WINDOW
+    ) -> "FlightReport":
+        """Return the report of a record with the hover point x, y, z, m.
+
+        The hover error is that of the last ``window`` s of the hover.
+        """
+        mean, largest = record.hover_error(point, window)
+        try:
+            touchdown = record.touchdown_speed()
+        except ValueError:
+            touchdown = float("nan")
+        return cls(
+            time_to_hover=record.time_to_hover(point, HOVER_TOLERANCE),
+            overshoot=record.overshoot(point),
+            hover_error_mean=mean,
+            hover_error_max=largest,
+            touchdown_speed=touchdown,
+            final_height=float(record.state.last[2]),
+            final_thrust=float(record.final_control.last[3]),
+        )
+
+    def complaints(self) -> list[str]:
+        """Return what was bad about the flight, a sentence each; empty for a good one."""
+        checks = [
+            (
+                self.hover_error_max <= HOVER_TOLERANCE,
+                f"it strayed {self.hover_error_max * 1000:.1f} mm from the hover point "
+                f"(limit {HOVER_TOLERANCE * 1000:.0f} mm)",
+            ),
+            (
+                self.overshoot <= OVERSHOOT_LIMIT,
+                f"it rose {self.overshoot * 1000:.0f} mm above the hover point "
+                f"(limit {OVERSHOOT_LIMIT * 1000:.0f} mm)",
+            ),
+            (
+                not self.touchdown_speed > TOUCHDOWN_LIMIT,
+                f"it touched down at {self.touchdown_speed:.2f} m/s "
+                f"(limit {TOUCHDOWN_LIMIT:g} m/s)",
+            ),
+            (
+                self.final_height <= GROUND_TOLERANCE,
+                f"it is {self.final_height:.3f} m above the ground after landing",
+            ),
+            (self.final_thrust == 0.0, f"thrust is {self.final_thrust:.2f} m/s^2 after landing"),
+        ]
+        return [complaint for is_good, complaint in checks if not is_good]
+
+    def table(self) -> str:
+        """Return the figures as lines of text."""
+        rows = [
+            ("time to hover", f"{self.time_to_hover:.2f} s"),
+            ("overshoot", f"{self.overshoot * 1000:.1f} mm"),
+            ("hover error, mean", f"{self.hover_error_mean * 1000:.2f} mm"),
+            ("hover error, maximum", f"{self.hover_error_max * 1000:.2f} mm"),
+            ("touchdown speed", f"{self.touchdown_speed:.2f} m/s"),
+        ]
+        known = ((name, "-" if value.startswith("nan") else value) for name, value in rows)
+        return "\n".join(f"{name:<22}{value:>12}" for name, value in known)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from crazyflie_reports.bag_flights import Flight
 from crazyflie_reports.figures import Figure
+from crazyflie_reports.flight_record import gaps
 
 Array = NDArray[np.float64]
 
@@ -28,18 +29,18 @@ def points_of(vehicles: int) -> int:
 def decimated(times: Array, values: Array, points: int) -> tuple[Array, Array]:
     """Return times and values, shape (n,), with at most about ``points`` left.
 
-    Of each interval the smallest and the largest value are left, so that peaks are.
+    Of each interval the smallest and the largest value are left, so that peaks are, and one that is
+    NaN, so that gaps are.
     """
-    known = np.isfinite(values)
-    times, values = times[known], values[known]
     if len(values) <= points:
         return times, values
-    kept = [
-        begin + extreme
-        for part in np.array_split(np.arange(len(values)), points // 2)
-        for begin in part[:1]
-        for extreme in sorted({values[part].argmin(), values[part].argmax()})
-    ]
+    kept: list[int] = []
+    parts = points // (3 if np.isnan(values).any() else 2)
+    for part in np.array_split(np.arange(len(values)), parts):
+        is_known = np.isfinite(values[part])
+        known = part[is_known]
+        extremes = (values[known].argmin(), values[known].argmax()) if len(known) else ()
+        kept += sorted({*known[list(extremes)], *part[~is_known][:1]})
     return times[kept], values[kept]
 
 
@@ -65,18 +66,28 @@ def flight_data(flight: Flight, found: list[Figure], points: int) -> dict[str, A
     }
 
 
-def page(recordings: list[dict[str, Any]], figure_names: list[list[str]]) -> str:
+def page(recordings: list[dict[str, Any]], names: list[list[str]]) -> str:
     """Return the HTML of a report.
 
     A recording has name, start, duration, remarks, and flights as `flight_data` returns them; a
-    figure has a name and a unit.
+    figure in ``names`` has a name, a unit, what it needs to be known, and a note.
     """
     folder = Path(rospkg.RosPack().get_path("crazyflie_reports")) / "page"
-    data = json.dumps({"recordings": recordings, "figures": figure_names}, allow_nan=False)
-    html = (folder / "report.html").read_text()
+    data = json.dumps({"recordings": recordings, "figures": names}, allow_nan=False)
     scripts = "".join((folder / f"{name}.js").read_text() for name in ("plots", "replay", "report"))
-    # Within a script element only "<" could end the element.
-    return html.replace("{{scripts}}", scripts).replace("{{data}}", data.replace("<", "\\u003c"))
+    # Its first line is its address: the page has its license in that place.
+    library = (folder / "uplot" / "uPlot.iife.min.js").read_text().partition("\n")[2]
+    parts = {
+        "style": (folder / "uplot" / "uPlot.min.css").read_text(),
+        "library": f"/* uPlot\n{(folder / 'uplot' / 'LICENSE').read_text()}*/\n{library}",
+        "scripts": scripts,
+        # Within a script element only "<" could end the element.
+        "data": data.replace("<", "\\u003c"),
+    }
+    html = (folder / "report.html").read_text()
+    for name, text in parts.items():
+        html = html.replace(f"{{{{{name}}}}}", text)
+    return html
 
 
 def _plots(flight, points):
@@ -123,18 +134,29 @@ def _plots(flight, points):
 
 
 def _curve(name, times, values, start, points):
+    known = np.isfinite(values)
+    times, values = times[known], values[known]
+    # A reference is one until the next.
+    if not name.endswith("reference"):
+        ends = np.flatnonzero(gaps(times)) + 1
+        times = np.insert(times, ends, (times[ends - 1] + times[ends]) / 2.0)
+        values = np.insert(values, ends, math.nan)
     times, values = decimated(times, values, points)
-    return {"name": name, "t": _rounded(times, start), "v": np.round(values, 4).tolist()}
+    numbers = [None if math.isnan(v) else v for v in np.round(values, 4).tolist()]
+    return {"name": name, "t": _rounded(times, start), "v": numbers}
 
 
 def _path(flight, points):
-    """Return poses at equal intervals: position, roll, pitch, yaw (m, rad), and the reference."""
+    """Return poses at equal intervals: position, roll, pitch, yaw (m, rad), and the reference.
+
+    A pose in a gap is None.
+    """
     state, reference = flight.record.state, flight.record.reference
     if not len(state):
         return None
     times = state.times
     period = max(FRAME_PERIOD, (times[-1] - times[0]) / points)
-    moments = np.arange(times[0], times[-1], period)
+    moments = times[0] + period * np.arange((times[-1] - times[0]) // period + 1)
     columns = [np.interp(moments, times, state.values[:, k]) for k in range(3)]
     attitude = flight.attitude
     if len(attitude):
@@ -148,11 +170,24 @@ def _path(flight, points):
         newest = np.searchsorted(reference.times, moments, side="right") - 1
         columns += list(reference.values[np.maximum(newest, 0), :3].T)
     rows = np.nan_to_num(np.round(np.array(columns).T, 3), posinf=0.0, neginf=0.0)
+    unknown = _in_gaps(moments, times) | _in_gaps(moments, attitude[:, 0])
     return {
         "start": round(float(times[0] - flight.start), 3),
         "period": period,
-        "rows": rows.tolist(),
+        "rows": [
+            None if is_unknown else row
+            for row, is_unknown in zip(rows.tolist(), unknown, strict=True)
+        ],
     }
+
+
+def _in_gaps(moments, times):
+    """Tell which moments are in gaps of times, s."""
+    step = np.searchsorted(times, moments, side="right") - 1
+    inside = (step >= 0) & (step < len(times) - 1)
+    found = np.zeros(len(moments), dtype=bool)
+    found[inside] = gaps(times)[step[inside]] & (moments[inside] > times[step[inside]])
+    return found
 
 
 def _rounded(times, start):

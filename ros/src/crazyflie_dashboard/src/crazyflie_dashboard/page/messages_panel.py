@@ -1,12 +1,13 @@
 """What the doctor and the diagnostics say, and the log."""
 
+import re
 import time
 
 from nicegui import ui
 
 from crazyflie_dashboard.page.component import Lines
 from crazyflie_dashboard.page.session import Session
-from crazyflie_dashboard.snapshot import Scene
+from crazyflie_dashboard.snapshot import LogLine, Scene
 
 LEVELS = ("debug", "info", "warn", "error", "fatal")
 MAX_LINES = 200  #: Lines of the log that are shown, the newest first.
@@ -20,7 +21,7 @@ class MessagesPanel:
         with ui.element("div").classes("tools"):
             ui.label("What is not as it should be").classes("choice")
             self._examine = ui.button("Ask the doctor", on_click=self._ask).props("outline dense")
-        self._sentences = Lines("Nothing is reported.")
+        self._sentences = Lines("Diagnostics and the doctor report nothing; the log is below.")
         with ui.element("div").classes("tools apart"):
             ui.label("Log").classes("choice")
             self._level = ui.select(list(LEVELS), value="info", label="level")
@@ -32,24 +33,33 @@ class MessagesPanel:
         """Show the newest ones."""
         self._sentences.show(
             [
-                [str(number), each.level, each.source, each.text, each.remedy]
+                [str(number), each.level, f"{each.level}  {each.source}", each.text, each.remedy]
                 for number, each in enumerate(scene.sentences)
             ]
         )
         shown = LEVELS[LEVELS.index(self._level.value) :]
         part = (self._filter.value or "").lower()
-        lines = [
-            [line.number, line.level, f"{_clock(line.time)}  {line.node}", line.text, ""]
-            for line in reversed(scene.log)
-            if line.level in shown and part in f"{line.node} {line.text}".lower()
-        ]
-        self._log.show(lines[:MAX_LINES])
+        lines: dict[tuple[str, str, str], list[LogLine]] = {}
+        for line in reversed(scene.log):
+            if line.level in shown and part in f"{line.node} {line.text}".lower():
+                # Numbers differ where the same is said again and again.
+                same = re.sub(r"[0-9.]+", "#", line.text)
+                lines.setdefault((line.level, line.node, same), []).append(line)
+        self._log.show([_shown(each) for each in [*lines.values()][:MAX_LINES]])
 
     async def _ask(self) -> None:
         self._examine.disable()
         if await self._session.succeeds(self._session.dashboard.examine()):
             self._session.say("The doctor has looked at everything.", "positive")
         self._examine.enable()
+
+
+def _shown(lines: list[LogLine]) -> list[object]:
+    """Return the newest of lines that say the same, and how often that has been said."""
+    line, count = lines[0], len(lines)
+    often = f", {count} times since {_clock(lines[-1].time)}" if count > 1 else ""
+    head = f"{line.level}  {_clock(line.time)}  {line.node}{often}"
+    return [line.number, line.level, head, line.text, ""]
 
 
 def _clock(seconds: float) -> str:

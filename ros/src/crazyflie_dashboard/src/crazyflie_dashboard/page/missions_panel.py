@@ -24,6 +24,11 @@ class MissionsPanel:
             self._dry_run.props("outline icon=play_circle")
             self._fly = ui.button("Fly").props("unelevated color=positive icon=flight")
             self._fly.on("click", self._start, js_handler=CLICKED)
+        ui.label(
+            "A dry run flies the mission with ideal vehicles from where the chosen ones are, and "
+            "checks speeds, distances and fences; nothing moves. When it has passed, Fly flies it. "
+            "For missions of your own: dashboard.launch folders:=DIRECTORY."
+        ).classes("hint apart")
         self._result = ui.label().classes("result")
         self._running = ui.label().classes("hint")
         self.list_files()

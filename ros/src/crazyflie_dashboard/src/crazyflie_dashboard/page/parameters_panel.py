@@ -25,7 +25,10 @@ class ParametersPanel:
             self._owner.props("dense outlined options-dense").classes("number")
             self._search = ui.input("search", on_change=self._build)
             self._search.props("dense outlined clearable debounce=300").classes("number search")
-        self._count = ui.label().classes("hint")
+        self._count = ui.label(
+            "Choose a node or a vehicle to see what can be changed while it runs. A value that is "
+            "typed is sent with Enter."
+        ).classes("hint")
         self._rows = ui.element("div").classes("parameters")
 
     def refresh(self, scene: Scene) -> None:

@@ -141,7 +141,7 @@ def points(series: Series) -> list[tuple[float, float | None]]:
 
 def chart(series: Iterable[Series], can_be_measured: bool) -> dict[str, Any]:
     """Return the options of ECharts, and the height (px) of all plots: one for each unit."""
-    groups = [list(group) for _, group in groupby(series, key=lambda each: each.unit)]
+    groups = [list(group) for _, group in groupby(series, key=_plot)]
     count = len(groups)
     tops = [TOP + k * (HEIGHT + GAP) for k in range(count)]
     return {
@@ -163,6 +163,11 @@ def chart(series: Iterable[Series], can_be_measured: bool) -> dict[str, Any]:
             for i, each in enumerate(group)
         ],
     }
+
+
+def _plot(series: Series) -> tuple[str, str]:
+    """Return what lines of one plot have in common: the unit, but each angle has its own."""
+    return series.unit, series.name if series.unit == "deg" else ""
 
 
 def _title(group: list[Series], top: int) -> dict[str, Any]:

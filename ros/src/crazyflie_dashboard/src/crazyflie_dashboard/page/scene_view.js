@@ -156,7 +156,9 @@ export default {
         if (place) box.expandByPoint(place);
       }
       const target = followed ?? box.getCenter(new THREE.Vector3());
-      const far = followed ? 1.5 : box.getSize(new THREE.Vector3()).length();
+      // A picture that is higher than wide has less to its sides.
+      const narrow = Math.max(1, 1 / this.camera.aspect);
+      const far = followed ? 1.5 : box.getSize(new THREE.Vector3()).length() * narrow;
       const way = view === "above" ? [0, -0.001, 1.3] : [-0.6, -0.9, 0.7];
       this.controls.target.copy(target);
       this.camera.position.copy(target).add(new THREE.Vector3(...way).multiplyScalar(far));

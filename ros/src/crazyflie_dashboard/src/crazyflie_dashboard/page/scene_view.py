@@ -131,7 +131,7 @@ def vehicle_rows(scene: Scene, chosen: set[str]) -> list[list[Any]]:
     for name, vehicle in scene.vehicles.items():
         pose = _pose(vehicle.position, vehicle.rotation)
         age = f"{vehicle.pose_age:.0f} s old" if vehicle.is_stale and vehicle.pose_age else ""
-        remark = "emergency" if vehicle.is_emergency else age
+        remark = "emergency" if vehicle.is_emergency else age or ("held" if vehicle.is_held else "")
         reference = vehicle.reference.position if vehicle.reference else ()
         row = [*pose, condition(vehicle), name in chosen, remark, *_rounded(reference)]
         rows.append(row)

@@ -90,16 +90,18 @@ class Session:
 
     async def command(
         self, action: Action, names: Iterable[str], clicked: float, **details: Any
-    ) -> None:
-        """Command vehicles, and show each refusal."""
+    ) -> bool:
+        """Command vehicles, and show each refusal; return whether all of them do it."""
         names = tuple(names)
         if not names:
             self.say(f"{action.value}: choose a vehicle first", "warning")
-            return
+            return False
         future = self.dashboard.command(self.page, Command(action, names, clicked, **details))
         outcomes = await self.result(future)
-        for text in summary(outcomes or ()):
+        refusals = summary(outcomes or ())
+        for text in refusals:
             self.say(text, "negative")
+        return bool(outcomes) and not refusals
 
     async def take_control(self) -> None:
         """Take control; ask whether to take it over if another page has it."""

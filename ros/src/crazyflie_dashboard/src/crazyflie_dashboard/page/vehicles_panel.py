@@ -21,6 +21,7 @@ RATES = {
     "final_control": "control",
     "cmd_vel": "control",
 }
+REACHED = 0.15  #: From a goal, m: it is not shown any more.
 LOOKS = ("ground", "flight", "stale", "emergency")
 
 
@@ -37,7 +38,8 @@ class VehiclesPanel:
             )
             ui.button("None", on_click=lambda: self._choose_only(())).props("flat dense")
         with ui.element("div").classes("tools"):
-            self._button("Take off", self._take_off).props("icon=flight_takeoff color=positive")
+            self._up = self._button("Take off", self._take_off)
+            self._up.props("icon=flight_takeoff color=positive")
             self._height = _number("height, m", 1.0, *HEIGHTS)
             self._button("Land", self._land).props("icon=flight_land color=primary")
         with ui.element("div").classes("tools goal"):
@@ -53,6 +55,7 @@ class VehiclesPanel:
         self._cards = Cards()
         self._cards.on("choose", self._choose)
         self._cards.on("act", self._act)
+        self._sent: tuple[float, ...] | None = None  # Where the last go to leads, m.
         scene_view.on("choose", self._choose)
         scene_view.on("goal", self._set_goal)
 
@@ -63,6 +66,10 @@ class VehiclesPanel:
         """Show what has become of the vehicles."""
         names = self._session.chosen_names
         self._choice.text = f"{len(names)} of {len(scene.vehicles)} chosen"
+        # None is chosen at first: what a press says then is the hint.
+        chosen = [scene.vehicles[name] for name in names if name in scene.vehicles]
+        self._up.set_enabled(not chosen or any(Action.TAKEOFF in offered(v) for v in chosen))
+        self._hide_goal_that_is_reached(chosen)
         self._cards.show([card(each, each.name in names) for each in scene.vehicles.values()])
 
     def _choose(self, event: GenericEventArguments) -> None:
@@ -104,6 +111,17 @@ class VehiclesPanel:
         yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
         self._scene_view.show_goal({"x": x, "y": y, "z": z, "yaw": yaw} if is_set else None)
 
+    def _hide_goal_that_is_reached(self, chosen):
+        """Take the goal away when the middle of the vehicles that were sent there has come."""
+        places = [each.position for each in chosen if each.position is not None]
+        if not self._sent or not places:
+            return
+        middle = [sum(place[k] for place in places) / len(places) for k in range(3)]
+        if math.dist(middle, self._sent) < REACHED:
+            self._sent = None
+            for field in self._goal[:2]:
+                field.value = None
+
     async def _go(self, event: GenericEventArguments) -> None:
         goal = [field.value for field in self._goal]
         if None in goal:
@@ -111,7 +129,8 @@ class VehiclesPanel:
             return
         yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
         names = self._session.chosen_names
-        await self._session.command(Action.GO_TO, names, event.args, goal=tuple(goal), yaw=yaw)
+        if await self._session.command(Action.GO_TO, names, event.args, goal=tuple(goal), yaw=yaw):
+            self._sent = tuple(goal)
 
 
 def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
@@ -132,18 +151,37 @@ def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
         place = "  ".join(f"{each:z.2f}" for each in vehicle.position)
         facts.insert(0, ["position", f"{place} m", "wide"])
     # In the order of the enum, the ordinary ones first; the emergency stands apart.
-    shown = [each for each in Action if each in vehicle.actions and each is not Action.GO_TO]
+    shown = [each for each in Action if each in offered(vehicle)]
     actions = [each.value for each in sorted(shown, key=lambda each: each is Action.EMERGENCY)]
     return {
         "name": vehicle.name,
         "kind": vehicle.kind.value,
         "state": "no pose" if vehicle.pose_age is None and vehicle.is_stale else vehicle.state,
-        "reason": vehicle.reason or ("" if vehicle.is_in_flight else vehicle.takeoff_refusal),
+        "reason": _reason(vehicle),
         "look": LOOKS[condition(vehicle)],
         "facts": [fact for fact in facts if fact[1]],
         "actions": actions,
         "chosen": is_chosen,
     }
+
+
+def offered(vehicle: VehicleSnapshot) -> set[Action]:
+    """Return what its card offers: what it can be told as it is now."""
+    shown = set(vehicle.actions) - {Action.GO_TO}
+    if vehicle.is_emergency:
+        return shown - {Action.TAKEOFF, Action.LAND, Action.ARM}
+    shown.discard(Action.RESET)
+    if vehicle.is_in_flight:
+        return shown - {Action.TAKEOFF, Action.ARM, Action.DISARM, Action.REBOOT}
+    return shown
+
+
+def _reason(vehicle):
+    if vehicle.is_emergency:
+        return f"{vehicle.reason or 'motors are off'} · to fly again, press reset first"
+    if vehicle.is_held:
+        return "held by the fleet: too near to another vehicle"
+    return vehicle.reason or ("" if vehicle.is_in_flight else vehicle.takeoff_refusal)
 
 
 def _age(age: float | None) -> str:

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, ClassVar
 
 from nicegui import context, ui
@@ -16,9 +17,11 @@ from crazyflie_dashboard.page.plots_panel import PlotsPanel
 from crazyflie_dashboard.page.scene_view import SceneView
 from crazyflie_dashboard.page.session import CLICKED, Session
 from crazyflie_dashboard.page.vehicles_panel import VehiclesPanel
+from crazyflie_dashboard.snapshot import Scene
 
 SCENE_PERIOD = 0.05
 PANEL_PERIOD = 0.5  #: Between two updates, s.
+MAX_SCENE_AGE = 1.0  #: Of a dashboard that is not held up, s.
 
 
 class View:
@@ -50,10 +53,11 @@ class View:
         self._take = ui.button("Take control", on_click=self._take_or_release)
         self._take.props("outline").classes("take")
         emergency = ui.button("Emergency").props("unelevated color=negative icon=dangerous")
+        # No tooltip: it would stay, and cover the tabs.
+        emergency.props('aria-label="Emergency: stop the motors of all vehicles"')
         emergency.classes("emergency-all").on("click", js_handler="(event) => emergency(event)")
         with emergency:
             ui.label("Esc Esc").classes("key")
-            ui.tooltip("Stops the motors of all vehicles, also from a page without control")
 
     def _build_views(self) -> None:
         with ui.element("div").classes("views"):
@@ -91,8 +95,14 @@ class View:
     def _watched(self) -> str | None:
         return self._session.watched or next(iter(self._session.vehicles), None)
 
+    def _is_hung(self, scene: Scene) -> bool:
+        return time.monotonic() - scene.made > MAX_SCENE_AGE
+
     async def _draw(self) -> None:
         scene = self._dashboard.scene()
+        if self._is_hung(scene):
+            vehicles = {n: replace(v, is_stale=True) for n, v in scene.vehicles.items()}
+            scene = replace(scene, vehicles=vehicles)
         await self._scene_view.show(scene, self._session.chosen, self._panels["Missions"].paths)
 
     def _refresh(self) -> None:
@@ -102,6 +112,9 @@ class View:
         count = len(scene.vehicles)
         noun = "vehicle" if count == 1 else "vehicles"
         trouble = next((f" · {s.text}" for s in scene.sentences if s.source == "dashboard"), "")
+        if self._is_hung(scene):
+            age = time.monotonic() - scene.made
+            trouble = f" · what is shown is {age:.0f} s old: the dashboard is held up"
         self._summary.text = (
             f"{count} {noun} · {flying} in flight · frame {scene.fixed_frame}{trouble}"
         )

@@ -10,7 +10,7 @@ others go to tf2, whose buffer is filled with the latest poses at the first of t
 import math
 import struct
 from collections import Counter, OrderedDict, deque
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 
 import genpy
 import tf2_py
@@ -141,7 +141,7 @@ class FrameTree:
             if name not in self._names and target != source:
                 text = f"frame {name} is not known; looked up {target} -> {source}"
                 raise tf2_py.LookupException(text)
-        if not set(self._chain(target)) & set(self._chain(source)):
+        if not set(self.chain(target)) & set(self.chain(source)):
             text = f"frames {target} and {source} are not connected"
             raise tf2_py.ConnectivityException(text)
         if self._tf2 is None:
@@ -213,8 +213,8 @@ class FrameTree:
             self.followed.add(frame)
             frame = self._parent(frame)
 
-    def _chain(self, name):
-        """Yield a frame and all above it."""
+    def chain(self, name: str | None) -> Iterator[str]:
+        """Yield a frame and all above it, each once."""
         seen = set()
         while name is not None and name not in seen:
             yield name
@@ -227,7 +227,7 @@ class FrameTree:
         So it is where two bodies are swapped, or a static transform has its frames the wrong way
         round.
         """
-        chain = list(self._chain(name))
+        chain = list(self.chain(name))
         for child in chain:
             moving, static = self._frames.get(child), self._static.get(child)
             if moving and static and moving.latest.parent != static.parent:

@@ -78,7 +78,9 @@ export class Goal extends THREE.Group {
   constructor() {
     super();
     const look = { color: "#ffc857" };
-    this.handle = new THREE.Mesh(new THREE.SphereGeometry(0.07, 20, 12), new THREE.MeshLambertMaterial(look));
+    // What is there when the goal is reached is seen through it.
+    this.handle = new THREE.Mesh(new THREE.SphereGeometry(0.07, 20, 12), new THREE.MeshLambertMaterial(
+      { ...look, transparent: true, opacity: 0.4, depthWrite: false }));
     this.stem = new THREE.Mesh(new THREE.CylinderGeometry(0.006, 0.006, 1, 8).rotateX(Math.PI / 2),
       new THREE.MeshBasicMaterial(look));
     this.foot = new THREE.Mesh(new THREE.RingGeometry(0.07, 0.085, 32), new THREE.MeshBasicMaterial(look));

@@ -1,0 +1,208 @@
+"""Recordings as MCAP, for Foxglove and Lichtblick: frames, markers, log, and numbers to plot.
+
+What is written is a ROS 2 bag, by PyPI's rosbags, with the types of this workspace.
+"""
+
+import heapq
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+from crazyflie_model.angles import quaternion_from_rpy
+from crazyflie_reports.bag_events import Kind
+from crazyflie_reports.bag_flights import Vehicle, vehicles
+from crazyflie_reports.bag_log import BagLog
+from crazyflie_reports.bag_ros2 import known, message, ros2_name, types
+
+FIXED = "world"  #: The frame of positions.
+
+ARM, ROTOR = 0.046, 0.023  #: Of a Crazyflie, m: half of its diagonal, radius of a propeller.
+PATH_POINTS = 2000  #: Of a path's marker.
+
+_STATE, _CONTROL = "crazyflie_msgs/PositionVelocityYawStateStamped", "crazyflie_msgs/ControlStamped"
+_LINE_STRIP, _LINE_LIST, _SPHERE, _CYLINDER, _TEXT = 4, 5, 2, 3, 9  # Types of a Marker.
+_WARN, _ERROR = 30, 40  # Levels of a Log.
+_ERRORS = (Kind.ERROR, Kind.EMERGENCY)
+
+Timed = tuple[float, str, str, Any]  # Time (s), topic, type, message.
+
+
+def write(log: BagLog, folder: Path) -> Path:
+    """Write a recording into a new folder, and return its file; the folder must not exist."""
+    writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    connections: dict[str, Any] = {}
+    with writer:
+        # One vehicle's numbers are in memory at a time; MCAP's index has the order.
+        for messages in (*(_of_vehicle(each, log) for each in vehicles(log)), _events(log)):
+            for time, topic, datatype, message in messages:
+                if topic not in connections:
+                    known(datatype)
+                    connections[topic] = writer.add_connection(
+                        topic, ros2_name(datatype), typestore=types()
+                    )
+                data = types().serialize_cdr(message, ros2_name(datatype))
+                writer.write(connections[topic], round(time * 1e9), data)
+    return folder / f"{folder.name}.mcap"
+
+
+def _header(time, frame=FIXED):
+    return message("std_msgs/Header", stamp=_stamp(time), frame_id=frame)
+
+
+def _stamp(time):
+    seconds, nanoseconds = divmod(round(time * 1e9), 10**9)
+    return message("builtin_interfaces/Time", sec=seconds, nanosec=nanoseconds)
+
+
+def _of_vehicle(vehicle: Vehicle, log: BagLog) -> Iterator[Timed]:
+    """Yield the messages of a vehicle in the order of their times."""
+    top, name = f"/{vehicle.name}", vehicle.name
+    yaw = np.nan_to_num(vehicle.state[:, 7:8])
+    flat = np.zeros((len(yaw), 2))
+    poses = vehicle.attitude
+    if not len(poses):
+        poses = np.hstack([vehicle.state[:, :4], flat, yaw])
+    states = log.events.flight_states.get(vehicle.namespace, [])
+    yield from _model(name, top, poses)
+    yield from heapq.merge(
+        ((row[0], "/tf", "tf2_msgs/TFMessage", _transform(name, row)) for row in poses),
+        (
+            (row[0], f"{top}/state", _STATE, _numbers(_STATE, row, stamp))
+            for row, (_, stamp) in zip(vehicle.state, vehicle.stamps, strict=True)
+        ),
+        (
+            (row[0], f"{top}/ref", _STATE, _numbers(_STATE, row, row[0]))
+            for row in vehicle.reference
+        ),
+        _references(name, top, vehicle.reference),
+        (
+            (row[0], f"{top}/control/final", _CONTROL, _numbers(_CONTROL, row, row[0]))
+            for row in vehicle.control
+        ),
+        (
+            (row[0], f"{top}/battery", "std_msgs/Float32", message("std_msgs/Float32", data=row[1]))
+            for row in vehicle.battery
+        ),
+        (
+            (
+                *(time, f"{top}/in_flight_flight_status", "crazyflie_msgs/FlightStatus"),
+                message("crazyflie_msgs/FlightStatus", header=_header(time), state=state),
+            )
+            for time, state in sorted(states)
+        ),
+        key=lambda each: each[0],
+    )
+
+
+def _numbers(datatype, row, stamp):
+    """Return a message of a header with a stamp (s), and of a message of numbers."""
+    known(datatype)
+    _, (field, kind) = types().fielddefs[ros2_name(datatype)][1]
+    inner = types().types[kind[1]](*(float(each) for each in row[1:]))
+    return message(datatype, **{"header": _header(stamp), field: inner})
+
+
+def _transform(name, row):
+    x, y, z, w = quaternion_from_rpy(*row[4:7])
+    transform = message(
+        "geometry_msgs/Transform",
+        translation=_vector("Vector3", row[1:4]),
+        rotation=message("geometry_msgs/Quaternion", x=x, y=y, z=z, w=w),
+    )
+    stamped = message(
+        "geometry_msgs/TransformStamped",
+        header=_header(row[0]),
+        child_frame_id=name,
+        transform=transform,
+    )
+    return message("tf2_msgs/TFMessage", transforms=[stamped])
+
+
+def _vector(kind, numbers):
+    x, y, z = (float(each) for each in numbers)
+    return message(f"geometry_msgs/{kind}", x=x, y=y, z=z)
+
+
+def _marker(time, name, kind, size, color, frame=FIXED, place=(0.0, 0.0, 0.0), **fields):
+    red, green, blue = color
+    return message(
+        "visualization_msgs/Marker",
+        header=_header(time, frame),
+        ns=name,
+        type=kind,
+        pose=message(
+            "geometry_msgs/Pose",
+            position=_vector("Point", place),
+            orientation=message("geometry_msgs/Quaternion", w=1.0),
+        ),
+        scale=_vector("Vector3", size),
+        color=message("std_msgs/ColorRGBA", r=red, g=green, b=blue, a=1.0),
+        **fields,
+    )
+
+
+def _markers(time, topic, markers):
+    for number, marker in enumerate(markers):
+        marker.id = number
+    array = message("visualization_msgs/MarkerArray", markers=list(markers))
+    return time, topic, "visualization_msgs/MarkerArray", array
+
+
+def _model(name: str, top: str, poses: np.ndarray) -> Iterator[Timed]:
+    """Yield the markers that stay: the vehicle, which moves with its frame, and its path."""
+    if not len(poses):
+        return
+    time, edge = float(poses[0, 0]), ARM / math.sqrt(2.0)
+    ends = [(a * edge, b * edge, 0.0) for a in (1, -1) for b in (1, -1)]
+    dark, light, blue = (0.1, 0.13, 0.19), (0.6, 0.64, 0.7), (0.0, 0.45, 0.7)
+    arms = [_vector("Point", point) for end in ends for point in ((0.0, 0.0, 0.0), end)]
+    own = {"frame": name, "frame_locked": True}
+    yield _markers(
+        time,
+        f"{top}/model",
+        [
+            _marker(time, name, _LINE_LIST, (0.006, 0.0, 0.0), dark, points=arms, **own),
+            *(
+                # Those in front are dark.
+                _marker(
+                    *(time, name, _CYLINDER, (2 * ROTOR, 2 * ROTOR, 0.004)),
+                    *(dark if place[0] > 0.0 else light,),
+                    place=place,
+                    **own,
+                )
+                for place in ends
+            ),
+            _marker(
+                *(time, name, _TEXT, (0.0, 0.0, 0.05), dark), place=(0, 0, 0.08), text=name, **own
+            ),
+        ],
+    )
+    path = [_vector("Point", row[1:4]) for row in poses[:: 1 + len(poses) // PATH_POINTS]]
+    line = _marker(time, name, _LINE_STRIP, (0.005, 0.0, 0.0), blue, points=path)
+    yield _markers(time, f"{top}/path", [line])
+
+
+def _references(name, top, rows):
+    for row in rows:
+        if np.isfinite(row[1:4]).all():
+            size, purple = (0.04, 0.04, 0.04), (0.48, 0.25, 0.63)
+            sphere = _marker(row[0], name, _SPHERE, size, purple, place=row[1:4])
+            yield _markers(row[0], f"{top}/reference", [sphere])
+
+
+def _events(log: BagLog) -> Iterator[Timed]:
+    """Yield the recording's events as lines of a log."""
+    for event in log.events.events:
+        line = message(
+            "rcl_interfaces/Log",
+            stamp=_stamp(event.time),
+            level=_ERROR if event.kind in _ERRORS else _WARN,
+            name=event.namespace or "flight",
+            msg=f"{event.kind.value}: {event.text}",
+        )
+        yield event.time, "/rosout", "rcl_interfaces/Log", line

@@ -1,0 +1,247 @@
+"""Messages of ROS 2 bags: files of sqlite3 and of MCAP, read by PyPI's rosbags.
+
+rosbags executes code that it makes of message definitions (`Typestore.register`, `get_msgdef`), and
+its AnyReader takes those in the bag. Here a store has the definitions that rosbags brings, those
+that are installed, and those below; the ones in a bag are only parsed, and compared with them.
+Formats: https://mcap.dev/spec, https://github.com/ros2/rosbag2.
+"""
+
+import struct
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, BinaryIO, ClassVar
+
+import lz4.frame
+import numpy as np
+import roslib.message
+from rosbags.interfaces import MessageDefinitionFormat, Nodetype
+from rosbags.rosbag2 import Reader, ReaderError
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from crazyflie_reports.bag_file import (
+    BagError,
+    Connection,
+    Expansion,
+    ExpansionError,
+    TopicError,
+)
+
+#: Of Python from 3.14 on.
+zstd = import_module("compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd")
+
+SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
+
+#: Types of crazyswarm2 and its motion capture, which no package here defines.
+FOREIGN = {
+    "crazyflie_interfaces/FullState": (
+        "std_msgs/Header header\ngeometry_msgs/Pose pose\ngeometry_msgs/Twist twist\n"
+        "geometry_msgs/Vector3 acc\n"
+    ),
+    "crazyflie_interfaces/Position": (
+        "std_msgs/Header header\nfloat32 x\nfloat32 y\nfloat32 z\nfloat32 yaw\n"
+    ),
+    "crazyflie_interfaces/Status": (
+        "std_msgs/Header header\nuint16 supervisor_info\nfloat32 battery_voltage\nuint8 pm_state\n"
+        "uint8 rssi\nuint32 num_rx_broadcast\nuint32 num_tx_broadcast\nuint32 num_rx_unicast\n"
+        "uint32 num_tx_unicast\nuint16 latency_unicast\n"
+    ),
+    "motion_capture_tracking_interfaces/NamedPose": "string name\ngeometry_msgs/Pose pose\n",
+    "motion_capture_tracking_interfaces/NamedPoseArray": (
+        "std_msgs/Header header\nmotion_capture_tracking_interfaces/NamedPose[] poses\n"
+    ),
+}
+
+_LARGEST_DEFINITION = 100_000  # Characters.
+_MCAP = b"\x89MCAP0\r\n"
+_CHUNK = 0x06  # The record of MCAP with compressed messages.
+_ZSTD = b"\x28\xb5\x2f\xfd"  # A message of CDR begins with 0.
+_RECORD = struct.Struct("<BQ")
+_PROGRESS = 1000  # Messages.
+
+_DECOMPRESSORS = {b"zstd": zstd.ZstdDecompressor, b"lz4": lz4.frame.LZ4FrameDecompressor}
+
+
+@cache
+def types() -> Typestore:
+    """Return the definitions that are known: of ROS 2 and of crazyswarm2; others are added."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for name, text in FOREIGN.items():
+        store.register(get_types_from_msg(text, ros2_name(name)))
+    return store
+
+
+def known(datatype: str) -> bool:
+    """Tell whether there is a definition of a type ("package/Name"); adds an installed one."""
+    name, store = ros2_name(datatype), types()
+    if name not in store.fielddefs and (installed := roslib.message.get_message_class(datatype)):
+        # ROS 1's Header is another one.
+        parsed = get_types_from_msg(installed._full_text, name)
+        store.register({k: v for k, v in parsed.items() if k not in store.fielddefs})
+    return name in store.fielddefs
+
+
+def ros2_name(datatype: str) -> str:
+    """Return the name of a type in ROS 2: "package/msg/Name" of "package/Name"."""
+    package, _, name = datatype.partition("/")
+    return f"{package}/msg/{name}"
+
+
+def message(datatype: str, **fields: Any) -> Any:
+    """Return a message of ROS 2 with some fields; the others are 0 or empty."""
+    if not known(datatype):
+        raise KeyError(datatype)
+    name = ros2_name(datatype)
+    values = {field: _zero(kind) for field, kind in types().fielddefs[name][1]}
+    return types().types[name](**(values | fields))
+
+
+def _zero(kind):
+    if kind[0] == Nodetype.NAME:
+        return message(kind[1].replace("/msg/", "/"))
+    if kind[0] == Nodetype.BASE:
+        return "" if kind[1][0] == "string" else False if kind[1][0] == "bool" else 0
+    element, length = kind[1]
+    is_number = element[0] == Nodetype.BASE and element[1][0] != "string"
+    return np.zeros(length, element[1][0]) if is_number else []
+
+
+@dataclass(frozen=True)
+class Ros2Connection(Connection):
+    """A topic of a ROS 2 bag."""
+
+    definition: str = ""  #: As the bag has it; "" if it has none.
+
+    encoding: ClassVar[str] = "cdr"
+
+    def deserializer(self) -> Callable[[bytes], Any]:
+        """Return what makes a message of its data.
+
+        `TopicError`: its type is not known here, or has other fields.
+        """
+        if not known(self.datatype):
+            raise TopicError(f"{self.topic} is left out: no package here defines {self.datatype}")
+        store, name = types(), ros2_name(self.datatype)
+        if self.definition:
+            try:
+                other = get_types_from_msg(self.definition[:_LARGEST_DEFINITION], name)
+            except (TypesysError, RecursionError):
+                other = {name: ([], [])}
+            for each in other.keys() & store.fielddefs.keys():
+                if other[each][1] != store.fielddefs[each][1]:
+                    there, here = _fields(other[each]), _fields(store.fielddefs[each])
+                    raise TopicError(
+                        f"{self.topic} is left out: {each} has the fields {there}; expected {here}"
+                    )
+        return lambda data: store.deserialize_cdr(data, name)
+
+
+def _fields(definition):
+    return ", ".join(f"{kind[1]} {name}" for name, kind in definition[1]) or "none"
+
+
+class Ros2BagFile:
+    """A file of a ROS 2 bag, as `bag_file.BagFile` is one of ROS 1.
+
+    What is compressed as a whole is put into ``folder``. `BagError`: there is no such file, or it
+    cannot be read.
+    """
+
+    def __init__(self, path: Path, folder: Path):
+        self._path = path
+        self.connections: list[Connection] = []
+        self.interruption = ""  #: Why reading has ended early; empty if it has not.
+        self.size = path.stat().st_size
+        self._expansion = Expansion(self.size)
+        self._source = path
+        try:
+            if path.suffix == ".zstd":
+                self._source = self._expanded(folder)
+            if self._source.suffix == ".mcap":
+                self._check_chunks()
+            self._reader = Reader(self._source)
+            self._reader.open()
+        except (
+            ReaderError,
+            ExpansionError,
+            OSError,
+            RuntimeError,
+            ValueError,
+            zstd.ZstdError,
+        ) as error:
+            is_open = self._source.suffix == ".mcap" and not isinstance(error, ExpansionError)
+            hint = "; mcap recover mends a file that was not closed" if is_open else ""
+            raise BagError(f"{path} cannot be read: {error}{hint}") from None
+        self._originals = {}
+        for each in self._reader.connections:
+            is_text = each.msgdef.format == MessageDefinitionFormat.MSG
+            definition = each.msgdef.data if is_text else ""
+            datatype = each.msgtype.replace("/msg/", "/")
+            connection = Ros2Connection(each.topic, datatype, each.digest, definition)
+            self.connections.append(connection)
+            self._originals[each.id] = connection
+
+    def messages(
+        self,
+        is_wanted: Callable[[Connection], bool],
+        progress: Callable[[int], Any] = lambda size: None,
+    ) -> Iterator[tuple[Connection, float, bytes]]:
+        """Yield connection, time of recording (s) and serialized message, in the order of times.
+
+        ``progress`` is called with about the number of bytes since its last call.
+        """
+        wanted = [c for c in self._reader.connections if is_wanted(self._originals[c.id])]
+        share = _PROGRESS * self.size // max(1, self._reader.message_count)
+        try:
+            for number, (each, time, data) in enumerate(
+                self._reader.messages(wanted) if wanted else ()
+            ):
+                if data[:4] == _ZSTD:
+                    data = b"".join(self._expansion.pieces(zstd.ZstdDecompressor(), data))
+                yield self._originals[each.id], time * 1e-9, data
+                if number % _PROGRESS == 0:
+                    progress(share)
+        except ExpansionError as error:
+            self.interruption = f"{self._path} is read in part: {error}"
+        except Exception as error:  # Whatever rosbags raises on a damaged file.
+            self.interruption = f"{self._path} is damaged, and is read in part: {error}"
+        finally:
+            self._reader.close()
+
+    def _expanded(self, folder):
+        """Return the decompressed file, in a folder of its own."""
+        target = Path(tempfile.mkdtemp(dir=folder)) / self._path.stem
+        decompressor = zstd.ZstdDecompressor()
+        with self._path.open("rb") as source, target.open("wb") as file:
+            while (data := source.read(1 << 20)) and not decompressor.eof:
+                file.writelines(self._expansion.pieces(decompressor, data))
+        return target
+
+    def _check_chunks(self):
+        """Raise `ExpansionError` before rosbags decompresses a chunk, which it does as a whole."""
+        with self._source.open("rb") as file:
+            if file.read(len(_MCAP)) != _MCAP:
+                return  # rosbags says so.
+            while len(head := file.read(_RECORD.size)) == _RECORD.size:
+                kind, size = _RECORD.unpack(head)
+                end = file.tell() + size
+                if kind == _CHUNK:
+                    compression, content = _chunk(file, size)
+                    while content and compression in _DECOMPRESSORS:
+                        decompressor = _DECOMPRESSORS[compression]()
+                        for _ in self._expansion.pieces(decompressor, content):
+                            pass
+                        content = decompressor.unused_data  # Of the next frame.
+                file.seek(end)
+
+
+def _chunk(file: BinaryIO, size: int) -> tuple[bytes, bytes]:
+    """Return compression and content of a chunk at which a file is."""
+    data = file.read(size)
+    (length,) = struct.unpack_from("<I", data, 28)
+    return data[32 : 32 + length], data[40 + length :]

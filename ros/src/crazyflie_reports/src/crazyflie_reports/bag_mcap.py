@@ -33,7 +33,7 @@ Timed = tuple[float, str, str, Any]  # Time (s), topic, type, message.
 
 def write(log: BagLog, folder: Path) -> Path:
     """Write a recording into a new folder, and return its file; the folder must not exist."""
-    writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
+    writer = Writer(folder, version=8, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
     connections: dict[str, Any] = {}
     with writer:

@@ -97,8 +97,9 @@ def message(datatype: str, **fields: Any) -> Any:
     if not known(datatype):
         raise KeyError(datatype)
     name = ros2_name(datatype)
-    values = {field: _zero(kind) for field, kind in types().fielddefs[name][1]}
-    return types().types[name](**(values | fields))
+    kinds = types().fielddefs[name][1]
+    values = {field: _zero(kind) for field, kind in kinds if field not in fields}
+    return types().types[name](**values, **fields)
 
 
 def _zero(kind):

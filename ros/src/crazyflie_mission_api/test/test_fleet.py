@@ -171,6 +171,23 @@ def test_a_landing_is_seen_by_the_supervisor_alone(fleet, driven):
     assert driven.called()[-1] == "land"
 
 
+def test_beside_the_table_a_vehicle_has_landed_when_it_flies_no_more(process, fleet, driven):
+    """It is below the place where it took off before it is on the floor."""
+    tell, last_calls = driven.tell, []
+
+    def touch_down():
+        last_calls.append(driven.called()[-1])
+        tell("ready: armed")
+
+    with fleet:
+        fleet["cf2"].takeoff(1.0)
+        driven.tell = lambda status: None
+        process.handle("/floor").timer(10.0, touch_down)
+    assert last_calls[:1] == ["land"]
+    assert driven.called()[-1] == "stop"
+    assert fleet.flying == []
+
+
 def test_the_fixed_frame_is_the_drivers(process):
     process.transport.parameters["/this_process/frames/fixed"] = "hall"
     DriverVehicle(process, "cf2", (1.0, 0.0, 0.0), "hall")

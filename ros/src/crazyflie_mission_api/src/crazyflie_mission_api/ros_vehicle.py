@@ -150,19 +150,14 @@ class RosVehicleState:
         """Return whether the vehicle is on the ground, with its motors off."""
         if not self.uses_driver:
             return self.flight_status.state == FlightStatus.ON_GROUND
-        place = self.position()
-        if place is None:
-            status = self.driver_status
+        status, place = self.driver_status, self.position()
+        if status.link == VehicleStatus.CONNECTED and status.has_supervisor:
+            # The floor may be lower than where the vehicle took off; the driver ends the landing.
             state = SupervisorState(status.supervisor)
-            is_down = (
-                status.link == VehicleStatus.CONNECTED
-                and status.has_supervisor
-                and not status.is_emergency
-                and not state.faults
-                and SupervisorState.FLYING not in state
-            )
+            is_flying = SupervisorState.FLYING in state or state.faults or status.is_emergency
+            is_down = not is_flying
         else:
-            is_down = place[2] < self._ground + _LANDED_HEIGHT
+            is_down = place is not None and place[2] < self._ground + _LANDED_HEIGHT
         # Then the mission stops the motors: not in the last centimetres.
         return is_down and self._handle.time() >= self._landing_end
 

@@ -40,8 +40,8 @@ class Tracker:
     A frame counts once: one that is not newer than the last one is dropped. So is one that is older
     than ``stale_after`` (s) on arrival, or from the future, or from another server's clock. Of a
     frame, bodies are dropped that were not tracked or whose pose is invalid. ``up_axis`` is the
-    stream's, see `frames.UP_AXES`; ``health`` counts events; ``hold_time`` (s) and ``log`` are those
-    of a `MarkerTracker`.
+    stream's, see `frames.UP_AXES`; ``health`` counts events; ``hold_time`` (s) and ``log`` are
+    those of a `MarkerTracker`.
     """
 
     def __init__(

@@ -231,7 +231,7 @@ class Next(enum.Enum):
 
 
 class Touchdown:
-    """When a vehicle stands that lands at a height (m), in a duration (s) from ``now`` (s) on.
+    """The end of a landing at a height (m), in a duration (s) from ``now`` (s) on.
 
     The height of the ground is not known: a vehicle may have started from a table, or the origin of
     its estimate may be one. Therefore a height is no touchdown: a vehicle is down when it has
@@ -239,6 +239,7 @@ class Touchdown:
     """
 
     def __init__(self, now: float, height: float, duration: float):
+        self.begin = now
         self._end = now + duration
         self._ground = height
         # Time, height and target when the vehicle was last seen to move.

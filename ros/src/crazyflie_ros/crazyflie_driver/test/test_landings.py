@@ -237,6 +237,10 @@ def test_a_landing_by_the_service_that_a_go_to_ends_is_over(beside):
 def test_a_landing_by_the_service_that_setpoints_end_is_over(beside):
     land(beside)
     beside.run(1.0)
+    setpoints = beside.server.node._vehicles[beside.uri].setpoints
+    count = setpoints.ignored
     beside.run(4.0, 0.1)
+    # Right after a command of the driver's some would be.
+    assert setpoints.ignored == count
     assert beside.height == pytest.approx(Beside.TABLE + 0.1, abs=0.1)
     assert beside.motors_run

@@ -121,7 +121,7 @@ def _excess(window):
 LIFT_LIMIT = 2.0  #: Time in which a vehicle has to lift off, s.
 MIN_CLIMB = 0.15  #: Setpoints that are lower above the ground do not ask for a flight, m.
 MAX_RISE = 0.05  #: A vehicle on the ground estimates no more above it, m.
-MAX_TURN = 10.0  #: From the heading on the ground to the one that is commanded, degrees.
+MAX_TURN = 10.0  #: Largest turn from the heading on the ground to the commanded one, degrees.
 MAX_GAP = 0.5  #: Setpoints older than this are levelled out by the firmware, s.
 STREAM_PAUSE = 1.0  #: After a pause of this length, s, setpoints are a new attempt.
 

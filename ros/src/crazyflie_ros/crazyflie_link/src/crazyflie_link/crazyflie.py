@@ -33,8 +33,8 @@ from crazyflie_link.trajectory import Trajectories
 CHECK_PERIOD = 0.05  #: Period at which the link is checked, s.
 
 #: Time for which a silent link is kept, s: if the vehicle is heard again, no set-up is needed.
-#: Silence of up to 1.4 s ends that way before 2 s, when the firmware locks; the set-up of a new link
-#: can take a second on a busy machine.
+#: Silence of up to 1.4 s ends that way before 2 s, when the firmware locks; the set-up of a new
+#: link can take a second on a busy machine.
 SILENCE_LIMIT = 1.0
 
 #: Pause after the first failed attempt to connect again, and the longest one, s; each is twice the

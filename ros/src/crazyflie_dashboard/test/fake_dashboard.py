@@ -25,7 +25,9 @@ from crazyflie_dashboard.snapshot import (
 )
 from crazyflie_utils.refusal import RefusalError
 
-ACTIONS = frozenset({Action.TAKEOFF, Action.LAND, Action.GO_TO, Action.EMERGENCY, Action.RESET})
+ACTIONS = frozenset(
+    {Action.TAKEOFF, Action.LAND, Action.GO_TO, Action.HOLD, Action.EMERGENCY, Action.RESET}
+)
 
 
 def done(result):
@@ -73,7 +75,7 @@ class FakeDashboard:
         self.flown = []
         self.fields = []
         self.typed = []
-        self.picture = None
+        self.picture = self.report_file = None
         self.refusals = {}
         self.gain = ParameterInfo(
             "cf1/controller", "K/gain", "float", 0.5, "1/s", "gain of the height", 0.0, 2.0
@@ -216,6 +218,13 @@ class FakeDashboard:
 
     def stop_mission(self, page, clicked):
         return done(None)
+
+    def record(self, page, is_on):
+        self._scene = replace(self._scene, recording="recording" if is_on else "")
+        return done(None if is_on else "report.html")
+
+    def report(self):
+        return self.report_file
 
     def watch_image(self, page, topic):
         return done(None)

@@ -72,7 +72,14 @@ def test_vehicles_are_found(dashboard, page):
     assert vehicle.kind == Kind.SIMULATED
     assert vehicle.position[2] == pytest.approx(0.0, abs=0.01)
     wait_until(lambda: dashboard.scene().vehicles["cf2"].state == "on the ground", "a state", LIMIT)
-    expected = {Action.TAKEOFF, Action.LAND, Action.GO_TO, Action.EMERGENCY, Action.RESET}
+    expected = {
+        Action.TAKEOFF,
+        Action.LAND,
+        Action.GO_TO,
+        Action.HOLD,
+        Action.EMERGENCY,
+        Action.RESET,
+    }
     assert vehicle.actions == expected
 
 

@@ -13,6 +13,7 @@ from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action
+from crazyflie_driver import srv
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose
@@ -222,13 +223,14 @@ def test_a_takeoff_to_no_height_of_a_room_is_refused(fleet, height):
     assert fleet.calls == []
 
 
-def test_a_vehicle_in_flight_is_not_disarmed(fleet):
-    services = {**fleet.graph.services, "/cf1/arm": "/fleet"}
+@pytest.mark.parametrize("action", [Action.DISARM, Action.REBOOT])
+def test_a_vehicle_in_flight_is_not_disarmed(fleet, action):
+    services = {**fleet.graph.services, "/cf1/arm": "/fleet", "/cf1/reboot": "/fleet"}
     fleet.graph = Graph(fleet.graph.topics, fleet.graph.topics, services)
     fleet.process.advance(2.1)
     fleet.report("cf1", FlightStatus.FLYING)
-    assert fleet.command(Action.DISARM, ["cf1"]) == {
-        "cf1": "disarm: the vehicle is flying; expected it to be on the ground"
+    assert fleet.command(action, ["cf1"]) == {
+        "cf1": f"{action.value}: the vehicle is flying; expected it to be on the ground"
     }
 
 
@@ -265,3 +267,34 @@ def test_what_a_page_asks_for_does_not_wait_for_callbacks_of_the_node(fleet):
     with pytest.raises(ControlError, match="no page has control"):
         answer.result(LIMIT)
     dashboard.close()
+
+
+def test_hold_keeps_vehicles_where_they_are(fleet):
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(4.0, 0.0, 1.0), cf3=(2.0, 2.0, 1.0))
+    fleet.command(Action.GO_TO, ["cf1"], goal=(2.0, 0.0, 1.0))
+    assert fleet.command(Action.HOLD, ["cf1", "cf2"]) == {"cf1": "", "cf2": ""}
+    for service, request in fleet.calls[1:]:
+        assert service.endswith("/high_level/go_to")
+        assert request.relative
+        assert (request.goal.x, request.goal.y, request.goal.z, request.yaw) == (0.0,) * 4
+    # The move that was held does not count any more.
+    assert fleet.command(Action.GO_TO, ["cf2"], goal=(2.0, 0.0, 1.0)) == {"cf2": ""}
+
+
+def test_lights_show_which_one_it_is_for_a_while(fleet):
+    lights = []
+
+    def update(request):
+        lights.append((request.params, fleet.process.transport.parameters["/cf2/led/bitmask"]))
+        return srv.UpdateParamsResponse()
+
+    fleet.process.handle("/driver").advertise_service(
+        "/cf2/update_params", srv.UpdateParams, update
+    )
+    services = {**fleet.graph.services, "/cf2/update_params": "/driver"}
+    fleet.graph = Graph(fleet.graph.topics, fleet.graph.topics, services)
+    fleet.process.advance(2.1)
+    assert fleet.command(Action.IDENTIFY, ["cf2"]) == {"cf2": ""}
+    assert lights == [(["led/bitmask"], 255)]
+    fleet.process.advance(5.1)
+    assert lights[1:] == [(["led/bitmask"], 0)]

@@ -52,7 +52,7 @@ def test_a_driver_alone_is_a_vehicle():
         topics={"/cf7/battery": "std_msgs/Float32", "/cf7/pose": "geometry_msgs/PoseStamped"},
         services=services(
             *(f"/cf7/{n}" for n in ("takeoff", "land", "go_to", "upload_trajectory", "emergency")),
-            *(f"/cf7/{n}" for n in ("reboot", "arm", "recover")),
+            *(f"/cf7/{n}" for n in ("reboot", "arm", "recover", "update_params")),
         ),
     )
     (vehicle,) = vehicles(graph)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from fake_dashboard import vehicle
 from pages import wait_for
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
 from crazyflie_dashboard.snapshot import Action, LogLine, Sentence
@@ -114,7 +115,7 @@ def test_cards_offer_what_can_be_done_now_and_say_what_comes_next(browser, serve
     assert acts(browser, "cf1") == ["take off", "land", "emergency"]
     server.dashboard.change("cf1", is_in_flight=True, state="hovering")
     browser.has("hovering", browser.card("cf1"))
-    assert acts(browser, "cf1") == ["land", "emergency"]
+    assert acts(browser, "cf1") == ["land", "hold", "emergency"]
     browser.choose("cf1")
     wait_for(lambda: not browser.button("Take off").is_enabled(), "no takeoff in flight")
     server.dashboard.change("cf1", is_in_flight=False, is_emergency=True, state="emergency")
@@ -388,3 +389,90 @@ def test_a_browser_that_was_busy_is_sent_the_newest_scene_and_not_all_that_it_ha
     finally:
         is_over.set()
         source.join()
+
+
+def test_what_cannot_be_undone_is_pressed_for_a_second(browser, server, driver):
+    server.dashboard.change("cf1", actions=frozenset({Action.REBOOT, Action.EMERGENCY}))
+    browser.take_control()
+    button = wait_for(lambda: browser.find(f"{browser.card('cf1')} button.reboot"), "its button")
+    button.click()
+    ActionChains(driver).click_and_hold(button).perform()
+    wait_for(lambda: server.dashboard.commands, "the command")
+    ActionChains(driver).release().perform()
+    assert server.actions() == [(Action.REBOOT, ("cf1",))]
+
+
+def test_an_alarm_is_heard_once_and_can_be_turned_off(browser, server, driver):
+    browser.has("3 vehicles")
+    server.dashboard.change("cf1", is_in_flight=True, is_battery_low=True)
+    wait_for(lambda: driver.execute_script("return alarms.join()") == "cf1: battery low", "alarm")
+    server.dashboard.change("cf2", is_emergency=True)
+    wait_for(lambda: len(driver.execute_script("return alarms")) == 2, "another one")
+    assert driver.execute_script("return alarms[1]") == "cf2: emergency"
+
+
+def test_more_than_twenty_vehicles_are_a_table_that_sorts(browser, server):
+    fleet = (vehicle(f"cf{k}", 0.1 * k, battery=3.0 + 0.04 * (k * 7 % 25)) for k in range(1, 26))
+    server.dashboard.set_vehicles(*fleet)
+    browser.has("25 vehicles")
+
+    def names():
+        return [
+            row.text.split()[0] for row in browser.driver.find_elements("css selector", "tbody tr")
+        ]
+
+    wait_for(lambda: names() == [f"cf{k}" for k in range(1, 26)], "cf10 after cf9")
+    browser.press("battery")
+    lowest = sorted(range(1, 26), key=lambda k: k * 7 % 25)
+    wait_for(lambda: names() == [f"cf{k}" for k in lowest], "the lowest battery first")
+    browser.press("battery ▲")
+    wait_for(lambda: names() == [f"cf{k}" for k in reversed(lowest)], "the highest first")
+    browser.find('tr[data-vehicle="cf7"] input').click()
+    browser.has("1 of 25 chosen")
+    browser.press("Show cards")
+    assert browser.find(f"{browser.card('cf7')}.chosen")
+
+
+def test_the_emergency_is_in_a_window_of_any_size(browser, driver):
+    size = driver.get_window_size()
+    try:
+        for width, height in ((500, 800), (700, 500), (900, 700)):
+            driver.set_window_size(width, height)
+            rect = browser.find(".emergency-all").rect
+            inner = driver.execute_script("return [innerWidth, innerHeight]")
+            assert rect["x"] >= 0.0 and rect["x"] + rect["width"] <= inner[0]
+            assert rect["y"] >= 0.0 and rect["y"] + rect["height"] <= inner[1]
+            # Nothing is above it.
+            x, y = rect["x"] + rect["width"] / 2, rect["y"] + rect["height"] / 2
+            top = f"document.elementFromPoint({x}, {y}).closest('.emergency-all')"
+            assert driver.execute_script(f"return {top} !== null")
+            assert browser.find(".scene").rect["height"] > 100
+    finally:
+        driver.set_window_size(size["width"], size["height"])
+
+
+NAMELESS = """
+const named = (e) => e.getAttribute("aria-label") || e.labels?.length || e.textContent.trim();
+return [...document.querySelectorAll("button, input, select, [role=tab], [role=switch]")]
+  .filter((e) => e.checkVisibility() && !named(e)).map((e) => e.outerHTML.slice(0, 200));
+"""
+
+
+def test_each_control_has_a_label(browser, driver):
+    browser.has("3 vehicles")
+    for tab in ("Vehicles", "Plots", "Parameters", "Missions", "Messages", "Cameras"):
+        browser.tab(tab)
+        assert driver.execute_script(NAMELESS) == []
+
+
+def test_a_recording_is_ended_with_a_link_to_its_report(browser, server, tmp_path):
+    server.dashboard.report_file = tmp_path / "report.html"
+    server.dashboard.report_file.write_text("<title>the flight</title>")
+    browser.press("Record")
+    browser.press("Stop recording")
+    link = wait_for(lambda: browser.find("a.report"), "the link")
+    with urllib.request.urlopen(link.get_attribute("href")) as answer:
+        assert answer.read() == b"<title>the flight</title>"
+    browser.press("Close")
+    browser.press("Record")
+    browser.press("Stop recording")

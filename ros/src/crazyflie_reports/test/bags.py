@@ -186,10 +186,12 @@ def ros2_pose(z):
     return pose
 
 
-def write_crazyswarm2(write, name="cf1", poses="pose"):
+def write_crazyswarm2(write, name="cf1", poses="pose", end=END):
     """Write what crazyswarm2 has of the flight; poses on "pose" or on motion capture's "poses"."""
     message = bag_ros2.message
     for _, time in steps():
+        if time > end:
+            break
         z, _ = height(time)
         if poses == "pose":
             pose = message("geometry_msgs/PoseStamped", header=ros2_header(time), pose=ros2_pose(z))

@@ -5,6 +5,7 @@ import sqlite3
 import struct
 import subprocess
 import sys
+from random import Random
 
 import bags
 import pytest
@@ -97,6 +98,47 @@ def test_what_expands_to_more_than_memory_holds(tmp_path, monkeypatch, storage, 
     monkeypatch.setattr(bag_file, "LARGEST_CHUNK", 30)
     with pytest.raises(BagError, match="expands to more than"):
         read(tmp_path / "a", tmp_path)
+
+
+def test_a_chunk_that_only_the_index_has_is_not_decompressed(tmp_path):
+    with bags.ros2_bag(tmp_path / "a", MCAP, (CompressionMode.STORAGE, ZSTD)) as write:
+        bags.write_crazyswarm2(write)
+    file = tmp_path / "a" / "a.mcap"
+    data = bytearray(file.read_bytes())
+    # Behind magic and header is the first chunk; its record says where it is, and how long.
+    (header,) = struct.unpack_from("<Q", data, 9)
+    begin = 17 + header
+    (size,) = struct.unpack_from("<Q", data, begin + 1)
+    place = data.rindex(struct.pack("<QQ", begin, 9 + size))
+    struct.pack_into("<Q", data, place, begin + 100)
+    file.write_bytes(data)
+    with pytest.raises(BagError, match="its index has a chunk that the file has not"):
+        read(file, tmp_path)
+
+
+@pytest.mark.parametrize(("storage", "compression"), STORAGES)
+def test_whatever_is_damaged_is_read_in_part_or_refused(tmp_path, storage, compression):
+    with bags.ros2_bag(tmp_path / "a", storage, compression) as write:
+        bags.write_crazyswarm2(write, end=3.0)
+    (file,) = set((tmp_path / "a").iterdir()) - {tmp_path / "a" / "metadata.yaml"}
+    whole, random = file.read_bytes(), Random(1)
+    refusals = 0
+    for number in range(40):
+        (tmp_path / str(number)).mkdir()
+        data = bytearray(whole)
+        for _ in range(random.choice((1, 3, 20))):
+            # More often where headers and index are.
+            place = random.choice((random.randrange(len(data)), random.randrange(400), -1))
+            place -= random.randrange(400) if place < 0 else 0
+            data[place] = random.choice((0, 255, random.randrange(256)))
+        file.write_bytes(data)
+        try:
+            for log in read(file, tmp_path / str(number)):
+                list(flights_of(log))
+        except BagError as error:
+            assert str(file) in str(error)
+            refusals += 1
+    assert 0 < refusals < 40
 
 
 @pytest.mark.parametrize("storage", [MCAP, SQLITE3])

@@ -1,11 +1,31 @@
-"""The body of the vehicle."""
+"""The body: motion, battery, ranging sensors, quaternions."""
+
+import math
 
 import numpy as np
 import pytest
+from cflib.utils.encoding import compress_quaternion as reference
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from virtual_bench import Bench
 
 from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_model.units import GRAVITY, HOVER_PWM
-from crazyflie_virtual.body import FULL_VOLTAGE, STEP, Physics, Sensors
+from crazyflie_utils import ParameterError
+from crazyflie_virtual.body import (
+    FULL_VOLTAGE,
+    LOW_CHARGE,
+    NOTHING,
+    STEP,
+    Battery,
+    Physics,
+    RangingSensors,
+    Sensors,
+    open_circuit_voltage,
+)
+from crazyflie_virtual.firmware.supervisor import LOW, ON_BATTERY, PowerMonitor
+from crazyflie_virtual.log import log_variables
+from crazyflie_virtual.quaternions import compress_quaternion, decompress_quaternion
 
 
 def fly(physics, commands, duration, voltage=FULL_VOLTAGE):
@@ -143,3 +163,155 @@ def test_barometer_and_magnetometer():
     sensors.sample_slow(0.0, (0.0, 0.0, half, half))
     # The nose to the left of north: north is to the right.
     assert (sensors.mag_x, sensors.mag_y) == pytest.approx((0.0, -north), abs=1e-12)
+
+
+def drained(battery, duration, load, dt=0.1):
+    for _ in range(round(duration / dt)):
+        battery.step(dt, load)
+    return battery
+
+
+def test_hover_lasts_as_long_as_the_data_sheet_says():
+    assert 0.0 < drained(Battery(), 6.0 * 60.0, load=1.0).charge < 0.15
+
+
+def test_idling_takes_hours():
+    assert drained(Battery(), 600.0, load=0.0).charge > 0.9
+
+
+def test_charge_that_is_taken_is_current_times_time():
+    battery = drained(Battery(), 60.0, load=1.0)
+    assert 1.0 - battery.charge == pytest.approx(battery.current * 60.0 / 900.0)
+
+
+def test_voltage_sags_under_load_and_comes_back():
+    battery = Battery(0.5)
+    idle = drained(battery, 0.1, load=0.0).voltage
+    flying = drained(battery, 0.1, load=1.0).voltage
+    assert 0.2 < idle - flying < 0.4
+    assert drained(battery, 0.1, load=0.0).voltage == pytest.approx(idle, abs=0.01)
+
+
+def test_open_circuit_voltage_is_monotonic():
+    voltages = [open_circuit_voltage(i / 100.0) for i in range(101)]
+    assert voltages == sorted(voltages)
+    assert (voltages[0], voltages[-1]) == (3.0, 4.2)
+
+
+def test_low_charge_is_low_in_flight_and_not_critical():
+    voltage = drained(Battery(LOW_CHARGE), 0.1, load=1.0).voltage
+    assert 3.0 < voltage < 3.2
+
+
+def test_battery_never_has_less_than_nothing():
+    battery = drained(Battery(0.0), 10.0, load=30.0)
+    assert battery.charge == 0.0
+    assert battery.voltage == 0.0
+
+
+def test_monitor_says_low_after_five_seconds():
+    monitor = PowerMonitor()
+    for k in range(100):
+        monitor.update(0.1 * k, 3.1 if k >= 20 else 4.0)
+        assert monitor.state == (LOW if k > 69 else ON_BATTERY)
+    monitor.update(10.0, 3.3)
+    assert monitor.state == ON_BATTERY
+
+
+@pytest.mark.parametrize(
+    ("voltage", "level"), [(2.9, 0), (3.5, 10), (3.8, 20), (3.93, 60), (4.2, 90)]
+)
+def test_level_is_guessed_from_the_voltage(voltage, level):
+    monitor = PowerMonitor()
+    monitor.update(0.0, voltage)
+    assert monitor.level == level
+
+
+SIDES = ("front", "back", "left", "right", "up")
+
+
+class At:
+    """A body at a height, m, with an attitude."""
+
+    world = None
+
+    def __init__(self, height, quaternion=(0.0, 0.0, 0.0, 1.0)):
+        self.position = (0.0, 0.0, height)
+        self.quaternion = quaternion
+
+
+def test_on_the_ground_and_in_flight():
+    bench = Bench(multiranger=True)
+    values = {v.name: v.read for v in log_variables() if v.group == "range"}
+    assert values["zrange"](bench.firmware) == 0
+    bench.take_off(1.0)
+    assert values["zrange"](bench.firmware) == pytest.approx(1000.0 * bench.height, abs=5)
+    assert {values[side](bench.firmware) for side in SIDES} == {NOTHING}
+
+
+def test_the_ground_is_beside_a_vehicle_that_is_tilted():
+    half = math.radians(60.0) / 2.0
+    # Nose down.
+    tilted = RangingSensors(At(1.0, (0.0, math.sin(half), 0.0, math.cos(half))), True, True)
+    assert tilted.distance("front") == round(1000.0 / math.sin(math.radians(60.0)))
+    assert tilted.distance("zrange") == 2000
+    assert {tilted.distance(side) for side in ("back", "up", "left", "right")} == {NOTHING}
+
+
+def test_reach():
+    assert RangingSensors(At(3.99), True, True).distance("zrange") == 3990
+    assert RangingSensors(At(4.01), True, True).distance("zrange") == NOTHING
+
+
+def test_without_decks():
+    without = RangingSensors(Physics(), False, False)
+    assert [without.distance(side) for side in (*SIDES, "zrange")] == [0] * 6
+
+
+WORLD = """\
+floor: {size: [4, 4]}
+objects:
+  - {type: box, name: box, centre: [1.5, 0, 1], size: [1, 1, 1]}
+"""
+
+
+def test_what_is_in_a_world(tmp_path):
+    file = tmp_path / "room.yaml"
+    file.write_text(WORLD)
+    bench = Bench(multiranger=True, world=str(file))
+    bench.take_off(1.0)
+    ranging = bench.firmware.ranging
+    x, _, height = bench.physics.position
+    assert ranging.distance("front") == pytest.approx(1000.0 * (1.0 - x), abs=20)
+    assert ranging.distance("zrange") == pytest.approx(1000.0 * height, abs=20)
+    assert {ranging.distance(side) for side in ("back", "left", "right", "up")} == {NOTHING}
+
+
+def test_a_bad_world_is_named(tmp_path):
+    file = tmp_path / "room.yaml"
+    file.write_text(WORLD.replace("type: box", "type: cone"))
+    with pytest.raises(ParameterError, match=r"room\.yaml:3: .*'cone'"):
+        Bench(multiranger=True, world=str(file))
+
+
+COMPONENTS = st.tuples(*[st.floats(-1.0, 1.0)] * 4)
+
+
+def unit(components):
+    vector = np.array(components)
+    assume(np.linalg.norm(vector) > 0.1)
+    return tuple((vector / np.linalg.norm(vector)).tolist())
+
+
+@given(COMPONENTS)
+def test_compression_is_the_clients(components):
+    quaternion = unit(components)
+    assert compress_quaternion(quaternion) == reference(quaternion)
+
+
+@given(COMPONENTS)
+def test_compressed_quaternions_come_back(components):
+    quaternion = unit(components)
+    returned = np.array(decompress_quaternion(compress_quaternion(quaternion)))
+    # The same rotation, perhaps with the other sign; 9 bits of magnitude.
+    assert abs(np.dot(returned, quaternion)) > 1.0 - 1e-5

@@ -1,12 +1,16 @@
-"""Settings from a command line, and what the programs need."""
+"""Settings, the programs' command lines, and the README's tables."""
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from test_cflib_examples import OTHERS, RUNNING
 
 from crazyflie_utils.parameters.declaration import parse_arguments
+from crazyflie_virtual.log import log_variables
 from crazyflie_virtual.mocap import MocapSettings
+from crazyflie_virtual.parameters import parameter_specs
 from crazyflie_virtual.settings import FaultSwitches, VehicleSettings
 
 
@@ -67,3 +71,26 @@ def test_programs_need_no_ros(module):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     assert "usage:" in done.stdout
+
+
+README = (Path(__file__).parent.parent / "README.md").read_text()
+
+
+def test_groups():
+    groups = {item.group for item in (*log_variables(), *parameter_specs())}
+    assert [group for group in groups if f"`{group}`" not in README] == []
+
+
+def test_figures():
+    assert f"{len(log_variables())} of them" in README
+    assert f"{len(parameter_specs())} of them" in README
+
+
+def test_switches_are_parameters_too():
+    names = [f"`virtual.{spec.name}`" for spec in parameter_specs() if spec.group == "virtual"]
+    assert [name for name in names if name not in README] == []
+
+
+def test_examples():
+    names = (*RUNNING, *OTHERS)
+    assert [name for name in names if f"`{name}`" not in README] == []

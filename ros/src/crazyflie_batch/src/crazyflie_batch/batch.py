@@ -18,7 +18,7 @@ class Batch:
     """Flights of n vehicles before they are flown."""
 
     plan: Plan
-    #: By the names of `Plan.parameter_dims`, arrays of shape (dim, n).
+    #: Name in `Plan.parameter_dims` -> array of shape (dim, n).
     parameters: Mapping[str, NDArray[np.float64]] = field(repr=False)
     #: Shape (x_dim, n). States of the model at the beginning.
     x: NDArray[np.float64] = field(repr=False)

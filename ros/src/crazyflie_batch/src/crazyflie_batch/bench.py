@@ -1,4 +1,4 @@
-"""How many steps of vehicles in closed loop are computed in a second.
+"""Benchmark: steps of vehicles in closed loop that are computed in a second.
 
 A step is 1 ms of one quadrotor: a rigid body of 13 states, four motors with their lag, inner loops
 at 500 Hz; and, at 100 Hz, motion capture, estimator and controller. With noise, random numbers are
@@ -21,7 +21,7 @@ from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_model.dynamics import STEP
 
 ONE, MANY = 1, 10_000  #: Numbers of vehicles that have a goal.
-DURATIONS = {ONE: 60.0, 100: 20.0, MANY: 2.0}  #: Of the flights, s, by number of vehicles.
+DURATIONS = {ONE: 60.0, 100: 20.0, MANY: 2.0}  #: Number of vehicles -> duration of the flights (s).
 
 GOALS = {ONE: 0.5e6, MANY: 10e6}  #: Steps per second on two processors.
 REPEATS = 5

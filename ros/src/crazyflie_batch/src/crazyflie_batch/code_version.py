@@ -1,4 +1,4 @@
-"""Which version of the code flies, so that results of two versions are not mixed."""
+"""The version of the code that flies, so that results of two versions are not mixed."""
 
 import ast
 import hashlib

@@ -92,11 +92,11 @@ class Kalman(Estimator):
     ) -> tuple[Vector[Any], Vector[Any], Vector[Any]]:
         noise, walk = parameters
         speeds = [(a - b) / dt for a, b in zip(position, memory[:3], strict=True)]
-        anew = _begin(position, speeds, noise)
+        restarted = _begin(position, speeds, noise)
         state, covariance = _predict(memory[:9], memory[9:], dt, walk * walk)
         state, covariance = _correct(state, covariance, position, noise * noise)
         is_late = dt > kalman.MEMORY
-        memory = [where(is_late, a, b) for a, b in zip(anew, state + covariance, strict=True)]
+        memory = [where(is_late, a, b) for a, b in zip(restarted, state + covariance, strict=True)]
         return memory, memory[:3], memory[3:6]
 
 

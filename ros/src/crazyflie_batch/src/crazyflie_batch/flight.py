@@ -21,7 +21,7 @@ from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Number, Vector, functions, where
 from crazyflie_model.supervisor import watchdog_control
 
-_SMALLEST_COSINE = 1e-6  #: Of a pitch at which roll and yaw are distinct.
+_SMALLEST_COSINE = 1e-6  #: Cosine of the pitch below which roll and yaw are not distinct.
 
 
 def yaw_from_quaternion(quaternion: Sequence[Number]) -> Number:
@@ -63,7 +63,7 @@ NOISE_DIM = 7
 
 #: Steps of the model from one sample of the inner loops to the next.
 SAMPLE_STEPS = round(inner_loops.PERIOD / STEP)
-POSE_DIM = 5  #: Of a pose on its way: position (3), yaw, and 1 for one that is not lost.
+POSE_DIM = 5  #: Components of a delayed pose: position (3), yaw, and 1 for one that is not lost.
 
 #: What is remembered of a flight: largest distance from the goal, m, and sum of the squared
 #: distances at the ticks after it has settled; of all ticks, the least cosine of the tilt and the
@@ -82,7 +82,7 @@ def components(rows: Iterable[Any], dims: Mapping[str, int]) -> Components:
 
 @dataclass(frozen=True)
 class Plan:
-    """What all flights of a batch have in common."""
+    """Model, controller and estimator of all flights of a batch."""
 
     #: ``make_model(**parameters)`` returns the `Dynamics` of one vehicle, by the names in
     #: ``model_parameters``.
@@ -91,11 +91,11 @@ class Plan:
     #: A vehicle that is tilted more than this, rad, has crashed, and its motors stop.
     max_tilt: float
     estimator: type[Estimator]
-    steps: int  #: Of the model in a tick, a multiple of `SAMPLE_STEPS`.
+    steps: int  #: Steps of the model in a tick, a multiple of `SAMPLE_STEPS`.
 
     @property
     def period(self) -> float:
-        """Of a tick, s."""
+        """Period of a tick (s)."""
         return self.steps * STEP
 
     def memory_dims(self) -> dict[str, int]:

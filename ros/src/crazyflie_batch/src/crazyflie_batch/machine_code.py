@@ -13,7 +13,7 @@ from crazyflie_batch.flight import Components, Plan
 from crazyflie_batch.symbols import DOUBLE, Emitter
 
 _INTEGER = ir.IntType(64)
-_BYTES = 8  #: Of a number.
+_BYTES = 8  #: Size of a number.
 
 
 class MachineCode:

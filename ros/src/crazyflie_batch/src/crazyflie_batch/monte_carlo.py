@@ -70,7 +70,7 @@ class Results:
             return np.load(path)
         except (ValueError, EOFError):
             path.unlink()
-            raise OSError(f"{path} was damaged, and is gone; call again to fly it anew") from None
+            raise OSError(f"{path} was damaged, and is gone; call again to fly it again") from None
 
     def _path(self, first):
         return self._chunks / f"{first:08d}.npy"

@@ -1,4 +1,4 @@
-"""What flies a group of vehicles with one plan: machine code, or numpy without llvmlite."""
+"""Programs that fly a group of vehicles with one plan: machine code, or numpy without llvmlite."""
 
 import logging
 import threading
@@ -118,5 +118,5 @@ def _warn_of_numpy():
 
 
 def clear() -> None:
-    """Drop all programs, so that they are made anew."""
+    """Drop all programs; they are compiled again when they are needed."""
     _program.cache_clear()

@@ -21,7 +21,7 @@ class Findings:
 
     settings: Settings
     values: dict[str, NDArray[np.float64]]  #: Swept parameters; see `Settings.values`.
-    #: By the names of `crazyflie_batch.Flights`, arrays of all flights.
+    #: Name in `crazyflie_batch.Flights` -> array of all flights.
     outcomes: dict[str, NDArray[np.float64]]
     is_within: NDArray[np.bool_]  #: Shape (flights,). Whether they stayed within limits.
 

@@ -128,7 +128,7 @@ _EXPECTED = (
 class Sweep:
     """Distribution of a parameter over the flights."""
 
-    name: str  #: Of a `FlightParameters`.
+    name: str  #: Name of a parameter in `FlightParameters`.
     unit: str
     kind: str  #: `UNIFORM`, `NORMAL` or `VALUES`.
     numbers: tuple[float, ...]  #: Lowest and highest; mean and standard deviation; or the values.

@@ -20,7 +20,7 @@ from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import GRAVITY
 
 HOVER = (0.0, 0.0, 0.0, GRAVITY)  #: Control at the reference.
-_ROUNDING = 1e-6  #: Of a whole number of periods, as a fraction of one.
+_ROUNDING = 1e-6  #: Tolerance of a whole number of periods, as a fraction of a period.
 
 
 @dataclass(frozen=True)

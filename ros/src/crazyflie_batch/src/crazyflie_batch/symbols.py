@@ -21,7 +21,7 @@ DOUBLE = ir.DoubleType()
 #: ABI), with AVX-512, AVX2 and SSE.
 _VECTOR_LETTERS = {8: "e", 4: "d", 2: "b"}
 
-#: Of the C library.
+#: Functions of the C library.
 _FUNCTIONS = {
     np.sin: "sin",
     np.cos: "cos",
@@ -31,7 +31,7 @@ _FUNCTIONS = {
     np.hypot: "hypot",
 }
 
-#: Of LLVM: one instruction of most processors.
+#: Intrinsics of LLVM: one instruction on most processors.
 _INTRINSICS = {np.sqrt: "llvm.sqrt", np.floor: "llvm.floor", np.absolute: "llvm.fabs"}
 #: Arrive as functions where numpy's own numbers are on the left.
 _OPERATORS = {np.add: "fadd", np.subtract: "fsub", np.multiply: "fmul", np.divide: "fdiv"}

@@ -35,6 +35,12 @@ _MAX_SPEED = 2.0  #: m/s.
 HEIGHTS = 0.1, 5.0  #: Lowest and highest of a takeoff, m.
 
 _HOLD_DURATION = 1.0  #: Of a move to where a vehicle is, s.
+#: The firmware's parameter for lights, the value of all, and for how long they are on, s.
+_LIGHTS, _ALL_LIGHTS, _LIGHT_TIME = "led/bitmask", 255, 5.0
+
+#: Of a vehicle in flight the motors would stop.
+_GROUND_ONLY = (Action.DISARM, Action.REBOOT)
+
 _STAYS = "not all of them can go"
 
 #: Parameters of the nodes that carry out a go to: whether headings can change; the goals' frame.
@@ -48,6 +54,7 @@ _TYPES = {
     Request.TAKEOFF: srv.Takeoff,
     Request.LAND: srv.Land,
     Request.GO_TO: srv.GoTo,
+    Request.UPDATE_PARAMS: srv.UpdateParams,
 }
 
 
@@ -134,9 +141,10 @@ class Actions:
         services = () if target is None else _services(target, command.action)
         if not services:
             return failed(_why_no_service(command.action, target))
-        if command.action == Action.DISARM and target.now.is_in_flight:
+        if command.action in _GROUND_ONLY and target.now.is_in_flight:
             return failed(
-                f"disarm: the vehicle is {target.now.state}; expected it to be on the ground"
+                f"{command.action.value}: the vehicle is {target.now.state}; expected it to be on "
+                "the ground"
             )
         if command.action == Action.TAKEOFF and target.fence is not None:
             top = target.fence.upper[2]
@@ -145,6 +153,9 @@ class Actions:
                     f"take off: the height is {command.height:g} m; expected at most {top:g} m, "
                     "where the geofence ends"
                 )
+        if command.action == Action.IDENTIFY:
+            return self._light(services[0].name.rpartition("/")[0], command)
+        self._moves.pop(name, None)
         may_move = Action.GO_TO in target.now.actions
         if command.action == Action.TAKEOFF and may_move:
             go_to = _services(target, Action.GO_TO)
@@ -169,6 +180,32 @@ class Actions:
             service.name, _TYPES[service.request], request, limit, MAX_COMMAND_AGE - age
         )
         answer.add_done_callback(lambda done: settle(done, outcome))
+        return outcome
+
+    def _light(self, driver, command):
+        """Have all lights of a vehicle on for a while, as its firmware can."""
+        service = Service(f"{driver}/update_params", Request.UPDATE_PARAMS)
+        request = srv.UpdateParamsRequest([_LIGHTS])
+        outcome: Future[Any] = Future()
+
+        def turn(value, act):
+            done = self._handle.set_param_later(f"{driver}/{_LIGHTS}", value)
+            done.add_done_callback(lambda _: self._handle.submit(act))
+
+        def on():
+            self._call(command, service, request).add_done_callback(lambda d: settle(d, outcome))
+
+        def off():
+            timer.stop()
+            turn(
+                0,
+                lambda: self._handle.call_service(
+                    service.name, srv.UpdateParams, request, _TIMEOUT
+                ),
+            )
+
+        turn(_ALL_LIGHTS, on)
+        timer = self._handle.timer(_LIGHT_TIME, off, steady=True)
         return outcome
 
     # Several vehicles that go somewhere.
@@ -279,11 +316,10 @@ class Actions:
 
     def _hold(self, targets):
         """Have vehicles stay where they are."""
-        request = srv.GoToRequest(relative=True, duration=genpy.Duration.from_sec(_HOLD_DURATION))
         for target in targets:
             self._moves.pop(target.vehicle.name, None)
             (service,) = _services(target, Action.GO_TO)
-            self._handle.call_service(service.name, srv.GoTo, request, _TIMEOUT)
+            self._handle.call_service(service.name, srv.GoTo, _hold_request(), _TIMEOUT)
 
     def _start_commander(self, vehicle, graph):
         name = vehicle.commander
@@ -367,8 +403,14 @@ def _request(command: Command, service: Service, target: Target | None) -> Any:
     if service.request == Request.TAKEOFF:
         duration = max(_MIN_DURATION, command.height / _CLIMB_SPEED)
         return srv.TakeoffRequest(0, command.height, genpy.Duration.from_sec(duration))
+    if service.request == Request.GO_TO:
+        return _hold_request()
     assert target is not None
     position = target.now.position
     height = _UNKNOWN_HEIGHT if position is None else position[2]
     duration = max(_MIN_DURATION, height / _CLIMB_SPEED)
     return srv.LandRequest(0, 0.0, genpy.Duration.from_sec(duration))
+
+
+def _hold_request():
+    return srv.GoToRequest(relative=True, duration=genpy.Duration.from_sec(_HOLD_DURATION))

@@ -4,17 +4,18 @@ import contextlib
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 from crazyflie_dashboard import missions
 from crazyflie_dashboard.actions import Actions, Target, expect_fresh
 from crazyflie_dashboard.answers import listed, settle, summary, words
 from crazyflie_dashboard.control import PageControl
-from crazyflie_dashboard.doctor_report import examine
 from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.graph_model import GraphModel
 from crazyflie_dashboard.live_parameters import LiveParameters
 from crazyflie_dashboard.master import Master
+from crazyflie_dashboard.messages import examine
 from crazyflie_dashboard.page_data import (
     Command,
     DryRunResult,
@@ -24,6 +25,7 @@ from crazyflie_dashboard.page_data import (
     Series,
 )
 from crazyflie_dashboard.page_state import PageState
+from crazyflie_dashboard.recording import Recording
 from crazyflie_dashboard.snapshot import Action, Scene
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.refusal import RefusalError
@@ -72,6 +74,8 @@ class Dashboard:
         self._parameters = LiveParameters(handle, self._workers, self._model)
         self._missions = missions.Missions()
         self._model.missions = lambda: self._missions.running
+        self._recording = Recording()
+        self._model.recording = lambda: self._recording.text
         self._open: dict[int, PageState] = {}
         self.pages.log = handle.info
         self.pages.on_first = lambda: self._submit(self._model.begin)
@@ -82,6 +86,7 @@ class Dashboard:
         """End what was begun here and flies nothing."""
         self._actions.close()
         self._lane.close()
+        self._recording.close()
         for each in (self._turns, self._workers):
             each.shutdown(wait=False, cancel_futures=True)
 
@@ -212,6 +217,19 @@ class Dashboard:
             self._missions.stop()
 
         return self._do(do, what=f"page {page}: stop the mission")
+
+    def record(self, page: int, is_on: bool) -> "Future[str | None]":
+        """Begin to record, or end it; then the future is done when there is a report."""
+
+        def do():
+            self.pages.expect_control(page)
+            return self._recording.start() if is_on else self._recording.stop()
+
+        return self._do(do, what=f"page {page}: {'record' if is_on else 'stop recording'}")
+
+    def report(self) -> Path | None:
+        """Return the report on the last recording that was ended here."""
+        return self._recording.report
 
     def examine(self) -> "Future[None]":
         """Have the doctor look the graph over: its sentences are in the scene, 10 s later."""

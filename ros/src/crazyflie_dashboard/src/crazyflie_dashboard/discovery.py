@@ -29,6 +29,7 @@ class Request(Enum):
     TAKEOFF = "crazyflie_driver/Takeoff"
     LAND = "crazyflie_driver/Land"
     GO_TO = "crazyflie_driver/GoTo"
+    UPDATE_PARAMS = "crazyflie_driver/UpdateParams"
 
 
 @dataclass(frozen=True)
@@ -148,15 +149,18 @@ def _candidates(
     for place in flights:
         yield Action.TAKEOFF, [Service(f"{place}/takeoff", Request.TAKEOFF)]
         yield Action.LAND, [Service(f"{place}/land", Request.LAND)]
-        yield Action.GO_TO, [Service(f"{place}/go_to", Request.GO_TO)]
+        for action in (Action.GO_TO, Action.HOLD):
+            yield action, [Service(f"{place}/go_to", Request.GO_TO)]
     if driver not in flights or driver != top:
         yield Action.TAKEOFF, [Service(f"{top}/takeoff", Request.EMPTY)]
         yield Action.LAND, [Service(f"{top}/land", Request.EMPTY)]
-        yield Action.GO_TO, [Service(f"{top}/go_to", Request.GO_TO)]
+        for action in (Action.GO_TO, Action.HOLD):
+            yield action, [Service(f"{top}/go_to", Request.GO_TO)]
     stops = dict.fromkeys((f"{top}/emergency", f"{driver}/emergency"))
     yield Action.EMERGENCY, [Service(name, Request.EMPTY) for name in stops]
     yield Action.RESET, [Service(f"{top}/emergency_reset", Request.EMPTY)]
     yield Action.REBOOT, [Service(f"{driver}/reboot", Request.EMPTY)]
     yield Action.RECOVER, [Service(f"{driver}/recover", Request.EMPTY)]
+    yield Action.IDENTIFY, [Service(f"{driver}/update_params", Request.UPDATE_PARAMS)]
     yield Action.ARM, [Service(f"{driver}/arm", Request.SET_BOOL)]
     yield Action.DISARM, [Service(f"{driver}/arm", Request.SET_BOOL)]

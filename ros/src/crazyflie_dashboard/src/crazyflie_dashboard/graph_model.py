@@ -70,10 +70,11 @@ class GraphModel:
         self.graph = Graph()  #: The newest one.
         self.models: dict[str, VehicleModel] = {}  #: By name of the vehicle.
         self.plots: dict[str, VehiclePlots] = {}  #: Of watched vehicles.
-        #: paths, sentences, missions: Parts of the scene that are set from outside.
+        #: paths, sentences, missions, recording: Parts of the scene that are set from outside.
         self.paths: Mapping[str, tuple[Triple, ...]] = {}
         self.sentences: tuple[Sentence, ...] = ()
         self.missions: Callable[[], tuple[str, ...]] = tuple
+        self.recording: Callable[[], str] = str
         self._parent, self._workers, self._read_graph = handle, workers, read_graph
         self._clock = clock
         self._handle: NodeHandle | None = None
@@ -228,6 +229,7 @@ class GraphModel:
             log=tuple(self._log) if self._lines != _last(self.scene.log) else self.scene.log,
             images=tuple(sorted(t for t, kind in self.graph.topics.items() if kind in IMAGES)),
             missions=self.missions(),
+            recording=self.recording(),
         )
 
     def _snapshot(self, name, fixed):

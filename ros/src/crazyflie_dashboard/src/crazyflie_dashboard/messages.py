@@ -1,8 +1,10 @@
-"""What nodes say: sentences of diagnostics, lines of the log."""
+"""What nodes and the doctor say: sentences of diagnostics, lines of the log, findings."""
 
+import subprocess
 from collections.abc import Callable
 from typing import Any
 
+import roslib.packages
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rosgraph_msgs.msg import Log
 
@@ -10,6 +12,7 @@ from crazyflie_dashboard.discovery import Vehicle
 from crazyflie_dashboard.snapshot import Kind, LogLine, Sentence
 
 _MAX_AGE = 10.0  #: A diagnostic that is older, s, is not true any more.
+_DOCTOR_TIMEOUT = 60.0  #: s; the doctor gives up after 40.
 
 _LEVELS = {
     Log.DEBUG: "debug",
@@ -71,3 +74,35 @@ class Diagnostics:
             if name in words and status.hardware_id.startswith("udp://"):
                 return Kind.VIRTUAL
         return Kind.REAL
+
+
+def examine() -> tuple[Sentence, ...]:
+    """Run the doctor, with low priority; return what it has found, errors first. It takes 10 s."""
+    found = roslib.packages.find_node("crazyflie_doctor", "doctor")
+    if not found:
+        return (
+            Sentence("error", "doctor", "there is no doctor", "build the workspace (./run build)"),
+        )
+    try:
+        done = subprocess.run(
+            ["nice", "-n", "19", found[0]], capture_output=True, text=True, timeout=_DOCTOR_TIMEOUT
+        )
+    except subprocess.TimeoutExpired:
+        return (
+            Sentence(
+                "error", "doctor", f"it did not end within {_DOCTOR_TIMEOUT:g} s", "try again"
+            ),
+        )
+    return sentences(done.stdout)
+
+
+def sentences(output: str) -> tuple[Sentence, ...]:
+    """Return the findings in the doctor's output, errors first."""
+    found = []
+    for line in output.splitlines():
+        level, _, rest = line.partition(" ")
+        check, separator, text = rest.strip().partition(": ")
+        if level in ("warn", "error") and separator:
+            text, _, remedy = text.partition("; ")
+            found.append(Sentence(level, f"doctor, {check}", text, remedy))
+    return tuple(sorted(found, key=lambda each: each.level != "error"))

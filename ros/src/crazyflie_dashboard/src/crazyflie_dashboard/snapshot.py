@@ -27,6 +27,7 @@ class Action(Enum):
 
     TAKEOFF = "take off"
     LAND = "land"
+    HOLD = "hold"
     GO_TO = "go to"
     EMERGENCY = "emergency"
     RESET = "reset"
@@ -34,6 +35,7 @@ class Action(Enum):
     ARM = "arm"
     DISARM = "disarm"
     RECOVER = "recover"
+    IDENTIFY = "which one?"
 
 
 @dataclass(frozen=True)
@@ -148,3 +150,4 @@ class Scene:
     log: tuple[LogLine, ...] = ()  #: The newest ones, oldest first.
     images: tuple[str, ...] = ()  #: Topics of cameras.
     missions: tuple[str, ...] = ()  #: What runs, as `missions.Run.text` says.
+    recording: str = ""  #: What a recording does that was begun here.

@@ -20,15 +20,17 @@ from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
 
 HOVER = (0.0, 0.0, 1.0)
 HOVER_DURATION = 2.2
-HOVER_WINDOW = 2.0  #: Until the figure eight begins; the hover error is taken from it, s.
+HOVER_WINDOW = 2.0  #: Time before the figure eight over which the hover error is measured (s).
 
 EIGHT_DURATION = 6.0
-#: Of the figure of `crazyflie_demo.figure8`, which in this time would need all of the 15 degrees
-#: that a control may have.
+#: Scale of `crazyflie_demo.figure8`: the whole figure would need, in this time, the full tilt of 15
+#: degrees that a control may have.
 EIGHT_SCALE = 0.8
-REFERENCE_PERIOD = 0.01  #: As the controller's: it sees a reference that moves as its state does.
+REFERENCE_PERIOD = (
+    0.01  #: That of the controller, so that its reference moves as its state does (s).
+)
 
-SETTLING = 0.5  #: From the end of the figure eight to the landing, s.
+SETTLING = 0.5  #: Time from the end of the figure eight to the landing (s).
 
 LAUNCH_FILE = ("crazyflie_examples", "sw_controller.launch")
 #: The controller of the examples that follows a yaw, and the model in which it matters.

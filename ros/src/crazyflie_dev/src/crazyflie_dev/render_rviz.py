@@ -25,7 +25,7 @@ from crazyflie_utils.testing.launching import roslaunch
 
 #: Width and height in pixels of the screen, and of RViz's window in its configuration.
 SCREEN = (1400, 900)
-#: Where the README expects the picture.
+#: Path of the picture in the README.
 PICTURE = Path(__file__).resolve().parents[5] / "docs" / "images" / "sw_hover.png"
 
 _DRAW_LIMIT = 90.0

@@ -35,7 +35,7 @@ from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
 
-HOVER_HEIGHT = 1.0  #: Of the launch file, m.
+HOVER_HEIGHT = 1.0  #: Hover height of the launch file (m).
 _STEP = 0.05  #: Between two looks of the operator at the flight, s.
 _TIMEOUT = 30.0  #: Longest wait for the reply to a call, or for the vehicle to come to rest, s.
 

@@ -1,4 +1,4 @@
-"""What goes wrong in a soak: poses, nodes, the clock, other programs, and what people do.
+"""Faults of a soak: poses, nodes, the clock, other programs, and commands of people.
 
 A fault is a generator of steps, twenty a second; its end is its ``close()``.
 """
@@ -47,23 +47,26 @@ MISSION_PARAMETERS = {
     "srv/emergency": "/emergency",
 }
 
-_RESPAWN = 1.0  #: From the end of a node until roslaunch has started it again, s.
-_FLIGHT_LIMIT = 10.0  #: How long a node that is to end waits for a flight, s.
+_RESPAWN = 1.0  #: Time from the end of a node until roslaunch has started it again (s).
+_FLIGHT_LIMIT = 10.0  #: Longest wait of a node that is to end for the end of a flight (s).
 
 HIGHEST = 1.4  #: Highest place that people ask for, m.
 _SUM_HEIGHT = 5.0  #: Highest place to which random services lead, m: relative goals add up.
-_HEIGHT = 1.0  #: Of other programs' references, m.
+_HEIGHT = 1.0  #: Height of references of other programs (m).
 _UP = (0.0, 0.0, _HEIGHT)
-#: Where a reference at `_HEIGHT` gets that climbs: at 2 m/s, the most that counts, for 0.5 s, m.
+#: Height of a reference that climbs from `_HEIGHT` at 2 m/s, the limit, for 0.5 s (m).
 _MOVED = _HEIGHT + 1.0
-_STREAM_RADIUS, _STREAM_SPEED = 0.5, 0.6  #: Of the circle that a mission streams, m and m/s.
+_STREAM_RADIUS, _STREAM_SPEED = (
+    0.5,
+    0.6,
+)  #: Radius and speed of the circle that a mission streams (m, m/s).
 
 Steps = Generator[None, None, None]
 
 
 @dataclass
 class Flight:
-    """What faults act on."""
+    """The flight on which faults act."""
 
     graph: FakeGraph
     random: Random
@@ -207,7 +210,7 @@ def _freeze(name: str) -> Callable[[Flight], Steps]:
 
 
 def _starve(flight):
-    """Let nodes run for 50 ms and stop for 0.1 to 0.6 s, each at other times than the others."""
+    """Run nodes for 50 ms and stop them for 0.1 to 0.6 s, each at times of its own."""
     ends: dict[str, float] = {}
     try:
         while True:
@@ -288,7 +291,7 @@ def _call_mission(flight, mission, service, **values):
 
 
 def _call_server(flight):
-    """Have people and missions call the server, each twice a second on average."""
+    """Call the server as people and missions do, each twice a second on average."""
     service, height = flight.random.choice((("takeoff", _HEIGHT), ("land", 0.0)))
     if flight.random.random() < 0.1:
         _call(f"/{service}", flight)

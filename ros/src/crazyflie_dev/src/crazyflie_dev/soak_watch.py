@@ -1,4 +1,4 @@
-"""What has to hold at every step of a soak, whatever fails."""
+"""Invariants of every step of a soak, whatever fails."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from crazyflie_takeoff.flight_state import flight_state
 from crazyflie_takeoff.safe_control import SINK_SPEED
 from crazyflie_utils.testing import FakeGraph
 
-MOST_THRUST = 16.0  #: Of a final control, m/s^2: the controller's limit.
-MOST_TILT = math.radians(15.1)  #: Of a final control, rad: the controller's limit.
-OVERSHOOT = 0.2  #: How far above its highest reference a vehicle may be, m.
+MOST_THRUST = 16.0  #: Limit of a final control (m/s^2): that of the controller.
+MOST_TILT = math.radians(15.1)  #: Limit of a final control (rad): that of the controller.
+OVERSHOOT = 0.2  #: Largest height of a vehicle above its highest reference (m).
 
 #: The same while all nodes stop for up to 0.6 s: a first stop in a climb at full thrust, of 6.2
 #: m/s^2, comes without warning and makes 1.1 m, and ending that climb with 4 m/s^2 1.7 m, less what
 #: was still to be climbed.
 STARVED_OVERSHOOT = 2.5
 
-#: How long a vehicle may be in the air without a good pose, s: 1.6 s in which the pose may come
-#: back, 5 s of descent, and what it falls then; and the way down at `SINK_SPEED` beside.
+#: Longest time in the air without a good pose (s): 1.6 s in which the pose may come back, 5 s of
+#: descent and the fall after it; the descent at `SINK_SPEED` is added.
 BLIND_LIMIT = 8.0
 
-#: Of a vehicle, m/s: a reference is at most 3 m away (`reference/max_jump`), and the vehicle tilts
-#: about both axes as far as it may over the first half of the way.
+#: Largest speed of a vehicle (m/s): a reference is at most 3 m away (`reference/max_jump`), and the
+#: vehicle tilts about both axes as far as it may over the first half of the way.
 MOST_SPEED = math.sqrt(3.0 * math.hypot(1.0, 1.0) * GRAVITY * math.tan(MOST_TILT))
 
-#: How far from the middle a vehicle may come in a flight that begins there, m: the models of 7
-#: states have no drag, and glide on while they sink blindly.
+#: Largest distance from the middle in a flight that begins there (m): the models of 7 states have
+#: no drag, and keep their speed while they descend without poses.
 FLY_AWAY = 8.0
 
 #: Most speed at which it may meet the ground unless its motors were switched off, m/s.
@@ -53,18 +53,18 @@ class Watch:
 
     graph: FakeGraph
     violations: list[str] = field(default_factory=list)  #: With the time of each.
-    highest: float = -math.inf  #: Above the highest reference, m.
+    highest: float = -math.inf  #: Largest height above the highest reference (m).
     hardest: float = 0.0  #: Speed at which the ground was met with motors on, m/s.
-    farthest: float = 0.0  #: From the middle, in the air, m.
+    farthest: float = 0.0  #: Largest distance from the middle in the air (m).
     is_calm: bool = False  #: Whether nothing has failed in this flight.
     is_blind: bool = False  #: Whether a fault keeps good poses away.
     may_fly: bool = False  #: Whether a takeoff has been asked for since the last landing.
     may_fall: bool = False  #: Whether the vehicle may meet the ground at any speed.
     is_emergency: bool = False  #: Whether motors have to stand still.
     is_starved: bool = False  #: Whether all nodes have stopped again and again in this flight.
-    height: float = 0.0  #: Of the vehicle now, m.
-    distance: float = 0.0  #: From the middle now, m.
-    state: str = ""  #: Of the flight, as the server publishes it.
+    height: float = 0.0  #: Height of the vehicle now (m).
+    distance: float = 0.0  #: Distance from the middle now (m).
+    state: str = ""  #: State of the flight, as the server publishes it.
     _reference: float = 0.0
     _blind_since: float = math.inf
     _last: tuple[float, tuple[float, ...], float] | None = None

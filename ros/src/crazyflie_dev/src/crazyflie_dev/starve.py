@@ -20,7 +20,7 @@ from crazyflie_utils.main import begin
 from crazyflie_utils.testing.launching import roslaunch
 
 MOST_HEIGHT = 1.5  #: The launch file's hover height, 1 m, and an overshoot, m.
-_RUN = 0.035  #: How long a node runs on average before it is stopped, s.
+_RUN = 0.035  #: Mean time for which a node runs before it is stopped (s).
 
 
 def starve(pids: list[int], share: float, duration: float, seed: int) -> None:

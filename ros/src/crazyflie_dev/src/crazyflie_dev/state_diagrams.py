@@ -5,7 +5,7 @@ below it is made of its rows; the first row's state is the initial one::
 
     <!-- states: crazyflie_takeoff.filter_machine:FilterMachine.TABLE -->
 
-``python3 -m crazyflie_dev.state_diagrams PAGE...`` draws the diagrams anew.
+``python3 -m crazyflie_dev.state_diagrams PAGE...`` updates the diagrams.
 """
 
 import argparse
@@ -49,8 +49,8 @@ def with_diagrams(page: str) -> str:
 
 
 def main() -> int:
-    """Draw the diagrams of the pages named on the command line anew."""
-    parser = argparse.ArgumentParser(description="Draw the state diagrams in pages anew.")
+    """Update the diagrams of the pages named on the command line."""
+    parser = argparse.ArgumentParser(description="Update the state diagrams in pages.")
     parser.add_argument("pages", nargs="+", type=Path, metavar="PAGE")
     for page in parser.parse_args().pages:
         page.write_text(with_diagrams(page.read_text()))

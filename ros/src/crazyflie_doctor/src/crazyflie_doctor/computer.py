@@ -18,8 +18,8 @@ from packaging.requirements import Requirement
 
 from crazyflie_doctor.installation import Network, Python, Radio
 
-_RESOLVER_LIMIT = 2.0  #: Of the wait for the address of a host, s.
-_PROGRAM_LIMIT = 20.0  #: How long another program may take, s.
+_RESOLVER_LIMIT = 2.0  #: Longest wait for the address of a host (s).
+_PROGRAM_LIMIT = 20.0  #: Longest run time of another program (s).
 
 _MODULES = ("rospy", "tf2_ros", "numpy", "cflib", "natnet")
 
@@ -104,7 +104,7 @@ def network() -> Network:
 
 
 def _resolve(name):
-    """Return the address of a host; empty if there is none within the limit."""
+    """Return the address of a host; empty if the resolver does not answer within the limit."""
     addresses = []
 
     def resolve():

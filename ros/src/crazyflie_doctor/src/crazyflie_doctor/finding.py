@@ -1,4 +1,4 @@
-"""What a check has found."""
+"""Findings of a check."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ OK, WARN, ERROR = "ok", "warn", "error"
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong, and what to do."""
+    """A fault and its remedy."""
 
     level: str  #: `WARN`, or `ERROR` for what keeps a vehicle from flying as it should.
     text: str
@@ -20,8 +20,8 @@ class Check:
     """A check of one thing."""
 
     name: str
-    fine: str  #: What is so when nothing is found.
-    findings: Iterable[Finding]  #: Of a generator, which makes the check when it is iterated.
+    fine: str  #: Text for a check without findings.
+    findings: Iterable[Finding]  #: Often a generator, which makes the check when it is iterated.
 
 
 def warn(text: str, remedy: str) -> Finding:

@@ -24,12 +24,12 @@ STATES_AND_REFERENCES = {
 #: Inputs, by the ends of their parameters' names, without which a node does its work.
 _OPTIONAL = {"prioritized_control"}
 
-_BUILD = "build the workspace anew (./run build), source it in every shell, and restart the nodes"
+_BUILD = "build the workspace again (./run build), source it in every shell, and restart the nodes"
 
 
 @dataclass(frozen=True)
 class Graph:
-    """What master and nodes say."""
+    """The graph as master and nodes report it."""
 
     #: publishers, subscribers: Topic -> names of nodes.
     publishers: Mapping[str, set[str]] = field(default_factory=dict)

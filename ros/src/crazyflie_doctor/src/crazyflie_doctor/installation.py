@@ -52,10 +52,10 @@ def check_packages(
 
 @dataclass(frozen=True)
 class Network:
-    """How nodes of this shell find each other."""
+    """Network settings by which nodes of this shell find each other."""
 
     variables: Mapping[str, str]  #: Environment.
-    hostname: str  #: Of this computer.
+    hostname: str  #: Hostname of this computer.
     #: ``resolve(name)`` returns the IPv4 address of a host, empty if unknown.
     resolve: Callable[[str], str]
     #: ``is_own(address)`` tells whether this computer has the address.
@@ -127,7 +127,7 @@ def check_log_directory(path: str, is_writable: bool, free: float) -> Iterator[F
 
 @dataclass(frozen=True)
 class Radio:
-    """What is known about Crazyradios."""
+    """Crazyradios of this computer, and whether they may be used."""
 
     #: Device file of each that is plugged in -> whether this user may use it.
     dongles: Mapping[str, bool]

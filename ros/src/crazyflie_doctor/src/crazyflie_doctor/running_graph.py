@@ -15,7 +15,7 @@ from rosgraph.network import read_ros_handshake_header, write_ros_handshake_head
 
 from crazyflie_doctor.graph import Graph, Type
 
-LIMIT = 2.0  #: Of the wait for one answer, s.
+LIMIT = 2.0  #: Longest wait for one answer (s).
 
 _AT_A_TIME = 16
 
@@ -40,14 +40,14 @@ def is_master_online() -> bool:
             # Nodes answer what `rosgraph.is_master_online` asks, too.
             rosgraph.Master(_NAME).getUri()
         except Exception:
-            # No answer, one that no master gives, or an URI that is none.
+            # No answer, one that no master gives, or an invalid URI.
             return False
         return True
 
 
 @contextlib.contextmanager
 def _limited():
-    """Have sockets made within give up; rospy's own, made later, must not."""
+    """Set a time limit for sockets made in this context; rospy's, made later, have none."""
     before = socket.getdefaulttimeout()
     socket.setdefaulttimeout(LIMIT)
     try:

@@ -25,7 +25,9 @@ FUTURE = 0.5
 
 #: Clocks that differ by more than this, s, are different clocks: simulated and real time.
 OTHER_CLOCK = 1e6
-USED_MARGIN = 2.0 / 3.0  #: Of the delay margin; what is left is for the vehicle and for jitter.
+USED_MARGIN = (
+    2.0 / 3.0
+)  #: Usable fraction of the delay margin; the rest is for the vehicle and for jitter.
 
 
 @dataclass(frozen=True)
@@ -44,10 +46,10 @@ class Transform:
 
 @dataclass
 class Recording:
-    """What was published for some seconds."""
+    """Messages of some seconds."""
 
     transforms: list[Transform] = field(default_factory=list)  #: In the order in which they came.
-    clocks: list[float] = field(default_factory=list)  #: Of /clock, s.
+    clocks: list[float] = field(default_factory=list)  #: Times on /clock (s).
     #: Topic of controls -> times from stamp to arrival, s.
     delays: dict[str, list[float]] = field(default_factory=dict)
     #: Topic of controls -> stamps, s.

@@ -51,7 +51,7 @@ def check_name(what: str, name: str) -> None:
 
 @dataclass(frozen=True)
 class Package:
-    """What is filled in."""
+    """Names that are filled in."""
 
     #: name, node: Of the package, and of its node without ``_node``.
     name: str
@@ -127,7 +127,7 @@ def create(package: Package, folder: Path) -> Path:
         raise GeneratorError(f"there is {target} already; expected the name of a new package")
     unfinished = None
     try:
-        # Beside its place, so that it appears there at once and whole.
+        # In the same folder, so that it appears at its place at once and complete.
         unfinished = Path(tempfile.mkdtemp(prefix=f".{package.name}-", dir=folder))
         for place, text in package.files():
             file = unfinished / place

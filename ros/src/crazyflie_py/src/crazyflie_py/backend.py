@@ -1,4 +1,4 @@
-"""What a back-end of Crazyswarm's API provides.
+"""The interface of the back-ends of Crazyswarm's API.
 
 `crazyflie_py.crazyflie` holds the classes that scripts see. They check arguments and call one of
 two back-ends: `crazyflie_py.simulation` (--sim) and `crazyflie_py.ros_backend`.
@@ -13,7 +13,7 @@ from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.setpoints import Setpoint
 
-#: Of vehicles in pictures, as Crazyswarm draws them: red, green and blue, 0 to 1.
+#: Colour in which Crazyswarm draws vehicles: red, green and blue, 0 to 1.
 DEFAULT_COLOR = (0.5, 0.5, 1.0)
 
 
@@ -87,7 +87,7 @@ class VehicleBackend(Commands, Protocol):
 
 
 class Visualizer(Protocol):
-    """What scripts call of ``timeHelper.visualizer``."""
+    """Methods of ``timeHelper.visualizer`` that scripts call."""
 
     def setGraph(self, edges: Sequence[tuple[int, int]]) -> None:
         """Draw lines between vehicles, given by their numbers in ``crazyflies``."""
@@ -116,13 +116,13 @@ class SwarmBackend(Commands, Protocol):
 
     @property
     def visualizer(self) -> Visualizer:
-        """What --sim draws with; otherwise one that does nothing."""
+        """The visualizer of --sim; otherwise one that draws nothing."""
 
     def time(self) -> float:
         """Return the time, s."""
 
     def sleep(self, duration: float) -> None:
-        """Let a duration (s) pass."""
+        """Return after a duration (s) of the vehicles' time."""
 
     def sleep_for_rate(self, rate: float) -> None:
         """Sleep until 1/rate (s) after the return of the last call with this rate (Hz)."""

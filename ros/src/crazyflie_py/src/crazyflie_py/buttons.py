@@ -24,7 +24,7 @@ _KEY = [0] * BUTTON + [1]  #: A key is the button.
 
 
 class Device(Protocol):
-    """What has buttons."""
+    """A source of button events."""
 
     def poll(self) -> Sequence[int]:
         """Return 1 for each button that is pressed, else 0; waits 0.01 s at most."""

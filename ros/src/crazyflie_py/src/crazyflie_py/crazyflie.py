@@ -232,7 +232,7 @@ class Crazyflie(ScriptCommands):
         self.prefix = f"/{vehicle.name}"
         #: As the fleet file has it, m.
         self.initialPosition: Array = np.array(vehicle.initial_position)
-        #: What `setLEDColor` has set; before, Crazyswarm's colour in pictures.
+        #: Colour that `setLEDColor` has set; before, Crazyswarm's colour in pictures.
         self.ledRGB = DEFAULT_COLOR
         self._group_mask = 0
 

@@ -78,7 +78,7 @@ class Crazyswarm:
     ):
         parser = build_argparser([] if parent_parser is None else [parent_parser])
         options, _ = parser.parse_known_args(args.split() if isinstance(args, str) else args)
-        # Whoever starts a script decides that it does not fly, whatever options it gives itself.
+        # The starting program decides that a script does not fly, whatever options it gives itself.
         options.sim = options.sim or bool(os.environ.get(fleet.DRY_RUN))
         backend = _backend(crazyflies_yaml, options)
         atexit.register(backend.close)

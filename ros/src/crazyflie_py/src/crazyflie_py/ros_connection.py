@@ -24,7 +24,7 @@ class CommandRefusedError(RuntimeError):
 
 
 class Connection:
-    """What the vehicles of a script have in common."""
+    """Handle, fleet and calls that all vehicles of a script share."""
 
     def __init__(self, handle: NodeHandle, fleet: Fleet, is_unchecked: bool):
         self.handle = handle
@@ -64,7 +64,7 @@ class Connection:
             self.refuse("; ".join(f"{name}: {what}: {text}" for name, text in failures.items()))
 
     def sleep(self, duration: float) -> None:
-        """Let a duration pass, s of the vehicles' time."""
+        """Return after a duration of the vehicles' time (s)."""
         clock = self.fleet.clock
         clock.wait_until(never, clock.time() + duration)
 

@@ -74,7 +74,7 @@ class HeldVehicle:
         return led_to(setpoint, place, self._vehicle.heading(), LOOK_AHEAD)
 
     def hold(self, place: Triple) -> None:
-        """Have it stay at a place, m."""
+        """Hold it at a position (m)."""
         if self.streamed_goal(place) is not None:
             self._held_at = place
             return
@@ -82,7 +82,7 @@ class HeldVehicle:
         self._vehicle.call("go_to", srv.GoTo, *arguments).add_done_callback(self._note_hold)
 
     def release(self) -> None:
-        """Have it follow setpoints again."""
+        """Release it: it follows its setpoints again."""
         self._held_at = None
 
     def _note_hold(self, answer):

@@ -1,4 +1,4 @@
-"""What --sim draws with: nothing, or matplotlib, in a window or for a video."""
+"""Visualizers of --sim: none, or matplotlib, in a window or for a video."""
 
 import logging
 import os
@@ -12,14 +12,14 @@ from crazyflie_py.simulated_vehicle import SimulatedVehicle
 
 _log = logging.getLogger(__name__)
 
-_ROOM = ((-5.0, 5.0), (-5.0, 5.0), (0.0, 3.0))  #: What is seen: limits of x, y and z, m.
+_ROOM = ((-5.0, 5.0), (-5.0, 5.0), (0.0, 3.0))  #: Displayed limits of x, y and z (m).
 
 _DOTS_PER_INCH = 100
 
 _LINE_COLOR = (0.3, 0.3, 0.3)
 
 _POINT_SIZE = 60  #: Area of a vehicle, in squared typographic points.
-_POINTS = 24  #: Of each of the three circles by which an ellipsoid is drawn.
+_POINTS = 24  #: Number of points of each of the three circles of an ellipsoid.
 
 
 class NullVisualizer:

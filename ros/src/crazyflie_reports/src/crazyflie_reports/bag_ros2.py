@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any, BinaryIO, ClassVar
+from typing import Any, ClassVar
 
 import lz4.frame
 import numpy as np
@@ -64,7 +64,7 @@ _ZSTD = b"\x28\xb5\x2f\xfd"  # A message of CDR begins with 0.
 _RECORD = struct.Struct("<BQ")
 _PROGRESS = 1000  # Messages.
 
-_DECOMPRESSORS = {b"zstd": zstd.ZstdDecompressor, b"lz4": lz4.frame.LZ4FrameDecompressor}
+_DECOMPRESSORS = {"zstd": zstd.ZstdDecompressor, "lz4": lz4.frame.LZ4FrameDecompressor}
 
 
 @cache
@@ -163,21 +163,18 @@ class Ros2BagFile:
         try:
             if path.suffix == ".zstd":
                 self._source = self._expanded(folder)
-            if self._source.suffix == ".mcap":
-                self._check_chunks()
+            checked = self._checked_chunks() if self._source.suffix == ".mcap" else set()
             self._reader = Reader(self._source)
             self._reader.open()
-        except (
-            ReaderError,
-            ExpansionError,
-            OSError,
-            RuntimeError,
-            ValueError,
-            zstd.ZstdError,
-        ) as error:
+            index = getattr(self._reader.storage, "chunks", ())
+            if {(c.chunk_start_offset, c.compression, c.compressed_size) for c in index} - checked:
+                raise ReaderError("its index has a chunk that the file has not")
+        except Exception as error:  # Whatever rosbags raises on a damaged file.
             is_open = self._source.suffix == ".mcap" and not isinstance(error, ExpansionError)
             hint = "; mcap recover mends a file that was not closed" if is_open else ""
-            raise BagError(f"{path} cannot be read: {error}{hint}") from None
+            raise BagError(
+                f"{path} cannot be read: {error or type(error).__name__}{hint}"
+            ) from None
         self._originals = {}
         for each in self._reader.connections:
             is_text = each.msgdef.format == MessageDefinitionFormat.MSG
@@ -223,26 +220,28 @@ class Ros2BagFile:
                 file.writelines(self._expansion.pieces(decompressor, data))
         return target
 
-    def _check_chunks(self):
-        """Raise `ExpansionError` before rosbags decompresses a chunk, which it does as a whole."""
+    def _checked_chunks(self) -> set[tuple[int, str, int]]:
+        """Return place, compression and size of each chunk, none of which expands to too much.
+
+        rosbags decompresses each as a whole. `ExpansionError`: one, or all of them, expand to more.
+        """
+        found = set()
         with self._source.open("rb") as file:
-            if file.read(len(_MCAP)) != _MCAP:
-                return  # rosbags says so.
+            file.seek(len(_MCAP))
             while len(head := file.read(_RECORD.size)) == _RECORD.size:
                 kind, size = _RECORD.unpack(head)
-                end = file.tell() + size
+                begin = file.tell()
+                if begin + size > self._source.stat().st_size:
+                    break  # rosbags says so.
                 if kind == _CHUNK:
-                    compression, content = _chunk(file, size)
-                    while content and compression in _DECOMPRESSORS:
-                        decompressor = _DECOMPRESSORS[compression]()
+                    data = file.read(size)
+                    (length,) = struct.unpack_from("<I", data, 28)
+                    name, content = data[32 : 32 + length].decode(), data[40 + length :]
+                    found.add((begin - _RECORD.size, name, len(content)))
+                    while content and name in _DECOMPRESSORS:
+                        decompressor = _DECOMPRESSORS[name]()
                         for _ in self._expansion.pieces(decompressor, content):
                             pass
                         content = decompressor.unused_data  # Of the next frame.
-                file.seek(end)
-
-
-def _chunk(file: BinaryIO, size: int) -> tuple[bytes, bytes]:
-    """Return compression and content of a chunk at which a file is."""
-    data = file.read(size)
-    (length,) = struct.unpack_from("<I", data, 28)
-    return data[32 : 32 + length], data[40 + length :]
+                file.seek(begin + size)
+        return found

@@ -12,6 +12,7 @@ from test_strict_vehicle import Flight
 from crazyflie_driver.msg import TrajectoryPolynomialPiece
 from crazyflie_driver.srv import (
     GoToRequest,
+    LandRequest,
     SpiralRequest,
     StartTrajectoryRequest,
     TakeoffRequest,
@@ -197,11 +198,49 @@ class Beside(Truth):
         super().wait(duration)
 
 
-def test_a_landing_beside_the_table_goes_down_to_the_floor(server):
+@pytest.fixture
+def beside(server):
+    """Return a flight beside the table."""
     with virtual_vehicle(positioning="none") as (virtual, uri):
         flight = Beside(server, virtual, uri)
         flight.run(3.0)
         assert flight.heights[-1] == pytest.approx(-Beside.TABLE, abs=0.02)
         flight.take_off()
-        server.node.prepare_shutdown()
-        assert flight.touches_down() < 1.0
+        yield flight
+
+
+def land(flight):
+    flight.server.call("/cf1/land", LandRequest(0, 0.0, Duration(2)))
+
+
+def test_a_landing_beside_the_table_goes_down_to_the_floor(beside):
+    beside.server.node.prepare_shutdown()
+    assert beside.touches_down() < 1.0
+
+
+def test_the_service_lands_beside_the_table_as_well(beside):
+    land(beside)
+    assert beside.touches_down() < 1.0
+
+
+def test_a_landing_by_the_service_that_a_go_to_ends_is_over(beside):
+    land(beside)
+    beside.run(0.5)
+    # In the height of the table, where a landing would go on.
+    place = Point(0.0, 0.0, 0.1)
+    beside.server.call("/cf1/go_to", GoToRequest(goal=place, duration=Duration(1)))
+    beside.run(4.0)
+    assert beside.height == pytest.approx(Beside.TABLE + 0.1, abs=0.1)
+    assert beside.motors_run
+
+
+def test_a_landing_by_the_service_that_setpoints_end_is_over(beside):
+    land(beside)
+    beside.run(1.0)
+    setpoints = beside.server.node._vehicles[beside.uri].setpoints
+    count = setpoints.ignored
+    beside.run(4.0, 0.1)
+    # Right after a command of the driver's some would be.
+    assert setpoints.ignored == count
+    assert beside.height == pytest.approx(Beside.TABLE + 0.1, abs=0.1)
+    assert beside.motors_run

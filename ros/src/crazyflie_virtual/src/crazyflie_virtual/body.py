@@ -20,9 +20,9 @@ from crazyflie_model.units import GRAVITY
 from crazyflie_world.world import World
 
 _CAPACITY = 900.0  #: Charge of the stock battery, C: 250 mAh [Bitcraze, data sheet].
-_RESISTANCE = 0.14  #: Of cell and leads, ohm: about 0.3 V of sag at hover, as vehicles log it.
+_RESISTANCE = 0.14  #: Cell and leads (ohm): about 0.3 V of sag at hover, as vehicles log it.
 _HOVER_CURRENT = 2.1  #: A: the 7 minutes of flight of the data sheet.
-_IDLE_CURRENT = 0.12  #: Of the electronics, A.
+_IDLE_CURRENT = 0.12  #: Current of the electronics (A).
 
 _CHARGES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 #: Open-circuit voltage, V, over state of charge; the firmware's table, which is of the stock
@@ -130,9 +130,9 @@ class Physics:
         x[6:10] = [0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)]
         x[13:17] = [0.0] * 4
         self._x = x
-        #: What an accelerometer feels, m/s^2, body frame.
+        #: Acceleration that an accelerometer measures, body frame (m/s^2).
         self.specific_force: Triple = (0.0, 0.0, GRAVITY)
-        #: What is around it; None for the ground alone, which is also all that it comes to rest on.
+        #: Surroundings; None for the ground alone. The vehicle collides with the ground only.
         self.world: World | None = None
         self.is_overturned = False  #: Came down on its back: lies there until `put_upright`.
 
@@ -195,7 +195,7 @@ class Physics:
         self.specific_force = rotate_back(after[6:10], force)
 
 
-NOTHING = 32767  #: What a sensor reports that sees nothing, mm.
+NOTHING = 32767  #: Reading of a sensor without an object in its range (mm).
 _REACH = 4.0  #: m.
 
 #: Log variable -> where its sensor looks, body frame.
@@ -253,7 +253,7 @@ _NOISE_SAMPLES = 8191
 
 
 class Sensors:
-    """What the vehicle measures of itself, with noise or without; ``seed`` is the noise's."""
+    """Inertial sensors, barometer and magnetometer; ``seed`` is that of their noise."""
 
     def __init__(self, noise: bool = True, seed: int = 0):
         source = random.Random(seed)

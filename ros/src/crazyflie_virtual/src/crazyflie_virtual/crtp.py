@@ -3,7 +3,7 @@
 from enum import IntEnum
 from typing import NamedTuple
 
-MAX_DATA = 30  #: Bytes that a packet holds beside its header.
+MAX_DATA = 30  #: Bytes of a packet without its header.
 _RESERVED = 3 << 2  #: Bits of the header that are set, but in broadcast packets.
 
 
@@ -54,14 +54,14 @@ def is_broadcast(datagram: bytes) -> bool:
     return not is_for_link and not datagram[0] & _RESERVED
 
 
-_ACTIVE = 2.0  #: How long after the last packet the client counts as connected, s.
+_ACTIVE = 2.0  #: Age of the last packet below which the client counts as connected (s).
 
 
 class LinkStatistics:
     """Traffic of the link, for the log."""
 
     def __init__(self) -> None:
-        self.is_connected = False  #: Whether a packet came lately.
+        self.is_connected = False  #: Whether the last packet is younger than 2 s.
         #: Packets since the start, to this vehicle and to all, modulo 2^16.
         self.received = self.received_broadcasts = 0
         self.received_rate = self.sent_rate = 0.0  #: Packets per second, over the last second.
@@ -84,7 +84,7 @@ class LinkStatistics:
         self._out += packets
 
     def update(self, time: float) -> None:
-        """Let time pass, to ``time`` (s)."""
+        """Update rates and connection to ``time`` (s)."""
         self.is_connected = self._last is not None and time - self._last < _ACTIVE
         elapsed = time - self._window
         if elapsed >= 1.0:

@@ -222,7 +222,7 @@ MAX_BLOCKS, MAX_VARIABLES, MAX_BYTES = 16, 128, 26
 _TABLE, _CONTROL, _DATA = 0, 1, 2
 _DELETE, _START, _STOP, _RESET, _CREATE, _APPEND, _START_2 = 2, 3, 4, 5, 6, 7, 8
 
-_PERIOD_UNIT = 10  #: Of the period on the wire, ms.
+_PERIOD_UNIT = 10  #: Unit of the period on the wire (ms).
 
 
 def packed(value: float, stored: NumberType, sent: NumberType) -> bytes:

@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from crazyflie_virtual.firmware.console import FirmwareAssertionError, Warn
 
-_SIZE = 112  #: Of a one-wire memory, bytes.
+_SIZE = 112  #: Size of a one-wire memory (bytes).
 _BITCRAZE = 0xBC  #: Vendor.
 _FAMILY = 0x0D  #: First byte of the serial numbers of this kind of memory.
 

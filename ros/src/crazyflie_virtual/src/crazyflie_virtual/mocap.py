@@ -21,20 +21,20 @@ from crazyflie_virtual.quaternions import turned
 from crazyflie_virtual.server import Address, Server, open_socket, received, run_server, send
 
 OCCLUSION = 0.3  #: Longest time for which a vehicle is hidden, s.
-_GHOST_MARGIN = 0.3  #: How far from the vehicles reflections may be, m.
-_STALE = 0.5  #: How long after the last observation a body counts as gone, s.
+_GHOST_MARGIN = 0.3  #: Largest distance of reflections from the vehicles, along each axis (m).
+_STALE = 0.5  #: Age of the last observation above which a body is not tracked (s).
 
 
 @dataclass
 class MocapSwitches:
-    """What can be made to go wrong, at any time."""
+    """Faults, which may be changed at any time."""
 
     dropout: float = 0.0  #: Probability with which a body is not tracked in a frame.
     invalid: str = ""  #: Numbers of bodies that are not tracked, separated by commas; or "all".
     silent: bool = False  #: Whether frames are held back.
-    #: Mean number of markers in a frame that are none: reflections, anywhere between the vehicles.
+    #: Mean number of reflections in a frame: points near the vehicles that are no markers.
     ghosts: float = 0.0
-    #: How often a vehicle begins to be hidden, 1/s; each time for up to `OCCLUSION` s.
+    #: Rate at which occlusions of a vehicle begin (1/s); each takes up to `OCCLUSION` s.
     occlusions: float = 0.0
 
     def hides(self, body_id: int) -> bool:
@@ -232,12 +232,12 @@ class MocapSettings(Parameters):
         return MocapSwitches(self.dropout, self.invalid, self.silent, self.ghosts, self.occlusions)
 
 
-_CLIENT_LIMIT = 5.0  #: How long after its last message a client is sent frames, s.
+_CLIENT_LIMIT = 5.0  #: Age of a client's last message above which it gets no frames (s).
 _LONGEST_WAIT = 0.1  #: s.
 
 
 class MocapServer(Server):
-    """Streams what a `Scene` shows; OSError if a port is taken, or an address is none.
+    """Streams what a `Scene` shows; OSError if a port is taken or an address is invalid.
 
     ``warn`` is not used: the server does not fall behind.
     """
@@ -259,7 +259,7 @@ class MocapServer(Server):
             raise
         super().__init__(self._commands, self._observations)
         self.address = self._commands.getsockname()  #: Host and port for commands.
-        #: Where the vehicles' true poses arrive.
+        #: Address at which the true poses of the vehicles arrive.
         self.observer_port = self._observations.getsockname()[1]
         if settings.multicast:
             interface = socket.inet_aton(settings.host)

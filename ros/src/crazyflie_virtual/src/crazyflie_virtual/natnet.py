@@ -40,7 +40,7 @@ class BodyPose(NamedTuple):
 
 
 def parse(datagram: bytes) -> tuple[int, bytes] | None:
-    """Return number and payload of a message; None when it is none."""
+    """Return number and payload of a message; None if the datagram is no message."""
     if len(datagram) < _HEADER.size:
         return None
     number, _ = _HEADER.unpack_from(datagram)

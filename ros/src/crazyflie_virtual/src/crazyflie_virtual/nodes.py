@@ -10,7 +10,7 @@ from crazyflie_virtual.mocap import MocapServer, MocapSettings
 from crazyflie_virtual.server import Server, VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
 
-_POLL_PERIOD = 0.5  #: How often the switches are read, s.
+_POLL_PERIOD = 0.5  #: Period at which the switches are read (s).
 
 
 class ServerNode(Node):

@@ -18,10 +18,10 @@ _FORM = struct.Struct("<4sH32s14d")
 class Observation(NamedTuple):
     """The truth about a vehicle at some moment."""
 
-    #: body_id, name: Of the vehicle; the name has at most 31 bytes.
+    #: body_id, name: those of the vehicle; the name has at most 31 bytes.
     body_id: int
     name: str
-    time: float  #: Of the machine's monotonic clock, s.
+    time: float  #: Time of the machine's monotonic clock (s).
     #: position, velocity: m and m/s, fixed frame.
     position: Triple
     velocity: Triple

@@ -268,7 +268,7 @@ _DEFAULT, _EXTENDED_TYPE_2, _DEFAULT_2 = 6, 7, 8
 
 _WORD = 4  #: Bytes of a request in which the answer to a write has the value as it is.
 _PERSISTENT = 1  #: The only extended type.
-_EXTENDED, _CORE, _READ_ONLY = 0x10, 0x20, 0x40  #: Flags beside the type's code.
+_EXTENDED, _CORE, _READ_ONLY = 0x10, 0x20, 0x40  #: Flags in the byte of the type's code.
 
 _NO_ENTRY = bytes([errno.ENOENT])
 
@@ -294,7 +294,7 @@ class Parameter:
 
     @property
     def has_effect(self) -> bool:
-        """Whether the vehicle does anything with it."""
+        """Whether the vehicle uses the value."""
         return self._owner is not None
 
     def set(self, value: float) -> None:

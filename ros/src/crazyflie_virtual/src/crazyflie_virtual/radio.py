@@ -18,11 +18,11 @@ from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
 
 BIT_RATE = 2e6  #: bit/s on air, of radio://.../2M.
-TURNAROUND = 130e-6  #: Of a transceiver, from standby or reception to transmission, s.
-#: Of an acknowledged packet with its USB transfers, without setup requests, s.
+TURNAROUND = 130e-6  #: Transceiver, from standby or reception to transmission (s).
+#: Time of an acknowledged packet with its USB transfers, without setup requests (s).
 ROUND_TRIP = 1.0 / 1370
 SETUP_REQUEST = 2.5e-3 / 3  #: A USB control transfer that changes address or acknowledgement, s.
-#: From one broadcast to the next, s: 37 bytes of 10 bits on the vehicle's serial line.
+#: Interval of two broadcasts (s): 37 bytes of 10 bits on the vehicle's serial line.
 BROADCAST_GAP = 0.5e-3
 _OVERHEAD_BITS = 8 * (1 + 5 + 2) + 9  #: Preamble, address, check sum; packet control field.
 
@@ -42,9 +42,9 @@ class RadioChannel:
     #: with the Crazyradio PA, and with cflib 0.1.34 for all. Otherwise they come with the packet
     #: (the Crazyradio 2.0's inline mode).
     has_setup_requests: bool = True
-    free: float = 0.0  #: When the dongle is free again, s.
-    busy: float = 0.0  #: For how long it has been at work, s.
-    #: unicasts, broadcasts: Packets so far.
+    free: float = 0.0  #: Time at which the dongle becomes free (s).
+    busy: float = 0.0  #: Total time for which it has been busy (s).
+    #: unicasts, broadcasts: number of packets sent.
     unicasts: int = 0
     broadcasts: int = 0
     _address: int | None = None
@@ -75,7 +75,7 @@ class RadioChannel:
 
 @dataclass(frozen=True)
 class Load:
-    """What is sent on a channel."""
+    """Traffic of a channel."""
 
     vehicles: int
     pose_rate: float  #: Frames of the motion capture, Hz.
@@ -87,11 +87,12 @@ class Load:
 
 @dataclass(frozen=True)
 class Usage:
-    """How a load of a channel is carried."""
+    """Utilization and delays of a channel under a load."""
 
-    share: float  #: Of the time that the dongle is at work; more than 1 is too much.
-    #: frame_delay, poll_delay: Longest time from when a frame, or a packet to a vehicle, is due
-    #: until it is there, s.
+    share: (
+        float  #: Fraction of time for which the dongle is busy; above 1 the channel is overloaded.
+    )
+    #: frame_delay, poll_delay: longest delay of a frame, and of a packet to a vehicle (s).
     frame_delay: float
     poll_delay: float
 

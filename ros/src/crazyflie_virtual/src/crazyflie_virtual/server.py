@@ -29,7 +29,7 @@ from crazyflie_virtual.vehicle import VirtualVehicle
 
 Address = tuple[str, int]  #: Host and port.
 _BURST = 256  #: Datagrams taken in at one time, so that a flood does not stop everything else.
-_STOP_LIMIT = 2.0  #: How long `Server.stop` waits for the thread, s.
+_STOP_LIMIT = 2.0  #: Longest wait of `Server.stop` for the thread (s).
 
 
 class Server(ABC):
@@ -163,10 +163,10 @@ def run_server(
         pass
 
 
-_TICK = 0.005  #: How long the vehicle may be behind the clock when nothing happens, s.
-#: What is simulated at once, s; beyond that the vehicle loses time instead of its link.
+_TICK = 0.005  #: Longest time between two steps of the vehicle when no packet comes (s).
+#: Longest time simulated at once (s); beyond it the vehicle loses time, and not its link.
 _GREATEST_LAG = 0.25
-_NULL = b"\xff"  #: What a scanner sends: it is no client.
+_NULL = b"\xff"  #: Packet of a scanner, which is no client.
 
 
 class VehicleServer(Server):

@@ -16,7 +16,7 @@ class NumberType:
 
     @property
     def is_float(self) -> bool:
-        """Whether it has a fraction."""
+        """Whether it is a floating-point type."""
         return self.format in "fe"
 
     @property

@@ -98,8 +98,7 @@ class Board:
         return packets
 
 
-#: Of the link port: packets that the radio chip answers itself, also while the microcontroller is
-#: off.
+#: Channel of the link port that the radio chip answers, also while the microcontroller is off.
 _RADIO_CHANNEL = 3
 
 _RADIO_COMMAND = 0xFE

@@ -26,13 +26,13 @@ WALL_COLOUR = (0.85, 0.85, 0.8)
 
 @dataclass(frozen=True, kw_only=True)
 class Shape:
-    """What all solid shapes have."""
+    """Attributes of all solid shapes."""
 
     #: No two objects of a world have the same; for those that move it is that of their tf frame.
     name: str
     centre: Position  #: x, y, z in the world's frame, m.
     colour: Colour = (0.5, 0.5, 0.5)
-    path: Path | None = None  #: Where the centre moves, if it does.
+    path: Path | None = None  #: Path of the centre; None for a shape that stands.
 
     @property
     def size(self) -> Position:
@@ -61,7 +61,7 @@ class Box(Shape):
     """A box that stands upright."""
 
     extent: Position  #: Along its own x, y and z, m.
-    yaw: float = 0.0  #: How far it is turned about the vertical, rad.
+    yaw: float = 0.0  #: Rotation about the vertical (rad).
     #: File of what is to be seen on its front, the side that looks along its own x; empty for
     #: nothing.
     picture: str = ""

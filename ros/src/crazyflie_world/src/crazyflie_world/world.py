@@ -1,4 +1,4 @@
-"""What stands and moves in a room."""
+"""A room: its floor, and objects that stand or move in it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from crazyflie_world.paths import Position
 from crazyflie_world.shapes import COLOUR, Box, Colour, Shape, cast
 
 FLOOR = "floor"  #: Name of the floor among the solids.
-TEXTURES = ("plain", "checkers", "speckles")  #: Of floors.
+TEXTURES = ("plain", "checkers", "speckles")  #: Textures of floors.
 
 
 class Floor(Parameters):
@@ -47,7 +47,7 @@ class World:
         return tuple(each for each in self.objects if each.path is not None)
 
     def __getitem__(self, name: str) -> Shape:
-        """Return the object with this name; KeyError if there is none."""
+        """Return the object with this name, or raise KeyError."""
         for each in self.objects:
             if each.name == name:
                 return each

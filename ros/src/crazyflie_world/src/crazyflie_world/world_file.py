@@ -48,7 +48,7 @@ class _Name(ParameterType):
 
 
 class _ObjectParameters(Parameters):
-    """What all objects but walls have."""
+    """Parameters of all objects but walls."""
 
     name: str = parameter(_Name(), "no other object has it")
     colour: tuple[float, float, float] = parameter(COLOUR, "red, green, blue", (0.5, 0.5, 0.5))
@@ -121,7 +121,7 @@ class WallParameters(Parameters):
 
 
 class WorldParameters(Parameters):
-    """What is in a world file besides objects."""
+    """Parameters of a world file, without its objects."""
 
     frame: str = parameter(FRAME, "tf frame of all positions", "world")
     floor: Floor = group(Floor, "floor")

@@ -24,7 +24,7 @@ from mocap_optitrack.marker_vehicle import SEPARATION, MarkerVehicle
 
 
 class OutputParameters(Parameters):
-    """How a body is published."""
+    """Parameters by which a body is published."""
 
     pose: str | None = parameter(
         TOPIC, "topic; a relative name is below the node's: `/mocap_node/Robot_1/pose`", None
@@ -58,12 +58,12 @@ class Body:
 
     @property
     def label(self) -> str:
-        """What the body is called in messages."""
+        """Name of the body in messages."""
         return self.key if self.name in (None, self.key) else f"{self.key} ({self.name})"
 
     @property
     def component(self) -> str:
-        """What the body is called in the diagnostics."""
+        """Name of the body in the diagnostics."""
         return f"rigid body {self.label}"
 
 
@@ -135,7 +135,7 @@ class SingleMarker(Body):
 
     @property
     def vehicle(self) -> MarkerVehicle:
-        """What the tracker has to know of it; its marker is at the start point less `offset`."""
+        """Configuration for the tracker; its marker is at the start point less `offset`."""
         p = self.parameters
         x, y, z = (a - b for a, b in zip(p.initial_position, p.offset, strict=True))
         limits = MotionLimits(p.max_velocity, p.max_acceleration)

@@ -14,8 +14,8 @@ _BUCKETS = 20
 #: than this, s; or, on a bad network, until the window is full.
 _AGREEMENT = 2e-3
 
-#: How fast the offset follows, s/s. A velocity from stamps is wrong by this fraction at most, and
-#: stamps never run backwards; no quartz drifts as fast.
+#: Largest rate of change of the offset (s/s). A velocity from stamps is wrong by this fraction at
+#: most, and stamps never run backwards; no quartz drifts as fast.
 _SLEW = 1e-3
 
 _JUMP = 0.1  #: A difference that no drift explains, s.
@@ -33,8 +33,8 @@ class FrameOrder(Enum):
 
     NEW = "new"  #: Sent after all others.
     OLD = "old"  #: Sent with or before one that has come already: doubled, or overtaken on its way.
-    FOREIGN = "foreign"  #: By another clock: too far back, or not even sent when it arrived.
-    #: One of the clocks was set; everything is learned anew, beginning with this message.
+    FOREIGN = "foreign"  #: Stamped by another clock: too old, or later than its arrival.
+    #: One of the clocks was set; learning restarts with this message.
     RESTART = "restart"
 
 
@@ -49,7 +49,7 @@ class ClockOffset:
     smoothly. Silence changes nothing.
 
     A message that contradicts the others is dropped. Only when they keep coming has a
-    clock been set, or the server been started again, and learning begins anew.
+    clock been set, or the server been restarted, and learning restarts.
     """
 
     _offset: float | None

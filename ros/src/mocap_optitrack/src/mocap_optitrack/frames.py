@@ -13,7 +13,7 @@ class Body(NamedTuple):
     body_id: int | None  #: Number that the server streams the body under; None when it has none.
     name: str | None  #: Name of the body on the server; None when it is not known.
     position: Vector3  #: m, in the server's coordinates.
-    quaternion: Quaternion  #: From the body's axes to the server's coordinates.
+    quaternion: Quaternion  #: Rotation from the body's axes to the server's coordinates.
     #: Whether the cameras saw the body in this frame; otherwise the pose is an old one, or none.
     is_tracked: bool
 
@@ -24,17 +24,17 @@ class Frame(NamedTuple):
     #: When the cameras took the frame, s of the server's clock; None when the stream does not have
     #: it.
     exposure: float | None
-    sent: float | None  #: When the server sent it, s of the same clock; None like `exposure`.
-    arrival: float  #: When it was received, s of the local clock.
+    sent: float | None  #: Time of sending by the same clock (s); None like `exposure`.
+    arrival: float  #: Time of reception by the local clock (s).
     bodies: tuple[Body, ...]
-    #: How long it had been on this machine by then, s; for streams without `exposure`.
+    #: Time that it had been on this machine by then (s); for streams without `exposure`.
     waited: float = 0.0
     #: Markers that the system has not assigned to a body, m, in the server's coordinates.
     points: tuple[Vector3, ...] = ()
 
 
 UP_AXES = ("z", "y")  #: Axes that may point up in a stream.
-_NORM_TOLERANCE = 0.01  #: How far the norm of a measured quaternion may be from 1.
+_NORM_TOLERANCE = 0.01  #: Largest difference of the norm of a measured quaternion from 1.
 
 
 def to_z_up(up_axis: str, position: Vector3, quaternion: Quaternion) -> tuple[Vector3, Quaternion]:

@@ -1,4 +1,4 @@
-"""How well motion capture works, for the diagnostics."""
+"""The state of motion capture, for the diagnostics."""
 
 import math
 from collections import Counter
@@ -11,8 +11,7 @@ from mocap_optitrack.frames import Body
 
 OK, WARN, ERROR = range(3)  #: Levels, as in diagnostic_msgs/DiagnosticStatus.
 
-#: How long a body may be missing before that is a fault: nothing is seen in the first moments of a
-#: stream, s.
+#: Time after which a missing body is a fault (s): the first moments of a stream show nothing.
 _GRACE = 2.0
 
 #: Bodies that are not configured and are remembered, so that a message can name them.
@@ -22,7 +21,7 @@ _TWO_SERVERS = "the server's clock keeps jumping: do two servers send to the sam
 
 
 class Event(Enum):
-    """What is counted beside good frames."""
+    """Events that are counted, apart from good frames."""
 
     LEARNING = "a frame came before the server's clock was known"
     CLOCK_SET = "the server's clock has jumped"
@@ -34,7 +33,7 @@ class Event(Enum):
 class Status(NamedTuple):
     """The state of the stream or of a body."""
 
-    component: str  #: What it is about.
+    component: str  #: Name of the stream or body.
     level: int  #: `OK`, `WARN` or `ERROR`.
     message: str  #: For an operator.
     values: dict[str, str]  #: Figures, with their units in the keys.
@@ -116,7 +115,7 @@ class Health:
     def report(self, now: float) -> list[Status]:
         """Return the state of the stream, then of every body, since the last report.
 
-        Counting begins anew at ``now`` (s).
+        Counting starts again at ``now`` (s).
         """
         statuses = [self._stream_status(now)]
         statuses += [self._body_status(key, now) for key in self._bodies]

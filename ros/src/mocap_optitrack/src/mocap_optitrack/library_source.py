@@ -17,7 +17,7 @@ from mocap_optitrack.frame_times import ArrivalTimes
 from mocap_optitrack.frames import Body, Frame
 from mocap_optitrack.source import Source, SourceError
 
-SYSTEMS = ("vicon", "qualisys", "vrpn")  #: What the package can do beside NatNet.
+SYSTEMS = ("vicon", "qualisys", "vrpn")  #: Systems other than NatNet.
 _MARGIN = 2.0  #: Added to the worker's own limit of connecting, s.
 
 _CHUNK = 65536

@@ -21,8 +21,8 @@ import sys
 import time
 from typing import Any
 
-CONNECT_LIMIT = 10.0  #: How long connecting may take, s.
-FRAME_LIMIT = 5.0  #: How long a frame may take, s.
+CONNECT_LIMIT = 10.0  #: Longest time for connecting (s).
+FRAME_LIMIT = 5.0  #: Longest wait for a frame (s).
 
 
 def main() -> int:

@@ -13,15 +13,16 @@ from mocap_optitrack.frames import Vector3
 Point = npt.NDArray[np.float64]  #: x, y, z in m, z up.
 GATE = 4.0  #: Standard deviations: of three normal variables together, 1 in 1000 is farther away.
 
-#: Of a marker along each axis, m^2. OptiTrack tells less than 0.3 mm; a marker that is seen in part
-#: by some cameras is off by more.
+#: Variance along each axis (m^2). OptiTrack states less than 0.3 mm; markers that some cameras see
+#: only in part have larger errors.
 _MEASUREMENT_VARIANCE = 0.002**2
 
-#: Of `MarkerMotion.costs`: -2 log(0.1 * 0.1 / m^3 * (2 pi _MEASUREMENT_VARIANCE)^1.5), for a marker
-#: that is missing in one frame of ten, and one reflection in 10 m^3.
+#: Cost in the units of `MarkerMotion.costs`:
+#: -2 log(0.1 * 0.1 / m^3 * (2 pi _MEASUREMENT_VARIANCE)^1.5), for a marker that is missing in one
+#: frame of ten, and one reflection in 10 m^3.
 UNSEEN_COST = 40.0
 
-_FIRST_SPEED_VARIANCE = 1.0  #: Of a marker that has been seen once, m^2/s^2.
+_FIRST_SPEED_VARIANCE = 1.0  #: Variance of the velocity after the first measurement (m^2/s^2).
 _BOX_MARGIN = GATE * (2.0 * _MEASUREMENT_VARIANCE) ** 0.5  #: Noise of two measurements, m.
 
 
@@ -43,10 +44,10 @@ class MarkerMotion:
     """
 
     def __init__(self, time: float, position: Point, limits: MotionLimits):
-        self.time = time  #: Of the last measurement, s.
+        self.time = time  #: Time of the last measurement (s).
         self.measured = position  #: The last measurement, m.
         self.position, self.velocity = position, np.zeros(3)  #: Estimates at that time, m and m/s.
-        self.limits = limits  #: From the next prediction on.
+        self.limits = limits  #: Limits, used from the next prediction on.
         self._covariance = (_MEASUREMENT_VARIANCE, 0.0, _FIRST_SPEED_VARIANCE)
 
     def variance(self, time: float) -> float:
@@ -96,8 +97,8 @@ class MarkerMotion:
         )
 
 
-#: By how much the second-best assignment has to cost more: it is less likely by exp(-3), which is 1
-#: in 20.
+#: Cost by which the second-best assignment has to be worse: it is less likely by exp(-3), or 1 in
+#: 20.
 _AMBIGUITY = 6.0
 
 _IMPOSSIBLE = 1e6

@@ -14,13 +14,13 @@ from mocap_optitrack.marker_motion import MarkerMotion, MotionLimits, Point
 #: motor. So a gate of half of it has the marker of one vehicle at most.
 SEPARATION = 0.1
 
-#: How far a marker may be from its vehicle's start point, m, if no other start point is nearer than
-#: three times as much.
+#: Largest distance of a marker from its vehicle's start point (m), unless another start point is
+#: nearer than three times as much.
 START_RADIUS = 0.25
 
 #: A marker that has been within so many m for so many s rests.
 _REST_TIME, _REST_RADIUS = 0.5, 0.02
-_GROUND = 0.1  #: How much higher than at its first place a vehicle on the ground may be, m.
+_GROUND = 0.1  #: Largest height above its first place of a vehicle on the ground (m).
 
 #: A vehicle without poses has stopped after so many s, and is on the ground after so many s:
 #: crazyflie_takeoff's filter ends its motion and lets it sink.
@@ -28,7 +28,7 @@ _STOP_TIME, _FALL_TIME = 1.0, 5.0
 
 #: Frames in which a marker has been seen that is taken for a vehicle's: reflections flash.
 _LEAST_SIGHTINGS = 3
-#: How long a marker of no vehicle may be unseen, s; one that `flashes` in no frame.
+#: Time after which an unseen marker of no vehicle is forgotten (s); one that `flashes`, at once.
 FORGET_TIME = 0.1
 
 
@@ -36,12 +36,12 @@ class MarkerVehicle(NamedTuple):
     """A vehicle with one marker."""
 
     name: str
-    start: Vector3  #: Of its marker, before the first flight, m, z up.
+    start: Vector3  #: Position of its marker before the first flight, z up (m).
     limits: MotionLimits = MotionLimits()
 
 
 class TrackState(Enum):
-    """What is known of a vehicle's marker.
+    """Knowledge of a vehicle's marker.
 
     ======= ============================================================ =======
     state   event                                                        next
@@ -107,7 +107,7 @@ class TrackedVehicle:
 
     @property
     def motion(self) -> MarkerMotion:
-        """Of its marker; there is none while it is `TrackState.UNSEEN`."""
+        """Motion of its marker; not defined while the state is `TrackState.UNSEEN`."""
         return self.marker.motion
 
     @property

@@ -29,7 +29,7 @@ from mocap_optitrack.parameters import NATNET, MocapParameters
 from mocap_optitrack.source import Receiver
 from mocap_optitrack.tracker import Tracker
 
-_REPORT_PERIOD = 1.0  #: Of the diagnostics, s; REP 107 wants one report a second.
+_REPORT_PERIOD = 1.0  #: Period of the diagnostics (s): REP 107 wants one report a second.
 _REPEAT = 5.0  #: The same warning comes at most this often, s.
 
 #: How long a heading counts, s: a gyroscope drifts by some degrees a minute, and the driver's come

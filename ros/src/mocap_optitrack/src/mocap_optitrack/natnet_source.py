@@ -40,7 +40,7 @@ def interface_towards(address: str) -> str | None:
 
 
 def join_group(receiver: socket.socket, address: str, port: int, interface: str) -> None:
-    """Let a UDP socket receive the datagrams to a group at a port, from one interface.
+    """Make a UDP socket receive the datagrams to a group at a port, from one interface.
 
     OSError: the port is taken, or this machine has no such interface.
     """
@@ -51,13 +51,13 @@ def join_group(receiver: socket.socket, address: str, port: int, interface: str)
     receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
 
 
-_ANSWER_LIMIT = 2.0  #: How long a server may take to answer, s.
+_ANSWER_LIMIT = 2.0  #: Longest wait for an answer of the server (s).
 _ASK_AGAIN = 0.5  #: Datagrams get lost: from one request for an answer to the next, s.
-_NAMES_AGAIN = 2.0  #: From one request for the names of bodies to the next, s.
+_NAMES_AGAIN = 2.0  #: Interval of requests for the names of bodies (s).
 #: Without a frame for this long the server is asked again, s: after a restart it has no clients.
 _SILENCE = 0.5
-_KEEP_ALIVE = 1.0  #: From one keep-alive to the next, without which a server stops sending, s.
-#: From one warning about datagrams of other senders than the server to the next, s.
+_KEEP_ALIVE = 1.0  #: Interval of keep-alives, without which a server stops sending (s).
+#: Interval of warnings about datagrams of senders other than the server (s).
 _FOREIGN_AGAIN = 5.0
 
 _LARGEST = 65536

@@ -81,7 +81,7 @@ class StreamVersion(ParameterType):
 
 
 class NatNetParameters(Parameters):
-    """How to find a NatNet server, ``optitrack_config``."""
+    """Connection to a NatNet server, ``optitrack_config``."""
 
     server_address: str | None = parameter(
         TEXT,
@@ -113,7 +113,7 @@ class NatNetParameters(Parameters):
 
 
 class LibraryParameters(Parameters):
-    """How to find a server of another system, ``motioncapture_config``."""
+    """Connection to a server of another system, ``motioncapture_config``."""
 
     hostname: str | None = parameter(
         TEXT,

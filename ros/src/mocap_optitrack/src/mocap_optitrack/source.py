@@ -10,13 +10,13 @@ from mocap_optitrack.frames import Frame
 
 _SILENCE = 1.0  #: A connection without a frame for this long is reported, s.
 
-#: A connection without a frame for this long is made anew, s: the server may have moved, or a
+#: A connection without a frame for this long is opened again (s): the server may have moved, or a
 #: network interface may have forgotten its multicast groups.
 _RECONNECT_AFTER = 10.0
 
-_RETRY = 1.0  #: From a failure to the next attempt, s.
-_POLL = 0.1  #: How long a source may wait for a frame before `Receiver.stop` is looked for, s.
-_STOP_LIMIT = 0.5  #: How long `Receiver.stop` waits for the thread, s.
+_RETRY = 1.0  #: Time from a failure to the next attempt (s).
+_POLL = 0.1  #: Longest wait of a source for a frame, after which `Receiver.stop` is checked (s).
+_STOP_LIMIT = 0.5  #: Longest wait of `Receiver.stop` for the thread (s).
 
 
 class SourceError(Exception):
@@ -40,7 +40,7 @@ class Source(ABC):
     @property
     @abstractmethod
     def silence_hint(self) -> str:
-        """What may be the matter when no frames come over an open connection."""
+        """Possible causes when no frames come over an open connection."""
 
     @abstractmethod
     def close(self) -> None:

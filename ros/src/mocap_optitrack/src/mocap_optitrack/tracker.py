@@ -10,8 +10,8 @@ from mocap_optitrack.frames import Frame, Quaternion, Vector3, normalized, to_z_
 from mocap_optitrack.health import Event, Health
 from mocap_optitrack.marker_tracker import MarkerTracker
 
-#: By how much a stamp may be ahead of its arrival, s: the offset of the server's clock is known to
-#: a millisecond or two.
+#: Largest time of a stamp ahead of its arrival (s): the offset of the server's clock is known to a
+#: millisecond or two.
 _LEAD = 0.005
 
 _EVENTS = {
@@ -22,14 +22,14 @@ _EVENTS = {
 
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
-_RESET = 1.0  #: By how much local time steps back when a simulation is reset, at least, s.
+_RESET = 1.0  #: Smallest step back of local time at the reset of a simulation (s).
 
 
 class BodyPose(NamedTuple):
     """A body where the cameras saw it."""
 
     body: Body
-    time: float  #: When, s of the local clock.
+    time: float  #: Time by the local clock (s).
     position: Vector3  #: m, z up.
     quaternion: Quaternion | None  #: Of norm 1; None for a single marker.
 
@@ -39,8 +39,8 @@ class Tracker:
 
     A frame counts once: one that is not newer than the last one is dropped. So is one that is older
     than ``stale_after`` (s) on arrival, or from the future, or from another server's clock. Of a
-    frame, bodies are dropped that were not tracked or whose pose is none. ``up_axis`` is the
-    stream's, see `axes.UP_AXES`; ``health`` counts what happens; ``hold_time`` (s) and ``log`` are
+    frame, bodies are dropped that were not tracked or whose pose is invalid. ``up_axis`` is the
+    stream's, see `frames.UP_AXES`; ``health`` counts events; ``hold_time`` (s) and ``log`` are
     those of a `MarkerTracker`.
     """
 

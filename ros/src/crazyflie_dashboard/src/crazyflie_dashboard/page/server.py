@@ -11,7 +11,7 @@ import uvicorn
 from fastapi import FastAPI
 from nicegui import Client, app, core, ui
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
 
 from crazyflie_dashboard.access import Access
 from crazyflie_dashboard.dashboard import Dashboard
@@ -53,6 +53,14 @@ async def _camera(dashboard: Dashboard, request: Request) -> Response:
     return Response(image, media_type=kind, headers={"cache-control": "no-store"})
 
 
+async def _report(dashboard: Dashboard, request: Request) -> Response:
+    """Answer with the report on the last recording."""
+    report = dashboard.report()
+    if report is None:
+        return PlainTextResponse("No recording has been ended here.\n", 404)
+    return FileResponse(report, media_type="text/html")
+
+
 class Page:
     """The server of the page; one in a process, since NiceGUI has one application in a process.
 
@@ -69,6 +77,7 @@ class Page:
         Client.shared_head_html = HEAD
         application.post("/emergency")(partial(_emergency, dashboard))
         application.get("/camera")(partial(_camera, dashboard))
+        application.get("/report")(partial(_report, dashboard))
 
         # Without a history of messages a page that has lost its connection is loaded anew.
         ui.page("/", title="Crazyflie mission control")(lambda: View(dashboard))

@@ -21,6 +21,7 @@ RATES = {
     "final_control": "control",
     "cmd_vel": "control",
 }
+CHARGE_RANGE = 3.0, 4.2  #: Voltages of an empty and of a full battery, V.
 REACHED = 0.15  #: From a goal, m: it is not shown any more.
 LOOKS = ("ground", "flight", "stale", "emergency")
 
@@ -42,6 +43,7 @@ class VehiclesPanel:
             self._up.props("icon=flight_takeoff color=positive")
             self._height = _number("height, m", 1.0, *HEIGHTS)
             self._button("Land", self._land).props("icon=flight_land color=primary")
+            self._button("Hold", self._hold).props("icon=pause color=secondary")
         with ui.element("div").classes("tools goal"):
             self._goal = [_number(f"{axis}, m") for axis in "xyz"]
             self._yaw = _number("yaw, °")
@@ -50,7 +52,8 @@ class VehiclesPanel:
             field.on_value_change(self._draw_goal)
         ui.label(
             "Click on the floor to set a goal, drag its handle, then press Go. Several vehicles "
-            "keep their formation."
+            "keep their formation. Hold stops them where they are; a mission goes on with its next "
+            "command."
         ).classes("hint")
         self._cards = Cards()
         self._cards.on("choose", self._choose)
@@ -98,6 +101,10 @@ class VehiclesPanel:
 
     async def _land(self, event: GenericEventArguments) -> None:
         await self._session.command(Action.LAND, self._session.chosen_names, event.args)
+
+    async def _hold(self, event: GenericEventArguments) -> None:
+        self._sent = None
+        await self._session.command(Action.HOLD, self._session.chosen_names, event.args)
 
     def _set_goal(self, event: GenericEventArguments) -> None:
         x, y, z = self._goal
@@ -161,6 +168,7 @@ def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
         "look": LOOKS[condition(vehicle)],
         "facts": [fact for fact in facts if fact[1]],
         "actions": actions,
+        "charge": None if vehicle.battery is None else _charge(vehicle.battery),
         "chosen": is_chosen,
     }
 
@@ -169,11 +177,17 @@ def offered(vehicle: VehicleSnapshot) -> set[Action]:
     """Return what its card offers: what it can be told as it is now."""
     shown = set(vehicle.actions) - {Action.GO_TO}
     if vehicle.is_emergency:
-        return shown - {Action.TAKEOFF, Action.LAND, Action.ARM}
+        return shown - {Action.TAKEOFF, Action.LAND, Action.ARM, Action.HOLD}
     shown.discard(Action.RESET)
     if vehicle.is_in_flight:
         return shown - {Action.TAKEOFF, Action.ARM, Action.DISARM, Action.REBOOT}
-    return shown
+    return shown - {Action.HOLD}
+
+
+def _charge(voltage: float) -> float:
+    # In steps: a bar that changes with every millivolt would be sent again all the time.
+    low, high = CHARGE_RANGE
+    return round(min(max((voltage - low) / (high - low), 0.0), 1.0), 2)
 
 
 def _reason(vehicle):

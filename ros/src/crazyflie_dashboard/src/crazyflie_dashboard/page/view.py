@@ -1,5 +1,6 @@
 """What one page consists of, and how it follows the graph."""
 
+import json
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,7 +18,7 @@ from crazyflie_dashboard.page.plots_panel import PlotsPanel
 from crazyflie_dashboard.page.scene_view import SceneView
 from crazyflie_dashboard.page.session import CLICKED, Session
 from crazyflie_dashboard.page.vehicles_panel import VehiclesPanel
-from crazyflie_dashboard.snapshot import Scene
+from crazyflie_dashboard.snapshot import Scene, VehicleSnapshot
 
 SCENE_PERIOD = 0.05
 PANEL_PERIOD = 0.5  #: Between two updates, s.
@@ -30,6 +31,7 @@ class View:
     def __init__(self, dashboard: Dashboard):
         self._dashboard = dashboard
         self._session = Session(dashboard, context.client)
+        self._alarms: set[str] = set()
         with ui.element("div").classes("page"):
             with ui.element("div").classes("bar"):
                 self._build_bar()
@@ -49,6 +51,9 @@ class View:
         self._missions = ui.label().classes("summary")
         self._stop = ui.button("Stop mission").props("unelevated color=warning icon=stop")
         self._stop.on("click", self._stop_mission, js_handler=CLICKED)
+        self._record = ui.button("Record", on_click=self._turn_recording)
+        self._record.props("flat dense icon=fiber_manual_record")
+        self._sound = ui.switch("Alarm", value=True).props("dense")
         self._control = ui.label().classes("control")
         self._take = ui.button("Take control", on_click=self._take_or_release)
         self._take.props("outline").classes("take")
@@ -119,8 +124,14 @@ class View:
             f"{count} {noun} · {flying} in flight · frame {scene.fixed_frame}{trouble}"
         )
         self._summary.classes(add="bad" if trouble else "", remove="" if trouble else "bad")
+        alarms = {what for each in scene.vehicles.values() for what in alarms_of(each)}
+        if self._sound.value and (new := sorted(alarms - self._alarms)):
+            ui.run_javascript(f"alarm({json.dumps(new)})")
+        self._alarms = alarms
         self._missions.text = " · ".join(scene.missions)
         self._stop.set_visibility(bool(scene.missions))
+        self._record.text = "Stop recording" if scene.recording == "recording" else "Record"
+        self._record.set_enabled(scene.recording in ("", "recording"))
         self._show_control()
         self._panels[self._tabs.value].refresh(scene)
 
@@ -143,5 +154,21 @@ class View:
             await self._session.take_control()
         self._show_control()
 
+    async def _turn_recording(self) -> None:
+        is_on = not self._dashboard.scene().recording
+        report = await self._session.result(self._dashboard.record(self._session.page, is_on))
+        if report is not None:
+            self._session.show_report()
+
     async def _stop_mission(self, event: GenericEventArguments) -> None:
         await self._session.succeeds(self._dashboard.stop_mission(self._session.page, event.args))
+
+
+def alarms_of(vehicle: VehicleSnapshot) -> list[str]:
+    """Return what an operator who does not look at the page has to know of a vehicle."""
+    found = ["emergency"] if vehicle.is_emergency else []
+    if vehicle.is_in_flight:
+        found += ["no pose"] if vehicle.is_stale else []
+        found += ["battery low"] if vehicle.is_battery_low else []
+        found += ["held"] if vehicle.is_held else []
+    return [f"{vehicle.name}: {what}" for what in found]

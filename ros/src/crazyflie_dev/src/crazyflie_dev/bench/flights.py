@@ -1,4 +1,4 @@
-"""What is launched, flown and measured; each function returns values by the name of their row."""
+"""Flights that are measured; each function returns values by the name of their row."""
 
 import bisect
 import contextlib
@@ -22,8 +22,8 @@ from crazyflie_utils.testing.programs import running
 
 Figures = dict[str, float]
 
-DURATION = 20.0  #: Of a measurement in a flight, s.
-PERIOD = 0.01  #: Of the controls, s.
+DURATION = 20.0  #: Duration of a measurement in a flight (s).
+PERIOD = 0.01  #: Period of the controls (s).
 
 
 def machine() -> Figures:

@@ -23,9 +23,9 @@ from rosgraph.network import read_ros_handshake_header, write_ros_handshake_head
 _LENGTH = struct.Struct("<I")
 _TIME = struct.Struct("<2I")
 
-#: Where a stamp is in a serialized message; in others it is behind a sequence number.
+#: Offset of a stamp in a serialized message; in others it follows a sequence number.
 _STAMP_AT = {"/tf": 8, "/clock": 0}
-_LIMIT = 10.0  #: How long a publisher may take to answer, s.
+_LIMIT = 10.0  #: Longest wait for an answer of a publisher (s).
 _CALLER = "/bench_listener"
 
 

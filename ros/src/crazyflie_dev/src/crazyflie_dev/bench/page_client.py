@@ -12,8 +12,8 @@ import socketio
 
 from crazyflie_dev.bench.graph import NotMeasuredError
 
-_LIMIT = 30.0  #: How long the dashboard may take to answer, s.
-_NICENESS = 19  #: Of the thread: a browser on another computer takes nothing from this one.
+_LIMIT = 30.0  #: Longest wait for an answer of the dashboard (s).
+_NICENESS = 19  #: Niceness of the thread: a browser on another computer would not load this one.
 
 
 class PageClient:

@@ -114,7 +114,7 @@ class GoToFlight:
     def tick(self, time: float, stamp: float | None, pose: Pose | None) -> Setpoint | None:
         """Return the setpoint for a time (s); None leaves the vehicle to its own watchdog.
 
-        The pose is the latest one, None if there is none. Its stamp is in s of any clock; the same
+        The pose is the latest one, or None. Its stamp is in s of any clock; the same
         stamp is the same pose.
         """
         self._follow_clock(time)

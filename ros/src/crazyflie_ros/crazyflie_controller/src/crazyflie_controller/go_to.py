@@ -102,7 +102,7 @@ class Pose(NamedTuple):
 
 
 class Setpoint(NamedTuple):
-    """What cmd_vel carries.
+    """A setpoint on cmd_vel.
 
     Pitch (deg, positive accelerates ahead) is ``linear.x``, roll (deg, positive accelerates to the
     right) ``linear.y``, thrust (PWM) ``linear.z``, yaw rate (deg/s, clockwise) ``angular.z``.

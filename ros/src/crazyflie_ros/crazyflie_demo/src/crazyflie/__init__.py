@@ -26,7 +26,7 @@ from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 
 _WORLD = "world"  #: The fixed frame, unless the script's parameter ~frames/fixed says otherwise.
 _TF_LIMIT = 10.0  #: Longest time until a position, or a voltage, is received, s.
-#: Of a position, s: tf keeps the last one of a vehicle that is not tracked any more.
+#: Age limit of a position (s): tf keeps the last one of a vehicle that is not tracked any more.
 _MAX_POSITION_AGE = 0.5
 
 #: Namespace, below a vehicle's name, of crazyflie_mission_api's high_level_node, which offers the

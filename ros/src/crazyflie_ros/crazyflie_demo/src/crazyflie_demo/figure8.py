@@ -20,8 +20,8 @@ from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece, evaluate,
 
 WIDTH, HEIGHT = 0.75, 0.375  #: Amplitudes along x and y, m.
 DURATION, RAMP, PIECE = 10.0, 2.0, 1.0  #: s.
-_RATE = 2.0 * math.pi / (DURATION - RAMP)  #: Of the phase between the ramps, rad/s.
-#: Of `crazyflie_model.trajectory.minimum_jerk`, by powers of s.
+_RATE = 2.0 * math.pi / (DURATION - RAMP)  #: Rate of the phase between the ramps (rad/s).
+#: Coefficients of `crazyflie_model.trajectory.minimum_jerk`, by powers of s.
 _RAMP_INTEGRAL = (0.0, 0.0, 0.0, 0.0, 2.5, -3.0, 1.0)
 
 

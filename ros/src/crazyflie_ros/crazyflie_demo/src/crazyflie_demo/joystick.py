@@ -5,7 +5,7 @@ import struct
 #: Axes, with the right stick for tilt: left, up and forward are positive.
 ROLL, PITCH, YAW, THRUST = 3, 4, 0, 1
 LAND, EMERGENCY, TAKEOFF, HEADLIGHT = 0, 1, 2, 4  #: Buttons.
-AXES, BUTTONS = 8, 11  #: How many a gamepad has.
+AXES, BUTTONS = 8, 11  #: Number of axes and buttons of a gamepad.
 
 
 #: struct js_event: time in ms, value, type, number of the axis or button.

@@ -10,8 +10,10 @@ from typing import NamedTuple
 from crazyflie_demo import joystick
 from crazyflie_demo.joystick import PITCH, ROLL, THRUST, YAW
 
-FIRST_HOLD = 0.6  #: How long a key counts as held after it was pressed, s: repetition begins late.
-REPEAT_HOLD = 0.15  #: How long it does after a repetition, s.
+FIRST_HOLD = (
+    0.6  #: Time for which a key counts as held after its press (s): repetition begins late.
+)
+REPEAT_HOLD = 0.15  #: Time for which a key counts as held after a repetition (s).
 
 _DEFLECTIONS = {
     "\x1b[A": (PITCH, 1.0),

@@ -1,4 +1,4 @@
-"""What several nodes share: parameters, goals, and the latest axes of a joystick."""
+"""Parts that several nodes share: parameters, goals, and the latest axes of a joystick."""
 
 import math
 
@@ -12,7 +12,7 @@ from crazyflie_utils import NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TOPIC, Integer, Number
 
 AXIS = Integer(0, 255)  #: Number of a joystick's axis.
-RATE = Number("Hz", above=0.0, maximum=500.0)  #: How often something is published.
+RATE = Number("Hz", above=0.0, maximum=500.0)  #: Rate of a publisher.
 
 
 class JoyParameters(Parameters):
@@ -78,7 +78,7 @@ class JoyAxes:
         return self._handle.time() <= self._expiry
 
     def axis(self, index: int) -> float:
-        """Return an axis, -1 to 1; 0 if there is none, or no joystick."""
+        """Return an axis, -1 to 1; 0 without this axis, or without a joystick."""
         if not self.are_alive() or index >= len(self._axes):
             return 0.0
         value = self._axes[index]

@@ -147,7 +147,7 @@ class QuadrotorTeleopNode(CmdVelTeleopNode):
 
 _HEADLIGHT_PARAMETER = "ring/headlightEnable"
 
-_LIMIT = 5.0  #: How long a service may take, s.
+_LIMIT = 5.0  #: Longest duration of a service call (s).
 
 
 class JoystickControllerParameters(JoyParameters):

@@ -12,9 +12,9 @@ from crazyflie_model.elementwise import join
 from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
 from crazyflie_utils.text import TextFileError, number_from_text, read_text, shortened, shown
 
-#: Of a line in a file: duration, then the coefficients of x, y, z and yaw.
+#: Numbers in a line of a file: duration, then the coefficients of x, y, z and yaw.
 COLUMNS = 1 + 4 * COEFFICIENTS
-_GAP = 0.01  #: How far apart two pieces may be where they meet, m or rad.
+_GAP = 0.01  #: Largest gap between two pieces where they meet (m or rad).
 
 
 class TrajectoryError(ValueError):

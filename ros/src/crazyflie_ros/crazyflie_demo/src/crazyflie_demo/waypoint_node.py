@@ -35,7 +35,7 @@ class WaypointParameters(GoalParameters, PoseParameters):
 class DemoNode(Node):
     """Publish waypoints as goals, one after the other; these are a square."""
 
-    #: Where to go unless the parameter ``waypoints`` says otherwise.
+    #: Default of the parameter ``waypoints``.
     waypoints: tuple[Waypoint, ...] = (
         Waypoint(0.0, 0.0, 0.5, 0.0, 2.0),
         Waypoint(0.5, 0.5, 0.5, 0.0, 1.0),

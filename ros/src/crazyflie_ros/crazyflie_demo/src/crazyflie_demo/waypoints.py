@@ -49,7 +49,7 @@ class WaypointList(ParameterType):
 
 
 class WaypointFollower:
-    """Which waypoint is the goal.
+    """The waypoint that is the goal.
 
     A waypoint is reached within the tolerances (m and rad); after its seconds the next one is the
     goal. The last one stays.

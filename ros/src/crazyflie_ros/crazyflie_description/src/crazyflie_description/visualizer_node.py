@@ -31,7 +31,7 @@ class FlownPath:
     def add(self, stamp: float, position: Sequence[float]) -> bool:
         """Append the vehicle's position (x, y, z, m); return whether ``positions`` has changed.
 
-        A stamp (s) before the last one means that time has been reset: the path begins anew.
+        A stamp (s) before the last one means that time has been reset: the path starts again.
         """
         is_reset = self._stamp is not None and stamp < self._stamp
         self._stamp = stamp

@@ -9,7 +9,7 @@ from crazyflie_driver.srv import AddCrazyflie
 from crazyflie_driver.vehicle_parameters import CrazyflieAddParameters
 from crazyflie_utils import Node, NodeHandle
 
-_LIMIT = 60.0  #: How long, in s, the server may take to come up and to connect.
+_LIMIT = 60.0  #: Time limit of the start of the server and of its connecting, s.
 
 
 def command_again(handle: NodeHandle, package: str, executable: str) -> str:

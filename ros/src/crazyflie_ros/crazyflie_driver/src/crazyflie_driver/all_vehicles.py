@@ -99,7 +99,7 @@ LIMIT = 5.0  #: Time limit of the vehicles' answers, s; their own limits are sho
 class AllVehicles:
     """Offers a service for all vehicles for each high-level command.
 
-    What is checked for a single vehicle is checked for each, before any is sent the command; a
+    All checks for a single vehicle are made for each, before any is sent the command; a
     landing or stop is sent to all others when it fails for one. A radio channel gets one
     packet for all if each of its vehicles needs just that; otherwise each vehicle gets its own.
     Every vehicle has to answer; one that has not received the broadcast is sent its own command.
@@ -175,7 +175,7 @@ def _results(
     results: dict[DriverVehicle, Any] = {}
     errors: dict[DriverVehicle, str] = {}
     for vehicle, future in futures.items():
-        # What is refused must not be carried out later.
+        # A refused command must not be carried out later.
         if future.cancel() if may_withdraw else not future.done():
             errors[vehicle] = f"no answer within {LIMIT:g} s"
         elif (error := future.exception()) is not None:

@@ -1,6 +1,5 @@
 """High-level commands to one vehicle, and the precautions against dropping it."""
 
-import contextlib
 import enum
 import time
 from collections.abc import Callable
@@ -13,7 +12,7 @@ from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.flight_state import REPORT_LAG, FlightState
 from crazyflie_driver.jobs import Job
 from crazyflie_driver.log_topics import LogTopics
-from crazyflie_driver.monitors import Charge
+from crazyflie_driver.monitors import Charge, Touchdown
 from crazyflie_driver.setpoint_gate import Event
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_link.broadcast import SharedCommand
@@ -75,13 +74,15 @@ _SENDERS: dict[str, Callable[[HighLevel, Any], None]] = {
 class Command:
     """A high-level command: ``send(high_level)`` blocks until the vehicle has replied.
 
-    The name is that of its service, the duration how long it is carried out, s.
+    The name is that of its service, the duration that of the motion, s. A landing has a height (m),
+    unless it only goes on with the one under way.
     """
 
     name: str
     send: Callable[[HighLevel], None]
     duration: float = 0.0
     group_mask: int = ALL_GROUPS
+    height: float | None = None
 
     def by(self, shared: SharedCommand | None) -> "Command":
         """Return the command, sent with those to other vehicles; with None the same command."""
@@ -100,7 +101,11 @@ def requested(name: str, request: Any) -> Command:
     duration = request.duration.to_sec() if hasattr(request, "duration") else 0.0
     sender = _SENDERS[name]
     return Command(
-        name, lambda high_level: sender(high_level, request), duration, request.groupMask
+        name,
+        lambda high_level: sender(high_level, request),
+        duration,
+        request.groupMask,
+        request.height if name == LAND else None,
     )
 
 
@@ -149,6 +154,8 @@ class FlightCommands:
     _notify_timer: Timer | None = None
     _feeds_watchdog: bool = False
     refusal: str = ""  #: Why no command may move the vehicle; empty if it may.
+    #: The landing under way, to be followed to the ground; None after any other command.
+    touchdown: Touchdown | None = None
     # A command that was not answered and was refused to its caller; it may still be carried out.
     _unanswered: Command | None = None
     _look_up: Future[bool] | None = None
@@ -316,9 +323,12 @@ class FlightCommands:
     def _execute(self, command, job):
         job.check()
         gate, handle = self._context.gate, self._context.handle
-        number = gate.high_level(handle.time())
+        begin = handle.time()
+        number = gate.high_level(begin)
+        if command.name != LAND:
+            self.touchdown = None
         try:
-            self._send_and_look_up(command, job)
+            is_accepted = self._send_and_look_up(command, job)
         except CrazyflieError:
             gate.resume(number)
             job.check()
@@ -327,6 +337,8 @@ class FlightCommands:
         is_refused = job.done.cancelled() and not command.ends_flight
         self._unanswered = command if is_refused else None
         self._setpoints.high_level_until(handle.time() + command.duration)
+        if command.height is not None and (is_accepted or self.touchdown is None):
+            self.touchdown = Touchdown(begin, command.height, command.duration)
         if command.ends_flight:
             self._flight.end_accepted(command.duration)
         else:
@@ -348,6 +360,7 @@ class FlightCommands:
         return True
 
     def _send_and_look_up(self, command, job):
+        # Returns False for a landing of a vehicle that lands already.
         was_at_rest = self._flight.is_at_rest()
         is_sent = False
 
@@ -358,7 +371,7 @@ class FlightCommands:
             return may
 
         try:
-            _send(command, self._context.crazyflie.high_level.guarded(may_send))
+            return _send(command, self._context.crazyflie.high_level.guarded(may_send))
         except (NoReplyError, LinkLostError) as error:
             if command.ends_flight or not is_sent:
                 raise
@@ -372,6 +385,7 @@ class FlightCommands:
             if not self._shows(state, command, was_at_rest):
                 raise NoReplyError(f"{error}; the vehicle's state is: {state.words()}") from None
             self._context.warn(f"{error}: the vehicle's state shows that it obeys")
+            return True
 
     def _state_after(self, command, job, was_at_rest):
         # The vehicle answers in the order in which it receives. It shows a command a little later.
@@ -423,6 +437,10 @@ class FlightCommands:
                 context.handle.warn(f"{name}: watchdog not fed: {error}", 1.0, (name, "watchdog"))
 
 
-def _send(command: Command, high_level: HighLevel) -> None:
-    with contextlib.suppress(AlreadyLandingError):
+def _send(command: Command, high_level: HighLevel) -> bool:
+    # Returns False if the vehicle lands already, which is a success as well.
+    try:
         command.send(high_level)
+    except AlreadyLandingError:
+        return False
+    return True

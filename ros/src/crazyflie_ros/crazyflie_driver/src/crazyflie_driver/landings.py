@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.flight_commands import LAND, STOP, Command, FlightCommands
 from crazyflie_driver.log_topics import LogTopics
-from crazyflie_driver.monitors import STEP, STEP_TIME, Charge, Next, Touchdown, landing_duration
+from crazyflie_driver.monitors import STEP, STEP_TIME, Charge, Next, landing_duration
 from crazyflie_driver.setpoint_gate import Event
 from crazyflie_driver.setpoint_topics import Control, SetpointTopics
 from crazyflie_model.supervisor import SupervisorState
@@ -44,7 +44,7 @@ class Landings:
     """Land a vehicle and follow it to the ground; no other command may replace the landing.
 
     The firmware lands at a height and stops the motors there, also without a link. With a link the
-    vehicle sinks further until it stands: see `Touchdown`.
+    vehicle sinks further until it stands: see `Touchdown`. So it does in landings of the service.
     """
 
     _context: VehicleContext
@@ -56,7 +56,6 @@ class Landings:
     # When it was sent, and when it should have been carried out, s.
     _begin: float = 0.0
     _end: float = 0.0
-    _touchdown: Touchdown | None = None
 
     def begin(self, reason: Reason) -> Future[None]:
         """Land; the result of the future is None once the vehicle has accepted it.
@@ -78,8 +77,9 @@ class Landings:
             duration = landing_duration(
                 height, self._context.server.landing_duration, self._reason.limit
             )
-            self._touchdown = Touchdown(self._context.handle.time(), ground, duration)
-            sent = self._sent = self._send(LAND, lambda h: h.land(ground, duration), duration)
+            sent = self._sent = self._send(
+                Command(LAND, lambda h: h.land(ground, duration), duration, height=ground)
+            )
         return sent
 
     def follow(self) -> None:
@@ -101,15 +101,16 @@ class Landings:
         elif is_active and self._reason is not None:
             self.begin(self._reason)
         elif not is_active and self._is_logged():
-            self._reason = self._sent = self._touchdown = None
+            self._reason = self._sent = None
             if not is_critical:
                 self._context.gate.handle(Event.BATTERY_RECOVERED)
         self._commands.refusal = self._refusal()
-        if self._sent is not None and _is_accepted(self._sent):
-            if self._reason is Reason.BATTERY:
-                self._context.gate.handle(Event.BATTERY_CRITICAL)
-            if is_active and self._touchdown is not None:
-                self._descend(self._touchdown)
+        is_accepted = self._sent is not None and _is_accepted(self._sent)
+        if is_accepted and self._reason is Reason.BATTERY:
+            self._context.gate.handle(Event.BATTERY_CRITICAL)
+        touchdown = self._commands.touchdown
+        if touchdown is not None and (is_accepted or self._sent is None):
+            self._descend(touchdown, is_active)
 
     def _is_active(self, state):
         if self._commands.is_high_level_flight_active:
@@ -133,21 +134,29 @@ class Landings:
         is_going_on = _is_accepted(sent) and not self._setpoints.is_streaming
         return is_going_on and self._context.handle.time() < self._end
 
-    def _descend(self, touchdown):
+    def _descend(self, touchdown, is_active):
         log, now, height = self._log, self._context.handle.time(), self._log.height
+        is_over = not is_active and now >= touchdown.begin + _LOG_DELAY
+        if is_over or self._setpoints.last_time > touchdown.begin:
+            # The vehicle is down, or setpoints have taken the landing's place.
+            self._commands.touchdown = None
+        if not is_active or self._commands.touchdown is None:
+            return
         step = touchdown.sample(now, height, log.vertical_speed, log.target_height)
         if step is Next.STOP:
-            self._touchdown = None
-            self._sent = self._send(STOP, lambda h: h.stop(), 0.0)
+            self._commands.touchdown = None
+            self._sent = self._send(Command(STOP, lambda h: h.stop()))
         elif step is Next.DESCENT and height is not None:
             touchdown.descend(now)
             lower = height - STEP
-            self._sent = self._send(LAND, lambda h: h.land_lower(lower, STEP_TIME), STEP_TIME)
+            self._sent = self._send(
+                Command(LAND, lambda h: h.land_lower(lower, STEP_TIME), STEP_TIME)
+            )
 
-    def _send(self, name, send, duration):
+    def _send(self, command):
         self._begin = self._context.handle.time()
-        self._end = self._begin + duration + _MARGIN
-        return self._commands.send(Command(name, send, duration), None)
+        self._end = self._begin + command.duration + _MARGIN
+        return self._commands.send(command, None)
 
 
 def _is_accepted(sent):

@@ -160,7 +160,7 @@ class LogTopics:
     target_height: float | None = None  #: z that the vehicle's controller holds, m, fixed frame.
     #: Latest state; None until it has come on the present link.
     supervisor: SupervisorState | None = None
-    #: Of the vehicle's Kalman filter, if it has one.
+    #: Variances of the vehicle's Kalman filter, if it has one.
     variances: Variances = field(default_factory=Variances)
     _packets: Publisher | None = None
     _heading: Publisher = field(init=False)

@@ -121,7 +121,7 @@ def _excess(window):
 LIFT_LIMIT = 2.0  #: Time in which a vehicle has to lift off, s.
 MIN_CLIMB = 0.15  #: Setpoints that are lower above the ground do not ask for a flight, m.
 MAX_RISE = 0.05  #: A vehicle on the ground estimates no more above it, m.
-MAX_TURN = 10.0  #: From the heading on the ground to the one that is commanded, degrees.
+MAX_TURN = 10.0  #: Largest turn from the heading on the ground to the commanded one, degrees.
 MAX_GAP = 0.5  #: Setpoints older than this are levelled out by the firmware, s.
 STREAM_PAUSE = 1.0  #: After a pause of this length, s, setpoints are a new attempt.
 
@@ -231,7 +231,7 @@ class Next(enum.Enum):
 
 
 class Touchdown:
-    """When a vehicle stands that lands at a height (m), in a duration (s) from ``now`` (s) on.
+    """The end of a landing at a height (m), in a duration (s) from ``now`` (s) on.
 
     The height of the ground is not known: a vehicle may have started from a table, or the origin of
     its estimate may be one. Therefore a height is no touchdown: a vehicle is down when it has
@@ -239,6 +239,7 @@ class Touchdown:
     """
 
     def __init__(self, now: float, height: float, duration: float):
+        self.begin = now
         self._end = now + duration
         self._ground = height
         # Time, height and target when the vehicle was last seen to move.

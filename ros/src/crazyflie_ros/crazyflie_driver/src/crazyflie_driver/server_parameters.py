@@ -12,7 +12,7 @@ _SHARE = Number("", minimum=0.0, maximum=1.0)
 
 
 class SafetyParameters(Parameters):
-    """What the driver does when something goes wrong."""
+    """Reactions of the driver to faults."""
 
     emergency_watchdog: bool = parameter(
         BOOLEAN,

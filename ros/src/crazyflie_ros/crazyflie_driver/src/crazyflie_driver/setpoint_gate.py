@@ -5,11 +5,11 @@ import enum
 import threading
 from collections.abc import Iterator
 
-PAUSE = 1.0  #: A stream that has been silent for so long, s, was begun anew on purpose.
+PAUSE = 1.0  #: A stream that goes on after a pause of this length, s, was restarted on purpose.
 
-#: After a high-level command or cmd_stop, setpoints that were on their way, since each topic has a
-#: connection of its own, are not sent for so long, s: a single one would take the vehicle from its
-#: planner or start its motors, and lock it 2 s later.
+#: Time after a high-level command or cmd_stop in which setpoints are not sent, s. Each topic has a
+#: connection of its own, so that some are under way then: a single one would take the vehicle from
+#: its planner or start its motors, and lock it 2 s later.
 OVERLAP = 0.5
 
 
@@ -26,7 +26,7 @@ class Block(enum.Flag):
 
 
 class Event(enum.Enum):
-    """What changes the blocks."""
+    """An event that changes the blocks."""
 
     EMERGENCY_STOP = enum.auto()
     REMOVAL = enum.auto()
@@ -107,20 +107,20 @@ class SetpointGate:
                 self._blocks = self._blocks & ~ended | begun
 
     def high_level(self, now: float) -> int:
-        """Take note that the vehicle is given a high-level command; return its number."""
+        """Begin the overlap of a high-level command; return the number of the command."""
         with self._lock:
             self._high_level_since = now
             self._commands += 1
             return self._commands
 
     def resume(self, command: int) -> None:
-        """Let setpoints pass again, as a command (its number) failed; not if one has followed."""
+        """Let setpoints pass again after a command (its number) failed, unless one has followed."""
         with self._lock:
             if command == self._commands:
                 self._high_level_since = None
 
     def stop(self, now: float) -> None:
-        """Take note that a stream was ended by cmd_stop."""
+        """Begin the overlap of cmd_stop, which ends a stream."""
         with self._lock:
             self._stopped_since = now
 

@@ -34,8 +34,8 @@ _REST, _REST_PERIOD = 0.5, 0.1
 class Sender(NamedTuple):
     """How the messages of a topic are sent, by ``send(crazyflie, message)``.
 
-    ``height_and_yaw(message)`` returns the height (m) and the yaw (degrees) that a setpoint asks
-    for; None for none.
+    ``height_and_yaw(message)`` returns the height (m) and the yaw (degrees) that a setpoint
+    commands; None where it commands none.
     """
 
     message_type: type

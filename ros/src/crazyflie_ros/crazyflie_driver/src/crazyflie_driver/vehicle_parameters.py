@@ -138,7 +138,7 @@ class VehicleParameters(Parameters):
 
     @property
     def name(self) -> str:
-        """What messages call the vehicle."""
+        """Name of the vehicle in messages."""
         return self.tf_prefix or self.uri
 
     @property

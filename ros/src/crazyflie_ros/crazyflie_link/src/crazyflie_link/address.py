@@ -25,7 +25,7 @@ EXPECTED = (
 )
 
 _HIGHEST_CHANNEL = 125
-_DEFAULT_ADDRESS = "E7E7E7E7E7"  #: Of a new vehicle; cflib assumes it where the URI has no address.
+_DEFAULT_ADDRESS = "E7E7E7E7E7"  #: Address of new vehicles, for URIs without one.
 _HIGHEST_PORT = 65535
 _SERIAL_LENGTH = 10  #: cflib takes so many digits for a serial number, fewer for a dongle's number.
 _THIS_MACHINE = "127.0.0.1"

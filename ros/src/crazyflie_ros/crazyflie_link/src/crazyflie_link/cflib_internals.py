@@ -81,7 +81,7 @@ def pinned_version() -> str:
 
 
 def forget_dead_radios() -> None:
-    """Let cflib open again every dongle whose thread has ended or that has no user."""
+    """Remove dongles whose thread has ended, or that have no user: cflib opens them again."""
     with RadioManager._lock:
         for devid, radio in enumerate(RadioManager._radios):
             if radio is None:
@@ -100,7 +100,7 @@ def forget_dead_radios() -> None:
 
 
 def release(driver: CRTPDriver) -> None:
-    """Let the thread of a radio link end, though a dead dongle may block it; never blocks."""
+    """End the thread of a radio link, even if a dead dongle blocks it; never blocks."""
     if not isinstance(driver, RadioDriver):
         return
     thread, radio = driver._thread, driver._radio

@@ -32,16 +32,16 @@ from crazyflie_link.trajectory import Trajectories
 
 CHECK_PERIOD = 0.05  #: Period at which the link is checked, s.
 
-#: How long a silent link is kept, s: if the vehicle is heard again, no set-up is needed. Silence of
-#: up to 1.4 s ends that way before 2 s, when the firmware locks; the set-up of a new link can take
-#: a second on a busy machine.
+#: Time for which a silent link is kept, s: if the vehicle is heard again, no set-up is needed.
+#: Silence of up to 1.4 s ends that way before 2 s, when the firmware locks; the set-up of a new
+#: link can take a second on a busy machine.
 SILENCE_LIMIT = 1.0
 
 #: Pause after the first failed attempt to connect again, and the longest one, s; each is twice the
 #: one before.
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 
-_JOIN_LIMIT = 0.3  #: How long `Crazyflie.close` waits for the thread that checks the link, s.
+_JOIN_LIMIT = 0.3  #: Time limit of the thread that checks the link in `Crazyflie.close`, s.
 _CLOSED = "the link was closed"
 
 
@@ -112,7 +112,7 @@ class Crazyflie:
     ):
         self.address = Address.parse(uri)
         self.state = LinkState.DISCONNECTED  #: State of the link.
-        self.connection_count = 0  #: How many times the link has been set up.
+        self.connection_count = 0  #: Number of times that the link has been set up.
         #: Restarts of the firmware that were noticed, and packets sent to this vehicle alone.
         self.restarts = self.sent = 0
         #: Strength of the vehicle's reception (-dBm), as the Crazyradio has it; None elsewhere.

@@ -33,7 +33,7 @@ class Lighthouse(Subsystem):
     def write_file(self, path: str, parameters: FirmwareParameters) -> int:
         """Write a configuration as cfclient writes it, and store it; blocks.
 
-        What is known of other stations is made invalid. Returns how many stations the file has.
+        The data of all other stations become invalid. Returns the number of stations in the file.
         Raises `ValueRangeError` about the file, `CrazyflieError` if the vehicle does not take it.
         """
         try:

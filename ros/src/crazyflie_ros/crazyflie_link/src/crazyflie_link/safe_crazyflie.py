@@ -32,7 +32,7 @@ if logging.getLogger("cflib").level == logging.NOTSET:
 
 
 def init_drivers() -> None:
-    """Let cflib know its drivers, once in a process."""
+    """Register cflib's drivers, once in a process."""
     with _init_lock:
         if not cflib.crtp.CLASSES:
             cflib.crtp.init_drivers()

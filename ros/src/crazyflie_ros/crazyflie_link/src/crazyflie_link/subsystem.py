@@ -1,4 +1,4 @@
-"""What the parts of the firmware share: the link, names, memories, limits of numbers."""
+"""Base of the parts of the firmware: their link, names, memories and limits of numbers."""
 
 import copy
 import math

@@ -181,7 +181,7 @@ class Supervisor(Subsystem):
         self._command(link, bytes([CMD_ARM_SYSTEM, do_arm]), verb)
 
     def recover(self) -> None:
-        """Let a vehicle that has crashed be armed again; blocks until it has confirmed it."""
+        """Clear a crash, so that the vehicle can be armed; blocks until it has confirmed it."""
         link = self._current_link()
         if link.protocol < SUPERVISOR_PROTOCOL:
             link.put(link.cflib.supervisor.send_crash_recovery_request)

@@ -18,7 +18,7 @@ from crazyflie_world.world import World
 
 LASER, ULTRASONIC = "laser", "ultrasonic"  #: Types of sensors.
 
-#: Where sensors look: roll, pitch, yaw that turn the body's x axis there, rad.
+#: Directions of sensors: roll, pitch, yaw that turn the body's x axis there (rad).
 DIRECTIONS: dict[str, Triple] = {
     "front": (0.0, 0.0, 0.0),
     "back": (0.0, 0.0, math.pi),

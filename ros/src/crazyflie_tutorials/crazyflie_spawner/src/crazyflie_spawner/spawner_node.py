@@ -52,7 +52,7 @@ def vehicle_name(wanted: str, taken: Container[str]) -> str:
     return wanted
 
 
-END_LIMIT = 15.0  #: How long, in s, roslaunch has to end its nodes; then they are killed.
+END_LIMIT = 15.0  #: Time after which nodes that roslaunch has not ended are killed (s).
 
 
 class VehicleProcess:
@@ -81,7 +81,7 @@ class VehicleProcess:
         return status
 
     def end(self) -> None:
-        """Have the vehicle end, without waiting for it."""
+        """Ask roslaunch to end the vehicle; return at once."""
         if self._deadline is None and self._process.poll() is None:
             self._deadline = time.monotonic() + END_LIMIT
             self._process.send_signal(signal.SIGINT)

@@ -126,7 +126,7 @@ class SweepNode(Node):
 
     @override
     def enter_safe_state(self) -> None:
-        """Let the vehicle hover where the reference is."""
+        """Stop the reference, so that the vehicle hovers."""
         if self._sweeper is not None and self._is_sweeping():
             self._sweeper.speed = 0.0
             self._publish_reference(self._sweeper)

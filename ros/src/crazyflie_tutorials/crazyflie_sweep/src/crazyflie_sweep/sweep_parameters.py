@@ -31,7 +31,7 @@ class Area(Parameters):
 
 
 class SpeedLimits(Parameters):
-    """How fast the reference goes."""
+    """Speeds and acceleration of the reference."""
 
     min: float = parameter(_SPEED, "least speed on lanes", 0.1)
     max: float = parameter(_SPEED, "largest speed on lanes", 0.7)
@@ -40,7 +40,7 @@ class SpeedLimits(Parameters):
 
 
 class CoverageGoal(Parameters):
-    """What counts as covered."""
+    """Criterion by which the area is covered."""
 
     swath: float = parameter(_WIDTH, "diameter of what the vehicle covers at a time", 0.7)
     cell: float = parameter(_WIDTH, "width of the cells that are counted", 0.1)
@@ -53,7 +53,7 @@ class CoverageGoal(Parameters):
 
 
 class Plan(Parameters):
-    """What to sweep, and how."""
+    """Area, lanes, speeds and coverage of a sweep."""
 
     area: Area = group(Area, "area")
     lane_width: float = parameter(_WIDTH, "largest distance of two lanes", 0.5)

@@ -82,7 +82,7 @@ class Sweeper:
         self.coverage = Coverage(plan.area, plan.coverage.cell, plan.coverage.swath)
         #: The largest distance of the vehicle from the lane that it was on, m.
         self.max_lane_distance = 0.0
-        self.speed = 0.0  #: Of the reference, m/s.
+        self.speed = 0.0  #: Speed of the reference (m/s).
         self._passes = 1
         self._s = 0.0
         self._path = self._with_approach(start)
@@ -96,7 +96,7 @@ class Sweeper:
 
     @property
     def is_on_lane(self) -> bool:
-        """Whether the reference is on a lane: there a service says how fast it goes."""
+        """Whether the reference is on a lane, where a service sets its speed."""
         return self._lane is not None
 
     @property
@@ -149,7 +149,7 @@ class Sweeper:
         return *position, self.speed * ux, self.speed * uy, self.speed * uz
 
     def measure(self, position: Point) -> bool:
-        """Take note of where the vehicle is; return whether it has covered something new."""
+        """Process a position of the vehicle; return whether it has covered new cells."""
         if self._lane is not None:
             self.max_lane_distance = max(self.max_lane_distance, self._lane.distance(position))
         return self.coverage.add(position)

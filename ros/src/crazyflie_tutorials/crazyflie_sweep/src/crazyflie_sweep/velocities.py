@@ -6,7 +6,7 @@ import random
 from crazyflie_utils.refusal import RefusalError
 
 OSCILLATOR_BEGIN = 2.0
-OSCILLATOR_END = 9.0  #: Where the oscillator has a velocity: from begin to end, both included.
+OSCILLATOR_END = 9.0  #: Interval in which the oscillator has a velocity, ends included.
 
 OSCILLATOR_LENGTH = OSCILLATOR_END - OSCILLATOR_BEGIN
 
@@ -81,7 +81,7 @@ class VelocitySource:
             self._failure = f"it answers {velocity:g}, which is not > 0 and <= {self._most:g}"
 
     def fail(self, reason: str) -> None:
-        """Take note that there was no answer; the last one is used as long as it may be."""
+        """Process a failed call; the last answer is used until it is too old."""
         self._failure = reason
 
     def velocity(self, time: float) -> float | None:

@@ -25,7 +25,7 @@ def circle_velocity(radius: float, speed: float, clockwise: bool) -> Velocity:
     return Velocity(x=speed, yaw_dot=-yaw_dot if clockwise else yaw_dot)
 
 
-AXIS_NUMBER = Integer(0, 63)  #: Of an axis or a button of sensor_msgs/Joy.
+AXIS_NUMBER = Integer(0, 63)  #: Number of an axis or a button of sensor_msgs/Joy.
 
 
 class AxisParameters(Parameters):

@@ -38,7 +38,7 @@ class MountParameters(Parameters):
 
 
 class CameraParameters(Parameters):
-    """What a camera's YAML file holds."""
+    """Parameters of a camera, from its YAML file."""
 
     width: int = parameter(Integer(16, 4096), "columns of the image", 320)
     height: int = parameter(Integer(16, 4096), "rows of the image", 240)

@@ -26,7 +26,7 @@ from crazyflie_world.shapes import Shape
 from crazyflie_world.world import World
 from crazyflie_world.world_file import WORLD_FILE
 
-#: By which a message may be, s: less than anyone can notice, more than the rounding of times.
+#: Tolerance of the time of delivery (s): more than the rounding of times.
 _EARLY = 1e-6
 
 

@@ -14,7 +14,7 @@ _SPEED = Number("m/s", minimum=0.0)
 
 
 class GainParameters(Parameters):
-    """How fast errors are to vanish."""
+    """Gains from errors to velocities."""
 
     forward: float = parameter(
         _GAIN, "velocity ahead over what is missing in distance", 1.5, live=True
@@ -24,7 +24,7 @@ class GainParameters(Parameters):
 
 
 class SpeedParameters(Parameters):
-    """What is not exceeded."""
+    """Limits of the velocities."""
 
     forward: float = parameter(_SPEED, "ahead, and back", 0.5, live=True)
     up: float = parameter(_SPEED, "upwards, and down", 0.3, live=True)

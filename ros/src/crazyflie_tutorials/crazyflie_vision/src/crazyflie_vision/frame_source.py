@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from crazyflie_vision.renderer import load_picture
 
-SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")  #: Of pictures in a folder.
+SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")  #: Suffixes of pictures in a folder.
 
 
 class FrameSource:
@@ -24,7 +24,7 @@ class FrameSource:
         Raises
         ------
         OSError
-            There is none any more.
+            The source has ended.
         """
         raise NotImplementedError
 
@@ -73,7 +73,7 @@ class Video(FrameSource):
     Raises
     ------
     OSError
-        It is none that OpenCV can read.
+        OpenCV cannot read it.
     """
 
     def __init__(self, path: Path):
@@ -99,7 +99,7 @@ class Pictures(FrameSource):
     Raises
     ------
     OSError
-        There is none, or one cannot be read.
+        The folder has no picture, or one cannot be read.
     """
 
     def __init__(self, path: Path):

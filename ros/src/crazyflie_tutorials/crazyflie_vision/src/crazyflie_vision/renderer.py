@@ -19,7 +19,7 @@ from crazyflie_world.shapes import Ball, Box, Colour, Cylinder, Shape
 from crazyflie_world.world import Floor, World
 
 Image = NDArray[np.uint8]  #: Rows, columns and, for colour, blue, green, red.
-LIGHT = np.array([-0.36, 0.28, 0.89])  #: Where the light comes from, length 1.
+LIGHT = np.array([-0.36, 0.28, 0.89])  #: Direction to the light, length 1.
 AMBIENT = 0.6  #: Share of the brightness that a face has when no light falls on it.
 
 CYLINDER_SIDES = 20
@@ -85,7 +85,7 @@ def load_picture(path: str) -> Image:
     Raises
     ------
     OSError
-        There is none, or it is none that OpenCV can read.
+        The file does not exist, or OpenCV cannot read it.
     """
     picture = cv2.imread(path, cv2.IMREAD_COLOR)
     if picture is None:
@@ -93,7 +93,7 @@ def load_picture(path: str) -> Image:
     return picture
 
 
-#: Of a box: the direction out of each, and which one is up on it. The first is the front.
+#: Sides of a box: outward normal, and the direction that is up on it. The first is the front.
 _SIDES = (
     ((1, 0, 0), (0, 0, 1)),
     ((-1, 0, 0), (0, 0, 1)),
@@ -147,7 +147,7 @@ def _texture(floor):
     return np.clip(light[..., None] * bgr(floor.colour), 0.0, 255.0).astype(np.uint8)
 
 
-NEAR = 0.02  #: What is nearer to the camera's plane is not seen, m.
+NEAR = 0.02  #: Distance from the camera's plane below which nothing is drawn (m).
 SKY = (225.0, 215.0, 205.0)  #: Blue, green, red of where nothing is.
 
 _SUBPIXEL_BITS = 4

@@ -105,7 +105,7 @@ def find(image: NDArray[Any], bounds: ColourBounds, smallest_area: float) -> Tar
         Blue, green, red.
     bounds : ColourBounds
     smallest_area : float
-        What is smaller is none, pixels.
+        Area below which a thing is no target (pixels).
     """
     moments = cv2.moments(largest_blob(bounds.mask(image)), binaryImage=True)
     area = moments["m00"]

@@ -1,1 +1,1 @@
-"""What the firmware of a Crazyflie does, in its own units and signs; no sockets, no wall clock."""
+"""The firmware of a Crazyflie, in its own units and signs, without sockets and wall clock."""

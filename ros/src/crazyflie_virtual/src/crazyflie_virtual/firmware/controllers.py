@@ -94,7 +94,7 @@ class AttitudeController:
         self.roll_rate = FirmwarePid(TILT_RATE, PERIOD)
         self.pitch_rate = FirmwarePid(TILT_RATE, PERIOD)
         self.yaw_rate = FirmwarePid(HEADING_RATE, PERIOD)
-        #: How far the desired heading may run ahead of the vehicle's, deg; 0 for no limit.
+        #: Largest difference of desired and actual heading (deg); 0 for no limit.
         self.yaw_max_delta = 0.0
 
     def reset(self) -> None:
@@ -132,7 +132,7 @@ def _to_16_bits(output):
 
 
 DT = 0.01  #: Time between two updates, s.
-#: How much of a limit the integral may go beyond it, so that it can leave it again.
+#: Fraction of a limit by which the output may exceed it, so that it can leave it again.
 _OVERHEAD = 1.1
 _THRUST_SCALE = 1000.0  #: PWM per unit of the climb controller's output.
 

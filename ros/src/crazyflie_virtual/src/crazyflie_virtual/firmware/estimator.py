@@ -27,12 +27,12 @@ from crazyflie_virtual.quaternions import normalized, turned
 
 _ACCELERATION_NOISE = 3.7e-4  #: Process noise, m^2/s^3: 0.6 m/s^2, held for 1 ms each.
 _RATE_NOISE = 1e-5  #: Process noise, rad^2/s: 0.1 rad/s, held for 1 ms each.
-#: Of position and velocity, m^2 and m^2/s^2 (MAX_COVARIANCE of kalman_core.c).
+#: Limit for position and velocity (m^2, m^2/s^2): MAX_COVARIANCE of kalman_core.c.
 _MOST_VARIANCE = 100.0
-#: Of the position, with the velocity, of the velocity; m^2, m^2/s, m^2/s^2.
+#: Variance of the position, covariance, variance of the velocity (m^2, m^2/s, m^2/s^2).
 _FIRST_VARIANCES = (_MOST_VARIANCE, 0.0, 1.0)
 _FIRST_ATTITUDE_VARIANCE = 10.0  #: rad^2: the first measurement counts in full.
-_LEAST_VARIANCE = 1e-12  #: Of a measurement, m^2 and rad^2: clients may set its deviation to 0.
+_LEAST_VARIANCE = 1e-12  #: Limit for measurements (m^2, rad^2): clients may set a deviation of 0.
 #: Time constant with which the attitude returns to the initial one at rest, s.
 _REVERSION_TIME = 10.0
 
@@ -182,7 +182,7 @@ class Localization:
         self.x = self.y = self.z = 0.0
         self.qx = self.qy = self.qz = 0.0
         self.qw = 1.0
-        self.time: float | None = None  #: When it came, s.
+        self.time: float | None = None  #: Time of its arrival (s).
         #: position_deviation, attitude_deviation: Standard deviations that external measurements
         #: are taken to have, m and rad.
         self.position_deviation = 0.01

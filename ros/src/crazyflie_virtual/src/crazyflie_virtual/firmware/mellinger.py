@@ -27,11 +27,11 @@ class MellingerController:
 
     def __init__(self) -> None:
         self.mass, self.mass_thrust = 0.027, 132000.0  #: kg, PWM/N.
-        #: Of the position, N/m, N/(m s) and N s/m; limits of its integrals, m s.
+        #: Gains of the position (N/m, N/(m s), N s/m), and limits of its integrals (m s).
         self.kp_xy, self.ki_xy, self.kd_xy, self.i_range_xy = 0.4, 0.05, 0.2, 2.0
         self.kp_z, self.ki_z, self.kd_z, self.i_range_z = 1.25, 1.5, 0.4, 0.4
-        #: Of attitude, body rates and integral of the attitude, PWM per rad, rad/s and rad s;
-        #: limits of these integrals, rad s; of the body accelerations, PWM per rad/s^2.
+        #: Gains of attitude, body rates and integral of the attitude (PWM per rad, rad/s, rad s),
+        #: limits of these integrals (rad s), gain of the body accelerations (PWM per rad/s^2).
         self.kR_xy, self.kw_xy, self.ki_m_xy, self.i_range_m_xy = 70000.0, 20000.0, 0.0, 1.0
         self.kR_z, self.kw_z, self.ki_m_z, self.i_range_m_z = 60000.0, 12000.0, 500.0, 1500.0
         self.kd_omega_rp = 200.0

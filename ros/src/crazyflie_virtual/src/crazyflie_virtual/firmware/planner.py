@@ -23,7 +23,7 @@ _POINTS = (0, 1, 3, 7)  #: Control points that are stored for each type of curve
 
 _MILLI = 1e-3
 _TENTH_DEGREE = math.pi / 1800.0
-_UNITS = (_MILLI, _MILLI, _MILLI, _TENTH_DEGREE)  #: Of x, y, z and yaw: m and rad.
+_UNITS = (_MILLI, _MILLI, _MILLI, _TENTH_DEGREE)  #: Units of x, y, z (m) and yaw (rad).
 
 
 def read_compressed(memory: bytes) -> tuple[PolynomialPiece, ...]:
@@ -65,10 +65,10 @@ DEFINITIONS = 31  #: Trajectories that can be defined at one time.
 IN_MEMORY = 1  #: The location of trajectories.
 POLYNOMIALS, COMPRESSED = 0, 1  #: Types of trajectories.
 REFUSED = 1  #: Returned by a command that the state does not permit.
-_MIN_DURATION = 0.01  #: Of a plan, s.
+_MIN_DURATION = 0.01  #: Shortest duration of a plan (s).
 #: Result of the firmware's arithmetic for a plan with infinite numbers.
 _NOT_A_NUMBER = PolynomialPiece(1.0, *[(math.nan,)] * 4)
-_MIN_SPEED = 0.001  #: Of a climb, m/s: clients may set the speed to 0.
+_MIN_SPEED = 0.001  #: Lower limit of the speed of a climb (m/s): clients may set 0.
 
 _TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
 

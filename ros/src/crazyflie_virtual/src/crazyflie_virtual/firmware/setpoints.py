@@ -12,7 +12,7 @@ from crazyflie_virtual.firmware.planner import Planner
 from crazyflie_virtual.firmware.states import ABSOLUTE, MOTION, VELOCITY, Estimate, Modes, Setpoint
 from crazyflie_virtual.quaternions import decompress_quaternion
 
-_LEAST_THRUST = 1000  #: Of an attitude setpoint, PWM: less is none.
+_LEAST_THRUST = 1000  #: Thrust of an attitude setpoint below which the motors are off (PWM).
 
 _RATE_MODE = 0
 
@@ -93,7 +93,7 @@ def _with_tilt(setpoint, roll, roll_is_rate, pitch, pitch_is_rate):
 class _FourFloats(NamedTuple):
     """A type of setpoint whose payload is four floats."""
 
-    fields: tuple[str, str, str, str]  #: Of the setpoint: what the floats are.
+    fields: tuple[str, str, str, str]  #: Names of the setpoint's fields that the floats set.
     mode: Modes
     velocity_body: bool = False
 
@@ -191,7 +191,7 @@ class Commander:
     def __init__(self, planner: Planner):
         self._planner = planner
         self.setpoint = Setpoint()
-        #: Of the setpoint: `PRIORITY_DISABLE`, `PRIORITY_HIGHLEVEL` or `PRIORITY_CRTP`.
+        #: `PRIORITY_DISABLE`, `PRIORITY_HIGHLEVEL` or `PRIORITY_CRTP`.
         self.priority = PRIORITY_DISABLE
         #: Parameter that the firmware has without effect: the commander is on.
         self.high_level_enabled = 1

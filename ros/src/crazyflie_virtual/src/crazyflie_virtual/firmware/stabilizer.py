@@ -20,7 +20,7 @@ from crazyflie_virtual.firmware.states import (
     Setpoint,
 )
 
-IDLE_THRUST = 7000  #: Of vehicles that the client arms, with brushless motors, PWM.
+IDLE_THRUST = 7000  #: Thrust of armed vehicles with brushless motors on the ground (PWM).
 DEFAULT, PID, MELLINGER = 0, 1, 2  #: Numbers of controllers; the default one is `PID`.
 
 

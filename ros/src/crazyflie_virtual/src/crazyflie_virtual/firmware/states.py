@@ -64,7 +64,7 @@ class Setpoint(_Motion):
     yaw_rate: float = 0.0
     quaternion: Quaternion = (0.0, 0.0, 0.0, 1.0)  #: (x, y, z, w).
     thrust: float = 0.0  #: PWM, used where z is disabled.
-    time: float = 0.0  #: Of its reception, s.
+    time: float = 0.0  #: Time of reception (s).
 
     @property
     def is_finite(self) -> bool:

@@ -122,7 +122,7 @@ def next_state(state: State, conditions: Condition) -> State:
 
 
 EMERGENCY_WATCHDOG = 1.0  #: Longest time between watchdog messages, after the first one, s.
-_LANDED_AFTER = 2.0  #: How long the motors are off until the vehicle is not flying, s.
+_LANDED_AFTER = 2.0  #: Time with the motors off after which the vehicle counts as landed (s).
 #: Accelerometer along up, g, below which the vehicle has tumbled, and after how long, s.
 _TILTED, _UPSIDE_DOWN = (0.5, 1.0), (-0.2, 0.1)
 #: Accelerometer, g, below which in all axes the vehicle is falling and not tumbled.

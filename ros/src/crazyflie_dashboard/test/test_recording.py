@@ -1,0 +1,61 @@
+"""Recordings: begun, ended, and made into a report."""
+
+import subprocess
+import sys
+
+import pytest
+
+from crazyflie_dashboard.recording import Recording
+from crazyflie_utils.refusal import RefusalError
+
+LIMIT = 30.0
+
+RECORDER = """
+import pathlib, sys, time
+folder = pathlib.Path(sys.argv[1].partition("=")[2]) / "2026-11-24"
+folder.mkdir()
+try:
+    time.sleep(30)
+except KeyboardInterrupt:
+    (folder / "flight.bag").touch()
+"""
+REPORT = """
+import pathlib, sys
+folder, _, out = sys.argv[1:]
+assert pathlib.Path(folder, "flight.bag").exists()
+pathlib.Path(out).mkdir()
+pathlib.Path(out, "report.html").write_text("the report")
+"""
+
+
+@pytest.fixture
+def recording(tmp_path):
+    def program(name):
+        path = tmp_path / name
+        text = RECORDER if name == "record_flight" else REPORT
+        path.write_text(f"#!{sys.executable}\n{text}")
+        path.chmod(0o755)
+        return str(path)
+
+    return Recording(tmp_path / "flights", program)
+
+
+def test_a_recording_becomes_a_report(recording, tmp_path):
+    recording.start()
+    assert recording.text == "recording"
+    with pytest.raises(RefusalError, match="record: recording; expected it to have ended"):
+        recording.start()
+    made = tmp_path / "flights" / "2026-11-24"
+    subprocess.run(["sh", "-c", f"until [ -d {made} ]; do :; done"], timeout=LIMIT, check=True)
+    report = recording.stop().result(LIMIT)
+    assert report == str(made / "report" / "report.html") == str(recording.report)
+    with pytest.raises(RefusalError, match="there is none"):
+        recording.stop()
+
+
+def test_what_fails_is_said(recording, tmp_path):
+    recording.start()
+    recording._recorder.kill()
+    with pytest.raises(RefusalError, match="nothing was recorded below"):
+        recording.stop().result(LIMIT)
+    assert recording.text == ""

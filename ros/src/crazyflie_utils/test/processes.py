@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import rospy
+from roslib.packages import find_node
 
 from crazyflie_utils.testing.peer import LIMIT
 
@@ -78,5 +79,5 @@ def composed(name, *arguments, **nodes):
     """Run a composed_node; ``nodes`` is node name = class in small_nodes.py."""
     if nodes:
         rospy.set_param(f"/{name}/nodes", {key: f"small_nodes:{nodes[key]}" for key in nodes})
-    script = str(_TEST.parent / "exec" / "composed_node")
+    [script] = find_node("crazyflie_utils", "composed_node")
     return _ended(NodeProcess([sys.executable, script, f"__name:={name}", *arguments]))

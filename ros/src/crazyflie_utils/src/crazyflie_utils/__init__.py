@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from crazyflie_utils.handle import NodeHandle as NodeHandle
     from crazyflie_utils.main import run as run
-    from crazyflie_utils.main import run_composed as run_composed
     from crazyflie_utils.main import run_nodes as run_nodes
     from crazyflie_utils.node import Node as Node
     from crazyflie_utils.parameters.declaration import ParameterError as ParameterError
@@ -31,7 +30,6 @@ _HOME = {
     "TransformError": "crazyflie_utils.tf.frame_tree",
     "parameter": "crazyflie_utils.parameters.declaration",
     "run": "crazyflie_utils.main",
-    "run_composed": "crazyflie_utils.main",
     "run_nodes": "crazyflie_utils.main",
     "run_program": "crazyflie_utils.program",
 }

@@ -45,19 +45,15 @@ def run(node_class: type | str, default_name: str) -> None:
     run_nodes(default_name, make_node)
 
 
-def run_composed(default_name: str) -> None:
-    """Run the nodes that the private parameter ``nodes`` lists; does not return.
+def composed_nodes(handle: NodeHandle) -> dict[str, Node]:
+    """Return the nodes that the private parameter ``nodes`` lists, by absolute name.
 
     ``nodes`` maps a node's name, relative to this process's namespace, to its
     class as "package.module:Class". Each node has the parameters, topics and
     services it would have in a process of its own.
     """
-
-    def make_nodes(handle):
-        classes = handle.load(ComposedParameters).nodes
-        return {handle.resolve(name): make() for name, make in classes.items()}
-
-    run_nodes(default_name, make_nodes)
+    classes = handle.load(ComposedParameters).nodes
+    return {handle.resolve(name): make() for name, make in classes.items()}
 
 
 def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, Node]] | str) -> None:

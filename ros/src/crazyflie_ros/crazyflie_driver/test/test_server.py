@@ -239,6 +239,8 @@ def test_the_end_of_the_server_stops_all_motors(server):
     vehicles = [server.make_vehicle() for _ in range(3)]
     for k, vehicle in enumerate(vehicles):
         server.add(vehicle.uri, f"cf{k}")
+        # What ends the zero thrust after connecting.
+        vehicle.wait_for_packets(7, 1)
         vehicle.received.clear()
     process, node = server.process, server.node
     process.shut_down({"/crazyflie_server": node})
@@ -249,6 +251,7 @@ def test_the_end_of_the_server_stops_all_motors(server):
 def test_a_vehicle_that_does_not_tell_its_state_is_stopped_if_its_log_has_it_on_the_ground(server):
     vehicle = server.make_vehicle()
     server.add(vehicle.uri)
+    vehicle.wait_for_packets(7, 1)
     vehicle.received.clear()
     vehicle.deaf.add((9, 0, b"\x0c"))
     server.remove(vehicle.uri)

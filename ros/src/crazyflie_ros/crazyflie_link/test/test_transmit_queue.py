@@ -107,3 +107,13 @@ def test_what_waits_at_the_end_is_not_sent(radio):
     radio.thread.join(LIMIT)
     assert not radio.thread.is_alive()
     assert radio.sent == []
+
+
+@pytest.mark.parametrize("reason", ["the vehicle has not been heard for 0.45 s", ""])
+def test_a_queue_that_is_closed_says_why(reason):
+    queue = TransmitQueue()
+    queue.close(reason)
+    for put in (queue.put, lambda send: queue.put_latest("stream", send)):
+        with pytest.raises(LinkLostError) as caught:
+            put(lambda: None)
+        assert str(caught.value) == reason

@@ -199,7 +199,7 @@ class Link:
         with self._changed:
             self._error = self._error or LinkLostError(reason)
             self._changed.notify_all()
-        self._transmit_queue.close()
+        self._transmit_queue.close(reason)
         self._request_reply.close(reason)
         self.cflib.disconnect()
 

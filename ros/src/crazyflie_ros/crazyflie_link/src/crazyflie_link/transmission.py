@@ -29,7 +29,7 @@ class TransmitQueue:
         self._commands: deque[Send] = deque()
         self._streams: dict[str, Send] = {}
         self._wake = threading.Condition()
-        self._closed = False
+        self._closed: str | None = None
         threading.Thread(target=self._run, name="crazyflie-transmit", daemon=True).start()
 
     def put(self, send: Send, urgent: bool = False) -> None:
@@ -61,21 +61,24 @@ class TransmitQueue:
         with self._wake:
             self._streams.pop(stream, None)
 
-    def close(self) -> None:
-        """Stop sending; discard the queue."""
+    def close(self, reason: str = "the link is closed") -> None:
+        """Stop sending; discard the queue. Later calls fail with the reason."""
         with self._wake:
-            self._closed = True
+            self._closed = reason
             self._wake.notify()
 
     def _check_open(self):
-        if self._closed:
-            raise LinkLostError("the link is closed")
+        if self._closed is not None:
+            raise LinkLostError(self._closed)
+
+    def _is_busy(self):
+        return self._closed is not None or self._commands or self._streams
 
     def _run(self):
         while True:
             with self._wake:
-                self._wake.wait_for(lambda: self._closed or self._commands or self._streams)
-                if self._closed:
+                self._wake.wait_for(self._is_busy)
+                if self._closed is not None:
                     return
                 if self._commands:
                     send = self._commands.popleft()

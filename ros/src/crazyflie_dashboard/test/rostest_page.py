@@ -102,6 +102,10 @@ def test_the_key_of_the_emergency_counts_right_after_loading_with_a_stopped_mast
     browser.has("on the ground", browser.card("cf1"))
     browser.press("Take off")
     browser.has("1 in flight")
+    # What a page plots is received for it alone, and its end waits for the master.
+    for page in dashboard.pages.pages:
+        dashboard.watch(page, None)
+    wait_for(lambda: not dashboard.plots(dashboard.pages.pages[-1]), "no plots")
     with stopped(rosgraph.Master("/dashboard").getPid()):
         browser.driver.get(browser.url)
         browser.type(Keys.ESCAPE, Keys.ESCAPE)

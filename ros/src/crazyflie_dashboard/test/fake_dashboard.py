@@ -1,5 +1,6 @@
 """A dashboard of vehicles that are only numbers, for tests of the page."""
 
+import math
 import time
 from concurrent.futures import Future
 from dataclasses import replace
@@ -114,7 +115,8 @@ class FakeDashboard:
         self._scene = replace(self._scene, vehicles=vehicles)
 
     def scene(self):
-        return self._scene
+        is_new = self._scene.made == math.inf
+        return replace(self._scene, made=time.monotonic()) if is_new else self._scene
 
     def watch(self, page, vehicle):
         self.watched = vehicle

@@ -1,6 +1,8 @@
 """Headless Chromium and a page of a `FakeDashboard`, for tests."""
 
 import contextlib
+import os
+import signal
 import socket
 import sys
 import time
@@ -53,6 +55,16 @@ def chromium(*arguments, scale=1.0):
         yield browser
     finally:
         browser.quit()
+
+
+@contextlib.contextmanager
+def stopped(process):
+    """Stop a process, as one that hangs, for as long as the block takes."""
+    os.kill(process, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(process, signal.SIGCONT)
 
 
 class Browser:

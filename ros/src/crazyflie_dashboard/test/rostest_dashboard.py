@@ -1,13 +1,11 @@
 """Three vehicles as a page sees and commands them: found, flown, refused, stale."""
 
-import contextlib
-import os
-import signal
 import time
 from xmlrpc.client import ServerProxy
 
 import pytest
 import rosgraph
+from pages import stopped
 
 from crazyflie_dashboard.control import ControlError
 from crazyflie_dashboard.dashboard import Dashboard
@@ -156,16 +154,6 @@ def test_live_parameters_right_and_wrong(dashboard, operator):
 
 def pid_of(node):
     return ServerProxy(rosgraph.Master("/dashboard").lookupNode(node)).getPid("/dashboard")[2]
-
-
-@contextlib.contextmanager
-def stopped(process):
-    """Stop a process, as one that hangs, for as long as the block takes."""
-    os.kill(process, signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        os.kill(process, signal.SIGCONT)
 
 
 def test_a_takeoff_at_a_node_that_is_stopped_does_not_happen_when_it_goes_on(dashboard, operator):

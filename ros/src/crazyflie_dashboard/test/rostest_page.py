@@ -3,7 +3,8 @@
 import math
 
 import pytest
-from pages import Browser, Server, chromium, wait_for
+import rosgraph
+from pages import Browser, Server, chromium, stopped, wait_for
 from selenium.webdriver.common.keys import Keys
 
 from crazyflie_dashboard.dashboard import Dashboard
@@ -67,7 +68,7 @@ def test_two_above_each_other_keep_their_distance(browser, dashboard):
         return vehicle(dashboard, name).position
 
     def is_near(name, goal):
-        return math.dist(place(name), goal) < 0.1
+        return math.dist(place(name), goal) < 0.15
 
     browser.press("None")
     browser.choose("cf1", "cf2")
@@ -88,17 +89,26 @@ def test_two_above_each_other_keep_their_distance(browser, dashboard):
     browser.choose("cf2")
     go(browser, x + 0.5, y, 1.5)
     wait_for(lambda: is_near("cf2", (x + 0.5, y, 1.0)), "cf2 below the goal")
-    assert is_near("cf1", (x + 0.5, y, 2.0))
+    wait_for(lambda: is_near("cf1", (x + 0.5, y, 2.0)), "cf1 above it")
     browser.press("Land")
     browser.has("0 in flight")
 
 
-def test_the_key_of_the_emergency_stops_a_flight(browser, dashboard):
+def test_the_key_of_the_emergency_counts_right_after_loading_with_a_stopped_master(
+    browser, dashboard
+):
     browser.press("None")
     browser.choose("cf1")
     browser.has("on the ground", browser.card("cf1"))
     browser.press("Take off")
     browser.has("1 in flight")
-    browser.type(Keys.ESCAPE, Keys.ESCAPE)
-    browser.has("emergency", browser.card("cf1") + " .state")
-    wait_for(lambda: vehicle(dashboard, "cf1").position[2] < 0.05, "cf1 has fallen")
+    # What a page plots is received for it alone, and its end waits for the master.
+    for page in dashboard.pages.pages:
+        dashboard.watch(page, None)
+    wait_for(lambda: not dashboard.plots(dashboard.pages.pages[-1]), "no plots")
+    with stopped(rosgraph.Master("/dashboard").getPid()):
+        browser.driver.get(browser.url)
+        browser.type(Keys.ESCAPE, Keys.ESCAPE)
+        browser.has("Emergency: all have answered", ".emergency-report")
+        browser.has("emergency", browser.card("cf1") + " .state")
+        wait_for(lambda: vehicle(dashboard, "cf1").position[2] < 0.05, "cf1 has fallen")

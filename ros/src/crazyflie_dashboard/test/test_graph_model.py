@@ -80,6 +80,10 @@ def test_nothing_is_received_without_a_page():
     assert fleet.process.transport.subscribers["/tf"]
     fleet.dashboard.pages.close(fleet.page)
     subscribers = fleet.process.transport.subscribers
+    # A page that is loaded again finds what was there.
+    fleet.process.advance(9.0)
+    assert list(fleet.vehicles) == ["cf1", "cf2", "cf3"]
+    fleet.process.advance(1.1)
     assert [topic for topic, each in subscribers.items() if each] == ["/clock"]
     fleet.page = fleet.dashboard.pages.open(fleet.texts.append)
     fleet.find()

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 import threading
 import time
 import urllib.request
@@ -96,6 +97,8 @@ def test_a_scene_that_is_not_renewed_is_shown_as_old(browser, server):
     browser.has("3 vehicles", ".summary")
     server.dashboard.set_vehicles(vehicle("cf1", 0.0), made=time.monotonic() - 5.0)
     browser.has("the dashboard is held up", ".summary.bad")
+    # The pose, too, is as old as what is shown.
+    wait_for(lambda: re.search(r"cf1 · ([5-9]|\d\d) s old", browser.text(".scene")), "its age")
     stale = "vehicles.poses.every((pose) => pose[7] === 2)"
     wait_for(lambda: browser.in_scene(stale), "a vehicle that is drawn as stale")
 

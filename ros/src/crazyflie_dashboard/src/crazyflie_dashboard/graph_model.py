@@ -3,6 +3,7 @@
 Nothing is subscribed to, and the master is not asked, while no page is open.
 """
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -40,6 +41,9 @@ _POLL_PERIOD = 2.0  #: From one look at the master to the next, s; longer where 
 _POLL_SHARE = 0.02  #: of the time at most.
 _FORGET_AFTER = 30.0  #: A vehicle whose topics are gone is shown for so long, s.
 _FEW = 10  #: With more vehicles references and controls of watched ones are received only.
+#: What is received is kept for so long, s, after the last page has gone: a page that is loaded
+#: again is shown it also without a master.
+_LINGER_TIME = 10.0
 _MAX_LINES = 500  #: Of the log.
 
 _OLDER = "an older pose is shown"
@@ -86,12 +90,14 @@ class GraphModel:
         self._lines = 0
         self._seen: dict[str, float] = {}
         self._poll_at = 0.0
+        self._end_at = math.inf
         self._known_frames = 0
         self._is_polling = False
         self._trouble = ""  #: Why there is no newer graph.
 
     def begin(self) -> None:
         """Begin to look at the graph: a page is open."""
+        self._end_at = math.inf
         if self._handle is not None:
             return
         handle = self._handle = self._parent.child()
@@ -105,12 +111,14 @@ class GraphModel:
         handle.timer(SCENE_PERIOD, self._on_timer, steady=True)
 
     def end(self) -> None:
-        """Forget the graph: no page is open."""
-        if self._handle is None:
-            return
+        """Look at the graph for a little longer: no page is open, or one is loaded again."""
+        self._end_at = self._clock() + _LINGER_TIME
+
+    def _forget(self):
         for model in self.models.values():
             model.close()
-        self._handle.close()
+        if self._handle is not None:
+            self._handle.close()
         self._handle = None
         for known in (self.models, self.plots, self._seen):
             known.clear()
@@ -136,6 +144,9 @@ class GraphModel:
             model.receive(name in self.plots, is_few, self.graph.topics)
 
     def _on_timer(self):
+        if self._clock() >= self._end_at:
+            self._forget()
+            return
         if self._clock() >= self._poll_at and not self._is_polling:
             self._is_polling = True
             began = self._clock()

@@ -1,6 +1,7 @@
 """What one page consists of, and how it follows the graph."""
 
 import json
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,11 +19,12 @@ from crazyflie_dashboard.page.plots_panel import PlotsPanel
 from crazyflie_dashboard.page.scene_view import SceneView
 from crazyflie_dashboard.page.session import CLICKED, Session
 from crazyflie_dashboard.page.vehicles_panel import VehiclesPanel
-from crazyflie_dashboard.snapshot import Scene, VehicleSnapshot
+from crazyflie_dashboard.snapshot import Scene, Sentence, VehicleSnapshot
 
 SCENE_PERIOD = 0.05
 PANEL_PERIOD = 0.5  #: Between two updates, s.
 MAX_SCENE_AGE = 1.0  #: Of a dashboard that is not held up, s.
+LOADING_TIME = 2.0  #: Until there is a first scene, s.
 
 
 class View:
@@ -32,6 +34,7 @@ class View:
         self._dashboard = dashboard
         self._session = Session(dashboard, context.client)
         self._alarms: set[str] = set()
+        self._loaded = time.monotonic()
         with ui.element("div").classes("page"):
             with ui.element("div").classes("bar"):
                 self._build_bar()
@@ -100,26 +103,33 @@ class View:
     def _watched(self) -> str | None:
         return self._session.watched or next(iter(self._session.vehicles), None)
 
-    def _is_hung(self, scene: Scene) -> bool:
-        return time.monotonic() - scene.made > MAX_SCENE_AGE
+    def _scene(self) -> Scene:
+        """Return the newest scene; of one that is held up all vehicles are stale."""
+        scene = self._dashboard.scene()
+        is_first = scene.made == math.inf
+        age = time.monotonic() - (self._loaded + LOADING_TIME if is_first else scene.made)
+        if age <= MAX_SCENE_AGE:
+            return scene
+        text = f"what is shown is {age:.0f} s old: the dashboard is held up"
+        vehicles = {
+            name: replace(each, is_stale=True, pose_age=each.pose_age and each.pose_age + age)
+            for name, each in scene.vehicles.items()
+        }
+        held_up = Sentence("error", "dashboard", text, "look at its log")
+        return replace(scene, vehicles=vehicles, sentences=(held_up, *scene.sentences))
 
     async def _draw(self) -> None:
-        scene = self._dashboard.scene()
-        if self._is_hung(scene):
-            vehicles = {n: replace(v, is_stale=True) for n, v in scene.vehicles.items()}
-            scene = replace(scene, vehicles=vehicles)
-        await self._scene_view.show(scene, self._session.chosen, self._panels["Missions"].paths)
+        await self._scene_view.show(
+            self._scene(), self._session.chosen, self._panels["Missions"].paths
+        )
 
     def _refresh(self) -> None:
         ui.run_javascript(f"setBeat({time.monotonic()})")
-        scene = self._dashboard.scene()
+        scene = self._scene()
         flying = sum(each.is_in_flight for each in scene.vehicles.values())
         count = len(scene.vehicles)
         noun = "vehicle" if count == 1 else "vehicles"
         trouble = next((f" · {s.text}" for s in scene.sentences if s.source == "dashboard"), "")
-        if self._is_hung(scene):
-            age = time.monotonic() - scene.made
-            trouble = f" · what is shown is {age:.0f} s old: the dashboard is held up"
         self._summary.text = (
             f"{count} {noun} · {flying} in flight · frame {scene.fixed_frame}{trouble}"
         )

@@ -8,8 +8,8 @@ from typing_extensions import override
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.types import SERVICE, TOPIC
 
-REPETITIONS = 20  #: How often a call is repeated on the topic.
-PERIOD = 0.05  #: Between two repetitions, s.
+REPETITIONS = 20  #: Number of messages for each call.
+PERIOD = 0.05  #: Period of the messages (s).
 
 
 class AllEmergencyParameters(Parameters):

@@ -22,10 +22,10 @@ from crazyflie_takeoff.safe_control import (
 from crazyflie_takeoff.transition_table import Table, Transition, step
 from crazyflie_utils.refusal import RefusalError
 
-TAKEOFF_CONTROL_LIMIT = 0.5  #: Age of a takeoff control up to which it excludes commanded ones, s.
-#: Age up to which no control is late: three periods of a controller at 100 Hz, s.
+TAKEOFF_CONTROL_LIMIT = 0.5  #: Age of a takeoff control up to which it excludes commanded ones (s).
+#: Age up to which no control is late (s): three periods of a controller at 100 Hz.
 SHORTEST_HOLD = 0.03
-LAST_STATE = 0.7  #: Age of the oldest state from which the filter predicts the motion, s.
+LAST_STATE = 0.7  #: Age of the oldest state from which the filter predicts the motion (s).
 RESET_DELAY = 2.0  #: Time after an emergency in which a vehicle may still fall, s.
 
 Control = TypeVar("Control")
@@ -34,7 +34,7 @@ Control = TypeVar("Control")
 class FilterState(enum.IntEnum):
     """State of the filter; the values are those of crazyflie_msgs/FilterStatus."""
 
-    PASSING = 0  # Passes controls on.
+    PASSING = 0  # Passes on controls.
     HOLDING = 1  # Keeps the vehicle in place until a control comes back.
     SINKING = 2  # Brings the vehicle down.
     DOWN = 3  # Keeps the motors off until the next takeoff.
@@ -96,9 +96,9 @@ class FilterMachine(Generic[Control]):
     started listens until a takeoff control comes or `stop_listening` is called; before that, only a
     flight state can select the controller.
 
-    Methods that return a control to publish return it as it has come, or a `Setpoint` of the
-    filter's own, or None. `tick` has to be called every 10 ms, or 40 ms while `is_nominal`.
-    ``sees`` is whether states can be expected.
+    Methods that return a control to publish return it unchanged, or a `Setpoint` of the
+    filter's own, or None. Call `tick` every 10 ms, or 40 ms while `is_nominal`.
+    ``sees`` states whether the vehicle's state is received.
     """
 
     def __init__(self, timeouts: LossTimeouts, limits: Limits, sees: bool = False):
@@ -107,7 +107,7 @@ class FilterMachine(Generic[Control]):
         self._measured, self._ground = self.relay.measured, self.relay.ground
         self.state = FilterState.PASSING
         self.reason = ""  # Why the state is not PASSING.
-        self.elapsed = 0.0  # Time since the state began, s.
+        self.elapsed = 0.0  # Time since the state began (s).
         # Age of the last commanded control, s. It begins at 0, since a filter that starts in flight
         # is not connected at once.
         self.silence = 0.0
@@ -117,7 +117,7 @@ class FilterMachine(Generic[Control]):
         # Whether there was no takeoff server for a while since the last control. Without a
         # reference of the server, the controller is silent.
         self.may_lack_reference = False
-        self.takeoff_thrust = 0.0  # Of the takeoff control that has just come, m/s^2.
+        self.takeoff_thrust = 0.0  # Thrust of the latest takeoff control (m/s^2).
         self.takeovers = 0  # Number of times that the filter has held the vehicle.
         self.is_commanded = False  # Whether a commanded control has ever come.
         # Whether a control that is on time and in its ranges passes unchanged.
@@ -126,7 +126,7 @@ class FilterMachine(Generic[Control]):
         self._toggled = False
         self._is_listening = True
         self._waiting: Control | None = None  # A commanded control, while the filter listens.
-        # The last takeoff control that was passed on, its thrust, m/s^2, and when it came, s.
+        # The last takeoff control that was passed on, its thrust (m/s^2), and when it came (s).
         self._takeoff_control: Control | None = None
         self._kept_thrust = 0.0
         self._takeoff_time = math.inf
@@ -136,7 +136,7 @@ class FilterMachine(Generic[Control]):
         self._ticked = math.nan
         self._safe = SafeControl(self.relay.hover, None)
         self._own = MOTORS_OFF
-        self._return_age = math.inf  # Time since a control has come back, s; see `RETURN_TIME`.
+        self._return_age = math.inf  # Time since a control has come back (s); see `RETURN_TIME`.
         self._last_motion: Motion | None = None
         self._event_reason = self._cause = ""
         self._descent_limit = 0.0
@@ -154,7 +154,7 @@ class FilterMachine(Generic[Control]):
         self.passes_unchanged = False
 
     def toggle(self) -> None:
-        """Take a toggle of in_flight; none restores a flight that has ended."""
+        """Process a toggle of in_flight; no toggle restores a flight that has ended."""
         if not self.state.passes_nothing:
             self._toggled = not self._toggled
             self.passes_unchanged = False
@@ -236,27 +236,27 @@ class FilterMachine(Generic[Control]):
     # Inputs.
 
     def measure(self, motion: Motion, age: float = 0.0) -> None:
-        """Take a state that was measured ``age`` s ago."""
+        """Process a state that was measured ``age`` s ago."""
         self.passes_unchanged = False
         self.relay.flush()
         self.relay.measure(motion, age, self.server_reports_ground, self.in_flight)
 
     def set_tilted(self, is_tilted: bool) -> None:
-        """Take whether the vehicle has tilted over."""
+        """Record whether the vehicle has tilted over."""
         self.relay.is_tilted = is_tilted
         self.passes_unchanged = False
 
     def set_box(self, box: Box) -> None:
-        """Take a new box of the geofence."""
+        """Set the box of the geofence."""
         self.relay.walls.change(box.without_floor())
         self.passes_unchanged = False
 
     def miss_controller(self) -> None:
-        """Take that no node publishes commanded controls: the next controller is a new one."""
+        """Record that no node publishes commanded controls: the next controller is a new one."""
         self.lacks_controller = False
 
     def miss_server(self) -> None:
-        """Take that no node publishes takeoff controls."""
+        """Record that no node publishes takeoff controls."""
         self.may_lack_reference = True
         self.passes_unchanged = False
 
@@ -288,7 +288,7 @@ class FilterMachine(Generic[Control]):
         return relay.takeoff(control, setpoint, self._lands)
 
     def pass_unchanged(self, time: float, control: Any, age: float) -> bool:
-        """Take a commanded control if it passes unchanged, and return whether it does.
+        """Accept a commanded control if it passes unchanged; return whether it does.
 
         In a nominal flight nearly all controls do; for the others, call `commanded`. The control
         comes from the node that sent the last one, and has the fields of a `Setpoint`; for ``age``
@@ -308,7 +308,7 @@ class FilterMachine(Generic[Control]):
     ) -> Control | Setpoint | None:
         """Return the control to publish after a commanded control; see `takeoff`.
 
-        A control whose data were measured ``age`` s earlier than usual counts as if it had come
+        A control whose data were measured ``age`` s earlier than usual is treated as if it had come
         that much earlier.
         """
         relay = self._interrupt(time)

@@ -18,16 +18,16 @@ class FlightState(enum.IntEnum):
 
     @property
     def word(self) -> str:
-        """The state as text topics have it."""
+        """The name of the state on text topics."""
         return self.name.lower()
 
     @property
     def in_flight(self) -> bool:
-        """Whether the vehicle is the controller's: what the topic in_flight toggles."""
+        """Whether the controller flies the vehicle: the value that the topic in_flight toggles."""
         return self in _IN_FLIGHT
 
 
-# Found here once: an enumeration takes its time to look a member up.
+# Looked up once: access to a member of an enumeration is slow.
 _IN_FLIGHT = (FlightState.FLYING, FlightState.DESCENDING)
 
 

@@ -12,7 +12,7 @@ from crazyflie_utils import NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import METRES, TOPIC
 
-DIAGNOSTICS_PERIOD = 1.0  #: As REP 107 recommends, s.
+DIAGNOSTICS_PERIOD = 1.0  #: Period of the diagnostics, as REP 107 recommends (s).
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -70,7 +70,7 @@ class FlightTopicParameters(Parameters):
 
     @property
     def box(self) -> Box:
-        """The geofence's box at the start; none where `box_topic` has it."""
+        """The geofence's box at the start; without walls if `box_topic` provides it."""
         if self.box_topic is not None:
             return NO_BOX
         return Box(self.lower.vector(-math.inf), self.upper.vector(math.inf))

@@ -15,30 +15,30 @@ from crazyflie_takeoff.safe_control import (
     limited,
 )
 
-CLIMB_RESPONSE = 0.1  #: Time constant with which a climb approaches its limit, s.
+CLIMB_RESPONSE = 0.1  #: Time constant with which a climb approaches its limit (s).
 CLIMB_BRAKING = 4.0  #: Deceleration of a climb below the highest position, m/s^2.
-RETURN_RATE = 0.5  #: Rate at which a vehicle above the highest position returns to it, 1/s.
+RETURN_RATE = 0.5  #: Rate at which a vehicle above the highest position returns to it (1/s).
 LANDING_CLIMB = 0.5  #: Fastest climb of a vehicle that is to land, m/s.
-CLIMB_TIMEOUT = 2.0  #: Time of controls that climb too fast after which the flight is ended, s.
+CLIMB_TIMEOUT = 2.0  #: Time of controls that climb too fast after which the flight is ended (s).
 MAX_SPEED_CHANGE = 0.5  #: Change of the speed by a control while the filter does not run, m/s.
 
-#: Largest difference between the thrust of a control and that of hover, m/s^2.
+#: Largest difference between the thrust of a control and that of hover (m/s^2).
 _MAX_EXCESS = MAX_THRUST - (1.0 - HOVER_RANGE) * GRAVITY
 
 #: Gap after which the vehicle's z_dot itself is kept within `MAX_SPEED_CHANGE`, since controls that
-#: are calculated from states before the gap add up, s.
+#: are calculated from states before the gap add up (s).
 BUSY_GAP = 0.2
-LONGEST_GAP = 1.0  #: Longest gap that counts, s: a clock that steps further was set.
-GAP_MEMORY = 2.0  #: Time constant with which a gap is forgotten, s.
+LONGEST_GAP = 1.0  #: Longest gap (s): if the clock steps further, it was set.
+GAP_MEMORY = 2.0  #: Time constant with which a gap is forgotten (s).
 #: Fraction of the time, averaged over `STARVATION_MEMORY` (s), which a filter that can control a
 #: flight may spend in gaps longer than `BUSY_GAP`.
 STARVED_SHARE, STARVATION_MEMORY = 0.5, 3.0
 
-OVERLAP = 0.5  #: Time after a message of one node in which one of another node is contention, s.
+OVERLAP = 0.5  #: Time after a message of one node in which one of another node is contention (s).
 MEMORY = 5.0  #: Time after which that is forgotten, s.
 
-DESCENT_TIMEOUT = 1.5  #: Longest time that a vehicle which is to land may stay up, s.
-PROGRESS = 0.02  #: Least decrease of the height that counts as a descent, m.
+DESCENT_TIMEOUT = 1.5  #: Longest time that a vehicle which is to land may stay up (s).
+PROGRESS = 0.02  #: Least decrease of the height in a descent (m).
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,9 @@ class Limits:
     """Limits of a vehicle in flight."""
 
     box: Box  # The geofence at the start.
-    outside: float  # Largest distance outside the box, m.
+    outside: float  # Largest distance outside the box (m).
     floor: float  # Lowest z, m, fixed frame.
-    climb: float  # Largest z_dot that controls may reach, m/s.
+    climb: float  # Largest z_dot that controls may reach (m/s).
     height: float  # Largest height above the ground that controls may reach, m.
 
 
@@ -86,7 +86,7 @@ class Walls:
         self._position: tuple[float, ...] | None = None
 
     def change(self, box: Box) -> None:
-        """Take a new box."""
+        """Set the box."""
         self._box = box
         if self._position is not None:
             self._granted = max(box.excess(self._position), 0.0)
@@ -190,7 +190,7 @@ class RunGaps:
 
     Meanwhile the vehicle keeps its last control. So a control may differ from hover by an
     acceleration of `MAX_SPEED_CHANGE` over the longest gap of the last seconds. If this is longer
-    than `BUSY_GAP`, the present z_dot counts as a part of `MAX_SPEED_CHANGE`.
+    than `BUSY_GAP`, the present z_dot is a part of `MAX_SPEED_CHANGE`.
     """
 
     def __init__(self) -> None:
@@ -215,7 +215,7 @@ class RunGaps:
         return self._longest * _MAX_EXCESS < MAX_SPEED_CHANGE
 
     def run(self, time: float) -> None:
-        """Take that the filter runs at ``time`` (s)."""
+        """Record that the filter runs at ``time`` (s)."""
         gap = time - self._time
         self._time = time
         if gap > 0.0:
@@ -232,7 +232,7 @@ class RunGaps:
 
         ``hover`` is the thrust of hover, m/s^2. ``climb`` is z_dot, m/s, or 0 if it is not known: a
         fall is ended with `MAX_SUBSTITUTE` at most, and a climb with `MAX_BRAKING`. Of a takeoff
-        control (``is_ramp``), which may be of the ramp of a landing, only thrust above hover is
+        control (``is_ramp``), which may belong to the ramp of a landing, only thrust above hover is
         limited.
         """
         if self._longest <= 0.0:
@@ -275,7 +275,7 @@ class Callers:
     """The nodes that publish on one topic, whose messages are called ``what``.
 
     A node that takes the place of another one, or is started again, is not a second publisher: a
-    change counts only if the former node has sent less than `OVERLAP` before. Up to ``tolerance``
+    change is contention only if the former node has sent within `OVERLAP`. Up to ``tolerance``
     changes within `MEMORY` are a handover.
     """
 
@@ -288,7 +288,7 @@ class Callers:
         self._changes: deque[float] = deque(maxlen=tolerance + 1)
 
     def note(self, time: float, caller: str, overlap: float = OVERLAP) -> None:
-        """Take a message of the node ``caller`` (empty: of this process) at ``time`` (s).
+        """Record a message of the node ``caller`` (empty: of this process) at ``time`` (s).
 
         For ``overlap`` (s) see `OVERLAP`.
         """
@@ -300,7 +300,7 @@ class Callers:
         self._last = (caller, time)
 
     def renew(self, time: float) -> None:
-        """Take another message of the last node at ``time`` (s)."""
+        """Record another message of the last node at ``time`` (s)."""
         if self._last is not None:
             self._last = (self._last[0], time)
 

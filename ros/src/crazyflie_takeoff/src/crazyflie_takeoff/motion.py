@@ -5,17 +5,17 @@ from typing import NamedTuple
 
 from crazyflie_utils.clock import CLOCK_STEP
 
-MAX_FEEDBACK_AGE = 0.2  #: Oldest state that controls the vehicle and its limits, s.
-MAX_POSITION_AGE = 0.5  #: Oldest position that counts as that of the vehicle, s.
-DRIFT = 0.1  #: Rate at which the usual age of messages may grow, s/s.
+MAX_FEEDBACK_AGE = 0.2  #: Oldest state that controls the vehicle and its limits (s).
+MAX_POSITION_AGE = 0.5  #: Age up to which a position is that of the vehicle (s).
+DRIFT = 0.1  #: Rate at which the usual age of messages may grow (s/s).
 MIN_AGE = -0.05  #: Least age of a message that is on time, by its stamp, s.
-TOUCHDOWN_HEIGHT = 0.05  #: Largest height of a vehicle that is down where it took off, m.
+TOUCHDOWN_HEIGHT = 0.05  #: Largest height of a vehicle that is down where it took off (m).
 ON_GROUND_HEIGHT = 0.1  #: Largest height of a vehicle that has not been flown, m.
-TOUCHDOWN_SPEED = 0.1  #: Largest speed of a vehicle that is down, m/s.
+TOUCHDOWN_SPEED = 0.1  #: Largest speed of a vehicle that is down (m/s).
 #: Thrust with which no vehicle stays in the air, as a fraction of that of hover: it passes through
 #: speeds below `TOUCHDOWN_SPEED` within 0.1 s.
 SINKING_THRUST = 0.75
-REST_TIME = 0.3  #: Time for which a vehicle that is down rests with so little thrust, s.
+REST_TIME = 0.3  #: Time for which a vehicle that is down rests with so little thrust (s).
 
 Position = tuple[float, float, float]  #: x, y, z in m, fixed frame, z up.
 
@@ -37,7 +37,7 @@ class Measurement:
         self._motion: Motion | None = None
 
     def update(self, motion: Motion, age: float) -> None:
-        """Take a state that was measured ``age`` s ago."""
+        """Process a state that was measured ``age`` s ago."""
         self._motion, self.age = motion, age
 
     def advance(self, step: float) -> None:
@@ -64,7 +64,7 @@ class MeasuredPosition:
         self._position: Position | None = None
         self._age = 0.0
         self._received = 0.0
-        self.missing_reason = ""  #: Why the estimator has no state, as it says; empty if it has.
+        self.missing_reason = ""  #: Why the estimator has no state; empty if it has one.
 
     @property
     def is_measured(self) -> bool:
@@ -72,7 +72,7 @@ class MeasuredPosition:
         return self._position is not None
 
     def measure(self, time: float, position: Position, age: float) -> None:
-        """Take a position (m) that was received at ``time`` with an age (s)."""
+        """Record a position (m) that was received at ``time`` with an age (s)."""
         self._position, self._received, self._age = position, time, age
 
     def value(self, time: float) -> Position | None:
@@ -101,9 +101,9 @@ class Delay:
     """Delay of messages relative to their usual age, from the stamps of their data.
 
     The usual age is the smallest age, which may grow at `DRIFT`. So neither a small offset of
-    another machine's clock nor the latency of a source counts as a delay. After a step of the wall
-    clock the measurement starts over; the negative age of a message that was stamped before the
-    clock was set back is not a usual one.
+    another machine's clock nor the latency of a source is measured as a delay. After a step of the
+    wall clock the measurement restarts; the negative age of a message that was stamped before the
+    clock was set back is ignored.
     """
 
     def __init__(self) -> None:
@@ -134,18 +134,18 @@ class Delay:
 class Ground:
     """The ground where the vehicle took off, and a touchdown at any height.
 
-    The vehicle took off where it was when the server last sent zero thrust. It may land lower, as
-    beside a table, or higher. So a vehicle that has flown is down where it rests although its
+    The vehicle took off where it was when the server last sent zero thrust. It may land lower, for
+    example next to a table, or higher. So a vehicle that has flown is down if it rests although its
     thrust does not carry it.
     """
 
     def __init__(self) -> None:
-        self.z = 0.0  # Where the vehicle took off, m, fixed frame.
+        self.z = 0.0  # Where the vehicle took off (m, fixed frame).
         self._has_flown = False
         self._rest = 0.0
 
     def measure(self, motion: Motion, is_on_ground: bool, in_flight: bool) -> None:
-        """Take a measured state, and whether the server reports ground or flight."""
+        """Process a measured state, and whether the server reports ground or flight."""
         if is_on_ground:
             self.z, self._has_flown = motion.position[2], False
         elif in_flight or not self.is_below(motion):

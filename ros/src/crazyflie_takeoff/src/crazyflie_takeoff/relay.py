@@ -17,9 +17,9 @@ from crazyflie_takeoff.limits import (
 from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Ground, Measurement, Motion
 from crazyflie_takeoff.safe_control import MOTORS_OFF, HoverThrust, Setpoint
 
-LEARNING_STEP = 0.2  #: Longest time between controls from which hover is learned, s.
+LEARNING_STEP = 0.2  #: Longest time between controls from which hover is learned (s).
 HANDOVER = 3  #: Most changes between publishers in a handover from one controller to another.
-CRASH_DURATION = 0.1  #: Time for which a position is wrong in a crash, s.
+CRASH_DURATION = 0.1  #: Time for which a position is wrong in a crash (s).
 
 Control = TypeVar("Control")
 
@@ -27,7 +27,7 @@ Control = TypeVar("Control")
 class Relay:
     """Limits controls, fades late ones to hover, and watches the flight that they make.
 
-    A control counts in full for half of ``hold`` (s), and is level hover from ``hold`` on.
+    A control is unchanged for half of ``hold`` (s), and is level hover from ``hold`` on.
     """
 
     def __init__(self, limits: Limits, hold: float):
@@ -35,7 +35,7 @@ class Relay:
         self.ground = Ground()
         self.walls = Walls(limits)
         self.gaps = RunGaps()
-        #: Whether the vehicle is tilted as only one that crashes is.
+        #: Whether the vehicle is tilted further than in any flight.
         self.is_tilted = False
         # The server is silent in flight: another one at once is a second one.
         self.takeoff_callers = Callers("takeoff controls", 0)
@@ -50,7 +50,7 @@ class Relay:
         self._command = self._allowed_command = self._passed = MOTORS_OFF
         self._takeoff = MOTORS_OFF
         # Of the controls that have passed unchanged since the last `flush`: the last one, the time
-        # for which they have flown the vehicle, s, and the integral of their vertical thrust, m/s.
+        # for which they have flown the vehicle (s), and the integral of their vertical thrust (m/s).
         self._unchanged: Any = None
         self._duration = self._impulse = 0.0
 
@@ -86,7 +86,7 @@ class Relay:
         return self.takeoff_callers.complaint or self.commanded_callers.complaint
 
     def measure(self, motion: Motion, age: float, is_on_ground: bool, in_flight: bool) -> None:
-        """Take a state that was measured ``age`` s ago, and whether the server reports ground."""
+        """Process a state, measured ``age`` s ago, and whether the server reports ground."""
         self.measured.update(motion, age)
         self.ground.measure(motion, is_on_ground, in_flight)
         self._position_complaint = self.walls.complaint(motion.position)
@@ -94,7 +94,7 @@ class Relay:
     def advance(self, time: float, step: float, elapsed: float, lands: bool) -> tuple[str, str]:
         """Advance to ``time`` (s); return a crash and an objection.
 
-        ``elapsed`` is the time since the last call, s, and ``step`` the part of it that counts for
+        ``elapsed`` is the time since the last call, s, and ``step`` the part of it that is added to
         durations. ``lands`` is whether the controller is to bring the vehicle down. A crash is the
         reason for which the motors are stopped in the air, an objection that for which the vehicle
         is landed; both may be empty.
@@ -117,7 +117,7 @@ class Relay:
     # Controls.
 
     def pass_unchanged(self, time: float, control: Any) -> bool:
-        """Take a commanded control while `is_free` holds; return False if it is out of range.
+        """Accept a commanded control while `is_free` holds; return False if it is out of range.
 
         ``control`` has the fields of a `Setpoint`.
         """
@@ -153,7 +153,7 @@ class Relay:
         return control if self._takeoff == setpoint else self._takeoff
 
     def command(self, setpoint: Setpoint) -> None:
-        """Take the numbers of a commanded control."""
+        """Set the last commanded control."""
         self._command = setpoint
 
     def commanded(

@@ -15,33 +15,33 @@ from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.motion import TOUCHDOWN_SPEED, Motion
 
-#: Longest time between two ticks that counts, s: if a clock was set, or the process was stopped for
+#: Longest step between two ticks (s): if a clock was set, or the process was stopped for
 #: a while, a silence is not as long as it seems.
 LONGEST_STEP = 0.05
 
 HOVER_RANGE = 0.25  #: Largest deviation of the thrust of hover from g, as a fraction.
-AVERAGING = 2.0  #: Time constant of the mean of the commanded thrust, s.
+AVERAGING = 2.0  #: Time constant of the mean of the commanded thrust (s).
 
-#: Decrease of the target of z_dot in a descent, and from the beginning while no state comes, m/s^2.
+#: Decrease of the target of z_dot in a descent, and from the start while no state comes (m/s^2).
 #: Without a state, the thrust is this much below hover, which may have been learned 2 % too high;
 #: then a vehicle meets the ground at 0.7 m/s from 1 m, and at 1.0 m/s from 2 m.
 SINK_RATE = 0.3
-SINK_SPEED = 0.4  #: Speed of a descent while z_dot is measured, m/s.
+SINK_SPEED = 0.4  #: Speed of a descent while z_dot is measured (m/s).
 PRESS_RATE = 4.0  #: Decrease of the thrust of a vehicle that does not sink, m/s^2 per s.
-SETTLING = 0.3  #: Time constant with which z_dot follows its target, s.
+SETTLING = 0.3  #: Time constant with which z_dot follows its target (s).
 MAX_CORRECTION = 0.2 * GRAVITY  #: Largest thrust above hover, m/s^2.
-MAX_BRAKING = 0.4 * GRAVITY  #: Largest thrust below hover, which ends a climb, m/s^2.
+MAX_BRAKING = 0.4 * GRAVITY  #: Largest thrust below hover, which ends a climb (m/s^2).
 
-POSITION_GAIN = 0.25 * GRAVITY  #: 0.25 rad/m, as in the softer gains (K_manual.txt), 1/s^2.
+POSITION_GAIN = 0.25 * GRAVITY  #: 0.25 rad/m, as in the softer gains (K_manual.txt) (1/s^2).
 #: 0.3 rad/(m/s), which damps `POSITION_GAIN` critically, 1/s. The softer gains have more, by which
 #: noise of the velocity becomes tilt.
 VELOCITY_GAIN = 0.3 * GRAVITY
-MAX_DISTANCE = 0.5  #: Largest position error, m: the vehicle returns at 0.4 m/s at most.
-MAX_SAFE_TILT = 0.15  #: Largest roll and pitch, rad.
+MAX_DISTANCE = 0.5  #: Largest position error (m): the vehicle returns at 0.4 m/s at most.
+MAX_SAFE_TILT = 0.15  #: Largest roll and pitch (rad).
 STOPPING_TIME = 0.5  #: Time in which the vehicle is to stop horizontally, s.
-HEIGHT_GAIN = 1.0  #: Target of z_dot over height error, 1/s.
+HEIGHT_GAIN = 1.0  #: Target of z_dot over height error (1/s).
 MAX_HEIGHT_SPEED = 0.3  #: Largest such target, m/s.
-MAX_SUBSTITUTE = (1.0 + HOVER_RANGE) * GRAVITY  #: Largest thrust of the filter's own, m/s^2.
+MAX_SUBSTITUTE = (1.0 + HOVER_RANGE) * GRAVITY  #: Largest thrust of the filter's own (m/s^2).
 RETURN_TIME = 0.2  #: Time in which the control changes over from the filter's own, s.
 
 
@@ -59,7 +59,7 @@ class Setpoint(NamedTuple):
         return self.thrust * math.cos(self.roll) * math.cos(self.pitch)
 
     def mixed(self, other: "Setpoint", weight: float) -> "Setpoint":
-        """Return a mean with another one, which has a weight (0 ... 1)."""
+        """Return the mean with another setpoint, which has a weight (0 ... 1)."""
         return Setpoint(*(a + weight * (b - a) for a, b in zip(self, other, strict=True)))
 
 
@@ -67,7 +67,7 @@ MOTORS_OFF = Setpoint(0.0, 0.0, 0.0, 0.0)
 
 
 class HoverThrust:
-    """The thrust at which a vehicle hovers: a running mean of what is commanded in flight.
+    """The thrust at which a vehicle hovers: a running mean of the thrust commanded in flight.
 
     Both the vertical part of the thrust and the vertical speed v are filtered with the time
     constant T (`AVERAGING`). As (v - mean v) / T is the filtered acceleration, subtracting it
@@ -81,11 +81,11 @@ class HoverThrust:
 
     @property
     def value(self) -> float:
-        """m/s^2, within `HOVER_RANGE` of g."""
+        """The thrust, m/s^2, within `HOVER_RANGE` of g."""
         return limited(self._thrust - self._acceleration, HOVER_RANGE * GRAVITY, GRAVITY)
 
     def update(self, step: float, lift: float, speed: float | None) -> None:
-        """Take the vertical thrust (m/s^2) that has flown the vehicle for ``step`` (s).
+        """Process the vertical thrust (m/s^2) that has flown the vehicle for ``step`` (s).
 
         ``speed`` is the measured z_dot, m/s, or None.
         """
@@ -114,7 +114,7 @@ class SafeControl:
         self._yaw = 0.0 if motion is None else motion.yaw
         self._place: tuple[float, float, float] | None = None
         self._target = 0.0
-        self._pressure = 0.0  # Reduction of the thrust while the vehicle does not sink, m/s^2.
+        self._pressure = 0.0  # Reduction of the thrust while the vehicle does not sink (m/s^2).
         self._seen = motion
         if motion is not None:
             self._reckon(age)

@@ -1,7 +1,7 @@
 """Takeoff and landing: the states of the server, their transitions, and the machine.
 
 Heights and positions are in the fixed frame (z up), m. Times are s of any clock that does not run
-backwards; if it is reset, what was under way goes on from there.
+backwards; if it is reset, a takeoff or a landing continues from there.
 """
 
 import enum
@@ -15,29 +15,29 @@ from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Position
 from crazyflie_takeoff.transition_table import Table, Transition, find, step
 from crazyflie_utils.refusal import RefusalError
 
-LIFT_OFF_THRUST = GRAVITY + 0.2  #: Thrust of the open-loop part of a takeoff, m/s^2.
-#: Time after which a vehicle that is still on the ground counts as unable to fly, s.
+LIFT_OFF_THRUST = GRAVITY + 0.2  #: Thrust of the open-loop part of a takeoff (m/s^2).
+#: Time after which a vehicle that is still on the ground is unable to fly (s).
 LIFT_OFF_TIME = 3.0
-RAMP_DURATION = 1.0  #: Duration of the thrust ramp of a landing; zero thrust follows, s.
+RAMP_DURATION = 1.0  #: Duration of the thrust ramp of a landing; zero thrust follows (s).
 RAMP_RATE = 5.0  #: Decrease of the thrust in that ramp, which begins at g, m/s^2 per s.
-RAMP_DROP = 0.1  #: A vehicle that sinks further in the ramp was not on the ground, m.
+RAMP_DROP = 0.1  #: A vehicle that sinks further in the ramp was not on the ground (m).
 TOUCHDOWN_LIMIT = 2.0  #: Longest time from the end of the ramp to the touchdown, s.
-ZERO_THRUST_PERIOD = 0.1  #: Period of zero thrust on the ground, s.
+ZERO_THRUST_PERIOD = 0.1  #: Period of zero thrust on the ground (s).
 #: Height above which a vehicle is in flight if no flight state is remembered, m.
 FLYING_HEIGHT = 0.15
-FILTER_LIMIT = 60.0  #: Longest time for which the filter may hold or land the vehicle, s.
+FILTER_LIMIT = 60.0  #: Longest time for which the filter may hold or land the vehicle (s).
 ROUNDING = 1e-6  #: Tolerance of comparisons between times, s.
 
-SHORTEST_DESCENT = 1.0  #: Least duration of a descent that has to end within a given time, s.
-DESCENT_MARGIN = 3.0  #: Time that a descent may take beyond its calculated duration, s.
+SHORTEST_DESCENT = 1.0  #: Least duration of a descent with a time limit (s).
+DESCENT_MARGIN = 3.0  #: Time that a descent may take beyond its calculated duration (s).
 #: Depth of the last reference of a descent below the ground, m: the vehicle meets the ground with
 #: its speed also when it hangs above the reference.
 PRESS_DEPTH = 0.3
-#: In a descent to an unknown ground, a vehicle that has not sunk for this time is down, s. The
+#: In a descent to an unknown ground, a vehicle that has not sunk for this time is down (s). The
 #: filter notices a controller that does not follow sooner (`DESCENT_TIMEOUT`).
 STOP_TIME = 2.0
-PROGRESS = 0.02  #: Least decrease of the height that counts as sinking, m.
-SEARCH_LIMIT = 20.0  #: Longest descent to an unknown ground, s.
+PROGRESS = 0.02  #: Least decrease of the height of a vehicle that sinks (m).
+SEARCH_LIMIT = 20.0  #: Longest descent to an unknown ground (s).
 
 #: Reason for which a takeoff or a landing is refused in a flight state.
 REFUSALS = {
@@ -65,7 +65,7 @@ class ServerState(enum.Enum):
 
     @property
     def flight_state(self) -> FlightState | None:
-        """The flight state that is published meanwhile; None if none is."""
+        """The flight state that is published meanwhile; None if no state is published."""
         return _FLIGHT_STATES.get(self)
 
 
@@ -125,7 +125,7 @@ class Descent:
         self._x, self._y, self._z = position
         self._speed = speed
         self._is_search = ground is None
-        # The lowest height that was measured, m, and when, s.
+        # The lowest height that was measured (m), and when (s).
         self._reached = (self._z, begin)
         if ground is None:
             self._lowest, self._end = -math.inf, begin + SEARCH_LIMIT
@@ -134,7 +134,7 @@ class Descent:
             self._end = begin + max(self._z - ground, 0.0) / speed + DESCENT_MARGIN
 
     def measure(self, time: float, z: float) -> None:
-        """Take a measured height of the vehicle (m)."""
+        """Record a measured height of the vehicle (m)."""
         if z < self._reached[0] - PROGRESS:
             self._reached = z, time
 
@@ -153,10 +153,10 @@ class Descent:
 
 @dataclass(frozen=True)
 class Plan:
-    """How to take off and land."""
+    """Durations and speed of takeoffs and landings."""
 
     hover: Position
-    open_loop: float  # Duration of `LIFT_OFF_THRUST`, s.
+    open_loop: float  # Duration of `LIFT_OFF_THRUST` (s).
     settle: float  # Time for the controller to reach the hover point, s.
     descent_speed: float  # m/s; 0 for a landing without a descent, by the ramp alone.
 
@@ -288,7 +288,7 @@ TABLE: Table[ServerState, "FlightStateMachine"] = (
         )
     ),
     Transition(_S.DESCENDING, _E.TICK, _down_or_descent_over, _S.RAMPING_DOWN, _begin_at_once),
-    # The ground may be lower than where the vehicle took off, as beside a table.
+    # The ground may be lower than at the takeoff, for example next to a table.
     Transition(_S.RAMPING_DOWN, _E.TICK, _still_sinks, _S.DESCENDING, _descend_further),
     Transition(_S.RAMPING_DOWN, _E.TICK, _ramp_over, _S.TOUCHING_DOWN),
     Transition(_S.TOUCHING_DOWN, _E.TICK, _down_or_not_seen_or_too_late, _S.ON_GROUND, _begin),
@@ -317,7 +317,7 @@ TABLE: Table[ServerState, "FlightStateMachine"] = (
 class Output:
     """Messages to publish after a tick."""
 
-    thrust: float | None = None  # Takeoff control with level attitude, m/s^2.
+    thrust: float | None = None  # Takeoff control with level attitude (m/s^2).
     reference: tuple[float, ...] | None = None  # x, y, z, m, and x_dot, y_dot, z_dot, m/s.
     toggle: bool = False  # Whether in_flight changes.
 
@@ -327,18 +327,18 @@ class FlightStateMachine:
 
     def __init__(self, plan: Plan, state: ServerState = ServerState.RECOVERING):
         self.state = state
-        self.plan = plan  #: May be replaced; what has begun already goes on as it was planned.
+        self.plan = plan  #: May be replaced; a takeoff or landing that has begun keeps its plan.
         self.filter = NO_FILTER  #: The last status of the filter.
-        self.ground = 0.0  #: Height (z) of the ground where the vehicle took off, m.
+        self.ground = 0.0  #: Height (z) of the ground where the vehicle took off (m).
         self.ground_is_known = True  # False where the vehicle has sunk further.
-        self.time = -math.inf  # Of the last tick, s.
+        self.time = -math.inf  # Time of the last tick (s).
         self.begun: float | None = None  # Begin of the present state, s; None until the next tick.
-        self.measured: Position | None = None  # Present position, m; None if it is not known.
+        self.measured: Position | None = None  # Present position (m); None if it is not known.
         self.reference: tuple[float, ...] | None = None  # See `Output`.
         self.descent: Descent | None = None
-        self.descent_speed = 0.0  # Of the plan when the present state began, m/s.
-        self.descent_end = math.inf  # When a descent has to be over, s after it began.
-        self.ramp_height: float | None = None  # First height measured in the ramp of a landing, m.
+        self.descent_speed = 0.0  # Planned speed when the present state began (m/s).
+        self.descent_end = math.inf  # Latest end of a descent, s after it began.
+        self.ramp_height: float | None = None  # First height measured in the ramp of a landing (m).
         self.zero_sent = -math.inf  # When zero thrust was sent last, s.
         # The last known position, in a descent also by dead reckoning.
         self._position: Position | None = None
@@ -360,7 +360,7 @@ class FlightStateMachine:
         return self.measured is not None and self.measured[2] - self.ground < TOUCHDOWN_HEIGHT
 
     def set_filter(self, report: FilterReport) -> None:
-        """Take a status of the filter."""
+        """Set the status of the filter."""
         self.filter = report
         self.handle(report.event)
 
@@ -369,11 +369,11 @@ class FlightStateMachine:
         return find(TABLE, self.state, event, self) is not None
 
     def handle(self, event: Event) -> None:
-        """Take the transition of an event, if the present state has one."""
+        """Make the transition of an event, if the present state has one."""
         self.state = step(TABLE, self.state, event, self)
 
     def request(self, event: Event) -> None:
-        """Take the transition of an event; `RefusalError` if the present state has none."""
+        """Make the transition of an event; `RefusalError` if the present state has none."""
         if not self.accepts(event):
             raise RefusalError(REFUSALS[self.flight_state])
         self.handle(event)
@@ -381,7 +381,7 @@ class FlightStateMachine:
     def recover(self, position: Position | None, ground: float) -> None:
         """Derive the state from the status of the filter and the measured position (m).
 
-        ``ground`` is the height (z) of the ground that the former server has noted, m. If the
+        ``ground`` is the height (z) of the ground that the former server has stored, m. If the
         filter remembers no flight, that may be of another launch, and z = 0 is taken.
         """
         remembered = self.filter.remembered
@@ -397,7 +397,7 @@ class FlightStateMachine:
             self.descent = None
 
     def tick(self, time: float, position: Position | None = None) -> Output:
-        """Let time pass until ``time`` (s); ``position`` is the measured one, None if unknown."""
+        """Advance to ``time`` (s); ``position`` is the measured one, None if unknown."""
         self._follow_clock(time)
         is_seen_again = position is not None and self.measured is None
         self.measured, self.reference = position, None

@@ -10,10 +10,10 @@ from crazyflie_takeoff.motion import MeasuredPosition
 from crazyflie_takeoff.server_table import Event, FilterReport
 from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters, hover_complaint
 
-MAX_VOLTAGE_AGE = 5.0  #: Age at which a voltage is unknown, s; the driver sends one a second.
-MAX_CONNECTION_AGE = 3.0  #: Age at which a status of the driver is unknown, s; one comes a second.
-_LONGEST_STEP = 1.5  #: Longest time between two voltages that counts, s.
-_NOT_LOWER = -math.inf  # Duration below a level of a voltage that is not below it, s.
+MAX_VOLTAGE_AGE = 5.0  #: Age at which a voltage is unknown (s); the driver sends one a second.
+MAX_CONNECTION_AGE = 3.0  #: Age at which a status of the driver is unknown (s); one comes a second.
+_LONGEST_STEP = 1.5  #: Longest time between two voltages that is added to a duration (s).
+_NOT_LOWER = -math.inf  # Duration below a level of a voltage that is not below it (s).
 
 
 class Charge(enum.Enum):
@@ -28,7 +28,7 @@ class Charge(enum.Enum):
 class Battery:
     """The charge of a battery, from the time for which its voltage has been below two levels (V).
 
-    In flight the voltage sags with every burst of thrust. So it has to stay low for ``duration``
+    In flight the voltage sags with every burst of thrust. So it must stay low for ``duration``
     (s); if that is 0, a single low voltage is enough.
     """
 
@@ -40,7 +40,7 @@ class Battery:
         self._time = math.inf  # s; infinite before the first voltage.
 
     def measure(self, time: float, voltage: float) -> None:
-        """Take a voltage (V) that was measured at ``time`` (s)."""
+        """Record a voltage (V) that was measured at ``time`` (s)."""
         step = min(max(time - self._time, 0.0), _LONGEST_STEP)
         self._lasted = [
             max(lasted + step, 0.0) if voltage < level else _NOT_LOWER
@@ -68,11 +68,11 @@ class DriverConnection:
         self._is_emergency = False
 
     def update(self, now: float, is_connected: bool) -> None:
-        """Take whether the driver is connected to the vehicle."""
+        """Record whether the driver is connected to the vehicle."""
         self._time, self._is_connected = now, is_connected
 
     def update_state(self, now: float, state: SupervisorState, is_emergency: bool) -> None:
-        """Take the vehicle's state, and whether the driver's emergency stop is latched."""
+        """Record the vehicle's state, and whether the driver's emergency stop is latched."""
         self._state_time, self._state, self._is_emergency = now, state, is_emergency
 
     def cannot_fly(self, now: float) -> str:
@@ -126,11 +126,11 @@ class TakeoffChecks:
         self._resolve = resolve
 
     def set_box(self, box: Box) -> None:
-        """Take the box of the geofence."""
+        """Set the box of the geofence."""
         self.box = box
 
     def set_controller(self, has_controller: bool) -> None:
-        """Take whether the filter sees a controller."""
+        """Record whether the filter sees a controller."""
         self.has_controller = has_controller
         self._had_controller = self._had_controller or has_controller
 

@@ -27,17 +27,17 @@ from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, N
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import stamped
 
-TIME_STEP = 0.01  #: Period of the filter's own controls, s.
+TIME_STEP = 0.01  #: Period of the filter's own controls (s).
 NOMINAL_TIME_STEP = 0.04  #: Period of the ticks in a nominal flight, s.
 
-#: Time that a filter listens when it starts, before it passes commanded controls, s: some periods
+#: Time that a filter listens when it starts, before it passes commanded controls (s): some periods
 #: of the zero thrust on the ground, and less than a vehicle flies on without controls.
 LISTENING_TIME = 0.4
-SERVER_LIMIT = 2.0  #: Longest time that it waits for a server that recovers the flight state, s.
+SERVER_LIMIT = 2.0  #: Longest time that it waits for a server that recovers the flight state (s).
 FRESH_TIME = 5.0  #: Time after the start in which commanded controls do not prove a flight, s.
-CONTROLLER_POLL_PERIOD = 0.1  #: Period of the search for publishers of controls, s.
+CONTROLLER_POLL_PERIOD = 0.1  #: Period of the search for publishers of controls (s).
 BUSY_GAP = 0.1  #: Gap after which the log says that the computer is too busy, s.
-REPETITION = 10.0  #: Shortest time between two such messages, s.
+REPETITION = 10.0  #: Shortest time between two such messages (s).
 
 
 class TakeoffControlFilterParameters(FlightTopicParameters):
@@ -101,7 +101,7 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
     tilted_topic = derived_topic("own_tilted_topic", "state_topic", "_tilted")
 
     def timeouts(self) -> LossTimeouts:
-        """Return how long the filter waits after a loss."""
+        """Return the timeouts of the filter after a loss."""
         return LossTimeouts(self.hold, self.recovery, self.descent, self.place)
 
     def limits(self) -> Limits:
@@ -161,7 +161,7 @@ class FilterStatusPublisher:
 
 
 class TakeoffControlFilterNode(Node):
-    """Pass on takeoff control always, and commanded control in flight; see `FilterMachine`."""
+    """Passes on takeoff controls always, and commanded controls in flight; see `FilterMachine`."""
 
     needed_in_flight = True
 
@@ -169,7 +169,7 @@ class TakeoffControlFilterNode(Node):
         self._published_controller: bool | None = None
         self._is_fresh = True
         self._state_delay, self._control_delay = Delay(), Delay()
-        self._wall_offset = 0.0  # Wall clock minus `handle.time`, as of the last tick, s.
+        self._wall_offset = 0.0  # Wall clock minus `handle.time`, as of the last tick (s).
         # Connection of the last commanded control; None if this process has sent it.
         self._connection: Any = self
         self._is_settled = False  # Whether the status of a nominal flight has been published.

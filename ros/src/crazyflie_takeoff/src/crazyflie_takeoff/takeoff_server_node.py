@@ -37,17 +37,17 @@ from crazyflie_utils import Node, NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import from_vector, stamped
 
-TIME_STEP = 0.01  #: Period of the server, s.
+TIME_STEP = 0.01  #: Period of the server (s).
 CRUISE_TIME_STEP = 0.1  #: Period in flight, where it only watches the battery, s.
-STATUS_PERIOD = 0.1  #: Period at which the status is compared with the published one, s.
+STATUS_PERIOD = 0.1  #: Period at which the status is compared with the published one (s).
 RECOVERY_LIMIT = 1.0  #: Time that a server waits for evidence of the flight when it starts, s.
 
-#: Longest descent when the process is to end, s: together with the ramp that is less than the 10 s
+#: Longest descent when the process is to end (s): together with the ramp that is less than the 10 s
 #: for which a process with a flight goes on.
 LEAVE_LIMIT = 7.0
 
 #: Time after the start of the server during which a takeoff waits for the first state and for a
-#: controller, s: nodes that are launched together need a while to find each other.
+#: controller (s): nodes that are launched together need a while to find each other.
 START_LIMIT = 5.0
 
 _EVENTS = {
@@ -69,10 +69,10 @@ _LOG_WORDS = {
 
 
 class Calls:
-    """Callers of services that answer at the end of a takeoff or a landing.
+    """Service calls that are answered at the end of a takeoff or a landing.
 
-    At most one call is under way. ``waiting`` are those of which it is not known yet whether they
-    may begin, in their order.
+    At most one call is under way. ``waiting`` are, in their order, the calls for which it is not
+    known yet whether they may begin.
     """
 
     def __init__(self) -> None:
@@ -120,7 +120,7 @@ class StatusPublisher:
         self._text = handle.publisher(parameters.status_topic, String, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._inhibit_shutdown = handle.inhibit_shutdown()
-        self.state: FlightState | None = None  # Published last.
+        self.state: FlightState | None = None  # The last state that was published.
         self.reason = ""  # Why the last landing or abort began.
         self._published: tuple[object, ...] | None = None
         self._published_text = ""

@@ -11,14 +11,14 @@ from crazyflie_takeoff.server_table import Plan
 from crazyflie_utils import parameter
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
 
-SLOWEST_DESCENT = 0.05  #: A slower descent would hardly ever end, m/s.
+SLOWEST_DESCENT = 0.05  #: A slower descent would hardly ever end (m/s).
 FASTEST_DESCENT = 1.0  #: A vehicle meets the ground with the speed of its descent, m/s.
-#: Without a controller a vehicle climbs by 2.5 m in this time, s: half of 0.2 m/s^2 times t^2.
+#: Without a controller a vehicle climbs by 2.5 m in this time (s): half of 0.2 m/s^2 times t^2.
 LONGEST_OPEN_LOOP = 5.0
 
 
 class DescentSpeed(Number):
-    """The speed of a descent, or 0."""
+    """Type of the speed of a descent, or 0."""
 
     @property
     @override
@@ -154,7 +154,7 @@ class TakeoffServerParameters(FlightTopicParameters):
         return self.hover_x, self.hover_y, self.hover_z
 
     def plan(self) -> Plan:
-        """Return how to take off and land."""
+        """Return the durations and the speed of takeoffs and landings."""
         return Plan(self.hover, self.open_loop, self.settle, self.descent_speed)
 
 

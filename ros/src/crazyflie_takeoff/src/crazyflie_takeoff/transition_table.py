@@ -1,4 +1,4 @@
-"""State machines as data: what runs is the table that the documentation draws.
+"""State machines as data: the program runs the table that the documentation draws.
 
 A table is a sequence of `Transition`; guards and actions are functions of one context, and their
 names are the words of the diagram.
@@ -19,7 +19,7 @@ class Transition(Generic[State, Context]):
 
     state: State
     event: enum.Enum
-    guard: Callable[[Context], bool] | None  # Changes nothing; None: always.
+    guard: Callable[[Context], bool] | None  # Has no side effects; None: always true.
     next: State  # May be the same.
     action: Callable[[Context], object] | None = None  # Called before the state changes.
 
@@ -30,7 +30,7 @@ Table = Sequence[Transition[State, Context]]
 def find(
     table: Table[State, Context], state: State, event: enum.Enum, context: Context
 ) -> Transition[State, Context] | None:
-    """Return the first row of a table that counts and whose guard holds, or None."""
+    """Return the first row of a table for a state and an event whose guard holds, or None."""
     for row in table:
         if row.state is state and row.event is event and (row.guard is None or row.guard(context)):
             return row

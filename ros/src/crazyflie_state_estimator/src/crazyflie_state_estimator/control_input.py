@@ -15,7 +15,7 @@ class ControlInput:
         self._time = 0.0
 
     def command(self, control: Sequence[float], time: float) -> None:
-        """Take a control (roll, pitch, yaw rate, thrust; rad, rad/s, m/s^2) at ``time`` (s)."""
+        """Set the control (roll, pitch, yaw rate, thrust; rad, rad/s, m/s^2) at ``time`` (s)."""
         self._control = control
         self._time = time
 

@@ -13,8 +13,8 @@ with the variance, along each axis,
 
 where f = (1, T, T^2 / 2), P is the covariance of the estimate, q the random walk of the
 disturbance (`DISTURBANCE_WALK`), D its limit (`DISTURBANCE_CHANGE`), L the uncertainty of the
-vehicle's delay (`LAG_ERROR`) and n what a place is known to. Poses that stay at one place to within
-their noise although p(t) is more than a threshold times s away from it do not respond to the
+vehicle's delay (`LAG_ERROR`) and n the error of a measured place. Poses that stay at one place to
+within their noise although p(t) is more than a threshold times s away from it do not respond to the
 control. A vehicle in gusts departs from p(t), too, but does not stay at one place meanwhile.
 """
 
@@ -25,38 +25,38 @@ from typing import NamedTuple
 
 from crazyflie_state_estimator.kalman import ConstantAccelerationFilter
 
-#: Poses and controls are averaged over at least this time, s, and so many poses.
+#: Least duration (s) and number of poses over which poses and controls are averaged.
 BLOCK, BLOCK_POSES = 0.05, 4
-MAX_GAP = 0.25  #: After a longer pause between two poses, s, the estimate starts anew.
-DISTURBANCE_WALK = 0.25  #: Random walk of the disturbance, m/s^2/sqrt(s).
+MAX_GAP = 0.25  #: Pause between two poses after which the estimate restarts (s).
+DISTURBANCE_WALK = 0.25  #: Random walk of the disturbance (m/s^2/sqrt(s)).
 
-#: Standard deviations of the velocity, m/s, and of the disturbance, m/s^2, after lifting off: mass
+#: Standard deviations of the velocity (m/s) and of the disturbance (m/s^2) after the liftoff: mass
 #: and thrust of a vehicle may be wrong by 15 %.
 FIRST_SPEED, FIRST_DISTURBANCE = 1.0, 1.5
 
-#: By how much the disturbance of a vehicle that stays at one place changes, m/s^2.
+#: Largest change of the disturbance of a vehicle that stays at one place (m/s^2).
 DISTURBANCE_CHANGE = 0.05
 
 #: Time constant of the vehicle's response (motors, attitude, latency of the poses) and its standard
-#: deviation, s.
+#: deviation (s).
 LAG, LAG_ERROR = 0.1, 0.04
 
-#: Least time T of a prediction, s, and the threshold for its distance, standard deviations. Of 570
+#: Least time T of a prediction (s), and threshold of its distance (standard deviations). In 570
 #: healthy flights, with gusts of up to 1 m/s and noise of up to 3 mm, the worst reached 0.8 of a
 #: threshold.
 THRESHOLDS = ((0.8, 3.6), (0.35, 5.5))
 
-#: Estimates from the first part of a stay, s, still contain the end of the motion before it.
+#: Time from the beginning of a stay in which estimates still contain the motion before it (s).
 SETTLING = 0.5
-WINDOW, ESTIMATE_PERIOD = 3.0, 0.25  #: Estimates are kept for this time, one every period, s.
+WINDOW, ESTIMATE_PERIOD = 3.0, 0.25  #: Time for which estimates are kept, and their period (s).
 
-#: Poses stay at a place when the mean of a block differs from that of the stay by less than the
-#: former, m, and so many standard deviations of the difference.
+#: Poses stay at a place while the mean of a block differs from that of the stay by less than the
+#: first value (m), or by less than the second one (standard deviations of the difference).
 TOLERANCE, TOLERANCE_FACTOR = 0.0003, 4.0
 
-#: Least noise of a pose, and error of the prediction at T = 0, m.
+#: Least noise of a pose, and error of the prediction at T = 0 (m).
 MIN_NOISE, PLACE_ERROR = 1e-4, 0.003
-NOISE_AVERAGING = 40.0  #: The variance of the noise is averaged over so many blocks.
+NOISE_AVERAGING = 40.0  #: Number of blocks over which the variance of the noise is averaged.
 
 Vector = Sequence[float]
 
@@ -98,7 +98,7 @@ class ResponseMonitor:
         self.reset()
 
     def reset(self) -> None:
-        """Start anew with the next pose; the noise of the poses stays known."""
+        """Restart with the next pose; keep the noise of the poses."""
         self._block: list[tuple[float, Vector, Vector]] = []
         self._time: float | None = None
         self._commanded: Vector = ()
@@ -110,7 +110,7 @@ class ResponseMonitor:
         self._stay: _Stay | None = None
 
     def update(self, time: float, position: Vector, acceleration: Vector) -> Departure | None:
-        """Take a pose; return where the vehicle is if the poses do not respond to the control.
+        """Process a pose; return where the vehicle is if the poses do not respond to the control.
 
         ``time`` is the pose's stamp, s; position, m, and commanded acceleration, m/s^2, are in the
         fixed frame.
@@ -196,7 +196,7 @@ class ResponseMonitor:
         for start in estimates:
             duration = time - start.time
             offset = self._offset(duration, start, place)
-            # Nearly all predictions of a flight that nothing disturbs end nearer than that.
+            # In an undisturbed flight nearly all predictions end nearer than that.
             if math.hypot(*offset) > tolerated:
                 deviation = self._deviation(duration, start)
                 significance = _significance(duration, offset, deviation)
@@ -209,7 +209,7 @@ class ResponseMonitor:
         return PLACE_ERROR + TOLERANCE_FACTOR * self._noise / math.sqrt(BLOCK_POSES)
 
     def _offset(self, t, start, place):
-        """Return where an estimate leads within ``t`` (s), less the ``place`` of the stay (m)."""
+        """Return the position predicted by an estimate after ``t`` (s) minus the stay's (m)."""
         x, y, z = place
         (px, py, pz), (vx, vy, vz), (dx, dy, dz) = start.position, start.velocity, start.disturbance
         (wx, wy, wz), (ux, uy, uz), (sx, sy, sz) = self._way, start.way, start.speed
@@ -243,10 +243,10 @@ class ResponseMonitor:
 
 
 def _significance(duration: float, offset: Vector, deviation: float) -> float:
-    """Return how far a prediction is from the place of the stay, over what is tolerated."""
+    """Return the distance of a prediction from the stay, over the largest that is tolerated."""
     threshold = next((limit for least, limit in THRESHOLDS if duration >= least), math.inf)
     x, y, z = offset
-    # A vehicle that is to sink may stand on something, and friction (of coefficient 1) hold it.
+    # A vehicle that is to sink may be on an object, and friction (coefficient 1) may hold it.
     distance = math.hypot(x, y, z) if z >= 0.0 else max(math.hypot(x, y) + z, 0.0)
     return distance / (threshold * deviation)
 

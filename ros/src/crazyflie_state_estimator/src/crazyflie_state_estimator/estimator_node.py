@@ -32,12 +32,12 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters.types import Integer
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple
 
-REPORT_PERIOD = 1.0  #: Of the diagnostics, s; REP 107 wants one report a second.
-SILENCE_PERIOD = 0.1  #: Period at which an estimator that acts on arrival checks for silence, s.
+REPORT_PERIOD = 1.0  #: Period of the diagnostics, as REP 107 recommends (s).
+SILENCE_PERIOD = 0.1  #: Period at which an estimator that acts on arrival checks for silence (s).
 
 
 class StateEstimatorNode(Node):
-    """Publish the state of the vehicle that tf knows."""
+    """Publishes the state of a vehicle from its pose on tf."""
 
     needed_in_flight = True
 
@@ -120,7 +120,7 @@ class StateEstimatorNode(Node):
     def _estimate(self):
         now = self._handle.time()
         if now < self._last_success:
-            # The simulation was reset, and what is known belongs to the past one.
+            # The simulation was reset, and the estimate belongs to the previous run.
             self._estimator.reset()
             self._gate.reset()
             self._frozen.reset()
@@ -165,7 +165,7 @@ class StateEstimatorNode(Node):
         self._frozen.restart()
 
     def _departure(self, attitude):
-        """Return the predicted motion where the measured one has just turned out to be wrong."""
+        """Return the predicted motion if the measured one has just turned out to be wrong."""
         departure = self._frozen.departure
         if departure is None:
             return None

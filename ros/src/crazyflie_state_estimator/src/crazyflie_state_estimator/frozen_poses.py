@@ -9,18 +9,19 @@ import math
 
 from crazyflie_state_estimator.control_response import Departure, ResponseMonitor, Vector
 
-#: So far above that place a pose that repeats is none on the ground, m: that repeats, too.
+#: Height above the lowest pose at which repeated poses show a frozen camera (m): poses of a vehicle
+#: on the ground repeat, too.
 CLEAR = 0.01
 
-#: On the ground a vehicle may need so much acceleration upwards more than nominal, m/s^2; what is
-#: commanded beyond that lifts any, when it has made so much speed, m/s.
+#: Largest acceleration above nominal that a vehicle may need to leave the ground (m/s^2), and the
+#: speed from the acceleration beyond that with which every vehicle has left it (m/s).
 HEAVY, LIFTING = 3.0, 0.3
 
-#: A vehicle whose last motion was smaller than this, m, has come to rest gradually.
+#: Last motion of a vehicle that has come to rest gradually (m): a smaller one.
 _ROUNDING = 1e-6
-LIFTED = 0.04  #: So far above the place where its motors were off last, a vehicle flies, m.
-_LEFT = 0.03  #: A camera that has gone on shows the vehicle further away than this, m, ...
-_CONFIRMATION = 3  #: ... in so many poses in a row.
+LIFTED = 0.04  #: Height of a flying vehicle above the place where its motors were off last (m).
+_LEFT = 0.03  #: Least distance of the poses that show that the camera runs again (m).
+_CONFIRMATION = 3  #: Number of such poses in a row.
 
 
 class FrozenPoseMonitor:
@@ -36,13 +37,13 @@ class FrozenPoseMonitor:
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew: the next pose is the vehicle's."""
+        """Restart: the next pose is the vehicle's."""
         self._ground: float | None = None
         self._is_flying = False
         self.restart()
 
     def restart(self) -> None:
-        """Take note that the vehicle is elsewhere, and did not fly there."""
+        """Restart after the vehicle was moved without flying."""
         self._last: tuple[Vector, Vector] | None = None
         self._last_step = 0.0
         self._repeats = False
@@ -58,7 +59,7 @@ class FrozenPoseMonitor:
     def update(
         self, time: float, position: Vector, rotation: Vector, acceleration: Vector | None
     ) -> bool:
-        """Take a pose; return whether it is not the vehicle's.
+        """Process a pose; return whether it is not the vehicle's.
 
         Its stamp ``time`` (s) is later than the one before; position (m, fixed frame) and rotation
         (quaternion). ``acceleration`` is the control's, m/s^2, fixed frame; None while it is
@@ -102,7 +103,7 @@ class FrozenPoseMonitor:
         elif acceleration is not None and acceleration[2] > HEAVY:
             self._lifting += (acceleration[2] - HEAVY) * elapsed
             self._repeats = self._repeats or self._lifting > LIFTING
-        # What repeats goes on to when the flight has ended.
+        # A pose that repeats still does so after the end of the flight.
         return self._repeats
 
     def _is_still_frozen(self, position, place):

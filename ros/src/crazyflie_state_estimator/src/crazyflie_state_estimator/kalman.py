@@ -4,25 +4,25 @@ from typing_extensions import override
 
 from crazyflie_state_estimator.motion import Components, RateFilter
 
-#: Default noise of poses, m and rad: a motion capture system that is not at its best.
+#: Default noise of poses (m and rad): that of a poorly calibrated motion capture system.
 POSITION_NOISE, ANGLE_NOISE = 0.001, 0.005
 
-#: Default for a vehicle whose control is not known, m/s^2/sqrt(s). Its tilt is limited to 15
+#: Default for a vehicle whose control is not known (m/s^2/sqrt(s)). Its tilt is limited to 15
 #: degrees, or 2.6 m/s^2, and may go from side to side in a second.
 ACCELERATION_WALK = 3.0
 
-#: Default where the control is known: wind, and how the vehicle differs from its model.
+#: Default for a known control: wind, and errors of the vehicle's model (m/s^2/sqrt(s)).
 ACCELERATION_WALK_WITH_CONTROL = 1.0
 
 #: Default for roll, pitch and yaw, rad/s^2/sqrt(s): with `ANGLE_NOISE` at 100 Hz their rates are
 #: followed up to about 40 rad/s.
 ANGULAR_ACCELERATION_WALK = 30.0
 
-#: After a longer pause between two samples, in s, the filter starts afresh: the acceleration known
+#: Pause between two samples after which the filter restarts (s): the acceleration known
 #: by then is out of date.
 MEMORY = 1.0
 
-#: Standard deviations at the first sample, per s and s^2: next to nothing is assumed.
+#: Standard deviations at the first sample (per s and s^2): almost nothing is assumed.
 UNKNOWN_RATE, UNKNOWN_ACCELERATION = 10.0, 10.0
 
 
@@ -38,13 +38,13 @@ class ConstantAccelerationFilter(RateFilter):
     the first sample rate and acceleration have the standard deviations ``first_rate`` and
     ``first_acceleration``.
 
-    An acceleration that is known (from the control) enters by its changes only: the estimate takes
-    each of them over, and the random walk makes up for what differs between model and vehicle. An
+    An acceleration that is known (from the control) enters by its changes only: they are added to
+    the estimate, and the random walk covers the differences between model and vehicle. An
     offset, such as a weak battery or the ground under a vehicle that has too little thrust to leave
     it, is thereby found from the samples, and knowledge that comes or goes causes no jump.
 
     In between samples of period T the filter follows signals up to about ``(walk**2 / (noise**2 T))
-    ** (1/6)`` rad/s and averages out what is faster.
+    ** (1/6)`` rad/s and averages faster ones out.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class ConstantAccelerationFilter(RateFilter):
 
     @override
     def start(self, value: Components, acceleration: Components | None = None) -> None:
-        """Take the first sample, and the acceleration to be expected if it is not zero."""
+        """Start with the first sample, and the expected acceleration if it is not zero."""
         self._begin(value, [0.0] * len(value))
         self._known = acceleration
         if acceleration is not None:

@@ -9,9 +9,9 @@ from typing_extensions import override
 
 from crazyflie_model.angles import wrap_to_pi
 
-#: One number for each axis. Of so few, plain floats are several times quicker than arrays.
+#: One number for each axis. For so few, plain floats are several times quicker than arrays.
 Components = Sequence[float]
-#: No source of poses is so quick, s: stamps that are nearer to each other are bad ones.
+#: Least time between two poses (s): no source is quicker, so nearer stamps are wrong.
 LEAST_STEP = 0.0005
 
 
@@ -20,16 +20,16 @@ class RateFilter(ABC):
 
     @abstractmethod
     def start(self, value: Components) -> None:
-        """Forget everything and take the first sample, n components."""
+        """Restart with the first sample, n components."""
 
     @abstractmethod
     def step(
         self, dt: float, value: Components, acceleration: Components | None = None
     ) -> tuple[Components, Components]:
-        """Take the next sample; return the signal at its time, and its rate per second.
+        """Process the next sample; return the signal at its time, and its rate per second.
 
-        It comes ``dt`` s after the last one (positive) and has n components, as has the
-        acceleration that was commanded since then, if it is known. Not every filter uses it.
+        The sample is ``dt`` s after the last one (positive) and has n components, as has the
+        acceleration commanded since then, if it is known. Not every filter uses it.
         """
 
 
@@ -64,19 +64,19 @@ class FiniteDifference(RateFilter):
 
 
 class Motion(NamedTuple):
-    """Where a vehicle is and how it moves, in the fixed frame."""
+    """Position, velocity, attitude and attitude rate of a vehicle, in the fixed frame."""
 
     position: Components  #: x, y, z in m.
-    velocity: Components  #: m/s.
+    velocity: Components  #: x_dot, y_dot, z_dot (m/s).
     attitude: Components  #: Roll, pitch, yaw in rad, in [-pi, pi]; see `crazyflie_model.angles`.
     #: Time derivatives of roll, pitch, yaw in rad/s (not the body's angular velocity).
     attitude_rate: Components
 
 
 #: A larger change between wall clock and monotonic clock, or between the stamps of poses and their
-#: arrivals, is a step, s.
+#: arrivals, is a step (s).
 STAMP_STEP = 0.03
-STEP_TIMEOUT = 0.5  #: How long after a step of the wall clock stamps may still step, s.
+STEP_TIMEOUT = 0.5  #: Time after a step of the wall clock in which stamps may step, too (s).
 
 
 class ClockStepMonitor:
@@ -108,8 +108,8 @@ class ClockStepMonitor:
 class MotionEstimator:
     """Motion from a sequence of poses, by the poses' own stamps.
 
-    A pose whose stamp repeats is ignored, and so is one that is not finite. One whose stamp goes
-    back is the first of a new sequence: tf hands out the latest pose, so its stamp goes back only
+    A pose whose stamp repeats, or that is not finite, is ignored. A pose whose stamp goes
+    back is the first of a new sequence: tf returns the latest pose, so its stamp goes back only
     when time does.
 
     The angle filter is given unwrapped roll, pitch and yaw, for their rates. The angles are passed
@@ -123,7 +123,7 @@ class MotionEstimator:
         self._angles: Components = (0.0, 0.0, 0.0)
 
     def reset(self) -> None:
-        """Forget everything: the next pose is the first."""
+        """Delete the estimate: the next pose is the first."""
         self._stamp = None
 
     def update(
@@ -133,7 +133,7 @@ class MotionEstimator:
         attitude: Components,
         acceleration: Components | None = None,
     ) -> Motion | None:
-        """Take the next pose and return the motion, or None when it is the first or ignored.
+        """Process the next pose; return the motion, or None if the pose is the first or ignored.
 
         The stamp is in ns, since floats resolve the time of day to 0.2 us only; the position in m;
         the attitude roll, pitch, yaw in rad; ``acceleration`` was commanded since the last pose, if

@@ -9,7 +9,7 @@ FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"
 
 
 class StateEstimatorParameters(Parameters):
-    """Parameters of an estimator of 7 states; one of others declares `x_dim` anew."""
+    """Parameters of an estimator of 7 states; subclasses declare another `x_dim`."""
 
     x_dim: int = parameter(Integer(7, 7), "number of fields of the state")
     time_step: float = parameter(TIME_STEP, "period at which tf is read")

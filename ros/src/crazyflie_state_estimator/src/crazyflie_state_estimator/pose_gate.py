@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from enum import Enum
 
 #: A position that is too far away is accepted after the vehicle has been measured there for this
-#: time, s: it was carried there while it was not measured. Not in flight, see `MIN_RESPONSE`.
+#: time (s): it was carried there while it was not measured. Not in flight, see `MIN_RESPONSE`.
 PERSISTENCE = 0.3
 
 #: In flight, poses at a position that is too far away are accepted once the control has led the
@@ -14,38 +14,38 @@ PERSISTENCE = 0.3
 MIN_RESPONSE, MAX_RESPONSE_ERROR = 0.15, 0.4
 
 #: After outliers in flight, the vehicle may differ from the acceleration of its control by this
-#: much, m/s^2, for this time, s: it is up to 0.145 m from where that leads.
+#: much (m/s^2) for this time (s): its position is up to 0.145 m from the predicted one.
 ACCELERATION_ERROR, MAX_PREDICTION_TIME = 1.0, 0.5
 
-MAX_PREDICTION_STEP = 0.1  #: After a longer pause between poses, s, the clock may have been set.
+MAX_PREDICTION_STEP = 0.1  #: Pause between poses after which the clock may have been set (s).
 
-#: The velocity before an outlier is the mean over up to twice this time, s; it is 0 if that is
+#: The velocity before an outlier is the mean over up to twice the former (s); it is 0 if that is
 #: shorter than the latter.
 VELOCITY_WINDOW, MIN_VELOCITY_WINDOW = 0.1, 0.02
 
-#: Longest time for which a vehicle that was not measured is assumed to have flown on, s.
+#: Longest time for which a vehicle that was not measured is assumed to have flown on (s).
 MAX_COAST_TIME = 0.5
 
 #: Number of poses in a row, without a jump between them, that are accepted after outliers: some
 #: outliers happen to lie where the vehicle might be.
 CONFIRMATION = 3
 
-#: A single pose is accepted within this time after a good one, s: the vehicle cannot be far.
+#: A single pose is accepted within this time after a good one (s): the vehicle cannot be far.
 TRUST_WINDOW = 0.03
-NOISE_MARGIN = 0.02  #: Largest displacement of a pose by noise, m.
-Pose = tuple[float, tuple[float, ...]]  #: Time, s, and position, m.
+NOISE_MARGIN = 0.02  #: Largest displacement of a pose by noise (m).
+Pose = tuple[float, tuple[float, ...]]  #: Time (s) and position (m).
 
 
 class Classification(Enum):
-    """How a pose is used."""
+    """Classification of a pose."""
 
     GOOD = "good"
     BAD = "bad"
-    MOVED = "moved"  #: Good, but the vehicle did not fly there: filters restart.
+    MOVED = "moved"  #: Good, but the vehicle was moved without flying: filters restart.
 
 
 class _Prediction:
-    """Where a vehicle flies that has the acceleration of its control."""
+    """Predicted position of a vehicle with the acceleration of its control."""
 
     def __init__(self, pose: Pose, velocity: Sequence[float]):
         self.begin, self.position = pose
@@ -53,7 +53,7 @@ class _Prediction:
         self._velocity = velocity
 
     def advance(self, time: float, acceleration: Sequence[float]) -> None:
-        """Let time pass until ``time`` (s) with an acceleration, m/s^2."""
+        """Advance to ``time`` (s) with an acceleration, m/s^2."""
         dt, self._time = min(time - self._time, MAX_PREDICTION_STEP), time
         self.position = tuple(
             x + dt * (v + 0.5 * dt * a)
@@ -65,8 +65,8 @@ class _Prediction:
 class PoseGate:
     """Rejects poses that a vehicle of ``max_speed`` (m/s) cannot have flown to, and counts them.
 
-    In flight, it goes on where its control has led it since the last good pose, or where poses
-    move as the control demands; a place alone, however long it persists, is not believed.
+    In flight, poses are accepted again at the position that the control predicts from the last good
+    pose, or if they move as the control demands; poses that stay at one place are not.
     """
 
     def __init__(self, max_speed: float):
@@ -181,7 +181,7 @@ class TiltMonitor:
         self._is_tilted = False
 
     def update(self, x: float, y: float) -> bool:
-        """Return whether it has, after the next pose; x, y are of its unit quaternion."""
+        """Return whether the vehicle has tipped over; x, y are of the pose's unit quaternion."""
         is_tilted = 1.0 - 2.0 * (x * x + y * y) < self._least_cosine
         self._count = 0 if is_tilted == self._is_tilted else self._count + 1
         if self._count >= self._POSES:

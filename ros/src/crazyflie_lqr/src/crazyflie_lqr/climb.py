@@ -13,21 +13,21 @@ integrator continues with the thrust that was found.
 
 import math
 
-SPEED = 0.4  #: Of the reference, m/s.
-ACCELERATION = 0.5  #: Of the reference, m/s^2.
-#: How far the reference may be above the vehicle, m: it waits for one that has not lifted off.
+SPEED = 0.4  #: Speed of the reference (m/s).
+ACCELERATION = 0.5  #: Acceleration of the reference (m/s^2).
+#: Largest height of the reference above the vehicle (m): it waits until the vehicle lifts off.
 LEAD = 0.15
-RATE = 3.0  #: Bandwidth of the observer, 1/s.
-LEARNING_TIME = 3.0 / RATE  #: The shortest that a climb lasts, s, also where there is no way to go.
-#: So near to its goal, m, and so slow, m/s, a vehicle has arrived.
+RATE = 3.0  #: Bandwidth of the observer (1/s).
+LEARNING_TIME = 3.0 / RATE  #: Shortest duration of a climb, also over no distance (s).
+#: Largest distance (m) and speed (m/s) of a vehicle that has arrived at its goal.
 ARRIVAL_DISTANCE, ARRIVAL_SPEED = 0.05, 0.1
 
 
 class Climb:
-    """The way up of one takeoff; ``limit`` is the largest disturbance believed in, m/s^2."""
+    """The climb of one takeoff; ``limit`` is the largest disturbance estimated, m/s^2."""
 
     def __init__(self, limit: float):
-        #: What accelerates the vehicle beside thrust and nominal weight, m/s^2, upwards.
+        #: Upward acceleration in addition to that of thrust and nominal weight (m/s^2).
         self.disturbance = 0.0
         self.z = self.z_dot = self.z_ddot = 0.0  #: Reference, m, m/s and m/s^2.
         self.has_arrived = False  #: The vehicle is at its goal and the reference, too.
@@ -36,14 +36,14 @@ class Climb:
         self._elapsed = 0.0
 
     def set_limit(self, limit: float) -> None:
-        """Change the largest disturbance that is believed in, m/s^2, also of the past."""
+        """Change the largest disturbance, m/s^2, and limit the present estimate."""
         self._limit = limit
         self.disturbance = _within(self.disturbance, limit)
 
     def advance(self, dt: float, z: float, z_dot: float, goal: float, excess: float) -> None:
         """Advance to the next state.
 
-        It comes ``dt`` s after the last one (not used with the first), at height ``z`` (m) and
+        The state is ``dt`` s after the last one (not used with the first), at height ``z`` (m) and
         speed ``z_dot`` (m/s); ``goal`` is the height to climb to (m), ``excess`` the thrust since
         the last state, less that of the reference control (m/s^2).
         """
@@ -64,7 +64,7 @@ class Climb:
             return
         braking = math.sqrt(2.0 * ACCELERATION * max(goal - self.z, 0.0))
         z_dot = min(self.z_dot + ACCELERATION * dt, SPEED, braking)
-        # More than that is a reference that jumped, not one that moves.
+        # A larger acceleration is a jump of the reference.
         self.z_ddot = _within((z_dot - self.z_dot) / dt, 2.0 * ACCELERATION)
         self.z_dot = z_dot
         self.z = min(self.z + z_dot * dt, z + LEAD)
@@ -76,12 +76,12 @@ def _within(value, limit):
     return min(max(value, -limit), limit)
 
 
-LIFTED = 0.05  #: A vehicle so far above the lowest height it has been at flies, m.
-LIFTOFF_TIMEOUT = 3.0  #: Longest time from a change of the reference's height to the liftoff, s.
+LIFTED = 0.05  #: Height of a flying vehicle above the lowest one that was measured (m).
+LIFTOFF_TIMEOUT = 3.0  #: Longest time from a change of the reference's height to the liftoff (s).
 
 
 class GroundGuess:
-    """A guess whether a vehicle flies: when it is `LIFTED`, or may be about to lift off."""
+    """Estimates whether a vehicle flies: when it is `LIFTED`, or may be about to lift off."""
 
     def __init__(self) -> None:
         self._lowest = math.inf
@@ -91,7 +91,7 @@ class GroundGuess:
     def is_flying(self, z: float, goal: float, time: float) -> bool:
         """Return the guess for a height and that of the reference (m) at ``time`` (s)."""
         self._lowest = min(self._lowest, z)
-        # After a reset of the clock the timeout begins anew.
+        # After a reset of the clock the timeout restarts.
         self._moved_at = min(self._moved_at, time)
         if self._goal is None or abs(goal - self._goal) > LIFTED:
             self._goal = goal

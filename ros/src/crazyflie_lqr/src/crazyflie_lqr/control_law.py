@@ -1,4 +1,4 @@
-"""The formulas of the control law, elementwise: for floats, arrays, and what is traced.
+"""The formulas of the control law, elementwise: for floats, arrays, and traced values.
 
 Nodes compute with floats, `crazyflie_batch` and vectorized fleets with one array per component;
 see `crazyflie_model.elementwise`. States, errors and controls are lists of components as
@@ -16,7 +16,7 @@ from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 ROLL, PITCH, YAW_DOT, THRUST = range(4)
 
 YAW = 6  #: Index of the yaw in states with position, velocity and yaw.
-X_DIM, U_DIM = 7, 4  #: Of these states, and of controls.
+X_DIM, U_DIM = 7, 4  #: Lengths of these states, and of controls.
 
 #: Least and most of each control.
 LIMITS = (
@@ -27,7 +27,7 @@ LIMITS = (
 )
 
 INTEGRATED = (PITCH, ROLL, THRUST)  #: The controls that the integrals of x, y and z act on.
-MAX_GAP = 0.5  #: Longest time between two states over which the position error is integrated, s.
+MAX_GAP = 0.5  #: Longest time between two states over which the position error is integrated (s).
 
 
 def heading_error(

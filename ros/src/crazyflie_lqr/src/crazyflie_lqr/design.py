@@ -14,7 +14,7 @@ from scipy.linalg import expm
 
 from crazyflie_lqr.models import LinearModel
 
-_ROUNDOFF = 1e-9  #: What is this much smaller than its surroundings counts as zero.
+_ROUNDOFF = 1e-9  #: Ratio to the neighbouring entries below which an entry is set to zero.
 _MAX_DELAY_STEPS = 50  #: Longest delay, in sample times; each adds u_dim states.
 
 
@@ -24,11 +24,13 @@ class DesignError(ValueError):
 
 @dataclass(frozen=True)
 class Weights:
-    """What deviations and control cost."""
+    """Weights of deviations and controls in the cost."""
 
-    Q: NDArray[np.float64]  #: Shape (x_dim, x_dim). Of the state: symmetric, positive semidefinite.
-    R: NDArray[np.float64]  #: Shape (u_dim, u_dim). Of the control: symmetric, positive definite.
-    #: Shape (x_dim, u_dim). Of their products: ``[[Q, N], [N^T, R]]`` is positive semidefinite.
+    #: Weights of the state, shape (x_dim, x_dim), symmetric, positive semidefinite.
+    Q: NDArray[np.float64]
+    #: Weights of the control, shape (u_dim, u_dim), symmetric, positive definite.
+    R: NDArray[np.float64]
+    #: Weights of products, shape (x_dim, u_dim); ``[[Q, N], [N^T, R]]`` is positive semidefinite.
     N: NDArray[np.float64]
 
     def check(self) -> None:
@@ -69,11 +71,11 @@ class Design:
     """Gains and the plant they were designed for."""
 
     K: NDArray[np.float64]  #: Shape (u_dim, x_dim). Gains, u = u_ref + K (x - x_ref).
-    #: Shape (n, n). Dynamics of the plant: the model's; of a sampled design, one step of the model
+    #: Shape (n, n). Dynamics of the plant: the model's; in a sampled design, one step of the model
     #: and, behind the x_dim states of the model, the controls that are still on their way.
     A: NDArray[np.float64]
     B: NDArray[np.float64]  #: Shape (n, u_dim).
-    sample_time: float  #: s; 0 is continuous.
+    sample_time: float  #: Sample time (s); 0 is continuous.
 
     @property
     def feedback(self) -> NDArray[np.float64]:

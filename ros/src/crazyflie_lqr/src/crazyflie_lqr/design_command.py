@@ -21,7 +21,7 @@ integral of x'Qx + u'Ru + 2x'Nu; print closed-loop poles and margins, and those 
 it is flown.
 """
 
-LEAST_DELAY = 0.02  #: Gains that bear less delay when they are flown need ``--force`` (s).
+LEAST_DELAY = 0.02  #: Least delay margin of gains as flown; with less, ``--force`` is needed (s).
 
 _MATRIX_HELP = """
 numbers, separated by blanks or commas: the diagonal, or the matrix row by row; or the path
@@ -30,7 +30,7 @@ of a text file with them
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; return its exit status: 0, or 1 for a design that cannot be."""
+    """Run the command; return its exit status: 0, or 1 if the design fails."""
     options = _parser().parse_args(arguments)
     model = MODELS[options.model]()
     try:
@@ -141,13 +141,13 @@ def _parser():
     )
     parser.add_argument("--out", metavar="FILE", help="write the gains to a file")
     parser.add_argument("--plot", metavar="FILE", help="draw step responses and Bode diagrams")
-    # What looks like an option but is a list of numbers is one.
+    # A list of numbers that looks like an option is a list of numbers.
     parser._negative_number_matcher = _NumberList()  # type: ignore[assignment]
     return parser
 
 
 class _NumberList:
-    """Stands in for argparse's pattern of negative numbers, which knows no lists."""
+    """Replaces argparse's pattern of negative numbers, which does not match lists."""
 
     def match(self, text):
         try:

@@ -1,7 +1,7 @@
 """Gain files: matrices as text.
 
-One row of the matrix a line, numbers separated by blanks; empty lines, and what
-follows a ``#``, are skipped. Files that are written have their comments at the end:
+One row of the matrix a line, numbers separated by blanks; empty lines, and text that
+follows a ``#``, are skipped. Written files have their comments at the end:
 the reader of the C++ workspace knows no comments, and stops at the first.
 """
 
@@ -57,7 +57,7 @@ def load_vector(path: str, length: int) -> NDArray[np.float64]:
 def save_matrix(path: str, matrix: ArrayLike, comment: str = "") -> None:
     """Write a matrix, shape (rows, columns), with 12 digits, and a comment at the end."""
     with open(path, "w", encoding="utf-8") as file:
-        # Adding 0 turns -0, which would read like a sign that matters, into 0.
+        # Adding 0 turns -0, which would look like a meaningful sign, into 0.
         for row in np.asarray(matrix) + 0.0:
             file.write(" ".join(f"{value:.12g}" for value in row) + "\n")
         for line in comment.splitlines():
@@ -101,12 +101,12 @@ def _rows(path, expected):
         with open(path, encoding="utf-8", errors="replace") as file:
             lines = file.read().split("\n")
     except (OSError, ValueError) as error:
-        # The latter: a path with a NUL.
+        # A path with a NUL raises ValueError.
         reason = error.strerror if isinstance(error, OSError) else error
         where = shortened(os.path.abspath(path))
         raise GainFileError(f"cannot read {where}: {reason}, {expected}") from None
     if lines[-1].endswith(".") and "#" not in lines[-1]:
-        # With a line break behind it, that is a way to write a number.
+        # With a line break after it, that is a valid number.
         raise GainFileError(
             f"{path}, line {len(lines)}: the file ends in a number without the digits behind its "
             f"point; expected them, or a line break, {expected}"

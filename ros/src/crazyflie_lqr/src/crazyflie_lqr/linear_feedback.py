@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 _LEAST_DAMPING = 0.7  #: A height loop with this damping ratio overshoots a step by 5 %.
-#: A state or a control; of so few numbers, plain floats are several times quicker than arrays.
+#: A state or a control; for so few numbers, plain floats are several times quicker than arrays.
 Components = Sequence[float]
 
 
@@ -100,7 +100,7 @@ class LinearFeedback:
         """Continue in flight where a controller with other parameters ends."""
 
     def reset_integrator(self) -> None:
-        """Integrate no more: the control is not flown; the vehicle is on the ground, say."""
+        """Stop the integration: the control is not flown, for example on the ground."""
 
     def enable_integrator(self) -> None:
         """Integrate from now on: the control is flown."""
@@ -193,11 +193,11 @@ class IntegralStateFeedback(LinearFeedback):
         self._thrust = previous._thrust
 
     def _climb_limit(self):
-        """Return the largest disturbance that the integrator can make up for, m/s^2."""
+        """Return the largest disturbance that the integrator can compensate, m/s^2."""
         return abs(self._integrator_k[2]) * self._integrator_limit[2]
 
     def _height_overshoots(self):
-        # The height loop is s^2 + k_d s + k_p, without regard to delays.
+        # The height loop is s^2 + k_d s + k_p, apart from delays.
         k_p, k_d = -self._rows[THRUST][2], -self._rows[THRUST][5]
         return k_p > 0.0 and k_d < 2.0 * _LEAST_DAMPING * math.sqrt(k_p)
 

@@ -21,11 +21,11 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters.types import TOPIC, Integer, Number
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple, to_vector
 
-MAX_GAIN = 1e6  #: Largest number of a gain file: larger ones make controls that are not finite.
+MAX_GAIN = 1e6  #: Largest entry of a gain file: larger ones give controls that are not finite.
 
 
 class LinearFeedbackParameters(Parameters):
-    """Parameters of a controller of 7 states; one of more declares `x_dim` and `K` anew."""
+    """Parameters of a controller of 7 states; subclasses declare other `x_dim` and `K`."""
 
     x_dim: int = parameter(Integer(7, 7), "length of the state")
     u_dim: int = parameter(Integer(4, 4), "length of the control")
@@ -102,7 +102,7 @@ class LinearFeedbackNode(Node):
     #: `LinearFeedbackParameters` or a subclass.
     parameters_type: type[LinearFeedbackParameters] = LinearFeedbackParameters
     yaw_index: int  #: Where the yaw is in the state, which begins with position and velocity.
-    reference_tail: tuple[float, ...] = ()  #: What the state has behind the fields of a reference.
+    reference_tail: tuple[float, ...] = ()  #: Reference of the states that messages do not have.
 
     def __init__(self) -> None:
         self._reference = GuardedReference(self.yaw_index, report=self._warn_of_reference)
@@ -197,7 +197,7 @@ class LinearFeedbackNode(Node):
             return
         self._flight_state = status.state
         if status.state in (FlightStatus.FLYING, FlightStatus.DESCENDING):
-            # A controller that did not see the takeoff has not learned the weight, either.
+            # A controller that did not see the takeoff has not learned the weight.
             self._take_off()
         else:
             self._is_flown = False
@@ -214,7 +214,7 @@ class LinearFeedbackNode(Node):
         x = to_tuple(message.state)
         x_ref = self._reference.value(self._handle.time(), x)
         if x_ref is None and self._flight_state == FlightStatus.FLYING:
-            # Started anew in flight; the reference may have been published once, long ago.
+            # Restarted in flight; the reference may have been published once, long ago.
             self._reference.update(at_rest(x, self.yaw_index))
             x_ref = self._reference.value(self._handle.time(), x)
         if x_ref is None:
@@ -237,7 +237,7 @@ class LinearFeedbackNode(Node):
         if age <= self._parameters.max_age:
             self._clocks_agree = True
             return False
-        # Clocks that have agreed still do; then the message was late.
+        # If the clocks have agreed before, the message was late.
         cause = (
             "this computer, or the network, is too busy"
             if self._clocks_agree

@@ -1,7 +1,7 @@
-"""How much worse each control loop may become before it is unstable.
+"""Stability margins of each control loop.
 
 The loops are broken at the plant's input, one at a time, with the others
-closed: the question is how far one control channel may be off.
+closed: the margins are those of one control channel.
 """
 
 import math
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from crazyflie_lqr.design import Design, sampled
 from crazyflie_lqr.models import LinearModel
 
-FLOWN_PERIOD = 0.01  #: Of the examples' estimators, each state of which is answered (s).
-_RATE = "_dot"  #: How the names of rates end.
+FLOWN_PERIOD = 0.01  #: Period of the controls, and of the states, in the examples (s).
+_RATE = "_dot"  #: Suffix of the names of rates.
 
 _FREQUENCIES = 500
 
-_INFINITE = 1e9  #: An open integrator has at least this gain at rest, in spite of rounding.
+_INFINITE = 1e9  #: Gain at rest from which a loop has an open integrator, in spite of rounding.
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class Margins:
     #: they may without limit.
     gain_up: float
     gain_down: float
-    phase: float  #: Phase it may lose, rad; infinity if its gain is never 1.
-    crossover: float  #: Where the phase margin is, rad/s; NaN without one.
-    delay: float  #: Time by which the control may be late in addition, s; 0 if unstable without.
+    phase: float  #: Phase that the loop may lose (rad); infinity if its gain is never 1.
+    crossover: float  #: Frequency of the phase margin (rad/s); NaN without one.
+    delay: float  #: Additional delay of the control that the loop tolerates (s); 0 if unstable.
     #: Least distance of the loop from -1, 1 / max |S| with the sensitivity S = 1 / (1 + L): 1 is a
     #: loop that amplifies no disturbance, 0 one that is not stable.
     modulus: float

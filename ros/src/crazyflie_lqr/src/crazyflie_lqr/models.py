@@ -1,4 +1,4 @@
-"""The vehicle linearised at hover, which is what gains are designed for.
+"""The vehicle linearised at hover, for which gains are designed.
 
 Deviations from hover at yaw 0: x_dot = A x + B u, in m, m/s, rad and rad/s;
 u = (roll, pitch, yaw_dot, thrust) in rad, rad/s and m/s^2.
@@ -14,11 +14,11 @@ from crazyflie_model.units import GRAVITY
 
 CONTROLS = ("roll", "pitch", "yaw_dot", "thrust")
 
-#: How roll and pitch of the vehicle follow their commands in `full_state`, s: the firmware's
+#: Lag of roll and pitch behind their commands in `full_state` (s): the firmware's
 #: attitude loop turns an error into a rate, and its rate loop is much faster.
 ATTITUDE_TIME_CONSTANT = 1.0 / inner_loops.TILT.kp
 
-#: Lag of the measured angular rates in `full_state`, s: they are differences of attitudes 10 ms
+#: Lag of the measured angular rates in `full_state` (s): they are differences of attitudes 10 ms
 #: apart.
 RATE_TIME_CONSTANT = 0.01
 

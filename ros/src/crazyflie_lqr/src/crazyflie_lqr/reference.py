@@ -1,4 +1,4 @@
-"""The reference a controller follows while its sources may fail."""
+"""The reference that a controller follows, also when its sources fail."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from crazyflie_lqr.linear_feedback import Components, at_rest
 from crazyflie_utils.last_valid import LastValid
 
-#: How long the velocity of a reference counts that is not followed by another, s.
+#: Age of the last reference up to which its velocity is used (s).
 VELOCITY_LIMIT = 0.5
-MAX_LEAD = 0.5  #: By how much velocities may have led further than the points have moved, m.
-_MEMORY = 2.0  #: Time constant at which such a lead is forgotten, s.
-#: A point that is further than this, m, from where its velocity led to did not move there.
+MAX_LEAD = 0.5  #: Largest integral of the velocities beyond the motion of the points (m).
+_MEMORY = 2.0  #: Time constant at which such a lead is forgotten (s).
+#: Distance of a point from the extrapolated one above which the reference has jumped (m).
 _JUMP = 0.1
-_FASTEST = 100.0  #: Larger velocities are taken as of this size, m/s, in order not to overflow.
+_FASTEST = 100.0  #: Limit of velocities, against overflow (m/s).
 
 _HERE = (0.0, 0.0, 0.0)
 
@@ -23,9 +23,9 @@ class VelocityCheck:
     """Compares the velocity of a sequence of references with the motion of their points.
 
     A controller adds gain times velocity to gain times position: where the point of references
-    stays while they have a velocity, the vehicle comes to rest beside it, by velocity gain over
-    position gain times that velocity. What is compared is the integral of the velocity, less
-    the way of the points. It does not grow where both agree, however irregularly they come.
+    stays while they have a velocity, the vehicle comes to rest away from it, by velocity gain over
+    position gain times that velocity. The check compares the integral of the velocity with
+    the motion of the points. The difference does not grow if both agree, at any message rate.
     """
 
     def __init__(self) -> None:
@@ -33,7 +33,7 @@ class VelocityCheck:
         self._lead: Vector = _HERE
 
     def update(self, position: Vector, velocity: Vector, time: float) -> bool:
-        """Take a reference (m, m/s) at ``time`` (s); return whether its velocity counts."""
+        """Process a reference (m, m/s) at ``time`` (s); return whether its velocity is used."""
         velocity = limited(velocity, _FASTEST)
         if self._last is not None and time >= self._last[2]:
             self._advance(*self._last, position, time)
@@ -52,7 +52,7 @@ class VelocityCheck:
             moved = _HERE
         keep = math.exp(-elapsed / _MEMORY)
         lead = [keep * a + b - c for a, b, c in zip(self._lead, led, moved, strict=True)]
-        # Bounded, so that it does not take long until velocities that are right count again.
+        # Bounded, so that correct velocities are soon used again.
         self._lead = limited(lead, 2.0 * MAX_LEAD)
 
 
@@ -63,20 +63,20 @@ def limited(vector: Vector, size: float) -> list[float]:
     return [scale * part for part in vector]
 
 
-DESCENT_LIMIT = 0.3  #: How long the reference of a descent counts, and it alone, s.
+DESCENT_LIMIT = 0.3  #: Time for which a descent's reference overrides all others (s).
 
 
 class GuardedReference:
     """The last valid reference; or, some time after invalid ones came, a hold point.
 
     `crazyflie_utils.last_valid.HOLD_LIMIT` after the first invalid reference the vehicle stops
-    where it is, until a valid one comes. A reference that is older than the present one is ignored;
-    one that is further from the vehicle than ``max_jump`` (m) becomes a place to rest at so far
-    from the vehicle, in the same direction, and is this as long as references come from about
-    there; a velocity larger than ``max_speed`` (m/s) is made as large as this; ``report(text)`` is
-    told of both. One with a velocity becomes a position at rest when no other has followed for
+    where it is, until a valid one comes. A reference that is older than the present one is ignored.
+    One that is further from the vehicle than ``max_jump`` (m) is replaced by a position at rest at
+    this distance in the same direction, which stays while references come from about the same
+    place. A velocity is limited to ``max_speed`` (m/s). ``report(text)`` is called in both cases.
+    A reference with a velocity becomes a position at rest when no other has followed for
     `VELOCITY_LIMIT`, and at once when the positions of the references do not move with their
-    velocities (see `VelocityCheck`). ``yaw_index`` is where the yaw is in the state.
+    velocities (see `VelocityCheck`). ``yaw_index`` is the index of the yaw in the state.
     """
 
     def __init__(
@@ -106,12 +106,12 @@ class GuardedReference:
     def update(
         self, x_ref: Components, stamp: float = 0.0, now: float = 0.0, time: float = 0.0
     ) -> bool:
-        """Take a valid reference; return False if it is older than the present one, and ignored.
+        """Accept a valid reference; return False if it is older than the present one, and ignored.
 
-        It was made at ``stamp`` (s; 0 if that is not known); ``now`` is by the same clock, and a
-        later stamp counts as this; ``time`` is now, s, by the clock of `value`.
+        It was made at ``stamp`` (s; 0 if that is not known); ``now`` is by the same clock, and
+        limits the stamp; ``time`` is now, s, by the clock of `value`.
         """
-        # After a reset of the clock nothing can be told from the stamps of before.
+        # After a reset of the clock, earlier stamps cannot be compared.
         if self._stamp > now:
             self._stamp = 0.0
         if 0.0 < stamp < self._stamp:
@@ -126,16 +126,16 @@ class GuardedReference:
         return True
 
     def invalidate(self, time: float) -> None:
-        """Take note that an invalid reference came at ``time`` (s)."""
+        """Record that an invalid reference came at ``time`` (s)."""
         self._last_valid.invalidate(time)
 
     def descend(self, x_ref: Components, time: float) -> None:
-        """Take the reference of a descent, x_dim components, at ``time`` (s)."""
+        """Set the reference of a descent, x_dim components, at ``time`` (s)."""
         self._descent = x_ref
         self._descent_time = time
 
     def value(self, time: float, x: Components) -> Components | None:
-        """Return what to follow, x_dim components, at ``time`` (s) and the vehicle's state ``x``.
+        """Return the reference to follow, x_dim components, at ``time`` (s) and the state ``x``.
 
         None before the first valid reference.
         """
@@ -157,7 +157,7 @@ class GuardedReference:
         return self._hold_point
 
     def _with_velocity(self, x_ref, time):
-        """Return a reference with the velocity that counts."""
+        """Return a reference with the velocity that is used."""
         velocity = x_ref[3:6]
         if not self._velocity_check.update(x_ref[:3], velocity, time):
             self._report(
@@ -197,7 +197,7 @@ class GuardedReference:
         if self._near is None or not is_repeated:
             self._far = x_ref
             self._near = at_rest(x_ref, self._yaw_index)
-            # A mean, so that neither a far one nor a short way overflows.
+            # A weighted mean, which does not overflow for far references or short distances.
             share = self.max_jump / distance
             self._near[:3] = [
                 (1.0 - share) * here + share * there

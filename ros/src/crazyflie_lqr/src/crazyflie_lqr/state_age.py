@@ -2,21 +2,20 @@
 
 from crazyflie_utils.clock import CLOCK_STEP
 
-#: Clocks that differ by more than this, s, are not meant to agree: one of them is simulated, or is
+#: Difference above which two clocks are not meant to agree (s): one of them is simulated, or is
 #: that of a bag.
 SAME_CLOCK = 60.0
 
-_DRIFT = 1e-3  #: By how much clocks that are not meant to agree may run apart, s/s.
+_DRIFT = 1e-3  #: Largest relative drift of clocks that are not meant to agree (s/s).
 
 
 class StateAge:
-    """Tells how old states are, also where their stamps are of another clock.
+    """Estimates the age of states, also if their stamps are of another clock.
 
-    A stamp that is within `SAME_CLOCK` of now is of this machine's clock, and from then on
-    all are: one that is minutes old then is old. Before that, the smallest difference between now
-    and a stamp is taken for the offset of the other clock, and the age is the rest. The measurement
-    starts over where stamps of another clock repeat or go back, and where this machine's clock was
-    set.
+    A stamp that is within `SAME_CLOCK` of now is of this machine's clock, and so are all later
+    ones: a stamp of minutes ago is then old. Before that, the smallest difference between now
+    and a stamp is the offset of the other clock, and the age is the rest. The measurement
+    restarts if stamps of another clock repeat or go back, and if this machine's clock was set.
     """
 
     def __init__(self) -> None:
@@ -24,7 +23,7 @@ class StateAge:
         self._stamp = self._time = self._wall_offset = 0.0
 
     def update(self, stamp: float, now: float, time: float) -> float:
-        """Return the age, s, of a state with a stamp (s; 0 is none); negative in the future.
+        """Return the age, s, of a state with a stamp (s; 0: no stamp); negative in the future.
 
         ``stamp`` and ``now`` are wall-clock time (s), ``time`` is the same moment by a clock that
         is never set (s).

@@ -200,7 +200,7 @@ class Network(FakeGraph):
             assert self.time < end, "the condition never came true"
             self.advance(self.TICK)
 
-    def subscribes(self, topic, besides):
+    def subscribes(self, topic, excluding):
         """Return that all topics are listened to, as by rosbag."""
         return True
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python
-"""What a message and a timer cost, on a master of its own; prints a table.
+"""Measures the time of messages and timers, on a master of its own; prints a table.
 
 Run it in a shell that has sourced the workspace:
 
     python3 ros/src/crazyflie_utils/bench/costs.py
 
-With CRAZYFLIE_ROSPY_PATCHES=none, or all names of its patches but one, it says what these bring.
+With CRAZYFLIE_ROSPY_PATCHES=none, or all names of its patches but one, it shows their effect.
 Wall time is per piece of work; CPU time is this process's, with all its threads.
 Nothing is asserted: the figures depend on the machine and on its other work.
 """

@@ -101,7 +101,7 @@ boxes:
 
 def test_keys_that_somebody_else_reads(load):
     table = load("center: [0, 0, 1]\nwheels: 4\n")
-    assert table.read(BoxParameters, besides=("wheels",)).center == (0.0, 0.0, 1.0)
+    assert table.read(BoxParameters, extra_keys=("wheels",)).center == (0.0, 0.0, 1.0)
 
 
 def test_what_does_not_fit_together_is_named_with_its_line(load):

@@ -168,7 +168,7 @@ class Settings:
 def read_settings(path: str | Path) -> Settings:
     """Return the settings in a file; `ParameterError` names all errors with file and line."""
     file = load(path)
-    run = file.read(RunParameters, besides=("vehicle", "sweep"))
+    run = file.read(RunParameters, extra_keys=("vehicle", "sweep"))
     vehicle = file["vehicle"].read(FlightParameters) if "vehicle" in file else _DEFAULTS
     sweeps = tuple(_sweep(entry, key) for key, entry in file["sweep"].entries().items())
     if not sweeps:

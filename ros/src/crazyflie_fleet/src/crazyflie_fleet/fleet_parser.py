@@ -158,13 +158,13 @@ class FleetParser:
         if self._errors:
             raise ParameterError(*dict.fromkeys(self._errors))
 
-    def _read(self, entry, settings, *besides):
+    def _read(self, entry, settings, *extra_keys):
         def on_unknown(unknown, known):
             with self._collecting():
                 self.remarks.unknown(unknown, known)
 
         with self._collecting():
-            return entry.read(settings, besides, on_unknown)
+            return entry.read(settings, extra_keys, on_unknown)
 
     @contextmanager
     def _collecting(self):
@@ -173,8 +173,8 @@ class FleetParser:
         except ParameterError as error:
             self._errors += error.complaints
 
-    def _check(self, entry, *besides):
-        if self._read(entry, PartialSettings, *_FIRMWARE, *besides) is None:
+    def _check(self, entry, *extra_keys):
+        if self._read(entry, PartialSettings, *_FIRMWARE, *extra_keys) is None:
             return
         for key in _WITHOUT_EFFECT:
             if (idle := _inner(entry, key)) is not None:

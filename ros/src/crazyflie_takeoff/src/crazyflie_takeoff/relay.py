@@ -49,7 +49,7 @@ class Relay:
         self._time = math.nan
         self._command = self._allowed_command = self._passed = MOTORS_OFF
         self._takeoff = MOTORS_OFF
-        # Of the controls that have passed unchanged since the last `flush`: the last one, the time
+        # Of controls that passed unchanged since the last `flush`: the last one, the time
         # for which they have flown the vehicle (s), and the integral of their vertical thrust (m/s).
         self._unchanged: Any = None
         self._duration = self._impulse = 0.0

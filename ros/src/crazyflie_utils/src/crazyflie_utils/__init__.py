@@ -1,4 +1,4 @@
-"""What every node of the workspace needs: the node handle and declared parameters.
+"""Node handle, nodes and declared parameters: the base of every node of the workspace.
 
 The names below are loaded when they are first used, so that algorithms can
 import `crazyflie_utils.parameters.declaration` and the like without ROS.

@@ -1,4 +1,4 @@
-"""The two clocks a process can live by.
+"""The clocks of a process: the machine's steady clock, or simulated time.
 
 ``time()`` is for intervals: seconds that never run backwards unless a
 simulation is reset. ``stamp(time)`` is for message headers.
@@ -9,16 +9,16 @@ from collections.abc import Callable
 
 import genpy
 
-CLOCK_STEP = 0.02  #: A larger change of wall clock minus monotonic clock is a step, s.
-_QUIET = 100_000  #: Two readings of clocks that are this close, in ns, were not interrupted.
-#: Wall clock and monotonic clock may drift apart by this, in ns, before stamps follow.
+CLOCK_STEP = 0.02  #: A larger change of wall clock minus monotonic clock is a step (s).
+_QUIET = 100_000  #: Longest time between two readings that were not interrupted (ns).
+#: Drift between wall clock and monotonic clock above which stamps follow (ns).
 _OFFSET_TOLERANCE = 1_000_000
-_SECOND = 1_000_000_000  #: ns.
+_SECOND = 1_000_000_000  #: One second (ns).
 
 
 def ros_time(nanoseconds: int) -> genpy.Time:
     """Return a time as a message has it, of whole nanoseconds since 1970."""
-    # genpy looks at the types of what it is given, which takes five times as long.
+    # genpy checks the types of its arguments, which takes five times as long.
     time = genpy.Time.__new__(genpy.Time)
     time.secs, time.nsecs = divmod(nanoseconds, _SECOND)
     return time
@@ -73,11 +73,11 @@ class SimulatedClock:
         return round((self._time if moment is None else moment) * 1e9)
 
     def on_change(self, listener: Callable[[float, bool], None]) -> None:
-        """Have ``listener(time, is_reset)`` called after every `set`."""
+        """Call ``listener(time, is_reset)`` after every `set`."""
         self._listeners.append(listener)
 
     def set(self, moment: float) -> None:
-        """Move to ``moment`` (s); a step back counts as a reset of the simulation."""
+        """Move to ``moment`` (s); a step back is a reset of the simulation."""
         is_reset = moment < self._time
         self._time = moment
         for listener in self._listeners:

@@ -12,7 +12,7 @@ from crazyflie_utils.transport import Transport
 
 
 class ClockSource:
-    """Publishes /clock from a process with this clock and these timers by simulated time."""
+    """Publishes /clock, from a process with a simulated clock and timers."""
 
     def __init__(
         self,
@@ -44,11 +44,11 @@ class ClockSource:
         return set_clock
 
     def next_event(self) -> float:
-        """Return the next moment, s, at which simulated time has to stop.
+        """Return the next moment, s, at which simulated time must stop.
 
-        That is when a timer of this process is due; or at once, where the clock has a subscriber
-        in it beside the process itself.
+        That is when a timer of this process is due; or at once, where /clock has another subscriber
+        in this process than the process itself.
         """
-        if self._publisher is None or self._publisher.is_read_here(beside=1):
+        if self._publisher is None or self._publisher.is_read_here(excluding=1):
             return -math.inf
         return self._timers.next_deadline()

@@ -1,4 +1,4 @@
-"""What the nodes of one process share."""
+"""The objects that the nodes of one process share."""
 
 from collections.abc import Callable
 from functools import partial
@@ -17,7 +17,7 @@ from crazyflie_utils.transport import Transport
 
 
 class ProcessContext:
-    """One executor, one clock, one set of topics, one tf buffer.
+    """One executor, one clock, one set of topics and one tf buffer for all nodes of a process.
 
     With ``use_sim_time`` the clock is simulated time, which stands still until it is set; a test
     passes a ``clock`` of its own.
@@ -45,7 +45,7 @@ class ProcessContext:
         self._simulated = TimerQueue(self.executor, *tf)
         self.clock_source = ClockSource(transport, self.topics, self.clock, self._simulated)
         self._inhibitors: list[ShutdownInhibitor] = []
-        #: With which the process is to end; None while it is not.
+        #: Exit status with which the process is to end; None while it is not to end.
         self.exit_status: int | None = None
         self.is_refused = False  #: Whether another process flies the vehicle of this one's nodes.
         if isinstance(self.clock, SimulatedClock):
@@ -53,7 +53,7 @@ class ProcessContext:
             self.topics.subscribe("/clock", Clock, partial(self._on_clock, self.clock))
 
     def end(self, status: int) -> None:
-        """Have the process shut down and exit with ``status``."""
+        """Shut the process down; it exits with ``status``."""
         self.exit_status = status
 
     @property
@@ -62,7 +62,7 @@ class ProcessContext:
         return isinstance(self.clock, SimulatedClock)
 
     def inhibit_shutdown(self, node: str) -> ShutdownInhibitor:
-        """Return what publishes the flights of a node, named absolutely."""
+        """Return the publisher of the flights of a node, named absolutely."""
         inhibitor = ShutdownInhibitor(self.topics, node)
         self._inhibitors.append(inhibitor)
         return inhibitor

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 
 class _FairLock:
-    """A lock that threads are given in the order in which they asked for it.
+    """A lock that threads acquire in the order in which they asked for it.
 
     A thread that runs timers without a pause would win a plain lock over and
     over again, before those who wait for it have even woken up.
@@ -43,7 +43,7 @@ class _FairLock:
 class Executor:
     """Run submitted work one piece at a time, first come, first served.
 
-    Nothing runs before `start`. Work must not raise; `NodeHandle` sees to it.
+    Nothing runs before `start`. Work must not raise; `NodeHandle` ensures that.
     """
 
     def __init__(self) -> None:
@@ -53,14 +53,14 @@ class Executor:
         self._started = False
 
     def start(self) -> None:
-        """Begin to run work, first what has been submitted so far."""
+        """Begin to run work, in the order of submission."""
         self._started = True
         if not self.is_running_here:
             self._drain()
 
     @property
     def is_running_here(self) -> bool:
-        """Whether it is this thread that runs work at present."""
+        """Whether this thread runs work at present."""
         return self._runner == threading.get_ident()
 
     def submit(self, work: Callable[[], None]) -> None:

@@ -21,7 +21,7 @@ WORDS = {
 def subscribe(
     handle: NodeHandle, topic: str, text_topic: str | None, callback: Callable[[FlightStatus], None]
 ) -> None:
-    """Have ``callback(status)`` called for each flight status on a topic.
+    """Call ``callback(status)`` for each flight status on a topic.
 
     A takeoff server without flight status has a ``text_topic`` of std_msgs/String: names of states
     in small letters; any other text is `FlightStatus.UNKNOWN`.

@@ -1,4 +1,4 @@
-"""Which vehicles are in flight: what a process must know before it ends."""
+"""Which vehicles are in flight: a process waits for them before it ends."""
 
 import time
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ class ShutdownInhibitor:
 
     def __init__(self, topics: Topics, node: str):
         self.node = node  #: Its absolute name.
-        self.in_flight = False  #: What was published last.
+        self.in_flight = False  #: Last published value.
         self._publisher = topics.publisher(TOPIC, String, latch=True)
 
     def publish(self, in_flight: bool) -> None:
@@ -31,7 +31,7 @@ class ShutdownInhibitor:
             self._send(_TO_END)
 
     def close(self) -> None:
-        """Publish no more."""
+        """End the publication."""
         self.in_flight = False
         self._publisher.close()
 

@@ -1,4 +1,4 @@
-"""The only door between a node and ROS: roscpp's NodeHandle for Python."""
+"""The interface of a node to ROS: roscpp's NodeHandle for Python."""
 
 import contextlib
 import math
@@ -39,7 +39,7 @@ class NodeHandle:
     """Names, parameters, topics, services, timers, time, tf and log of one node.
 
     Callbacks run one at a time, also those of several nodes in a process. One that raises is logged
-    once with its traceback, `on_fault` has the node made safe, and it will be called again.
+    once with its traceback, `on_fault` makes the node safe, and the callback will be called again.
     ``name`` is the node's absolute name, such as /simulator.
     """
 
@@ -61,7 +61,7 @@ class NodeHandle:
         #: For the node that publishes /clock; see `ClockSource`.
         self.clock_publisher, self.next_event = source.publisher, source.next_event
         tf = process.transforms
-        self.broadcast_transforms = tf.broadcaster  #: These six: see `Transforms`.
+        self.broadcast_transforms = tf.broadcaster  #: This and the next five: see `Transforms`.
         self.broadcast_static_transforms = tf.static_broadcaster
         self.listen_to_transforms, self.listen_to_poses = tf.listener, tf.pose_listener
         self.has_pose_consumers = tf.has_pose_consumers
@@ -76,7 +76,7 @@ class NodeHandle:
         return child
 
     def close(self) -> None:
-        """Take down all that was made through this handle; its callbacks begin no more."""
+        """End all that was made through this handle; its callbacks are not called any more."""
         self.is_closed = True
         while self._undo:
             self._undo.pop()()
@@ -90,9 +90,9 @@ class NodeHandle:
         return self._process.transport.remap(rosgraph.names.resolve_name(name, self.name))
 
     def load(self, parameters: type[P], on_change: Callable[[P], None] | None = None) -> P:
-        """Return the node's own (private) parameters; `ParameterError` about all that is wrong.
+        """Return the node's own (private) parameters; `ParameterError` lists all errors.
 
-        ``on_change(parameters)`` offers the live ones to dynamic_reconfigure: it is called with all
+        With ``on_change``, dynamic_reconfigure can change the live ones: it is called with all
         of them, checked, after some were changed. It may raise `ParameterError` to refuse.
         """
         source = PrivateParameters(self._process.transport.get_param, self.name, self.resolve)
@@ -102,9 +102,9 @@ class NodeHandle:
         return loaded
 
     def get_param(self, name: str, type: ParameterType, default: Any = REQUIRED) -> Any:  # noqa: A002
-        """Return a parameter that cannot be declared: another's, or one of a changing name.
+        """Return a parameter that cannot be declared: another node's, or with a varying name.
 
-        Waits for the master: not for callbacks. Raises `ParameterError`, see `load`.
+        Waits for the master: not to be used in callbacks. Raises `ParameterError`, see `load`.
         """
         declaration = Declaration(self.resolve(name), type, "", default, live=False)
         return read_parameter(declaration, self._process.transport.get_param)
@@ -114,7 +114,7 @@ class NodeHandle:
         self._process.transport.set_param(self.resolve(name), value)
 
     def set_param_later(self, name: str, value: Any) -> "Future[None]":
-        """As `set_param`, without waiting; the latest value is set. The future is of any thread."""
+        """As `set_param`, without waiting; the latest value is set. Any thread ends the future."""
         return self._process.transport.set_param_later(self.resolve(name), value)
 
     def publisher(self, topic: str, message_type: type, latch: bool = False) -> Publisher:
@@ -132,7 +132,7 @@ class NodeHandle:
         on_invalid: Callable[[], None] | None = None,
         latest_only: bool = False,
     ) -> Subscriber:
-        """Have ``callback(message)`` called for each message, which is shared: never change it.
+        """Call ``callback(message)`` for each message, which is shared: never change it.
 
         ``finite`` is a field of the message, such as "control", whose numbers must be finite: other
         messages are dropped with a warning, and ``on_invalid()`` is called instead. With
@@ -182,11 +182,11 @@ class NodeHandle:
         self._undo.append(advertise(full_name, service_type, begin, self.time))
 
     def claim_controls(self, topic: str, kind: str) -> None:
-        """Have this node's vehicle, "simulated" or "real", be the only one that flies by a topic.
+        """Claim a topic's controls for this node's vehicle, which is "simulated" or "real".
 
         ``ParameterError`` while a node of another process has claimed it and lives: controls of a
-        simulation never reach a real vehicle. The claim is a service, ``TOPIC/vehicle``, that says
-        who flies.
+        simulation never reach a real vehicle. The claim is a service, ``TOPIC/vehicle``, whose
+        response names the node.
         """
         name = f"{self.resolve(topic)}/vehicle"
         owner = self.service_nodes().get(name)
@@ -242,10 +242,11 @@ class NodeHandle:
         steady: bool = False,
         stagger: bool = False,
     ) -> Timer:
-        """Have ``callback()`` called every ``period`` seconds; ticks that are missed are skipped.
+        """Call ``callback()`` every ``period`` seconds; ticks that are missed are skipped.
 
-        With ``steady`` they are of the machine's clock also when time is simulated; with
-        ``stagger`` not those of other timers, for reports of many nodes. See `TimerQueue.add`.
+        With ``steady`` they are seconds of the machine's clock also if time is simulated; with
+        ``stagger`` the ticks differ from those of other timers, for reports of many nodes. See
+        `TimerQueue.add`.
         """
         timer = self._process.add_timer(period, self._tick(callback), steady, stagger)
         self._undo.append(timer.stop)
@@ -268,7 +269,7 @@ class NodeHandle:
         return tick
 
     def submit(self, callback: Callable[..., None], *arguments: Any) -> None:
-        """Have ``callback(*arguments)`` called in its turn; from any thread of the node."""
+        """Queue a call ``callback(*arguments)``; from any thread of the node."""
         self._submit(partial(self.guard(callback), *arguments))
 
     def broadcast_poses(
@@ -286,12 +287,12 @@ class NodeHandle:
         return self._process.transforms.pose_broadcaster()
 
     def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:
-        """Have ``callback()`` called for new poses of a frame, one in ``period`` (s, by stamps)."""
+        """Call ``callback()`` for new poses of a frame, once in ``period`` (s, by stamps)."""
         guarded = self.guard(callback)
         self._process.transforms.on_pose(frame, period, lambda: self._submit(guarded))
 
     def inhibit_shutdown(self) -> Callable[[bool], None]:
-        """Return ``publish(in_flight)``, which publishes whether a flight of this node goes on.
+        """Return ``publish(in_flight)``, which publishes whether this node has a flight.
 
         Processes with nodes that are needed in flight do not end at SIGINT before it has ended.
         """
@@ -300,11 +301,11 @@ class NodeHandle:
         return inhibitor.publish
 
     def on_fault(self, enter_safe_state: Callable[[], None]) -> None:
-        """Have ``enter_safe_state()`` called after a callback of this node has raised."""
+        """Call ``enter_safe_state()`` after a callback of this node has raised."""
         self._faults.enter_safe_state = enter_safe_state
 
     def guard(self, callback: Callable[..., Any]) -> Callable[..., None]:
-        """Return ``callback`` such that what it raises is reported and goes no further."""
+        """Return ``callback`` with its exceptions caught and reported."""
 
         def guarded(*args):
             if self.is_closed:
@@ -343,9 +344,9 @@ def serve(
 
 
 class Reply(Future[Any]):
-    """The response to a call; what is added to it is a callback of the node.
+    """The response to a call; functions added to it are callbacks of the node.
 
-    A plain future would only log what that raises, and the node would not be made safe.
+    A plain future would only log their exceptions, and the node would not be made safe.
     """
 
     def __init__(self, handle: NodeHandle):
@@ -358,7 +359,7 @@ class Reply(Future[Any]):
 
 
 def forward(done: Future[Any], to: Future[Any], handle: NodeHandle) -> None:
-    """Let one future have the outcome of another, any error as a `ServiceError`."""
+    """Complete a future with the outcome of another, any error as a `ServiceError`."""
     if not to.set_running_or_notify_cancel():
         return
     if done.cancelled():

@@ -5,7 +5,7 @@ from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
-#: How long, in s, a valid value may stand in for invalid ones: the firmware, too, gives up on a
+#: Longest time for which a valid value replaces invalid ones (s): the firmware, too, gives up a
 #: setpoint after 500 ms.
 HOLD_LIMIT = 0.5
 
@@ -19,14 +19,14 @@ class LastValid(Generic[T]):
         self._expiry = math.inf
 
     def update(self, value: T) -> None:
-        """Take a valid value."""
+        """Set a valid value."""
         self._value = value
         self._expiry = math.inf
 
     def invalidate(self, time: float) -> None:
-        """Take note that an invalid value came at ``time`` (s)."""
+        """Record that an invalid value came at ``time`` (s)."""
         self._expiry = min(self._expiry, time + self._limit)
 
     def value(self, time: float) -> T | None:
-        """Return the value that holds at ``time`` (s); None before the first and after the last."""
+        """Return the value at ``time`` (s); None before the first one and after `limit`."""
         return self._value if time < self._expiry else None

@@ -1,4 +1,4 @@
-"""A node's log: no floods, and one traceback for each fault."""
+"""A node's log: repeated texts are limited, and each fault has one traceback."""
 
 import time
 import traceback
@@ -11,7 +11,7 @@ _MAX_KEYS = 64
 
 
 class Throttle:
-    """Lets each key pass once in a period; new keys do not pass while it remembers `_MAX_KEYS`."""
+    """Passes each key once in a period; new keys do not pass while `_MAX_KEYS` are stored."""
 
     def __init__(self) -> None:
         self._allowed_from: dict[Hashable, float] = {}
@@ -37,25 +37,25 @@ class NodeLog:
         self._throttle = Throttle()
 
     def info(self, text: str) -> None:
-        """Log what an operator may want to know."""
+        """Log information for an operator."""
         self._transport.log("info", f"{self._node}: {text}")
 
     def warn(self, text: str, throttle: float = 0.0, key: Hashable = None) -> None:
         """Log a warning; the same ``key`` (the text) at most once in ``throttle`` seconds.
 
-        They are of the machine's clock, also in simulated time. A text that varies needs a key.
+        The time is that of the machine's clock, also in simulated time. A varying text needs a key.
         """
         key = text if key is None else key
         if throttle <= 0.0 or self._throttle.passes(key, throttle, time.monotonic()):
             self._transport.log("warn", f"{self._node}: {text}")
 
     def error(self, text: str) -> None:
-        """Log what makes the node fail."""
+        """Log an error that makes the node fail."""
         self._transport.log("error", f"{self._node}: {text}")
 
 
 class FaultHandler:
-    """Logs what the callbacks of a node raise, and has the node made safe.
+    """Logs exceptions of a node's callbacks, and makes the node safe.
 
     A fault is logged with its traceback when it is new, and later only counted.
     """

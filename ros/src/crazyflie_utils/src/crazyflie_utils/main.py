@@ -22,12 +22,12 @@ from crazyflie_utils.ros1.master_watch import MasterWatch, namesake
 from crazyflie_utils.ros1.transport import RosTransport
 from crazyflie_utils.shutdown import FLUSH_TIME, Shutdown, catch_signals, exit_at_once, fail
 
-_END_LIMIT = 5.0  #: How long, in s, the end waits for nodes that have no flight any more.
-#: How long, in s, a node that roslaunch has started and that is refused waits before it ends: with
-#: respawn, it would otherwise take the processor from the nodes that fly.
+_END_LIMIT = 5.0  #: Longest time that the end waits for nodes that have no flight any more (s).
+#: Time that a refused node of roslaunch waits before it ends (s): with respawn, it would otherwise
+#: take the processor from the nodes that fly.
 _REFUSED_TIME = 5.0
-_MASTER_LIMIT = 10.0  #: How long, in s, a node waits for a ROS master.
-#: How long, in s, a thread that has something to do waits for another that computes.
+_MASTER_LIMIT = 10.0  #: Longest time that a node waits for a ROS master (s).
+#: Time after which a computing thread yields to a waiting one (s).
 _SWITCH_INTERVAL = 0.0005
 
 
@@ -89,7 +89,7 @@ class ComposedParameters(Parameters):
 
 
 def _flatten(tree, prefix=""):
-    # A name such as cf1/simulator is a tree to the parameter server.
+    # For the parameter server, a name such as cf1/simulator is a tree.
     leaves = {}
     for key, value in tree.items():
         if isinstance(value, dict):
@@ -111,7 +111,7 @@ def _node_class(path):
 
 
 def begin(default_name: str, signals: list[int] | None = None) -> Process:
-    """Make this process a ROS node and return what its nodes share, not yet started.
+    """Make this process a ROS node; return the `Process`, not yet started.
 
     Exits with status 1 without a ROS master, if a node of this name lives, which the master would
     shut down, and at ``signals``, see `catch_signals`.
@@ -162,14 +162,14 @@ def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
 
 
 def ros_process() -> Process:
-    """Return what the nodes of this process share, when it is a ROS node already."""
+    """Return the `Process` of a process that is a ROS node already."""
     value = rospy.get_param("/use_sim_time", False)
     try:
         use_sim_time = BOOLEAN(value)
     except ValueError:
         rospy.logerr(f"parameter /use_sim_time is {value!r}; expected {BOOLEAN}")
         fail()
-    # In simulated time there is no such thing as too many messages a second.
+    # In simulated time any number of messages a second is allowed.
     transport = RosTransport(limits_rate=not use_sim_time)
     if use_sim_time:
         transport.follow_clock()
@@ -219,7 +219,7 @@ def _run(process, make_nodes, signals):
     watch = MasterWatch()
     watch.start()
     _avoid_pauses()
-    # Not in this thread, which must stay free to end a callback that does not.
+    # Not in this thread, which must be able to end the process if a callback does not return.
     threading.Thread(target=process.start, name="start", daemon=True).start()
     while not signals and process.exit_status is None and not rospy.is_shutdown():
         time.sleep(0.1)
@@ -227,7 +227,7 @@ def _run(process, make_nodes, signals):
         shutdown.wait_for_flights()
     watch.stop()
     rospy.signal_shutdown(f"signal {signals}" if signals else "the node has ended")
-    # Another process may have asked for it, and a thread of rospy be at it.
+    # At the request of another process, a thread of rospy may run the shutdown.
     shutdown.has_ended.wait(_END_LIMIT)
     if shutdown.is_stuck:
         exit_at_once(1)
@@ -235,9 +235,9 @@ def _run(process, make_nodes, signals):
 
 
 def _avoid_pauses():
-    """Keep what Python does by the way from delaying controls."""
-    # A search for garbage among all that has been imported takes 10 ms; none of it ever is.
+    """Reduce pauses by Python's garbage collection and thread switching."""
+    # A search for garbage among all imported objects takes 10 ms, and never finds any.
     gc.collect()
     gc.freeze()
-    # By default a thread that computes lets others wait for 5 ms.
+    # By default other threads wait 5 ms for one that computes.
     sys.setswitchinterval(_SWITCH_INTERVAL)

@@ -1,4 +1,4 @@
-"""The anatomy that all nodes share."""
+"""The base class of all nodes."""
 
 import traceback
 from typing import ClassVar
@@ -9,28 +9,28 @@ from crazyflie_utils.program import missing_module
 
 
 def initialization_failure(error: Exception) -> str:
-    """Return why a node cannot be initialized: what is to be installed, or the traceback."""
+    """Return why a node cannot be initialized: a package to install, or the traceback."""
     trace = "".join(traceback.format_exception(error))
     return missing_module(error) or f"failed to initialize\n{trace}"
 
 
 class Node:
-    """A ROS node as an object: give it a `NodeHandle` and it is one.
+    """A ROS node as an object, which is initialized with a `NodeHandle`.
 
     A subclass overrides `load_parameters`, `register_callbacks` and, if silence is not safe enough,
-    `enter_safe_state`. ``__init__`` holds what changes while the node runs, and makes no ROS call.
+    `enter_safe_state`. ``__init__`` defines the state of the node, and makes no ROS call.
 
     Callbacks never run before `initialize` has returned and never at the same time, so a node
     needs no locks.
     """
 
-    #: Whether a process with this node lives on after SIGINT until flights have ended.
+    #: Whether a process with this node continues after SIGINT until flights have ended.
     needed_in_flight: ClassVar[bool] = False
 
     _handle: NodeHandle
 
     def initialize(self, handle: NodeHandle) -> bool:
-        """Load parameters, register callbacks; False if it cannot run, the reason is in the log."""
+        """Load parameters, register callbacks; return False if that fails, and log the reason."""
         self._handle = handle
         try:
             self.load_parameters(handle)
@@ -47,7 +47,7 @@ class Node:
     def load_parameters(self, handle: NodeHandle) -> None:
         """Load the parameters, with `NodeHandle.load`, and build the algorithm.
 
-        May raise `ParameterError`, with full names and what was expected.
+        May raise `ParameterError`, with full names and the expected values.
         """
         raise NotImplementedError
 
@@ -56,14 +56,14 @@ class Node:
         raise NotImplementedError
 
     def enter_safe_state(self) -> None:
-        """Leave the vehicle safe after a callback has raised, and at shutdown.
+        """Make the vehicle safe after an exception of a callback, and at shutdown.
 
-        By default the node falls silent; the vehicle's watchdog does the rest.
+        By default the node publishes nothing, and the vehicle's watchdog acts.
         """
 
     def prepare_shutdown(self) -> None:
-        """End what needs time, such as a flight: called at SIGINT, when all goes on for a while."""
+        """Begin to end a flight: called at SIGINT, after which callbacks still run for a while."""
 
     def shutdown(self) -> None:
-        """End: called once, when timers no longer fire and topics still work."""
+        """Clean up: called once, when timers no longer fire and topics still work."""
         self.enter_safe_state()

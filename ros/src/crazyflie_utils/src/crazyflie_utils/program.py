@@ -1,4 +1,4 @@
-"""Starts programs by name, and says in a sentence what installs a Python module that is missing."""
+"""Starts programs by name, and names the package of a Python module that is missing."""
 
 import importlib
 import sys
@@ -32,7 +32,7 @@ PACKAGES = {
 
 
 def missing_module(error: BaseException | None) -> str:
-    """Return in a sentence which module of `PACKAGES` is missing, and what installs it.
+    """Return a sentence with the module of `PACKAGES` that is missing, and how to install it.
 
     That is the cause of an error, or the cause of its cause; empty if there is none.
     """
@@ -50,13 +50,13 @@ def missing_module(error: BaseException | None) -> str:
 
 
 def load(path: str) -> Any:
-    """Import what is named as "package.module:name" and return it."""
+    """Import and return the object named as "package.module:name"."""
     module, _, name = path.partition(":")
     return getattr(importlib.import_module(module), name)
 
 
 def run_program(path: str) -> NoReturn:
-    """Exit with what the function "package.module:function" returns.
+    """Exit with the status that the function "package.module:function" returns.
 
     The exit status is 1, with a sentence, if a module of `PACKAGES` is missing.
     """

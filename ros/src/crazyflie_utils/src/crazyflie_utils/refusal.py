@@ -1,8 +1,8 @@
-"""What an algorithm raises, so that a service is answered with the reason."""
+"""The exception by which an algorithm refuses a command, with the reason."""
 
 
 class RefusalError(Exception):
-    """A command makes no sense now; the text says why. Nothing has changed.
+    """A command is not possible now; the text says why. Nothing has changed.
 
-    Raised in the callback of a service, it is the service's error.
+    If the callback of a service raises it, the text is the service's error.
     """

@@ -1,4 +1,4 @@
-"""The end of a process: signals, flights that go on, the last messages."""
+"""The end of a process: signals, flights that are not over, the last messages."""
 
 import logging
 import os
@@ -14,25 +14,25 @@ from crazyflie_utils.flights import Flights
 from crazyflie_utils.node import Node
 from crazyflie_utils.process import Process
 
-_SHUTDOWN_LIMIT = 2.0  #: How long, in s, shutdown waits for a callback that does not return.
+_SHUTDOWN_LIMIT = 2.0  #: Longest time that shutdown waits for a callback (s).
 
-#: How long, in s, a process goes on for a flight that is to end: less than the 15 s that roslaunch
-#: gives it.
+#: Longest time that a process continues for a flight that is to end (s): less than the 15 s that
+#: roslaunch waits.
 _FLIGHT_LIMIT = 10.0
 
-#: How long, in s, a process waits for another one to publish that its flight is to end, before it
-#: logs by itself that it waits.
+#: Time that a process waits for another one to publish that its flight is to end, before it logs
+#: that it waits (s).
 _NOTICE_DELAY = 1.0
 
-#: How long, in s, the last messages have to be sent by rospy's threads and to be read: a subscriber
-#: hangs up as soon as the master tells it of the publisher's end.
+#: Time for rospy's threads to send the last messages, and for subscribers to read them (s): a
+#: subscriber disconnects as soon as the master reports the publisher's end.
 FLUSH_TIME = 0.2
 
 
 def catch_signals() -> list[int]:
     """Return a list to which SIGINT and SIGTERM are added from now on.
 
-    To be called before ``rospy.init_node``, whose handlers shut down inside the handler, where
+    Call it before ``rospy.init_node``, whose handlers shut down inside the handler, where
     any lock may be held by the very code that was interrupted.
     """
     caught: list[int] = []
@@ -40,7 +40,7 @@ def catch_signals() -> list[int]:
 
     def note(number, _frame):
         caught.append(number)
-        # After a first one a flight may have to end; the next signal ends that.
+        # After the first signal the process waits for flights; the next one ends that.
         if len(caught) > 1:
             for each in ends:
                 signal.signal(each, signal.SIG_DFL)
@@ -51,7 +51,7 @@ def catch_signals() -> list[int]:
 
 
 class Shutdown:
-    """What a process with nodes, by absolute name, does before rospy closes its connections.
+    """The shutdown of a process with nodes (by absolute name) before rospy closes connections.
 
     ``signals`` is the list of `catch_signals`.
     """
@@ -61,7 +61,7 @@ class Shutdown:
         self._nodes = nodes
         self._signals = signals
         self.is_stuck = False  #: Whether a callback has not returned.
-        self.has_ended = threading.Event()  #: Whether `run` has done all.
+        self.has_ended = threading.Event()  #: Whether `run` is complete.
         needed = [name for name, node in nodes.items() if node.needed_in_flight]
         self._flights = Flights(process.topics, needed) if needed else None
 
@@ -120,7 +120,7 @@ def fail() -> NoReturn:
 
 
 def exit_at_once(status: int) -> NoReturn:
-    """Exit though threads, of rospy or stuck in a callback, would keep the process alive."""
+    """Exit even if threads, of rospy or stuck in a callback, would keep the process alive."""
     logging.shutdown()
     sys.stdout.flush()
     sys.stderr.flush()

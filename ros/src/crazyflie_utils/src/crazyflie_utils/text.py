@@ -1,11 +1,11 @@
-"""Text for people and by people: values and names in messages, files of text, numbers in them."""
+"""Values and names in messages; text files, and numbers in them."""
 
 import re
 import reprlib
 from pathlib import Path
 
-_VALUE_LENGTH = 80  #: Characters of a value in a message; an expected list of a few numbers fits.
-_NAME_LENGTH = 200  #: Characters of a name, or of a list of names, in a message.
+_VALUE_LENGTH = 80  #: Length of a value in a message (characters); a short list fits.
+_NAME_LENGTH = 200  #: Length of a name, or of a list of names, in a message (characters).
 
 
 class _Repr(reprlib.Repr):
@@ -26,7 +26,7 @@ _REPR = _Repr()
 
 
 def shown(value: object) -> str:
-    """Return a value as a message shows it: its `repr`, of which a long one is cut.
+    """Return the text of a value for messages: its `repr`, shortened if it is long.
 
     The time it takes does not depend on the size of the value.
     """
@@ -41,7 +41,7 @@ def shortened(text: str, length: int = _NAME_LENGTH) -> str:
     return f"{text[: length - 3 - end]}...{text[len(text) - end :]}"
 
 
-MAX_SIZE = 10_000_000  #: Bytes of a file of text; longer ones are something else.
+MAX_SIZE = 10_000_000  #: Largest text file (bytes).
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -84,7 +84,7 @@ def read_text(path: str | Path, max_size: int = MAX_SIZE) -> str:
 
 
 def number_from_text(text: str) -> float:
-    """Return the number in a text as all other programs read it: 1e-3, but not 1_000.
+    """Return the number in a text by the common rules: 1e-3, but not 1_000.
 
     ``nan`` and ``inf`` are numbers that the caller may refuse. ValueError if there is none.
     """

@@ -1,4 +1,4 @@
-"""Timers, by whatever clock, whose callbacks run on an `Executor`."""
+"""Timers, by any clock, whose callbacks run on an `Executor`."""
 
 import contextlib
 import heapq
@@ -12,15 +12,15 @@ from operator import attrgetter
 from crazyflie_utils.clock import SimulatedClock, SteadyClock
 from crazyflie_utils.executor import Executor
 
-#: A timer is due this much early, s: more than the rounding of a float that holds the seconds since
-#: 1970, less than anyone can notice.
+#: Time by which a timer may be early (s): more than the rounding error of the seconds since 1970 as
+#: a float, and negligible.
 _TOLERANCE = 1e-6
 
-#: Timers of at most this period, s, are due together where they can be: waking up costs more than
-#: most of them do.
+#: Longest period of timers that are due together where possible (s): waking up takes more time than
+#: most callbacks.
 _TOGETHER = 0.1
 
-#: Timers that are spread are due so far apart, s: most others are due as often as that.
+#: Time between the deadlines of staggered timers (s): the period of most other timers.
 _SLOT = 0.01
 
 
@@ -36,17 +36,17 @@ class Timer:
         self.restart(now)
 
     def stop(self) -> None:
-        """Let the timer never fire again, not even if it is due already."""
+        """Stop the timer, even if it is due already."""
         self.stopped = True
 
     def restart(self, now: float) -> None:
-        """Make it due one period from ``now`` (s)."""
+        """Set the next deadline one period after ``now`` (s)."""
         self._start = now
         self._count = 1
         self.deadline = now + self._period
 
     def skip_to(self, now: float) -> None:
-        """Make it due at the first moment of its phase after ``now`` (s)."""
+        """Set the next deadline to the first moment of its phase after ``now`` (s)."""
         if self._period == 0.0:
             self.deadline = now
             return
@@ -61,7 +61,7 @@ class Timer:
         self.deadline = self._start + self._count * self._period
 
     def fire(self) -> None:
-        """Call back, unless stopped."""
+        """Call the callback, unless the timer was stopped."""
         if not self.stopped:
             self._work()
 
@@ -72,7 +72,7 @@ _number = attrgetter("number")
 class TimerQueue:
     """Timers in the order of their deadlines.
 
-    ``before()`` and ``after()`` are called before and after several that are due at once.
+    ``before()`` and ``after()`` are called before and after several timers that are due at once.
     """
 
     def __init__(
@@ -130,7 +130,7 @@ class TimerQueue:
 
     def _next_moment(self, period, now, stagger):
         first = self._next_multiple(_SLOT, now) + (self._next_slot(period) if stagger else 0.0)
-        # Of the moments of its phase, the first one after now.
+        # The first moment of its phase after now.
         return first - math.floor((first - now - _TOLERANCE) / period) * period
 
     def _next_slot(self, period):
@@ -152,7 +152,7 @@ class TimerQueue:
     def run_due(self, now: float) -> None:
         """Submit every timer that is due at ``now`` (s), in order, each once.
 
-        A timer that is late by more than a period skips what it missed and
+        A timer that is late by more than a period skips the missed ticks and
         keeps its phase.
         """
         self._is_running = True
@@ -166,7 +166,7 @@ class TimerQueue:
             self._executor.submit(self._after)
 
     def rebase(self, now: float) -> None:
-        """Make every timer due one period from ``now`` (s): time has been reset."""
+        """Set every deadline one period after ``now`` (s): time has been reset."""
         with self._lock:
             timers = [timer for _, _, timer in sorted(self._heap)]
             self._heap.clear()
@@ -175,7 +175,7 @@ class TimerQueue:
                 self._push(timer)
 
     def stop(self) -> None:
-        """Let no timer fire again, not even those that are due already."""
+        """Stop all timers, even those that are due already."""
         with self._lock:
             self._is_stopped = True
             for _, _, timer in self._heap:
@@ -191,8 +191,8 @@ class TimerQueue:
                 timer = heapq.heappop(self._heap)[2]
                 if not timer.stopped:
                     due.append(timer)
-            # Those of one moment differ by rounding only, each time in another way. Who was there
-            # first is first, so that it has an even period.
+            # Deadlines of one moment differ by rounding only, which varies. The order is that of
+            # registration, so that periods are even.
             if due and due[-1].deadline - due[0].deadline < _TOLERANCE:
                 due.sort(key=_number)
             for timer in due:
@@ -212,7 +212,7 @@ class VaryingTimer:
         self._is_stopped = False
 
     def set_period(self, period: float) -> None:
-        """If it is another one than before, be due at most one period, s, from now, and so on.
+        """Change the period, s; the next deadline is at most one period from now.
 
         Then many timers with the same period are due at different moments.
         """
@@ -222,7 +222,7 @@ class VaryingTimer:
             self._timer = self._add_timer(period, self._work, stagger=True, align_phase=True)
 
     def stop(self) -> None:
-        """Never be due again."""
+        """Stop the timer."""
         self._is_stopped = True
         self._timer.stop()
 
@@ -233,15 +233,15 @@ class SteadyTimers:
     def __init__(self, queue: TimerQueue, clock: SteadyClock | SimulatedClock):
         self._queue = queue
         self._clock = clock
-        # Released when there is anything new. Waiting for a bare lock costs half of what it
-        # costs to wait for a condition.
+        # Released when there is anything new. Waiting for a bare lock takes half the time of
+        # waiting for a condition.
         self._news = threading.Lock()
         self._news.acquire()
         self._stopped = False
         self._thread = threading.Thread(target=self._run, name="timers", daemon=True)
 
     def start(self) -> None:
-        """Begin to fire."""
+        """Start the timers."""
         self._thread.start()
 
     def add(
@@ -257,7 +257,7 @@ class SteadyTimers:
         return timer
 
     def stop(self) -> None:
-        """Let no timer fire again, and end the thread."""
+        """Stop all timers, and end the thread."""
         self._queue.stop()
         self._stopped = True
         self._wake_up()

@@ -1,6 +1,6 @@
-"""Topics within a process: subscribers here are given the published object itself, by a call.
+"""Topics within a process: subscribers in it are called with the published object itself.
 
-They must therefore not change it. Messages are sent outside only when there are subscribers.
+They must therefore not change it. Messages are sent to other processes only if these subscribe.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,10 +30,10 @@ class Topic:
 
 
 class Publisher:
-    """The right to publish on a topic."""
+    """A publisher of a topic."""
 
     def __init__(self, topic: Topic, external: ExternalPublisher, latch: bool):
-        self.latched: genpy.Message | None = None  #: What late subscribers are sent.
+        self.latched: genpy.Message | None = None  #: Last message, for late subscribers.
         self._topic = topic
         self._external = external
         self._latch = latch
@@ -45,22 +45,22 @@ class Publisher:
         """Name of the topic, absolute."""
         return self._topic.name
 
-    def has_subscribers(self, beside: int = 0) -> bool:
-        """Return whether anyone, here (beside so many receivers) or outside, is connected."""
-        return self.is_read_here(beside) or self.is_heard_outside()
+    def has_subscribers(self, excluding: int = 0) -> bool:
+        """Return whether there are subscribers, except ``excluding`` ones of this process."""
+        return self.is_read_here(excluding) or self.is_heard_outside()
 
     def is_heard_outside(self) -> bool:
-        """Return whether anyone in another process is connected."""
+        """Return whether another process subscribes."""
         return self._external.has_subscribers()
 
-    def is_read_here(self, beside: int = 0) -> bool:
-        """Return whether this process has more receivers than ``beside``."""
-        return len(self._topic.receivers) > beside
+    def is_read_here(self, excluding: int = 0) -> bool:
+        """Return whether this process has more receivers than ``excluding``."""
+        return len(self._topic.receivers) > excluding
 
     def publish(self, message: genpy.Message, before: Sequence[genpy.Message] = ()) -> None:
         """Send a message of the topic's type (or TypeError), which must not be changed afterwards.
 
-        Those ``before`` it are sent to other processes only, all in one go.
+        The messages ``before`` it are sent to other processes only, all at once.
         """
         if not isinstance(message, self._topic.message_type):
             raise TypeError(
@@ -76,7 +76,7 @@ class Publisher:
         self._topic.deliver(message)
 
     def close(self) -> None:
-        """Publish no more; what is published later, and what was latched, is lost."""
+        """End the publication; later messages, and the latched one, are lost."""
         if not self._is_closed:
             self._is_closed = True
             self._topic.publishers.remove(self)
@@ -92,19 +92,19 @@ class Subscriber:
         self._external = external
 
     def has_publishers(self) -> bool:
-        """Return whether anyone, here or outside, is connected and may publish."""
+        """Return whether there are publishers, in this process or in others."""
         return bool(self._topic.publishers) or self._external.has_publishers()
 
     def caller(self, message: genpy.Message) -> str:
-        """Return the name of the node of another process that sent a message; else ""."""
+        """Return the name of the node of another process that sent a message, or ""."""
         header = getattr(message, "_connection_header", None) or {}
         # A node of this process may have passed on what it received on another topic.
         is_here = header.get("topic", self._topic.name) == self._topic.name
         return header.get("callerid", "") if is_here else ""
 
     def close(self) -> None:
-        """Receive no more."""
-        # Not in place: a message may be on its way to the others.
+        """End the subscription."""
+        # Not in place: a message may be being delivered to the others.
         receivers = self._topic.receivers
         self._topic.receivers = [each for each in receivers if each is not self._receiver]
         self._external.close()
@@ -118,11 +118,11 @@ class LatestMessage:
         self._message: Any = None
 
     def take(self, message: Any) -> None:
-        """Keep a message in the place of the one before."""
+        """Store a message; it replaces the previous one."""
         self._message = message
 
     def deliver(self) -> None:
-        """Call back with the latest message, if it is new."""
+        """Call the callback with the latest message, if it is new."""
         message, self._message = self._message, None
         if message is not None:
             self._callback(message)
@@ -149,7 +149,7 @@ def finite_only(
 
 
 class Topics:
-    """All topics of a process; TypeError for one that has another type in it already."""
+    """All topics of a process; TypeError for one that has another type already."""
 
     def __init__(self, transport: Transport):
         self._transport = transport
@@ -167,7 +167,7 @@ class Topics:
         receiver: Receiver,
         outside_type: type[genpy.Message] | None = None,
     ) -> Subscriber:
-        """Have ``receiver(message)`` called for every message on a topic.
+        """Call ``receiver(message)`` for every message on a topic.
 
         Messages from outside come as ``outside_type``, a subclass of ``message_type``, if given.
         """
@@ -176,8 +176,8 @@ class Topics:
         for publisher in topic.publishers:
             if publisher.latched is not None:
                 receiver(publisher.latched)
-        # Each receiver for itself, so that one that comes late is sent what an
-        # outside publisher has latched; the connection is shared all the same.
+        # One subscription for each receiver, so that a late one gets the latched message of another
+        # process; the connection is shared.
         external = self._transport.subscribe(name, outside_type or message_type, receiver)
         return Subscriber(topic, receiver, external)
 

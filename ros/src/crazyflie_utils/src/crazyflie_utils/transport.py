@@ -1,7 +1,7 @@
-"""What a process needs of the world outside it.
+"""The interface of a process to other processes.
 
-`RosTransport` is rospy; `FakeTransport` is a unit test. Everything else about a
-`NodeHandle` is the same for both.
+`RosTransport` uses rospy, `FakeTransport` is for unit tests; everything else of a `NodeHandle` is
+the same for both.
 """
 
 from abc import ABC, abstractmethod
@@ -18,43 +18,43 @@ class ServiceError(Exception):
 
 
 class ExternalPublisher(ABC):
-    """Publishes one topic to those outside the process."""
+    """Publishes one topic to other processes."""
 
     @abstractmethod
     def has_subscribers(self) -> bool:
-        """Return whether anyone outside this process subscribes."""
+        """Return whether another process subscribes."""
 
     @abstractmethod
     def publish(self, *messages: genpy.Message) -> None:
-        """Send messages to those outside."""
+        """Send messages to other processes."""
 
     @abstractmethod
     def close(self) -> None:
-        """Publish no more."""
+        """End the publication."""
 
 
 class ExternalSubscriber(ABC):
-    """Receives one topic from those outside the process."""
+    """Receives one topic from other processes."""
 
     @abstractmethod
     def has_publishers(self) -> bool:
-        """Return whether anyone outside this process is connected and may publish."""
+        """Return whether another process publishes."""
 
     @abstractmethod
     def close(self) -> None:
-        """Receive no more."""
+        """End the subscription."""
 
 
 class Transport(ABC):
     """Parameters, topics, services, logging and life time, by absolute names."""
 
     def starting(self) -> AbstractContextManager[None]:
-        """Return a with block that initializes nodes; those outside see all of them at its end."""
+        """Return a with block that initializes nodes; other processes see them at its end."""
         return nullcontext()
 
     @abstractmethod
     def remap(self, name: str) -> str:
-        """Return the name that the launch file puts in the place of ``name``."""
+        """Return the name to which the launch file remaps ``name``."""
 
     @abstractmethod
     def get_param(self, name: str) -> Any:
@@ -76,15 +76,15 @@ class Transport(ABC):
 
     @abstractmethod
     def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
-        """Announce a topic to those outside."""
+        """Announce a topic to other processes."""
 
     @abstractmethod
     def subscribe(
         self, topic: str, message_type: type, deliver: Callable[[Any], None]
     ) -> ExternalSubscriber:
-        """Have ``deliver(message)`` called with what those outside publish.
+        """Call ``deliver(message)`` with the messages of other processes.
 
-        Also with what they have latched; a topic may be subscribed more than once.
+        That includes latched ones; a topic may be subscribed more than once.
         """
 
     @abstractmethod
@@ -97,11 +97,9 @@ class Transport(ABC):
     ) -> Callable[[], None]:
         """Answer calls of a service with the outcome of ``serve(request, is_withdrawn)``, a future.
 
-        ``is_withdrawn()`` tells whether the caller has given up on the call.
-
-        The caller gets a `ServiceError`, also when the process
-        ends or when ``time()``, by which the service lives, stands still. Returns a
-        function that ends the service.
+        ``is_withdrawn()`` returns whether the caller has given up the call. The caller gets a
+        `ServiceError`, also if the process ends, or if ``time()``, the service's clock, stands
+        still. Returns a function that ends the service.
         """
 
     @abstractmethod
@@ -124,4 +122,4 @@ class Transport(ABC):
 
     @abstractmethod
     def clock_was_set(self, stamp: genpy.Time) -> None:
-        """Take note that this process, which publishes /clock, moved to ``stamp``."""
+        """Set the transport's clock: this process, which publishes /clock, moved to ``stamp``."""

@@ -60,7 +60,7 @@ def from_vector(
             f"{message_type._type} has {len(fields)} fields {tuple(fields)}, "
             f"got a vector of {len(vector)}"
         )
-    # Its own __init__ looks at each field several times.
+    # The type's __init__ checks each field several times.
     message = object.__new__(message_type)
     for field, value in zip(fields, vector, strict=True):
         setattr(message, field, float(value))
@@ -70,7 +70,7 @@ def from_vector(
 def is_finite(message: genpy.Message) -> bool:
     """Return whether every number of a message, of nested ones and of lists, is finite."""
     message_type: Any = type(message)
-    # A sum is finite only of finite numbers; one that overflows says nothing.
+    # If the sum is finite, so are the numbers; if it overflows, each one is checked.
     if _is_flat(message_type) and math.isfinite(sum(to_tuple(message), 0.0)):
         return True
     return all(_is_finite(getattr(message, field)) for field in message.__slots__)

@@ -145,7 +145,7 @@ def load(path: str | FilePath) -> World:
     `ParameterError` is about everything that is wrong in it: file, line and what was expected.
     """
     file = yaml_file.load(path)
-    settings = file.read(WorldParameters, besides=("objects",))
+    settings = file.read(WorldParameters, extra_keys=("objects",))
     entries = file["objects"].elements() if "objects" in file else []
     objects: list[Shape] = []
     complaints: list[str] = []
@@ -171,9 +171,9 @@ WORLD_FILE = File(load, "a world file")
 def _object(entry: Entry) -> Shape:
     kind = _type(entry, (*OBJECTS, WALL))
     if kind == WALL:
-        return entry.read(WallParameters, besides=("type",)).shape()
+        return entry.read(WallParameters, extra_keys=("type",)).shape()
     path = _path(entry["path"]) if "path" in entry else None
-    parameters = entry.read(OBJECTS[kind], besides=("type", "path"))
+    parameters = entry.read(OBJECTS[kind], extra_keys=("type", "path"))
     if (parameters.centre is None) == (path is None):
         raise entry.error("has a centre and a path, or none of them; expected one of them")
     return _with_picture(parameters.shape(path), entry)
@@ -193,7 +193,7 @@ def _with_picture(shape: Shape, entry: Entry) -> Shape:
 
 
 def _path(entry: Entry) -> Path:
-    return entry.read(PATHS[_type(entry, tuple(PATHS))], besides=("type",))
+    return entry.read(PATHS[_type(entry, tuple(PATHS))], extra_keys=("type",))
 
 
 def _type(entry: Entry, choices: tuple[str, ...]) -> str:

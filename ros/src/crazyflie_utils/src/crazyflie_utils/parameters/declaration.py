@@ -22,7 +22,7 @@ _KEY = "declaration"
 
 
 class ParameterError(Exception):
-    """Parameters are missing or unusable; each complaint names one of them in full."""
+    """Parameters are missing or invalid; each complaint names one of them in full."""
 
     def __init__(self, *complaints: str):
         super().__init__("\n".join(complaints))
@@ -31,14 +31,14 @@ class ParameterError(Exception):
 
 @dataclasses.dataclass(frozen=True)
 class Declaration:
-    """What is known about a parameter."""
+    """The declaration of a parameter."""
 
     #: Below the node's name, such as "topics/state"; a name that begins with a slash is not the
     #: node's own.
     name: str
     type: ParameterType
-    help: str  #: What it is; without its type, unit, range and default.
-    default: Any  #: Taken as it is when the parameter is not set; `REQUIRED` for none.
+    help: str  #: Description, without type, unit, range and default.
+    default: Any  #: Value, not checked, if the parameter is not set; `REQUIRED`: no default.
     live: bool  #: Whether it may be changed while the node runs.
 
 
@@ -76,7 +76,7 @@ class Parameters:
         dataclasses.dataclass(frozen=True, kw_only=True)(cls)
 
     def complaints(self) -> Iterable[str]:
-        """Return a text about each thing wrong with values that are good one by one."""
+        """Return an error text for each combination of valid values that is invalid."""
         return ()
 
     @classmethod
@@ -91,11 +91,10 @@ class Parameters:
 
     @classmethod
     def read(cls, get: Callable[[str], Any], full_name: Callable[[str], str] = str) -> Self:
-        """Return the parameters that a source holds, all of them checked.
+        """Return the parameters of a source, all of them checked.
 
         ``get(name)`` returns the raw value of a parameter, or raises KeyError; ``full_name(name)``
-        is how messages call it. `ParameterError` is about everything that is missing or not what is
-        expected.
+        is its name in messages. `ParameterError` lists everything that is missing or invalid.
         """
         values: dict[str, Any] = {}
         complaints: list[str] = []
@@ -156,7 +155,7 @@ def read_parameter(
     try:
         return expected(raw)
     except (ValueError, TypeError, OverflowError) as error:
-        # The latter two are Python's own words about a number that is none.
+        # TypeError and OverflowError have Python's own texts about something that is not a number.
         reason = f" ({error})" if isinstance(error, ValueError) and str(error) else ""
         raise ParameterError(
             f"parameter {full_name(declaration.name)} is {shown(raw)}; expected {expected}{reason}"
@@ -178,8 +177,8 @@ P = TypeVar("P", bound=Parameters)
 def parse_arguments(parameters: type[P], arguments: list[str], program: str, description: str) -> P:
     """Return the parameters on a command line: ``init/x`` is the argument ``--init-x``.
 
-    ``program`` and ``description`` are for ``--help``. Exits with status 2 and a message about all
-    that is wrong.
+    ``program`` and ``description`` are for ``--help``. Exits with status 2 and a message that lists
+    all errors.
     """
     parser = argparse.ArgumentParser(prog=program, description=description)
     declarations = {_option(d.name): d for d in parameters.declarations()}
@@ -198,7 +197,7 @@ def parse_arguments(parameters: type[P], arguments: list[str], program: str, des
         try:
             return types[name].from_text(text)
         except ValueError:
-            # The type refuses the text as well, and says what it expects.
+            # The type refuses the text, too, and names the expected value.
             return text
 
     types = {declaration.name: declaration.type for declaration in declarations.values()}

@@ -1,8 +1,8 @@
-"""Parameters that may be changed in flight, as dynamic_reconfigure and rqt_reconfigure do it.
+"""Parameters that dynamic_reconfigure and rqt_reconfigure can change in flight.
 
-Through the node handle, so that a change comes between two callbacks; the library's own server has
-threads of rospy's. Only its messages are imported: its other modules load what finds packages in
-the file system, two hundred modules and 20 MiB of them.
+Changes come through the node handle, between two callbacks; the library's own server uses threads
+of rospy. Only its messages are imported: its other modules load two hundred modules, 20 MiB, that
+find packages in the file system.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ from crazyflie_utils.transport import ServiceError
 
 
 class Reconfiguration:
-    """Offers the live parameters of a node, which were read with ``get``; see `NodeHandle.load`.
+    """Offers the live parameters of a node, which ``get`` returns; see `NodeHandle.load`.
 
     The handle is a `NodeHandle`, whose module imports this one.
     """

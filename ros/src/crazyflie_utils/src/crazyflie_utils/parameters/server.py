@@ -7,7 +7,7 @@ from typing import Any
 
 
 class PrivateParameters:
-    """The parameters below the absolute name of a node, and those of others that are remapped to.
+    """The parameters below the absolute name of a node, and those to which names are remapped.
 
     For ``get_param`` and ``resolve`` see `Transport` and `NodeHandle`.
     """
@@ -41,8 +41,7 @@ class PrivateParameters:
 class ParameterWriter:
     """Sets parameters in the order in which they changed, each to its latest value.
 
-    A thread calls ``write(name, value)``, however long that takes, and ``report(text)`` when it has
-    raised.
+    A thread calls ``write(name, value)``, however long that takes, and ``report(text)`` on errors.
     """
 
     def __init__(self, write: Callable[[str, Any], None], report: Callable[[str], None]):
@@ -53,7 +52,7 @@ class ParameterWriter:
         self._is_running = False
 
     def set(self, name: str, value: Any) -> "Future[None]":
-        """Have a parameter set soon; the future is done when this value, or a later one, is set."""
+        """Set a parameter soon; the future is done when this value, or a later one, is set."""
         with self._lock:
             _, done = self._waiting.get(name, (None, Future()))
             self._waiting[name] = value, done
@@ -74,7 +73,7 @@ class ParameterWriter:
             try:
                 self._write(name, value)
             except Exception as error:
-                # The master may be gone, or xmlrpc may know no such value.
+                # The master may be gone, or xmlrpc may not support the value.
                 self._report(f"parameter {name} is not set on the parameter server: {error!r}")
                 done.set_exception(error)
             else:

@@ -5,7 +5,7 @@ below it is theirs::
 
     <!-- parameters: crazyflie_takeoff.takeoff_server_node:TakeoffServerParameters -->
 
-``python3 -m crazyflie_utils.parameters.tables PAGE...`` writes the tables anew.
+``python3 -m crazyflie_utils.parameters.tables PAGE...`` updates the tables.
 """
 
 import argparse
@@ -21,9 +21,9 @@ _PLACE = re.compile(r"(<!-- parameters: (.+?) -->\n)(?:\n?(?:\|.*\n)+)?")
 
 
 def table(*classes: type[Parameters]) -> str:
-    """Return a Markdown table of what classes declare.
+    """Return a Markdown table of the parameters that classes declare.
 
-    Parameters that are alike but for their names, such as those of three axes, share a row.
+    Parameters that differ only in their names, such as those of three axes, share a row.
     """
     rows = ["| parameter | type, unit | default | range | |", "|---|---|---|---|---|"]
     declarations = itertools.chain.from_iterable(each.declarations() for each in classes)
@@ -72,8 +72,8 @@ def _class(path):
 
 
 def main() -> int:
-    """Write the tables of the pages named on the command line anew."""
-    parser = argparse.ArgumentParser(description="Write the tables of parameters in pages anew.")
+    """Update the tables of the pages named on the command line."""
+    parser = argparse.ArgumentParser(description="Update the tables of parameters in pages.")
     parser.add_argument("pages", nargs="+", type=Path, metavar="PAGE")
     for path in parser.parse_args().pages:
         text = path.read_text()

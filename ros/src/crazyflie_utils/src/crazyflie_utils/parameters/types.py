@@ -1,4 +1,4 @@
-"""Types of parameters: what a value may be, and in words (``str(type)``) what is expected."""
+"""Types of parameters: the allowed values, and their description (``str(type)``)."""
 
 import math
 from collections.abc import Callable
@@ -14,18 +14,18 @@ class ParameterType:
     """Base class of parameter types."""
 
     label: str  #: For tables and command lines, such as "float".
-    unit: str = ""  #: Of a number; empty for none.
-    range: str = ""  #: For tables, such as "> 0"; empty for none.
+    unit: str = ""  #: Unit of a number; empty without one.
+    range: str = ""  #: Range for tables, such as "> 0"; empty without one.
 
     def __call__(self, value: Any) -> Any:
-        """Return the value that a raw one, of the parameter server or a command line, means.
+        """Return the value of a raw one from the parameter server or a command line.
 
-        Raises ValueError if it means none; with a reason where ``str(type)`` does not say it.
+        Raises ValueError if it is invalid; with a reason if ``str(type)`` does not contain it.
         """
         raise NotImplementedError
 
     def from_text(self, text: str) -> Any:
-        """Return the raw value that a word on a command line means, or raise ValueError."""
+        """Return the raw value of a word on a command line, or raise ValueError."""
         return text
 
 
@@ -73,7 +73,7 @@ class Number(ParameterType):
 
 @dataclass(frozen=True)
 class Integer(ParameterType):
-    """A whole number in [minimum, maximum]; 7.0 counts as 7."""
+    """A whole number in [minimum, maximum]; 7.0 is accepted as 7."""
 
     minimum: int
     maximum: int
@@ -89,7 +89,7 @@ class Integer(ParameterType):
 
     def from_text(self, text: str) -> int:
         """Return the integer in a text; 0x begins a hexadecimal one."""
-        # Only Python writes large numbers like this.
+        # Only Python allows underscores in numbers.
         if "_" in text:
             raise ValueError
         return int(text, 0)
@@ -114,7 +114,7 @@ class Boolean(ParameterType):
     label = "bool"
 
     def from_text(self, text: str) -> bool:
-        """Return what true or false means."""
+        """Return the Boolean of "true" or "false"."""
         if text.lower() not in ("true", "false"):
             raise ValueError
         return text.lower() == "true"
@@ -164,7 +164,7 @@ class GraphName(ParameterType):
 
     @override
     def __call__(self, value: Any) -> str:
-        # Here, since programs without ROS have no such names.
+        # Imported here, since programs without ROS have no such names.
         from rosgraph.names import is_legal_name
 
         if not isinstance(value, str) or not value or not is_legal_name(value):
@@ -193,24 +193,24 @@ class Frame(ParameterType):
 
 @dataclass(frozen=True)
 class ListOf(ParameterType):
-    """A list, of any length if that is None, with entries of one type; its value is a tuple."""
+    """A list with entries of one type; its value is a tuple. ``length`` None: any length."""
 
     entry: ParameterType
     length: int | None = None
 
     @property
     def label(self) -> str:  # type: ignore[override]
-        """As the entry's."""
+        """That of the entries."""
         return f"list of {self.entry.label}"
 
     @property
     def unit(self) -> str:  # type: ignore[override]
-        """As the entry's."""
+        """That of the entries."""
         return self.entry.unit
 
     @property
     def range(self) -> str:  # type: ignore[override]
-        """As the entry's."""
+        """That of the entries."""
         return self.entry.range
 
     @override
@@ -226,10 +226,10 @@ class ListOf(ParameterType):
 
 @dataclass(frozen=True)
 class File(ParameterType):
-    """The path of a file; its value is what ``load(path)`` returns, which raises what is wrong."""
+    """The path of a file; its value is the result of ``load(path)``, which raises on errors."""
 
     load: Callable[[str], Any]
-    content: str  #: For messages, such as "a world file".
+    content: str  #: Description for messages, such as "a world file".
     label = "string"
 
     @override
@@ -243,7 +243,7 @@ class File(ParameterType):
 FINITE = Number()
 POSITIVE = Number(above=0.0)
 DURATION = Number(unit="s", minimum=0.0)
-#: A period of a node: with shorter ones it would do nothing else than to be late.
+#: A period of a node; with a shorter one it would always be late.
 TIME_STEP = Number(unit="s", minimum=1e-4)
 METRES = Number(unit="m")
 BOOLEAN = Boolean()

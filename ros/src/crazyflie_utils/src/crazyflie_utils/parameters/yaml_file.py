@@ -1,7 +1,7 @@
-"""Settings in a YAML file: declared parameters, and for everything wrong the file and line.
+"""Settings in a YAML file: declared parameters, and errors with file and line.
 
-For what is a list of many alike things, such as the vehicles of a fleet, which does
-not fit the parameter server::
+For lists of many similar entries, such as the vehicles of a fleet, which do not fit the
+parameter server::
 
     for name, entry in yaml_file.load("lab.yaml")["boxes"].entries().items():
         boxes[name] = entry.read(BoxParameters)
@@ -18,9 +18,9 @@ from typing_extensions import override
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters
 from crazyflie_utils.text import TextFileError, read_text, shortened, shown
 
-MAX_SIZE = 1_000_000  #: Bytes of a file: a fleet of a thousand vehicles has a third of it.
-MAX_DEPTH = 50  #: Lists and mappings inside each other.
-MAX_NODES = 50_000  #: Values and keys; an alias counts as what it stands for.
+MAX_SIZE = 1_000_000  #: Largest file (bytes): that of a thousand vehicles has a third of it.
+MAX_DEPTH = 50  #: Largest number of nested lists and mappings.
+MAX_NODES = 50_000  #: Largest number of values and keys, with aliases expanded.
 
 
 def compose(text: str, name: str) -> yaml.Node | None:
@@ -48,7 +48,7 @@ def compose(text: str, name: str) -> yaml.Node | None:
 class _Loader(yaml.SafeLoader):
     def __init__(self, text: str, name: str):
         super().__init__(text)
-        self.name = name  # In the marks of its nodes.
+        self.name = name  # Name of the file in the marks of its nodes.
         self._depth = 0
         self._count = 0
         self._sizes: dict[int, int] = {}
@@ -116,10 +116,10 @@ def _refusal(name, error):
 
 @dataclass(frozen=True)
 class Entry:
-    """A value in a file, and its place. What it is not, raises `ParameterError` with the place."""
+    """A value in a file, and its place, which is part of each `ParameterError`."""
 
     name: str  #: Its keys from the top of the file, such as "boxes/table"; empty for the whole.
-    node: yaml.Node  #: What the parser made of it.
+    node: yaml.Node  #: The parser's node.
 
     @property
     def file(self) -> Path:
@@ -133,22 +133,22 @@ class Entry:
 
     @property
     def value(self) -> Any:
-        """The value as YAML means it; not all means anything, such as a 13th month."""
+        """The value by YAML's rules; some texts have none, such as a date in a 13th month."""
         loader = yaml.SafeLoader("")
         try:
             return loader.construct_document(self.node)
         except (yaml.YAMLError, ValueError, TypeError, LookupError, AttributeError) as error:
-            # The latter two are how PyYAML finds that a text does not fit its tag.
+            # PyYAML raises LookupError or AttributeError for a text that does not fit its tag.
             raise self.error(f"cannot be read: {shortened(str(error))}") from None
         finally:
             loader.dispose()
 
     def error(self, text: str) -> ParameterError:
-        """Return an error about it: file, line and name, then the text."""
+        """Return an error about the entry: file, line and name, then the text."""
         return ParameterError(f"{self.file}:{self.line}: {self._title()} {text}")
 
     def entries(self) -> dict[str, "Entry"]:
-        """Return what it holds, by key, if it is a mapping whose keys are different strings."""
+        """Return the entries of a mapping by key; keys must be different strings."""
         if not isinstance(self.node, yaml.MappingNode):
             raise self.error(f"is {shown(self.value)}; expected a mapping")
         found: dict[str, Entry] = {}
@@ -165,7 +165,7 @@ class Entry:
         return found
 
     def elements(self) -> list["Entry"]:
-        """Return what it holds in order, if it is a list."""
+        """Return the elements of a list, in order."""
         if not isinstance(self.node, yaml.SequenceNode):
             raise self.error(f"is {shown(self.value)}; expected a list")
         return [Entry(f"{self.name}[{index}]", node) for index, node in enumerate(self.node.value)]
@@ -182,13 +182,13 @@ class Entry:
     def read(
         self,
         parameters: type[P],
-        besides: tuple[str, ...] = (),
+        extra_keys: tuple[str, ...] = (),
         on_unknown: Callable[["Entry", set[str]], None] | None = None,
     ) -> P:
-        """Return the parameters that it holds; those of a group in a mapping of their own.
+        """Return the parameters in a mapping; those of a group are in a mapping of their own.
 
-        Keys in ``besides`` are known, too, and read elsewhere. The error is about everything that
-        is missing, unknown, or not what is expected; with ``on_unknown(entry, known)`` this is
+        Keys in ``extra_keys`` are known, too, and read elsewhere. The error lists everything that
+        is missing, unknown or invalid; with ``on_unknown(entry, known)`` this function is
         called with each entry that is unknown instead.
         """
         names = {declaration.name for declaration in parameters.declarations()}
@@ -197,12 +197,12 @@ class Entry:
         for path, entry in self._leaves(names):
             if path in names:
                 known[path] = entry
-            elif path in besides:
+            elif path in extra_keys:
                 continue
             elif on_unknown is not None:
-                on_unknown(entry, names | set(besides))
+                on_unknown(entry, names | set(extra_keys))
             else:
-                expected = ", ".join(sorted(names | set(besides)))
+                expected = ", ".join(sorted(names | set(extra_keys)))
                 complaints += entry.error(f"is not known; expected one of {expected}").complaints
 
         def place(name: str) -> str:
@@ -227,7 +227,7 @@ class Entry:
                 yield path, entry
 
     def _with_place(self, complaint: str) -> str:
-        # One about how values fit together does not know where they stand.
+        # An error about a combination of values does not contain their place.
         if str(self.file) in complaint:
             return complaint
         return f"{self.file}:{self.line}: {self._title()}: {complaint}"

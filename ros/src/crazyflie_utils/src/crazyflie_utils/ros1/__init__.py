@@ -1,1 +1,1 @@
-"""The door to rospy."""
+"""The interface to rospy."""

@@ -1,4 +1,4 @@
-"""Calls of services, answered and made, that end."""
+"""Calls of services, answered and made, with time limits."""
 
 import ast
 import contextlib
@@ -16,11 +16,11 @@ from rospy.impl.tcpros_base import TCPROSTransport
 
 from crazyflie_utils.transport import ServiceError
 
-#: How long, in s of the machine's clock, the caller of a service waits while simulated time stands
-#: still.
+#: Longest time that the caller of a service waits while simulated time stands still (s of the
+#: machine's clock).
 _STALL_LIMIT = 5.0
 
-_MAX_CALLS = 8  #: Calls of one service that may be without an answer.
+_MAX_CALLS = 8  #: Largest number of unanswered calls of one service.
 
 _in_thread = threading.local()
 
@@ -28,7 +28,7 @@ _in_thread = threading.local()
 class ServiceCaller:
     """Calls services, each call in a thread of its own.
 
-    Those of this process, ``own``, are called without a connection: a fleet's are a hundred.
+    Services of this process, ``own``, are called without a connection: a fleet has a hundred.
     """
 
     def __init__(self) -> None:
@@ -115,7 +115,7 @@ class _Connection:
 class WithdrawableService(rospy.Service):
     """A service whose handler can ask whether the caller is still there.
 
-    ``is_withdrawn()`` tells so while the handler runs; it may be called by other threads.
+    ``is_withdrawn()`` returns it while the handler runs; other threads may call it, too.
     """
 
     def handle(self, transport: TCPROSTransport, header: dict[str, str]) -> None:
@@ -125,7 +125,7 @@ class WithdrawableService(rospy.Service):
 
 
 def withdrawn() -> Callable[[], bool]:
-    """Return a function that tells whether the call that this thread answers was withdrawn."""
+    """Return a function that returns whether the call that this thread answers was withdrawn."""
     return getattr(_in_thread, "is_withdrawn", lambda: False)
 
 
@@ -170,7 +170,7 @@ def _call(connection, request, limit, future, calls, own):
             rospy.wait_for_service(connection.name, timeout=limit)
             response = connection.exchange(request)
     except Exception as error:
-        # rospy has many, of which not all are its own; one follows from giving up.
+        # rospy raises many types, not all its own; one follows from giving up the call.
         if not connection.is_closed:
             _fail(future, _reason(error))
     else:
@@ -182,7 +182,7 @@ def _call(connection, request, limit, future, calls, own):
 
 
 def _reason(error):
-    """Return what a service says; rospy puts its own words around that."""
+    """Return the error text of a service, without the words that rospy adds."""
     text = str(error)
     _, found, said = text.partition(" responded with an error: ")
     if not found:
@@ -205,6 +205,6 @@ def _answers(own):
 
 
 def _fail(future, text):
-    # The answer and the limit may come at the same moment; the first one counts.
+    # The answer and the time limit may come at the same moment; the first one is used.
     with contextlib.suppress(InvalidStateError):
         future.set_exception(ServiceError(text))

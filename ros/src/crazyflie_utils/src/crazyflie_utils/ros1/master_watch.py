@@ -1,4 +1,4 @@
-"""Nodes as the master knows them: others of the same name, and this process.
+"""Nodes registered with the master: others of the same name, and this process.
 
 A master shuts a node down when another one of its name registers, and a master that is restarted
 knows no node.
@@ -26,7 +26,7 @@ def register() -> None:
     """Register all topics and services of this process with the master."""
     listeners = registration.get_registration_listeners()
     topics, services = registration.get_topic_manager(), registration.get_service_manager()
-    # Of publishers that come first, the master need not tell the subscribers that come then.
+    # With publishers first, the master need not notify the subscribers that come next.
     registered = [
         *(("pub", *each) for each in topics.get_publications()),
         *(("sub", *each) for each in topics.get_subscriptions()),
@@ -51,13 +51,13 @@ def register() -> None:
 
 
 def update_publishers(topic: str, uris: list[str]) -> None:
-    """Have rospy connect the subscribers of a topic to publishers, in its own thread."""
+    """Connect the subscribers of a topic to publishers, in a thread of rospy."""
     for listener in registration.get_registration_listeners().listeners:
         listener.publisher_update(topic, uris)
 
 
-_PERIOD = 2.0  #: How often the master is asked whether it knows this process, s.
-_ANSWER_LIMIT = 3.0  #: A node that does not answer within this, s, counts as dead.
+_PERIOD = 2.0  #: Period at which the master is asked whether it knows this process (s).
+_ANSWER_LIMIT = 3.0  #: Time after which a node that does not answer is dead (s).
 
 
 class _BoundedTransport(xmlrpc.client.Transport):
@@ -87,11 +87,11 @@ def living_node(name: str) -> str | None:
 
 
 def namesake(names: set[str]) -> str | None:
-    """Return which node of these names lives, and what to do about it; None without any."""
+    """Return which node of these names runs, and what to do about it; None without any."""
     try:
         registrations = rosgraph.Master(rospy.get_name()).getSystemState()
     except (OSError, rosgraph.MasterException):
-        # The master has just gone; who registers waits for it.
+        # The master has just gone; the registration waits for it.
         return None
     registered = {node for kind in registrations for _, nodes in kind for node in nodes}
     for name in sorted(names & registered):
@@ -107,7 +107,7 @@ def namesake(names: set[str]) -> str | None:
 class MasterWatch:
     """Registers this process again with a master that has forgotten it.
 
-    Connections between nodes do without a master, so that a flight goes on when it is gone.
+    Connections between nodes need no master, so that a flight continues without it.
     """
 
     def __init__(self) -> None:
@@ -117,7 +117,7 @@ class MasterWatch:
         self._pid: int | None = None
 
     def start(self) -> None:
-        """Begin to watch, in a thread of its own: a master may be frozen."""
+        """Start the watch in a thread of its own: a master may be frozen."""
         threading.Thread(target=self._run, name="master watch", daemon=True).start()
 
     def stop(self) -> None:

@@ -1,6 +1,6 @@
-"""rospy's part of the topics of handles: derived from rospy's classes, for these topics only.
+"""rospy's side of the topics of handles: derived from rospy's classes, for these topics only.
 
-A topic that rospy has subscribed or publishes in this process already stays as it is.
+A topic that rospy subscribes to or publishes in this process already stays unchanged.
 """
 
 from collections.abc import Callable
@@ -16,9 +16,9 @@ from crazyflie_utils.ros1.sending import NonBlockingConnection, serialized
 
 
 class OwnCallback:
-    """A callback of a handle: not for messages that handles of this process publish.
+    """A callback of a handle, which ignores messages that handles of this process publish.
 
-    Those are handed over, if ``is_handed_over()``. They come by a socket as well where rospy
+    Those are passed by a call, if ``is_handed_over()``. They also come by a socket if rospy
     subscribes to the topic in this process, too, and without `skip_self_connections`.
     """
 
@@ -34,7 +34,7 @@ class OwnCallback:
 
 
 class OwnSubscription(rospy.topics._SubscriberImpl):
-    """rospy's part of a topic, by remapped name, that handles subscribe to, with these patches on.
+    """rospy's side of a topic, by remapped name, that handles subscribe to, with these patches.
 
     See `OwnCallback` and `receiving.harden`.
     """
@@ -87,12 +87,12 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
 
 
 class OwnPublication(rospy.topics._PublisherImpl):
-    """rospy's part of a topic that handles publish."""
+    """rospy's side of a topic that handles publish."""
 
     def __init__(self, name: str, message_type: type, queue_size: int, latch: bool):
         super().__init__(name, message_type)
         self.resolved_name = self.name = name
-        # Now: as soon as the topic is registered, subscribers connect.
+        # Set now: as soon as the topic is registered, subscribers connect.
         self._limit = queue_size
         self.is_latch = latch
 

@@ -1,10 +1,10 @@
-"""All that is changed of rospy, which offers none of it: a table, and what it switches.
+"""All changes of rospy's behaviour: a table, and the functions that apply them.
 
 The changes are to objects that handles own: their topics, and the process's server and clock.
 rospy's modules and classes, and topics that are subscribed or published by rospy alone, stay as
-they are. Where a target is not what a patch was written for, and where the environment variable
+they are. If a target is not the code for which a patch was written, or the environment variable
 CRAZYFLIE_ROSPY_PATCHES ("all", "none" or names such as "send_at_once,connect_once") leaves it out,
-rospy does the same in its own way, and the log has one line about it.
+rospy's own code runs, and the log has one line about it.
 
 The figures are those of
 
@@ -37,7 +37,7 @@ ROSOUT = "rosout"  #: The logger behind rospy.loginfo and its like.
 
 
 class Shielded(logging.Handler):
-    """Hands records on to another handler, and handles its errors as Python's own handlers do.
+    """Passes records to another handler, and handles its errors as Python's own handlers do.
 
     rospy's, which writes to the screen, does not. Under roslaunch the "screen" may be a file.
     """
@@ -47,7 +47,7 @@ class Shielded(logging.Handler):
         self._handler = handler
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Have the other handler write a record."""
+        """Write a record by the other handler."""
         try:
             self._handler.emit(record)
         except OSError:
@@ -70,7 +70,7 @@ def log_without_master() -> None:
     that was frozen, in the middle of an emergency.
     """
     value = False
-    # A master that has just gone is in no process's way.
+    # A master that has just gone does not block the process.
     with contextlib.suppress(OSError):
         value = rospy.get_param(_NO_TOPICS, False)
     paramserver.get_param_server_cache().set(_NO_TOPICS, value)
@@ -86,13 +86,13 @@ _TCP = "rospy.impl.tcpros_base:"
 class Patch:
     """A change of rospy."""
 
-    replaces: str  #: What rospy does.
-    reason: str  #: What is done in its place, and why.
+    replaces: str  #: Behaviour of rospy.
+    reason: str  #: Behaviour with the patch, and the reason.
     gain: str  #: Measured without -> with it, on a machine that did other things, too.
-    without: str  #: What is slower or missing without it, for the log.
+    without: str  #: Text for the log about the effect of its absence.
     #: "module:Class.function" to its parameters and, behind a colon, names that its code uses.
     targets: dict[str, str]
-    versions: str = "1.15.15"  #: Of rospy, in which it was seen to work.
+    versions: str = "1.15.15"  #: Versions of rospy with which it was tested.
 
 
 PATCHES = {
@@ -169,7 +169,7 @@ PATCHES = {
 
 
 def _fits(target: str, expected: str) -> bool:
-    """Return whether a function has the parameters, and uses the names, that are expected."""
+    """Return whether a function has the expected parameters and uses the expected names."""
     module, _, path = target.partition(":")
     parameters, _, names = expected.partition(":")
     try:
@@ -177,7 +177,7 @@ def _fits(target: str, expected: str) -> bool:
         code = function.__code__
     except (ImportError, AttributeError):
         return False
-    # What a function calls may be in one within it.
+    # A name may be used in a nested function.
     known = {*code.co_names, *code.co_varnames}
     return code.co_varnames[: code.co_argcount] == tuple(parameters.split()) and known >= set(
         names.split()
@@ -186,7 +186,7 @@ def _fits(target: str, expected: str) -> bool:
 
 @functools.cache
 def active() -> frozenset[str]:
-    """Return the names of the patches that are on; the environment and rospy are looked at once."""
+    """Return the names of the active patches; environment and rospy are inspected once."""
     wanted = os.environ.get(SWITCH, "all")
     names = set(PATCHES) if wanted == "all" else set(wanted.split(",")) - {"none", ""}
     for unknown in sorted(names - set(PATCHES)):
@@ -212,7 +212,7 @@ def own_subscription(
     report: Report,
     limits_rate: bool,
 ) -> None:
-    """Make rospy's part of a topic that a handle is about to subscribe to, unless it is there."""
+    """Create rospy's side of a topic that a handle is about to subscribe to, unless it exists."""
     if {"skip_self_connections", "connect_once", "harden_subscribers"} & active():
         manager = registration.get_topic_manager()
         with manager.lock:
@@ -224,7 +224,7 @@ def own_subscription(
 
 
 def own_publication(name: str, message_type: type, queue_size: int, latch: bool) -> None:
-    """Make rospy's part of a topic that a handle is about to publish, unless it is there."""
+    """Create rospy's side of a topic that a handle is about to publish, unless it exists."""
     if "send_at_once" in active():
         manager = registration.get_topic_manager()
         with manager.lock:
@@ -234,14 +234,14 @@ def own_publication(name: str, message_type: type, queue_size: int, latch: bool)
 
 
 def harden_tcp_server(report: Report) -> None:
-    """Have the process's server answer each connection in a thread of its own."""
+    """Make the process's server answer each connection in a thread of its own."""
     server = tcpros_base._tcpros_server
     is_done = server is None or isinstance(server._tcp_server_callback, Acceptor)
     if is_done or "harden_tcp_server" not in active():
         return
     server._tcp_server_callback = Acceptor(server, report)
     if server.tcp_ros_server is not None:
-        # It holds the method that it was started with, and keeps five connections waiting: those
+        # The server keeps the method with which it was started, and queues five connections: those
         # beyond them try again after a second or two.
         server.tcp_ros_server.inbound_handler = server._tcp_server_callback
         server.tcp_ros_server.server_sock.listen(MAX_PENDING)
@@ -249,12 +249,12 @@ def harden_tcp_server(report: Report) -> None:
 
 @contextlib.contextmanager
 def registering_together() -> Iterator[None]:
-    """Register what is announced in a with block at its end; nothing of it if the block raises."""
+    """Register all topics and services of a with block at its end; none if the block raises."""
     if "register_together" not in active():
         yield
         return
     listeners = registration.get_registration_listeners()
-    # What is announced is in rospy's tables by then, from where `register` takes it.
+    # They are in rospy's tables by then, which `register` reads.
     listeners.notify_added = lambda *_: None
     try:
         yield
@@ -264,7 +264,7 @@ def registering_together() -> Iterator[None]:
 
 
 def take_over_clock() -> bool:
-    """Have rospy's clock listen to /clock no more; return whether `set_clock` is to set it."""
+    """Unsubscribe rospy's clock from /clock; return whether `set_clock` is to set it."""
     if "set_own_clock" not in active():
         return False
     subscriber = getattr(simtime, "_clock_sub", None)
@@ -278,6 +278,6 @@ def set_clock(stamp: genpy.Time) -> None:
     moment = rospy.Time.__new__(rospy.Time)
     moment.secs, moment.nsecs = stamp.secs, stamp.nsecs
     rostime._rostime_current = moment
-    # rospy notifies every time, which takes several times as long as all else here.
+    # rospy notifies every time, which takes several times as long as the rest of this function.
     if rostime._rostime_cond._waiters:
         rostime._set_rostime(moment)

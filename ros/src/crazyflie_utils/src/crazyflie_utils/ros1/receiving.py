@@ -1,4 +1,4 @@
-"""Messages of publishers that may send anything: what a subscriber of a handle takes of them.
+"""Reception of messages by subscribers of a handle, from publishers that may send anything.
 
 Messages that cannot be decoded are dropped and the connection goes on, where rospy would connect
 again and again. Publishers of another type and messages without end are disconnected, and a flood
@@ -23,48 +23,48 @@ from rosgraph.network import (
 )
 from rospy.exceptions import TransportException, TransportInitError, TransportTerminated
 
-#: ``report(text, key)`` takes note of what a peer did wrong; the key is that of the kind.
+#: ``report(text, key)`` reports an error of a peer; ``key`` identifies its kind.
 Report = Callable[[str, Hashable], None]
 
 _LENGTH = struct.Struct("<I")
 
-#: The longest message that is taken, bytes: an uncompressed image of 20 megapixels.
+#: Longest message that is accepted (bytes): an uncompressed image of 20 megapixels.
 MAX_MESSAGE_SIZE = 64_000_000
-MAX_RATE = 2000.0  #: Messages per second on one connection; more of them are a flood,
-_BURST = 200.0  #: when there are so many more than that.
-_FLOOD_PERIOD = 0.005  #: In a flood, one message is taken in such a period, s.
-_MAX_READS = 16  #: Reads of a socket in one period: a flood never ends, but part of it is enough.
+MAX_RATE = 2000.0  #: Rate of messages on one connection above which they are a flood (1/s).
+_BURST = 200.0  #: Number of messages beyond `MAX_RATE` from which they are a flood.
+_FLOOD_PERIOD = 0.005  #: Period in which one message of a flood is accepted (s).
+_MAX_READS = 16  #: Largest number of reads of a socket in one period: a flood never ends.
 
 
 class RateLimiter:
-    """Finds out whether a connection is flooded (a leaky bucket)."""
+    """Detects whether a connection is flooded (a leaky bucket)."""
 
     def __init__(self) -> None:
         self._level = 0.0
         self._at = time.monotonic()
 
     def is_flooded(self, count: int) -> bool:
-        """Take note of ``count`` more messages."""
+        """Count ``count`` more messages; return whether they are a flood."""
         now = time.monotonic()
         self._level = max(0.0, self._level - MAX_RATE * (now - self._at)) + count
-        # A flood of hours is forgotten as quickly as one of a second.
+        # Limited, so that the end of a long flood is detected as quickly as that of a short one.
         self._level = min(self._level, 2.0 * _BURST)
         self._at = now
         return self._level > _BURST
 
 
 class Inbox:
-    """Cuts what a publisher sends on a TCPROSTransport of rospy's into messages."""
+    """Splits the data of a publisher, on a TCPROSTransport of rospy, into messages."""
 
     def __init__(self, connection: Any, report: Report):
         self.sock = connection.socket
-        # The connection forgets it when it is closed, which another thread may do at any moment.
+        # The connection deletes it when it is closed, which another thread may do at any moment.
         self._protocol = connection.protocol
         self._connection = connection
         self._report = report
         self._limiter = RateLimiter()
         self._part = bytearray()
-        # What has come behind the header of the connection.
+        # Data that have come after the header of the connection.
         self._read = connection.read_buff.getvalue()[: connection.read_buff.tell()]
         self.sock.setblocking(True)
 
@@ -79,7 +79,7 @@ class Inbox:
         return self._decode(frames)
 
     def _drop_flood(self, frames):
-        """Return what is decoded of one period: the last message, or all of a lossless type."""
+        """Return the messages of one period to decode: the last one, or all of a lossless type."""
         time.sleep(_FLOOD_PERIOD)
         for _ in range(_MAX_READS):
             try:
@@ -151,7 +151,7 @@ class Inbox:
 
 
 def harden(connection: Any, report: Report, limits_rate: bool) -> None:
-    """Have one connection to a publisher, which is not connected yet, receive by an `Inbox`.
+    """Make a connection to a publisher, which is not connected yet, receive by an `Inbox`.
 
     With ``limits_rate`` only the last message of every 5 ms is decoded in a flood of more than
     `MAX_RATE`; all of them, every 5 ms, of a message type with the attribute ``lossless``.
@@ -189,8 +189,8 @@ def _validate_header(connection, validate, report, header):
     try:
         validate(header)
     except TransportInitError:
-        # Such as of a publisher that is not quite there. rospy means to try again, but takes a
-        # connection that has a socket for one that was made.
+        # For example from a publisher that is still starting. rospy is to try again, but takes a
+        # connection that has a socket for an established one.
         connection.socket.close()
         connection.socket = None
         raise
@@ -210,12 +210,12 @@ def _type_mismatch(protocol, header):
     )
 
 
-_HEADER_LIMIT = 5.0  #: How long, in s, a peer may take to send its header.
-MAX_PENDING = 32  #: Connections whose header has not come yet.
+_HEADER_LIMIT = 5.0  #: Longest time for a peer to send its header (s).
+MAX_PENDING = 32  #: Largest number of connections whose header has not come yet.
 
 
 class Acceptor:
-    """In the place of ``TCPROSServer._tcp_server_callback``, which reads one header at a time."""
+    """Replaces ``TCPROSServer._tcp_server_callback``, which reads one header at a time."""
 
     def __init__(self, server: Any, report: Report):
         self._server = server
@@ -247,7 +247,7 @@ class Acceptor:
             self._places.release()
 
     def _handle(self, sock, address, header):
-        """Return why a connection is refused, or a false value."""
+        """Return why a connection is refused, or a false value if it is accepted."""
         if rospy.core.is_shutdown_requested():
             return "node shutting down"
         if "topic" in header:

@@ -1,8 +1,8 @@
-"""Connections to subscribers that are sent to at once and never waited for.
+"""Connections to subscribers, to which messages are sent at once and without waiting.
 
-rospy either sends in the publisher's thread, which a frozen subscriber stops, or gives every
-subscriber a thread, which costs more than the message. Here the publisher's thread sends as far as
-the socket takes it; only a subscriber that does not keep up gets a thread.
+rospy either sends in the publisher's thread, which a frozen subscriber blocks, or uses a thread for
+every subscriber, which takes more time than the message. Here the publisher's thread sends as much
+as the socket accepts; only a subscriber that does not keep up gets a thread.
 """
 
 import io
@@ -22,7 +22,7 @@ _NO_WAIT = socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL
 
 
 def serialized(message: genpy.Message, number: int) -> bytes:
-    """Return a message as it is on the wire, with a sequence number in its header, if any."""
+    """Return a serialized message, with a sequence number in its header, if it has one."""
     if message._has_header:
         header = message.header
         header.seq = number
@@ -35,7 +35,7 @@ def serialized(message: genpy.Message, number: int) -> bytes:
 
 
 class NonBlockingConnection:
-    """A connection to a subscriber, in the place of rospy's ``QueuedConnection``.
+    """A connection to a subscriber, which replaces rospy's ``QueuedConnection``.
 
     While the subscriber does not keep up, the last ``limit`` messages (0: all) wait for it.
     """
@@ -44,7 +44,7 @@ class NonBlockingConnection:
         self._connection = connection
         self._lock = threading.Lock()
         self._waiting: deque[bytes] = deque(maxlen=limit or None)
-        # The rest of a message that has begun; with it a thread is at work.
+        # The rest of a message that was sent in part; while there is one, a thread sends.
         self._rest = b""
         # Not only where the subscriber asks for it: messages above 490 bytes wait up to 40 ms.
         connection.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -65,7 +65,7 @@ class NonBlockingConnection:
                 threading.Thread(target=self._catch_up, daemon=True).start()
 
     def _send(self, data):
-        """Send as much as the socket takes; return the rest."""
+        """Send as much as the socket accepts; return the rest."""
         connection = self._connection
         sock = connection.socket
         if connection.done or sock is None:

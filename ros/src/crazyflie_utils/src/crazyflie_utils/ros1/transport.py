@@ -1,4 +1,4 @@
-"""The world outside a process, as rospy shows it."""
+"""The interface of a process to other processes, by rospy."""
 
 import contextlib
 import math
@@ -28,8 +28,8 @@ from crazyflie_utils.ros1.own_topics import OwnCallback, publish
 from crazyflie_utils.ros1.patches import log_without_master, shield_screen_log
 from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
 
-#: Messages kept for a listener that does not keep up: a simulation that runs as fast as it can
-#: fills a short queue faster than the listener gets its turn.
+#: Number of messages kept for a subscriber that does not keep up: a simulation that runs as fast as
+#: possible fills a short queue before the subscriber runs.
 _QUEUE_SIZE = 100
 
 
@@ -64,7 +64,7 @@ class _RosSubscriber(ExternalSubscriber):
 class RosTransport(Transport):
     """rospy, for a process that has called ``rospy.init_node``.
 
-    It decodes floods in part if ``limits_rate``; not in simulated time, which may pass quickly.
+    If ``limits_rate``, it decodes floods in part; not in simulated time, which may pass quickly.
     ``refused`` counts what peers did wrong, by kind.
     """
 
@@ -102,7 +102,7 @@ class RosTransport(Transport):
             self._is_starting, self._services_at_start = False, None
 
     def _refuse(self, text, key):
-        # Once, since a peer that is wrong stays so; and of the first 64 only.
+        # Reported once, since a faulty peer stays so; and for the first 64 only.
         if self._complaints.passes(key, math.inf, 0.0):
             self.log("warn", text)
         elif key not in self.refused:
@@ -214,7 +214,7 @@ class RosTransport(Transport):
 
 
 def allow_many_topics() -> None:
-    """Let this process have as many files open as the system lets it.
+    """Raise this process's limit of open files to the largest that the system allows.
 
     rospy holds one for each topic, and a shell allows 1024 unless told otherwise: too few for
     forty vehicles.

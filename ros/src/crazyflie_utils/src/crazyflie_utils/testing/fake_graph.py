@@ -147,28 +147,28 @@ class FakeGraph:
 
     # What the transports need.
 
-    def publishes(self, topic: str, besides: str) -> bool:
-        """Return whether another process than ``besides`` publishes a topic."""
+    def publishes(self, topic: str, excluding: str) -> bool:
+        """Return whether another process than ``excluding`` publishes a topic."""
         return any(
             topic in process.transport.advertised
             for name, process in self._processes.items()
-            if name != besides
+            if name != excluding
         )
 
-    def subscribes(self, topic: str, besides: str) -> bool:
-        """Return whether anyone but ``besides`` receives a topic."""
+    def subscribes(self, topic: str, excluding: str) -> bool:
+        """Return whether anyone but ``excluding`` receives a topic."""
         return topic in self._listeners or any(
             process.transport.subscribers.get(topic)
             for name, process in self._processes.items()
-            if name != besides
+            if name != excluding
         )
 
-    def latched(self, topic: str, besides: str) -> list[Any]:
-        """Return what other processes than ``besides`` have latched on a topic."""
+    def latched(self, topic: str, excluding: str) -> list[Any]:
+        """Return what other processes than ``excluding`` have latched on a topic."""
         return [
             message
             for (name, latched_topic), message in self._latched.items()
-            if latched_topic == topic and name != besides
+            if latched_topic == topic and name != excluding
         ]
 
     def send(self, name: str, topic: str, message: genpy.Message, latch: bool) -> None:

@@ -1,4 +1,4 @@
-"""What a process knows of tf's frames.
+"""The tf frames of a process.
 
 Transforms of other processes are decoded only for frames that were looked up, and for those above
 them in the tree. Of the others the last transform is kept serialized.
@@ -27,13 +27,13 @@ connected), ExtrapolationException (not at that time).
 
 _LATEST = genpy.Time()
 
-_CACHE = genpy.Duration(10.0)  #: What tf2 keeps, by its own default.
-#: Stamps that are remembered for tf2: the last ten seconds of a vehicle at 1 kHz.
+_CACHE = genpy.Duration(10.0)  #: Length of tf2's buffer: tf2's default.
+#: Number of stamps stored for tf2: ten seconds of a vehicle at 1 kHz.
 _MAX_STAMPS = 10_000
 
 
 class Buffer:
-    """Transforms in tf2, with stamps as they came: tf2 in Python has them as floats, to 0.1 us."""
+    """Transforms in tf2, with exact stamps: tf2 in Python has floats, which resolve 0.1 us."""
 
     def __init__(self) -> None:
         self._buffer = tf2_py.BufferCore(_CACHE)
@@ -49,7 +49,7 @@ class Buffer:
             self._stamps.popitem(last=False)
 
     def clear(self) -> None:
-        """Forget everything that moves."""
+        """Delete all moving frames."""
         self._stamps.clear()
         self._buffer.clear()
 
@@ -62,21 +62,21 @@ class Buffer:
         return pose._replace(stamp=stamp or known)
 
 
-_HISTORY = 100  #: Poses of a frame that are kept for the moment when tf2 is begun.
-_NORM_TOLERANCE = 0.01  #: How far tf2 lets the squared norm of a quaternion be from 1.
+_HISTORY = 100  #: Number of poses of a frame that are kept until tf2 is used.
+_NORM_TOLERANCE = 0.01  #: tf2's tolerance of the squared norm of a quaternion.
 
-#: A stamp that is older than the last one of its frame by less than this, ns, came by a slower way;
-#: the present pose is still the younger one.
+#: Largest step back of a stamp that came late by a slower path (ns): the younger pose stays the
+#: present one.
 _STEP_BACK = 100_000_000
 
-_STEPS_BACK = 3  #: So many of them in a row, and the source's clock has been set back.
-_MAX_FRAMES = 1000  #: Names of frames that are known, and frames that are kept for later.
-_MAX_BYTES = 1024  #: Of a transform that is kept for later.
+_STEPS_BACK = 3  #: Number of these in a row after which the source's clock was set back.
+_MAX_FRAMES = 1000  #: Largest number of known frames, and of frames kept serialized.
+_MAX_BYTES = 1024  #: Largest transform that is kept serialized (bytes).
 _ONE = b"\x01\0\0\0"  #: The length of a message with one transform.
 
 
 class _Frame:
-    """What is known of a frame that moves."""
+    """A moving frame: its poses and parent."""
 
     __slots__ = ("latest", "recent", "steps_back")
 
@@ -101,7 +101,7 @@ class FrameTree:
         ahead: float,
         on_new: Callable[[StampedPose], None],
     ):
-        self.rejected: Counter[str] = Counter()  #: How many transforms were dropped, by reason.
+        self.rejected: Counter[str] = Counter()  #: Number of dropped transforms by reason.
         self.followed: set[str] = set()  #: Frames that are decoded.
         self._codec = codec
         self._warn = warn
@@ -110,13 +110,13 @@ class FrameTree:
         self._frames: dict[str, _Frame] = {}
         self._static: dict[str, StampedPose] = {}
         self._names: set[str] = set()
-        # Those that are followed, as they may be on the wire; and names that are not allowed.
+        # Serialized names of the frames that are followed; and names that are not allowed.
         self._wanted = {b"", b"/"}
         self._unread: dict[bytes, bytes] = {}
         self._tf2: Buffer | None = None
 
     def clear(self) -> None:
-        """Forget everything that moves: time has been reset."""
+        """Delete all moving frames: time has been reset."""
         self._frames.clear()
         self._unread.clear()
         if self._tf2 is not None:
@@ -136,7 +136,7 @@ class FrameTree:
         """
         for name in (target, source):
             self._check_parents(name)
-        # tf2 need not begin as long as it would know no answer.
+        # tf2 is not needed as long as a frame is unknown.
         for name in (target, source):
             if name not in self._names and target != source:
                 text = f"frame {name} is not known; looked up {target} -> {source}"
@@ -149,7 +149,7 @@ class FrameTree:
         return self._tf2.lookup(target, source, stamp)
 
     def read(self, raw: bytes, now: int) -> None:
-        """Take what is in a serialized message, at the ROS time ``now`` (ns)."""
+        """Process a serialized message at the ROS time ``now`` (ns)."""
         try:
             for child, start, end in entries(raw):
                 if child in self._wanted:
@@ -163,7 +163,7 @@ class FrameTree:
             self._warn("ignoring a message on /tf that cannot be read", "cannot be read")
 
     def take(self, pose: StampedPose, now: int) -> None:
-        """Take a pose, unless something is wrong with it, at the ROS time ``now`` (ns)."""
+        """Process a pose at the ROS time ``now`` (ns); reject an invalid one."""
         frame = self._frames.get(pose.child)
         reason = _why_invalid(pose) or self._why_too_many(pose)
         if reason is None:
@@ -172,7 +172,7 @@ class FrameTree:
             self._reject(pose, reason)
         if reason is not None:
             return
-        # The frames may have been forgotten meanwhile.
+        # The frames may have been deleted meanwhile.
         frame = self._frames.get(pose.child)
         if frame is None:
             frame = self._frames[pose.child] = _Frame(pose)
@@ -189,7 +189,7 @@ class FrameTree:
             self._tf2.add(pose)
 
     def take_static(self, pose: StampedPose, now: int) -> None:
-        """Take a pose that holds for ever, unless something is wrong with it."""
+        """Process a static pose; reject an invalid one."""
         reason = _why_invalid(pose) or self._why_too_many(pose)
         if reason is not None:
             self._reject(pose, reason)
@@ -200,7 +200,7 @@ class FrameTree:
         self._notice(pose, now)
 
     def follow(self, frame: str | None, now: int) -> None:
-        """Have a frame and all above it decoded, from the ROS time ``now`` (ns) on."""
+        """Decode a frame and all above it, from the ROS time ``now`` (ns) on."""
         while frame is not None and frame not in self.followed:
             if len(self.followed) >= _MAX_FRAMES:
                 return
@@ -209,7 +209,7 @@ class FrameTree:
                 kept = self._unread.pop(name, None)
                 if kept is not None:
                     self.read(_ONE + kept, now)
-            # Not before, or a long chain would be followed by recursion.
+            # Not before, to avoid a recursion over a long chain.
             self.followed.add(frame)
             frame = self._parent(frame)
 
@@ -222,10 +222,9 @@ class FrameTree:
             name = self._parent(name)
 
     def _check_parents(self, name):
-        """Refuse a frame above which one has two parents, or frames are in a loop: tf2 is silent.
+        """Refuse a frame above which one has two parents, or that is in a loop: tf2 does not.
 
-        So it is where two bodies are swapped, or a static transform has its frames the wrong way
-        round.
+        That happens if two bodies are swapped, or the frames of a static transform are exchanged.
         """
         chain = list(self.chain(name))
         for child in chain:
@@ -258,7 +257,7 @@ class FrameTree:
         return tf2
 
     def _notice(self, pose, now):
-        """Take note of names that are new."""
+        """Store names that are new."""
         self._names.update((pose.parent, pose.child))
         if pose.child in self.followed:
             self.follow(pose.parent, now)
@@ -269,7 +268,7 @@ class FrameTree:
         self._warn(text, (pose.parent, pose.child, reason))
 
     def _why_untimely(self, frame, stamp, now):
-        """Return why a pose must not be taken now; "" if that needs no warning."""
+        """Return why a pose is rejected now; "" if that needs no warning; None if it is not."""
         if stamp > now + self._ahead:
             # Until the first /clock of a simulation that runs, now is 0.
             return "is stamped in the future" if now else ""
@@ -282,13 +281,13 @@ class FrameTree:
             frame.steps_back += 1
             if frame.steps_back < _STEPS_BACK:
                 return "is stamped in the past"
-            # The clock of the source was set back, and the last pose of before would
-            # stand until the stamps have caught up.
+            # The clock of the source was set back, and the last pose before that would
+            # stay the latest until the stamps have caught up.
             self.clear()
         return None
 
     def _why_too_many(self, pose):
-        # tf2 never forgets a name.
+        # tf2 never deletes a name.
         names = self._names
         if (pose.parent in names and pose.child in names) or len(names) < _MAX_FRAMES:
             return None
@@ -296,7 +295,7 @@ class FrameTree:
 
 
 def _why_invalid(pose):
-    # tf2 refuses all of them, too, but says so without a throttle.
+    # tf2 refuses all of them, too, but logs each one.
     if not pose.child.strip("/") or not pose.parent.strip("/"):
         return "does not name its frames"
     (a, b, c), (x, y, z, w) = pose.position, pose.rotation

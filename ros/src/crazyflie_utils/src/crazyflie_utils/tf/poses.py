@@ -1,7 +1,7 @@
-"""Poses as tf has them, and their way into and out of serialized tf2_msgs/TFMessages.
+"""Poses of tf frames, and their serialization as tf2_msgs/TFMessage.
 
-A pose is a tuple, which costs a fraction of a geometry_msgs/TransformStamped; one is made into
-a message where a message is asked for.
+A pose is a tuple, which takes a fraction of the time of a geometry_msgs/TransformStamped; it is
+converted to a message only where one is needed.
 """
 
 import struct
@@ -20,17 +20,17 @@ _HEADER = struct.Struct("<4I")  # Sequence number, s, ns, length of the parent's
 _POSE = struct.Struct("<7d")
 _STAMP = struct.Struct("<3I")
 
-#: Pairs of frames whose names are kept as they are on the wire, and the other way round.
+#: Largest number of frame pairs whose serialized and decoded names are stored.
 _MAX_NAMES = 1000
 
 
 class StampedPose(NamedTuple):
-    """Where a frame is at a time."""
+    """The pose of a frame at a time."""
 
-    #: parent, child: The frame that the pose is in, and the one whose pose it is.
+    #: parent, child: The frame in which the pose is given, and the frame that it describes.
     parent: str
     child: str
-    stamp: int  #: ROS time, ns.
+    stamp: int  #: ROS time (ns).
     position: tuple[float, float, float]  #: x, y, z in m.
     #: Quaternion (x, y, z, w), from child to parent coordinates.
     rotation: tuple[float, float, float, float]
@@ -63,7 +63,7 @@ class StampedPose(NamedTuple):
 
 
 class RawTransforms(TFMessage):
-    """A tf2_msgs/TFMessage as it is on the wire, decoded when it is asked for its transforms."""
+    """A serialized tf2_msgs/TFMessage, decoded when its transforms are read."""
 
     __slots__ = ("raw",)
     lossless = True
@@ -87,16 +87,16 @@ class RawTransforms(TFMessage):
 
 
 class PoseCodec:
-    """Reads and writes poses on the wire; it remembers names of frames, which repeat."""
+    """Serializes and deserializes poses; stores names of frames, which repeat."""
 
     def __init__(self) -> None:
         self._read: dict[bytes, tuple[str, str]] = {}
         self._written: dict[tuple[str, str], tuple[bytes, bytes]] = {}
 
     def decode(self, raw: bytes, start: int, end: int) -> StampedPose:
-        """Return what is between two places of a serialized message, as `entries` names them.
+        """Return the pose between two offsets of a serialized message, see `entries`.
 
-        UnicodeDecodeError: a name is no text.
+        UnicodeDecodeError: a name is not valid text.
         """
         _, seconds, nanoseconds, length = _HEADER.unpack_from(raw, start)
         names = raw[start + _HEADER.size - _LENGTH.size : end - _POSE.size]
@@ -124,14 +124,14 @@ class PoseCodec:
                 *known,
                 _POSE.pack(*position, *rotation),
             )
-        # Four parts make a pose.
+        # A pose has four parts.
         return RawTransforms().deserialize(_LENGTH.pack(len(parts) // 4) + b"".join(parts))
 
 
 def entries(raw: bytes) -> Iterator[tuple[bytes, int, int]]:
     """Yield child frame, start and end of every transform of a serialized TFMessage.
 
-    struct.error or ValueError: it is shorter than it says.
+    struct.error or ValueError: it is shorter than its own length fields.
     """
     (count,) = _LENGTH.unpack_from(raw)
     start = _LENGTH.size

@@ -1,4 +1,4 @@
-"""tf for all nodes of a process: what is received and sent on /tf and /tf_static."""
+"""tf for all nodes of a process: reception and transmission on /tf and /tf_static."""
 
 import threading
 from collections.abc import Callable, Hashable
@@ -12,9 +12,9 @@ from crazyflie_utils.tf.frame_tree import FrameTree
 from crazyflie_utils.tf.poses import PoseCodec, RawTransforms, StampedPose
 from crazyflie_utils.topics import Subscriber, Topics
 
-#: How far a stamp may be ahead of now, s. tf's static_transform_publisher stamps 0.1 s ahead.
+#: Largest time of a stamp ahead of now (s). tf's static_transform_publisher stamps 0.1 s ahead.
 MAX_FUTURE_STAMP = 0.2
-#: The same in simulated time: pose and /clock come by different ways.
+#: The same in simulated time (s): pose and /clock come by different paths.
 MAX_FUTURE_STAMP_SIMULATED = 2.0
 
 
@@ -29,7 +29,7 @@ class _Listener:
     def is_due(self, stamp: int) -> bool:
         """Return whether a pose, by its stamp in ns, is due."""
         early = self._due - stamp
-        # Rounding makes none late by one pose; much earlier ones are of a clock that was set back.
+        # Tolerates rounding; a much earlier stamp is that of a clock that was set back.
         if self._period // 100 < early <= 2 * self._period:
             return False
         self._due = stamp + self._period if early > 0 else max(self._due + self._period, stamp)
@@ -37,7 +37,7 @@ class _Listener:
 
 
 class Transforms:
-    """What the process has received of tf, and sends to it, on its /tf and /tf_static.
+    """The transforms that the process receives and sends on /tf and /tf_static.
 
     ``warn`` and ``ahead`` are those of `FrameTree`; ``now()`` returns the present ROS time, ns.
     """
@@ -62,11 +62,11 @@ class Transforms:
         self._listeners: dict[str, list[_Listener]] = {}
         self._arrived: list[_Listener] = []
         self._sources: list[Callable[[], None]] = []
-        # Each broadcaster outside has a thread of its own.
+        # Each external broadcaster has a thread of its own.
         self._lock = threading.RLock()
 
     def rejected_by_reason(self) -> dict[str, int]:
-        """Return how many transforms were not taken in this process, reason to number."""
+        """Return the numbers of transforms that were rejected in this process by reason."""
         return dict(self._tree.rejected)
 
     def broadcaster(self) -> Callable[[list[TransformStamped]], None]:
@@ -82,7 +82,7 @@ class Transforms:
     def static_broadcaster(self) -> Callable[[list[TransformStamped]], None]:
         """Announce /tf_static and return ``broadcast(list of TransformStamped)``.
 
-        Those of earlier calls hold on; a child frame that is there again is replaced.
+        Transforms of earlier calls stay valid; a repeated child frame is replaced.
         """
         publisher = self._topics.publisher("/tf_static", TFMessage, latch=True)
 
@@ -98,13 +98,13 @@ class Transforms:
             self._publisher = self._topics.publisher("/tf", TFMessage, latch=False)
 
     def on_lookup(self, refresh: Callable[[], None]) -> None:
-        """Have ``refresh()`` called before poses are looked up."""
+        """Call ``refresh()`` before poses are looked up."""
         self._sources.append(refresh)
 
     def has_pose_consumers(self) -> bool:
         """Return whether poses are used when they are broadcast, not only by lookups here."""
-        beside = int(self._subscriber is not None)
-        return bool(self._listeners) or self._publisher.has_subscribers(beside)
+        own = int(self._subscriber is not None)
+        return bool(self._listeners) or self._publisher.has_subscribers(own)
 
     def _broadcast_poses(self, poses):
         # A message is made only if it is received outside of this class.
@@ -114,7 +114,7 @@ class Transforms:
                 for pose in poses:
                     self._tree.take(pose, now)
             self._notify_listeners()
-        if not self._publisher.has_subscribers(beside=int(self._subscriber is not None)):
+        if not self._publisher.has_subscribers(excluding=int(self._subscriber is not None)):
             return
         if self._gathered is None:
             self._send(poses)
@@ -122,12 +122,12 @@ class Transforms:
             self._gathered += poses
 
     def gather(self) -> None:
-        """Keep the poses that several broadcast from now on for one message."""
+        """Collect the poses that are broadcast from now on for one message."""
         if self._broadcasters > 1 and self._gathered is None:
             self._gathered = []
 
     def send_gathered(self) -> None:
-        """Publish what has been gathered; from now on each broadcast is a message again."""
+        """Publish the gathered poses; from now on each broadcast is a message again."""
         poses, self._gathered = self._gathered, None
         if poses:
             self._send(poses)
@@ -154,14 +154,14 @@ class Transforms:
             self._topics.subscribe("/tf_static", TFMessage, self._on_static)
 
     def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:
-        """Have ``callback()`` called when a pose of a frame is new; once in ``period`` (s)."""
+        """Call ``callback()`` when a pose of a frame is new; once in ``period`` (s)."""
         self._listen()
         with self._lock:
             self._listeners.setdefault(frame, []).append(_Listener(period, callback))
             self._tree.follow(frame, self._now())
 
     def clear(self) -> None:
-        """Forget everything that moves: time has been reset."""
+        """Delete all moving frames: time has been reset."""
         with self._lock:
             self._tree.clear()
 
@@ -175,7 +175,7 @@ class Transforms:
         return self.lookup_pose(target, source, stamp).message()
 
     def lookup_pose(self, target: str, source: str, stamp: genpy.Time | None = None) -> StampedPose:
-        """Return the same as `lookup`, as a pose, which is quicker."""
+        """Return the result of `lookup` as a pose, which is quicker."""
         for refresh in self._sources:
             refresh()
         tree = self._tree
@@ -207,7 +207,7 @@ class Transforms:
                 self._arrived.append(listener)
 
     def _notify_listeners(self):
-        # Not under the lock, since what is done now may look poses up.
+        # Not under the lock, since callbacks may look up poses.
         if self._arrived:
             with self._lock:
                 arrived, self._arrived = self._arrived, []

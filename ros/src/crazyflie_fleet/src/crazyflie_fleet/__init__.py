@@ -1,1 +1,1 @@
-"""Many vehicles by one file: what they are, and what all of them do together."""
+"""Fleets of vehicles that one file describes: configuration, services and safety distances."""

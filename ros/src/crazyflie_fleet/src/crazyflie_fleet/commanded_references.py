@@ -1,4 +1,4 @@
-"""References of a vehicle that flies by high-level commands, and the marker of its way."""
+"""References of a vehicle that flies by high-level commands, and the marker of its path."""
 
 import copy
 from collections.abc import Callable
@@ -20,18 +20,18 @@ from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.timers import Timer
 
 _COLOUR = ColorRGBA(0.95, 0.55, 0.05, 0.8)
-_WIDTH = 0.01  #: m.
-_POINTS = 20  #: Per piece of a trajectory,
-_MAX_POINTS = 200  #: and in all.
+_WIDTH = 0.01  #: Width of the line (m).
+_POINTS = 20  #: Number of points of a piece of a trajectory.
+_MAX_POINTS = 200  #: Largest number of points of a trajectory.
 
-SETPOINT_TIMEOUT = 0.5  #: A stream without a setpoint for this long has stopped, s.
-_HOLD_DURATION = 0.5  #: Of the move to the goal of the last setpoint, s.
+SETPOINT_TIMEOUT = 0.5  #: Time without a setpoint after which a stream has stopped (s).
+_HOLD_DURATION = 0.5  #: Duration of the move to the goal of the last setpoint (s).
 
 
 class PlanMarker:
     """Publishes a trajectory, in the fixed frame ``frame``, from its beginning to its end.
 
-    The topic is latched, so that it is also seen by those who look later.
+    The topic is latched, for late subscribers.
     """
 
     def __init__(self, handle: NodeHandle, topic: str, frame: str):
@@ -49,7 +49,7 @@ class PlanMarker:
         self._is_shown = True
 
     def clear(self) -> None:
-        """Take the trajectory away, if there is one."""
+        """Remove the trajectory, if there is one."""
         if self._is_shown:
             self._publish(Marker.DELETE, [])
             self._is_shown = False
@@ -120,7 +120,7 @@ class CommandedReferences:
             raise ServiceError(str(reason)) from None
 
     def take(self, setpoint: Goal[float] | Velocity, ground: float) -> None:
-        """Follow a setpoint; heights of a velocity count above ``ground``, m."""
+        """Follow a setpoint; heights of a velocity are above ``ground``, m."""
         now = self._handle.time()
         if isinstance(setpoint, Goal):
             self.follower.take_setpoint(now, setpoint)
@@ -145,7 +145,7 @@ class CommandedReferences:
             self.publish(at_rest(last.position, last.yaw))
 
     def rest(self) -> None:
-        """Leave the controller a reference at rest, if it follows one that moves."""
+        """Publish a reference at rest, if the controller follows one that moves."""
         goal = self.follower.goal(self._handle.time())
         if (self._is_moving or self._setpoint_time is not None) and goal is not None:
             self.publish(at_rest(goal.position, goal.yaw))
@@ -166,7 +166,7 @@ class CommandedReferences:
             self._publisher.publish(message)
 
     def _set_timer(self):
-        """Have a timer only while there are references to publish: a fleet has many vehicles."""
+        """Run the timer only while there are references to publish: a fleet has many vehicles."""
         if not self._is_moving:
             self._plan.clear()
         is_needed = self._is_moving or self._setpoint_time is not None

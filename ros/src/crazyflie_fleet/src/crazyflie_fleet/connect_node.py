@@ -22,11 +22,11 @@ from crazyflie_fleet.vehicle_nodes import PLACE
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import TEXT, ListOf
 
-_PERIOD = 30.0  #: Between two reports about one vehicle, s.
+_PERIOD = 30.0  #: Least time between two reports about one vehicle (s).
 
 
 class BatteryReportNode(Node):
-    """Log that the battery of a vehicle is below a voltage of the fleet file."""
+    """Logs that the battery of a vehicle is below a voltage of the fleet file."""
 
     def __init__(self, vehicles: Iterable[VehicleConfig]):
         self._vehicles = [each for each in vehicles if not each.settings.voltages_act]
@@ -56,7 +56,7 @@ class BatteryReportNode(Node):
 
 ADD = "/add_crazyflie"
 
-TIMEOUT = 60.0  #: Of the driver to start, to connect, and to write parameters, s.
+TIMEOUT = 60.0  #: Timeout of the driver's start, connections, and writing of parameters (s).
 
 
 def connection(vehicle: VehicleConfig) -> VehicleParameters:
@@ -78,7 +78,7 @@ def connection(vehicle: VehicleConfig) -> VehicleParameters:
 
 
 class FleetConnectParameters(FleetParameters):
-    """Which vehicles are added."""
+    """Parameters of `FleetConnectNode`."""
 
     vehicles: tuple[str, ...] = parameter(
         ListOf(TEXT), "only these are added; empty for all of the machine", ()
@@ -96,7 +96,7 @@ class FleetConnectParameters(FleetParameters):
 
 
 class FleetConnectNode(Node):
-    """Connect vehicles, write their base stations and their firmware parameters.
+    """Connects vehicles, writes their base stations and their firmware parameters.
 
     The process ends with status 0 when all are connected, else with 1, and names the others.
     The driver itself writes the parameters again after a reconnection.
@@ -141,7 +141,7 @@ class FleetConnectNode(Node):
         error = done.exception()
         params = dict(vehicle.firmware_params)
         if vehicle.settings.has_single_marker:
-            # Only the Kalman filter takes external positions, and finds the yaw by them.
+            # Only the Kalman filter uses external positions, and estimates the yaw from them.
             params.setdefault("stabilizer.estimator", 2)
         if error is not None or not params:
             self._finish(vehicle, error)

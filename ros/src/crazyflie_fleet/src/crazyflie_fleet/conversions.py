@@ -49,7 +49,7 @@ def full_state_message(goal: Goal[float], frame: str = "world") -> FullState:
 
 
 def heading(x: float, y: float, z: float, w: float) -> float:
-    """Return the turn about the vertical of a quaternion, rad: the yaw of a level vehicle."""
+    """Return the rotation of a quaternion about the vertical, rad: the yaw of a level vehicle."""
     return math.remainder(2.0 * math.atan2(z, w), 2.0 * math.pi)
 
 

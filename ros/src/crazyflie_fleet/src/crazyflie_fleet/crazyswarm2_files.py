@@ -10,7 +10,7 @@ from crazyflie_utils.parameters.types import TEXT, ListOf, Number, Text
 
 _CONFIGURATIONS = ("marker_configurations", "dynamics_configurations")
 
-#: Their type -> backend of mocap_node.
+#: Type of motion capture -> backend of mocap_node.
 _BACKENDS = {
     "optitrack": "natnet",
     "optitrack_closed_source": "natnet",
@@ -21,8 +21,8 @@ _BACKENDS = {
 
 _LINK = "warnings/communication/"
 _SHARE = Number("", minimum=0.0, maximum=1.0)
-#: The driver's diagnostics come once a second, and have the figures of each link; it reads all
-#: parameters; a simulation here is another launch file.
+#: Settings without effect here: the driver's diagnostics come once a second, with the figures of
+#: each link; it reads all parameters; a simulation has a launch file of its own.
 _WITHOUT_EFFECT = (
     "warnings/frequency",
     _LINK + "publish_stats",
@@ -32,7 +32,7 @@ _WITHOUT_EFFECT = (
 
 
 class MotionCaptureSettings(Parameters):
-    """Where motion capture is."""
+    """Type and host of motion capture."""
 
     type: str = parameter(Text(tuple(_BACKENDS)), "of the system")
     hostname: str = parameter(TEXT, "of the computer that runs it")
@@ -66,7 +66,7 @@ def load_motion_capture(path: str | Path) -> dict[str, Any]:
 
 
 class ServerSettings(Parameters):
-    """When crazyswarm2's server warns."""
+    """Thresholds of the warnings of crazyswarm2's server."""
 
     rate_limits: tuple[float, float] | None = parameter(
         ListOf(Number("Hz", minimum=0.0), 2),
@@ -89,7 +89,7 @@ class ServerSettings(Parameters):
 
 
 class ServerFile(NamedTuple):
-    """What the file says: parameters of the driver and of mocap_node, and remarks."""
+    """Content of server.yaml: parameters of the driver and of mocap_node, and remarks."""
 
     driver: dict[str, Any]
     motion_capture: dict[str, Any]
@@ -97,7 +97,7 @@ class ServerFile(NamedTuple):
 
 
 def load_server(path: str | Path) -> ServerFile:
-    """Return what a file says.
+    """Return the content of a file.
 
     Raises
     ------

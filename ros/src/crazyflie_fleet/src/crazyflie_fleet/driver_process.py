@@ -1,4 +1,4 @@
-"""The driver of a fleet, with what crazyswarm2's files say about the radio."""
+"""The driver of a fleet, with the radio's settings in crazyswarm2's files."""
 
 from crazyflie_driver.server_node import CrazyflieServerNode
 from crazyflie_fleet.crazyswarm2_files import load_server
@@ -8,7 +8,7 @@ from crazyflie_utils.parameters.types import Text
 
 
 class DriverFleetParameters(FleetParameters):
-    """Which vehicles there are, and when the driver warns."""
+    """The fleet's vehicles, and thresholds of the driver's warnings."""
 
     server: str = parameter(
         Text(may_be_empty=True),

@@ -10,11 +10,11 @@ from scipy.spatial import cKDTree
 
 from crazyflie_fleet.settings import MachineSettings, RobotSettings
 
-#: How much farther apart one above the other two vehicles have to be than side by side: the air
-#: that rotors throw down takes lift from a vehicle below.
+#: Vertical distance of two vehicles over their horizontal one: the downwash of the rotors reduces
+#: the lift of a vehicle below.
 DOWNWASH = 2.0
 
-#: Parameter below a vehicle's name: its collision buffer, m, by which others plan.
+#: Parameter below a vehicle's name: its collision buffer, by which others plan (m).
 BUFFER = "buffer"
 
 
@@ -23,7 +23,7 @@ class LogTopic:
     """A topic of firmware variables."""
 
     name: str  # Below the vehicle's namespace.
-    frequency: float  # Hz.
+    frequency: float  # Frequency of the messages (Hz).
     variables: tuple[str, ...]  # Such as "pm.vbat".
 
 
@@ -32,7 +32,7 @@ class VehicleConfig:
     """One vehicle."""
 
     name: str  # Its namespace and its tf frame.
-    position: tuple[float, float, float]  # Before takeoff, m, fixed frame.
+    position: tuple[float, float, float]  # Before takeoff (m, fixed frame).
     settings: RobotSettings  # Merged from the vehicle, its type and ``all``.
     # "group.name" to value, written after each connection.
     firmware_params: Mapping[str, float] = dataclasses.field(default_factory=dict)
@@ -62,7 +62,7 @@ class VehicleConfig:
 
     @property
     def battery_limits(self) -> tuple[float, float]:
-        """With less takeoff is refused, and with less it is landed, V."""
+        """Voltages below which a takeoff is refused, and below which the vehicle is landed, V."""
         own = self.settings if self.settings.voltages_act else RobotSettings
         return own.voltage_warning, own.voltage_critical
 
@@ -75,9 +75,9 @@ class FleetConfig:
     disabled: tuple[str, ...] = ()  # Names of the others.
     machines: Mapping[str, MachineSettings] = dataclasses.field(default_factory=dict)
     warnings: tuple[str, ...] = ()  # Remarks on the file: line and reason.
-    # Parameters of the driver that say how it broadcasts.
+    # Parameters of the driver's broadcasts.
     broadcasts: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    # Names of two whose start points are closer than their buffers.
+    # Pairs of names of vehicles whose start points are closer than their buffers.
     unplaced: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -123,7 +123,7 @@ def close_pairs(
     i, j : int
         With i < j.
     distance, allowed : float
-        m; a metre of height counts for `DOWNWASH` metres less.
+        m; heights are divided by `DOWNWASH`.
     """
     radii = np.asarray(buffers, dtype=float)
     if len(radii) < 2:

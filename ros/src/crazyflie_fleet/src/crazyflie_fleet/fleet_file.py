@@ -19,7 +19,7 @@ VEHICLES, TYPES = "crazyflies", "crazyflieTypes"  #: Keys at the top of the two 
 _TYPE_KEYS = {
     "bigQuad": ("big_quad",),
     "batteryVoltageWarning": ("battery", "voltage_warning"),
-    # So it is spelt in their file.
+    # Spelt like this in Crazyswarm 1's files.
     "batteryVoltateCritical": ("battery", "voltage_critical"),
     "batteryVoltageCritical": ("battery", "voltage_critical"),
     "markerConfiguration": ("motion_capture", "marker"),
@@ -30,7 +30,7 @@ _ID = Integer(0, 255)
 _CHANNEL = Integer(0, 125)
 
 FIRST_PORT = 19850  #: UDP port of a grid's first vehicle.
-TYPES_FILE = "crazyflieTypes.yaml"  #: Name of Crazyswarm 1's second file, beside the first.
+TYPES_FILE = "crazyflieTypes.yaml"  #: Name of Crazyswarm 1's second file, in the same folder.
 
 
 def converted(vehicles: Entry, types: Entry | None) -> Entry:
@@ -135,7 +135,7 @@ def _text(value: str, place: yaml.Node) -> yaml.ScalarNode:
 def load(path: str | Path) -> FleetConfig:
     """Return the fleet that a file describes.
 
-    A file in Crazyswarm 1's layout has its types in `TYPES_FILE` beside it.
+    A file in Crazyswarm 1's layout has its types in `TYPES_FILE` in the same folder.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def grid(n: int, spacing: float = 1.0) -> FleetConfig:
     ----------
     n : int
     spacing : float
-        From one to the next, m.
+        Distance between neighbours, m.
 
     Raises
     ------

@@ -15,11 +15,11 @@ NAME = ColorRGBA(0.05, 0.25, 0.60, 1.0)
 FREE = ColorRGBA(0.05, 0.45, 0.90, 0.12)
 HELD = ColorRGBA(0.85, 0.15, 0.10, 0.45)
 
-_ROTOR = 0.0325  #: From the middle to a rotor, along x and along y, m.
+_ROTOR = 0.0325  #: Distance from the middle to a rotor, along x and along y (m).
 
 _TEXT_SIZE = 0.12
 
-PERIOD = 1.0  #: Between two messages, s: RViz drops a marker that comes before its frame.
+PERIOD = 1.0  #: Period of the messages (s): RViz drops a marker that comes before its frame.
 
 
 class FleetMarkersParameters(FleetParameters):
@@ -32,7 +32,7 @@ class FleetMarkersParameters(FleetParameters):
 
 
 class FleetMarkersNode(Node):
-    """Publish markers that RViz itself moves with the vehicles' frames."""
+    """Publishes markers, which RViz moves with the vehicles' frames."""
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:

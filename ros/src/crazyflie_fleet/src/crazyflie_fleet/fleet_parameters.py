@@ -1,4 +1,4 @@
-"""Parameters: which vehicles a fleet has, and how they are flown."""
+"""Parameters of the vehicles of a fleet, and of the process that flies them."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -39,7 +39,7 @@ class NodeParameters(ParameterType):
 
 
 class FleetParameters(Parameters):
-    """Which vehicles there are."""
+    """Parameters of the vehicles of a fleet."""
 
     file: str = parameter(
         Text(may_be_empty=True), "names the vehicles; empty for a grid of `n`", "", "fleet/file"

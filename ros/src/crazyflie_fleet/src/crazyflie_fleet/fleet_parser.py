@@ -28,7 +28,7 @@ from crazyflie_utils.parameters.types import BOOLEAN, ParameterType
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_utils.text import shortened, shown
 
-#: How much an unknown key resembles a known one that it is a misspelling of, 0 to 1.
+#: Least similarity of an unknown key to a known one that is misspelt (0 to 1).
 _SIMILAR = 0.8
 
 _TOP = ("robots", "robot_types", "all", "machines", "fileversion")
@@ -52,11 +52,11 @@ class Remarks:
         self._file: object = ""
 
     def add(self, text: str, key: object = None) -> None:
-        """Note a text; only the first one with the same key, which is by default the text."""
+        """Add a text, unless there is one with the same key, by default the text itself."""
         self._texts.setdefault(key or text, text)
 
     def unknown(self, entry: Entry, known: Iterable[str]) -> None:
-        """Note an entry with a key that is not known.
+        """Add an entry with an unknown key.
 
         Raises
         ------
@@ -70,7 +70,7 @@ class Remarks:
         self._note(self._unknown, key, entry)
 
     def idle(self, entry: Entry, key: str) -> None:
-        """Note an entry of a known key that has no effect."""
+        """Add an entry with a known key that has no effect."""
         self._note(self._idle, key, entry)
 
     def texts(self) -> tuple[str, ...]:
@@ -119,7 +119,7 @@ class FleetParser:
             name: self._read(entry, MachineSettings)
             for name, entry in _entries(self._parts, "machines").items()
         }
-        # What vehicles inherit is checked where it is given: once, and not in each of them.
+        # Inherited settings are checked where they are given: once, and not for each vehicle.
         for entry in types.values():
             self._check(entry)
         if common is not None:
@@ -132,7 +132,7 @@ class FleetParser:
         for entry in (*robots.values(), *types.values(), *([common] if common else [])):
             self._check_choice(entry, "machine", (LOCAL, *machines))
         self._raise_errors()
-        # And what is wrong only together, in each of them.
+        # Combinations of settings are checked for each vehicle.
         vehicles = [self._vehicle(name, entry, types, common) for name, entry in robots.items()]
         self._raise_errors()
         enabled = [vehicle for vehicle in vehicles if vehicle.settings.enabled]
@@ -149,7 +149,7 @@ class FleetParser:
             tuple(enabled), tuple(disabled), machines, self.remarks.texts(), broadcasts, unplaced
         )
 
-    # What is wrong.
+    # Errors.
 
     def _error(self, entry, text):
         self._errors += entry.error(text).complaints
@@ -257,7 +257,7 @@ class FleetParser:
             )
         return tuple(pairs)
 
-    # What vehicles are.
+    # Vehicles.
 
     def _vehicle(self, name, robot, types, common):
         layers = [common, types.get(robot["type"].value) if "type" in robot else None, robot]
@@ -270,7 +270,7 @@ class FleetParser:
         return VehicleConfig(name, settings.position, settings, *self._firmware(merged))
 
     def _check_voltages(self, merged, settings):
-        # Which of the robot, its type and all has which of them is known only here.
+        # Only here it is known whether each comes from the robot, its type or ``all``.
         critical, warning = settings.voltage_critical, settings.voltage_warning
         if critical <= warning:
             return
@@ -281,7 +281,7 @@ class FleetParser:
         else:
             entry, text = given["voltage_warning"], f"is {warning:g}; expected not less than"
             other = f"voltage_critical, {critical:g} (V)"
-        # Without the robot's name: what several inherit is wrong once.
+        # Without the robot's name: an inherited error is reported once.
         name = entry.name.removeprefix(f"{merged.name}/")
         self._error(Entry(name, entry.node), f"{text} {other}")
 
@@ -319,7 +319,7 @@ class FleetParser:
         enabled = "enabled" not in parts or self._check_type(
             BOOLEAN, parts["enabled"].value, parts["enabled"]
         )
-        # Without its battery a vehicle is not safe: it is watched in any case.
+        # For safety, the battery is always monitored.
         names = ("battery", *standard) if enabled else ("battery",)
         return tuple(dict.fromkeys(names)), tuple(custom) if enabled else ()
 

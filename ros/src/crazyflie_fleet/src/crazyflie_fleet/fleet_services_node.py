@@ -24,11 +24,11 @@ _HIGH_LEVEL_SERVICES = {
     "start_trajectory": srv.StartTrajectory,
     "notify_setpoints_stop": srv.NotifySetpointsStop,
 }
-#: How long after the start of this node a takeoff waits for vehicles that refuse it, s of the
-#: machine's clock: the nodes of a hundred need a while to find each other.
+#: Time after the start of this node in which a takeoff waits for vehicles that refuse it (s of the
+#: machine's clock): the nodes of a hundred vehicles need a while to find each other.
 START_LIMIT = 60.0
-TAKEOFF_WAIT = 10.0  #: How long one call waits at most, s of the machine's clock.
-_PERIOD = 0.2  #: Between two looks at the vehicles meanwhile, s.
+TAKEOFF_WAIT = 10.0  #: Longest time that one call waits (s of the machine's clock).
+_PERIOD = 0.2  #: Period of the checks of the vehicles meanwhile (s).
 
 _FLYING = (FlightStatus.TAKING_OFF, FlightStatus.FLYING)
 _NOT_BEGUN = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
@@ -36,17 +36,17 @@ _NOT_BEGUN = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
 
 @dataclass
 class _Takeoff:
-    """A call that waits until every vehicle would take off."""
+    """A call that waits until no vehicle refuses a takeoff."""
 
     service: str
     service_type: Any
     request: Any
     answer: "Future[Any]" = field(default_factory=Future)
-    waited: float = 0.0  # s.
+    waited: float = 0.0  # Time that the call has waited (s).
 
 
 class FleetServicesNode(Node):
-    """Offer one service for all vehicles where each has its own.
+    """Offers services for all vehicles, each of which calls those of the vehicles.
 
     A call is answered when all vehicles have answered, with an error that names each one that
     has refused. A fleet takes off as a whole or not at all. Vehicles above each other land one
@@ -106,7 +106,7 @@ class FleetServicesNode(Node):
 
     def _on_takeoff(self, service, service_type, request):
         if getattr(request, "group_mask", 0):
-            # Only the vehicles know who is a member.
+            # Only the vehicles know their groups.
             return self._call_all(service, service_type, request)
         takeoff = _Takeoff(service, service_type, request)
         if not self._begin(takeoff):
@@ -143,7 +143,7 @@ class FleetServicesNode(Node):
             takeoff.answer.set_exception(ServiceError(text))
             return True
         names = self._fleet.names
-        # Those that fly refuse /NAME/takeoff; they go to the height of the firmware's takeoff.
+        # Vehicles in flight refuse /NAME/takeoff; they go to the height of the firmware's takeoff.
         flying = [name for name in names if self._state(name) in _FLYING]
         if flying and takeoff.service_type is Empty:
             names = tuple(name for name in names if name not in flying)

@@ -9,19 +9,19 @@ from crazyflie_model.polynomials import Goal
 from crazyflie_model.trajectory import Pieces, Trajectory
 from crazyflie_utils.refusal import RefusalError
 
-#: A move begins at the present goal if the vehicle is this near to it, m; otherwise where the
-#: vehicle is, since another node has moved it.
+#: Largest distance of the vehicle from the present goal at which a move begins at the goal (m);
+#: otherwise it begins at the vehicle's position, since another node has moved it.
 NEAR = 0.5
 
 
-_MAX_STEP = 0.1  #: Longest time between two setpoints of a velocity for which the goal moves on, s.
+_MAX_STEP = 0.1  #: Longest time after a setpoint of a velocity in which the goal moves on (s).
 
 
 class Velocity(NamedTuple):
     """A setpoint without a position."""
 
-    velocity: Triple  # Of the vehicle in the fixed frame, m/s.
-    height: float | None = None  # Above the ground, m.
+    velocity: Triple  # Velocity of the vehicle in the fixed frame (m/s).
+    height: float | None = None  # Height above the ground (m).
 
 
 class Follower:
@@ -51,7 +51,7 @@ class Follower:
     ) -> None:
         """Replace any command by a goal that moves on from the present one at a velocity.
 
-        ``ground`` is the height (z) above which that of the setpoint counts, m.
+        ``ground`` is the height (z) of the ground, above which the setpoint's height is given, m.
         """
         start = self._start(time, measured)
         passed = 0.0 if self._setpoint is None else min(max(time - self._begin, 0.0), _MAX_STEP)
@@ -67,7 +67,7 @@ class Follower:
 
     @property
     def trajectory(self) -> Trajectory | None:
-        """Of the present command, from its beginning on; None before any, and of a setpoint."""
+        """The present command's trajectory, from its beginning; None without one or in a stream."""
         return self._trajectory
 
     def goal(self, time: float) -> Goal[float] | None:

@@ -28,25 +28,25 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.timers import Timer
 
-CLIMB_SPEED = 0.7  #: Largest mean speed of a takeoff, m/s.
+CLIMB_SPEED = 0.7  #: Largest mean speed of a takeoff (m/s).
 
 
 @dataclass
 class _Takeoff:
     """A takeoff by this node.
 
-    Its references begin `HOLD_LIMIT` after the takeoff server has handed over: so long the filter
-    holds the server's last control.
+    Its references begin `HOLD_LIMIT` after the takeoff server has handed over: until then the
+    filter holds the server's last control.
     """
 
     hover: Goal[float]
-    end: float  # s.
+    end: float  # End of the takeoff (s).
     handover: Timer | None = None
     is_followed: bool = False
 
 
 class HighLevelNode(Node):
-    """Fly a vehicle by high-level commands: make references for its controller.
+    """Flies a vehicle by high-level commands: publishes references for its controller.
 
     In its own namespace it offers the services of the driver for a real vehicle, so that the same
     clients fly simulated vehicles. It is silent on the ground and during landing.
@@ -61,7 +61,7 @@ class HighLevelNode(Node):
         self._status = FlightStatus()
         self._groups = Groups()
         self._takeoff: _Takeoff | None = None
-        self._next: tuple[Any, ...] | None = None  # A command during a takeoff, for its end.
+        self._next: tuple[Any, ...] | None = None  # A command received in a takeoff, for its end.
         self._landings: list[Future[Any]] = []
 
     @override
@@ -103,7 +103,7 @@ class HighLevelNode(Node):
 
     @override
     def enter_safe_state(self) -> None:
-        """Leave the controller a reference at rest."""
+        """Publish a reference at rest."""
         if self._is_followed():
             self._references.rest()
         self._references.forget()
@@ -135,7 +135,7 @@ class HighLevelNode(Node):
         self._begin_next()
 
     def _on_reference(self, _):
-        # With its hover point the server leaves the vehicle to the controller.
+        # With the hover point the server hands the vehicle over to the controller.
         takeoff = self._takeoff
         if takeoff is None or takeoff.handover or self._status.state != FlightStatus.TAKING_OFF:
             return

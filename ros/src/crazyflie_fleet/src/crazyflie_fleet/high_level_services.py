@@ -20,8 +20,8 @@ from crazyflie_utils.parameters.types import BOOLEAN, FRAME, SERVICE, TIME_STEP,
 #: Namespace, below a vehicle's name, of the node; below /all of the same services for all.
 HIGH_LEVEL = "high_level"
 
-#: Nodes, one space between two, that begin what was uploaded to them as trajectory 0: vehicles that
-#: are called one after the other do not begin together.
+#: Names of nodes, separated by spaces, that start their uploaded trajectory 0: vehicles that are
+#: called one after the other do not start together.
 START_TOPIC = "/all/start_trajectory"
 
 
@@ -62,11 +62,11 @@ class HighLevelParameters(Parameters):
 
 _ALL = 0  #: Mask of a command to all vehicles.
 
-_CALL_TIMEOUT = 58.0  #: Of a takeoff or landing of the takeoff server, s of the machine's clock.
+_CALL_TIMEOUT = 58.0  #: Timeout of the server's takeoffs and landings (s of the machine's clock).
 
 
 class Groups:
-    """The groups that a vehicle belongs to: none at first."""
+    """The groups of a vehicle; at first it has no group."""
 
     def __init__(self) -> None:
         self._mask = 0
@@ -112,7 +112,7 @@ def relay(handle: NodeHandle, service: str, response_type: type) -> "Future[Any]
 
 
 class SetpointSubscribers:
-    """Subscribe to the driver's setpoints below a node; ``on_setpoint`` takes the finite ones.
+    """Subscribes to the driver's setpoints below a node; calls ``on_setpoint`` with finite ones.
 
     Without ``has_yaw`` yaw and yaw rate are ignored with a warning; cmd_stop is in any case.
     """

@@ -1,4 +1,4 @@
-"""Landings of a fleet by ROS: in rounds, and beside the vehicles beneath."""
+"""Landings of a fleet by ROS: in rounds, and next to vehicles beneath."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
@@ -28,13 +28,13 @@ from crazyflie_fleet.vehicle_states import VehicleStates
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, NodeHandle
 
-SERVICE_TIMEOUT = 60.0  #: Of a takeoff or landing, s of the machine's clock.
+SERVICE_TIMEOUT = 60.0  #: Timeout of takeoffs and landings (s of the machine's clock).
 LANDING_TOPIC = "/fleet/landing"  #: Names of vehicles that only the fleet moves, until they land.
-_PERIOD = 0.1  #: Between two updates of a landing, s.
-#: A round begins when all vehicles are slower than this, m/s, or after this time, s.
+_PERIOD = 0.1  #: Period of the updates of a landing (s).
+#: Speed of all vehicles below which a round begins (m/s), and longest wait for it (s).
 _SLOW, _BRAKING_TIMEOUT = 0.3, 3.0
 
-_SHORTEST_MOVE = 2.0  #: s.
+_SHORTEST_MOVE = 2.0  #: Shortest duration of a move to a free place (s).
 
 _UP = (FlightStatus.FLYING, FlightStatus.TAKING_OFF)
 
@@ -42,7 +42,7 @@ Refusals = Mapping[str, str]
 
 
 class SafeDescentsNode(Node):
-    """Pass on the references of descents, beside vehicles that are beneath.
+    """Passes on the references of descents, moved away from vehicles that are beneath.
 
     ``vehicles`` are flown in this process; ``states`` and collision ``buffers`` (m) are those of
     all vehicles, these first.
@@ -150,7 +150,7 @@ class Lander(LandingSide):
     def _is_up(self, name):
         return self._states.flight_states[self._numbers[name]] in _UP
 
-    # What `land_in_rounds` asks for.
+    # Methods that `land_in_rounds` calls.
 
     @override
     def time(self) -> float:
@@ -179,7 +179,7 @@ class Lander(LandingSide):
             everyone,
             positions[known],
             np.array([name in names for name in everyone]),
-            # A vehicle that descends counts as on the ground.
+            # A vehicle that descends is treated as one on the ground.
             np.array([not self._is_up(name) for name in everyone]),
             self._limits[np.ix_(known, known)],
             -everywhere,

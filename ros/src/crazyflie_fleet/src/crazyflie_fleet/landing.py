@@ -1,9 +1,9 @@
 """Landings in rounds: which vehicles land next, and where, so that none comes down on another.
 
-Vehicles land in rounds, from below. In each round those land straight down that have nothing
-beneath them. When only such are left that have others beneath them on the ground, the lowest of
-them first fly, at their height, to the nearest places that are free. A vehicle that descends by
-itself is led beside those beneath it.
+Vehicles land in rounds, the lowest ones first. In each round the vehicles with nothing beneath them
+land straight down. When all that are left have others beneath them on the ground, the lowest ones
+first fly, at their height, to the nearest free places. A vehicle that descends by itself is moved
+to a place next to those beneath it.
 """
 
 import math
@@ -21,37 +21,37 @@ from crazyflie_model.trajectory import minimum_jerk
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Place = tuple[float, float, float]  #: x, y, z in m.
+Place = tuple[float, float, float]  #: x, y, z (m).
 
 #: Names of the vehicles whose positions are known, and the arguments of `next_round`.
 Situation = tuple[Sequence[str], Array, Flags, Flags, Array, Array, Array]
 
-SIDE_SPEED = 0.5  #: Mean speed at which vehicles fly to free places, m/s.
-MAX_DETOUR = 3.0  #: How far aside along x and y a vehicle lands that descends already, m.
+SIDE_SPEED = 0.5  #: Mean speed at which vehicles fly to free places (m/s).
+MAX_DETOUR = 3.0  #: Largest move along x and y of a vehicle that descends already (m).
 
-#: Distance of a free place from other vehicles, in distances that they must keep: for the errors of
-#: their positions.
+#: Distance of a free place from other vehicles over the distance that they must keep, to allow for
+#: errors of their positions.
 _MARGIN = 1.05
 
-#: A vehicle lands within this distance of its free place, m; within the second one if it takes
-#: longer than the timeout of its side beyond the planned duration.
+#: Distance from its free place within which a vehicle lands (m), and the larger one that is
+#: accepted after the planned duration plus `LandingSide.arrival_timeout` (m).
 _ARRIVED, _NEAR = 0.05, 0.1
 
-_PITCH = 0.5  #: Between two candidates for a free place, in distances that vehicles must keep.
-_MAX_CANDIDATES = 400  #: Candidates, the nearest first, that are checked for a free way.
-_ROUNDING = 1e-6  #: m.
+_PITCH = 0.5  #: Distance of two candidates for a free place over that which vehicles must keep.
+_MAX_CANDIDATES = 400  #: Number of candidates, the nearest first, that are checked for a free path.
+_ROUNDING = 1e-6  #: Tolerance of comparisons of distances (m).
 
-_SIDE_DURATION = 1.1  #: Duration of the move sideways, in the shortest possible ones.
-_MAX_GAP = 0.5  #: Between two references of one descent, s.
+_SIDE_DURATION = 1.1  #: Duration of the move sideways over the shortest possible one.
+_MAX_GAP = 0.5  #: Longest time between two references of one descent (s).
 
 
 class LandingSide(Protocol):
-    """What carries out landings: the process of a fleet, or a mission.
+    """Interface of a process of a fleet, or of a mission, that carries out landings.
 
     A vehicle that refuses a command is not `left` any more.
     """
 
-    arrival_timeout: float  #: s.
+    arrival_timeout: float  #: Longest time beyond the planned duration of a move (s).
 
     def time(self) -> float:
         """Return the time, s."""
@@ -66,7 +66,7 @@ class LandingSide(Protocol):
         """Return where vehicles are; ``names`` are to land."""
 
     def distance(self, name: str, goal: Place) -> float:
-        """Return how far a vehicle is from a goal (m), m; infinite if that is not known."""
+        """Return the distance of a vehicle from a goal (m), m; infinite if it is not known."""
 
     def go_aside(self, goals: Mapping[str, Place]) -> float:
         """Send vehicles to free places, m; return when they should be there, s."""
@@ -79,7 +79,7 @@ class LandingSide(Protocol):
 
 
 def land_in_rounds(side: LandingSide) -> Iterator[None]:
-    """Land the vehicles that are left, also those added meanwhile; yield while there is to wait."""
+    """Land the vehicles that are left, also those added meanwhile; yield while it must wait."""
     while True:
         while side.is_busy():
             yield
@@ -131,7 +131,7 @@ def next_round(
         Which of them are in flight and to land, and which are on the ground. The others are in
         flight and stay where they are.
     limits : ndarray, shape (n, n)
-        How far apart each two have to be, m; heights count for 1 / `DOWNWASH`.
+        Distances that each two must keep, m; heights are divided by `DOWNWASH`.
     lower, upper : ndarray, shape (n, 2)
         Corners x, y of the box that each may land in, m.
 
@@ -167,7 +167,7 @@ def free_place(i: int, places: Array, is_down: Flags, limits: Array) -> tuple[fl
     i : int
         Its number.
     places, is_down, limits
-        As of `next_round`; vehicles that descend count as on the ground, at their landing places.
+        As for `next_round`; descending vehicles are on the ground, at their landing places.
 
     Returns
     -------
@@ -204,7 +204,7 @@ class _Scene:
         is_below = order[None, :] < order[:, None]
         is_near = cdist(self._xy, self._xy) < limits - _ROUNDING
         beneath = is_near & is_below
-        # A vehicle on a table above is as much in the way of a landing.
+        # A vehicle above, on a table, obstructs a landing as well.
         self.is_obstructed = (is_near & is_down | beneath & ~lands & ~is_down).any(axis=1)
         self.is_lowest = lands & ~(beneath & lands).any(axis=1)
 
@@ -240,7 +240,7 @@ class _Scene:
         s = np.clip(-(way * begin).sum(axis=-1) / lengths, 0.0, 1.0)
         height = ((self._z[others] - self._z[i]) / DOWNWASH) ** 2
         nearest = np.sqrt(((begin + s[..., None] * way) ** 2).sum(axis=-1) + height)
-        # A pair that is too near already may part.
+        # Vehicles that are too near already may move apart.
         present = np.sqrt((begin**2).sum(axis=-1) + height)
         allowed = np.minimum(self._limits[i][others], present)
         return (nearest >= allowed - _ROUNDING).all(axis=1)
@@ -264,7 +264,7 @@ class _Descent:
 class SafeDescents:
     """Landing places of vehicles that descend.
 
-    A vehicle with another beneath it flies to the nearest free place while it sinks. ``buffers``
+    A vehicle with another one beneath flies to the nearest free place while it sinks. ``buffers``
     are the collision buffers of all vehicles, m.
     """
 
@@ -290,7 +290,7 @@ class SafeDescents:
         Parameters
         ----------
         positions : (n, 3) array
-            Of all vehicles, m; NaN where they are not known.
+            Positions of all vehicles, m; NaN where they are not known.
         is_landing : (n,) array of bool
             Which of them descend, or are on the ground.
         """

@@ -10,7 +10,7 @@ from crazyflie_utils import ParameterError
 
 
 def launch_text(path: str | Path) -> str:
-    """Return a launch file that has each machine of a fleet file simulate its vehicles.
+    """Return a launch file by which each machine of a fleet file simulates its vehicles.
 
     The file has the same ``path`` on all these computers.
 

@@ -1,4 +1,4 @@
-"""Who flies which vehicles: the missions that run, and those that end while their vehicles fly."""
+"""The missions that run, their vehicles, and missions that end while their vehicles fly."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -7,11 +7,11 @@ from std_msgs.msg import String
 
 from crazyflie_utils import NodeHandle
 
-#: Published by missions: their name, the vehicles in flight, and behind a bar all their vehicles;
-#: the name alone by one that ends.
+#: Topic of missions: their name, the vehicles in flight, and after a bar all their vehicles; a
+#: mission that ends publishes its name alone.
 MISSION_TOPIC = "/all/mission"
-MISSION_PERIOD = 0.5  #: Between two of these messages, s of the machine's clock.
-#: A mission without a message for so long has died, s of the machine's clock.
+MISSION_PERIOD = 0.5  #: Period of these messages (s of the machine's clock).
+#: Time without a message after which a mission has died (s of the machine's clock).
 MISSION_TIMEOUT = 5.0
 
 
@@ -27,7 +27,7 @@ class Claim(NamedTuple):
 
 
 class MissionWatch:
-    """The missions that run, but ``own``; a mission that has died has no vehicles any more.
+    """The missions that run, except ``own``; a mission that has died has no vehicles any more.
 
     ``on_lost(names)`` gets the vehicles that flew by the last message of a mission that has died.
     """
@@ -40,7 +40,7 @@ class MissionWatch:
     ):
         self._on_lost = on_lost
         self._own = own
-        self.claims: dict[str, Claim] = {}  #: Of the missions that run, by their names.
+        self.claims: dict[str, Claim] = {}  #: Vehicles of the missions that run, by their names.
         self.heard: set[str] = set()  #: Names of missions, also of those that have ended.
         # Ticks since the last message, so that a suspended computer does not lose missions.
         self._ticks: dict[str, int] = {}

@@ -11,12 +11,12 @@ from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import Text
 from mocap_optitrack.mocap_node import MocapNode
 
-#: Name to configuration, as crazyswarm2's motion_capture.yaml has them.
+#: Name to configuration, as in crazyswarm2's motion_capture.yaml.
 Configurations = Mapping[str, Mapping[str, Any]]
 
 
 class MocapFleetParameters(FleetParameters):
-    """Which vehicles there are, and where motion capture is."""
+    """The fleet's vehicles, and motion capture."""
 
     motion_capture: str = parameter(
         Text(may_be_empty=True),
@@ -39,7 +39,7 @@ def bodies(
     dynamics: Configurations = MappingProxyType({}),
     markers: Configurations = MappingProxyType({}),
 ) -> dict[str, Any]:
-    """Return the parameters of mocap_node that say what it publishes.
+    """Return the parameters of mocap_node for its bodies and markers.
 
     A vehicle with one marker gets its position, for its own estimator, by the driver's topic
     external_position, and its yaw on tf is that estimator's.
@@ -98,7 +98,7 @@ def _check_names(fleet, key, setting, configurations):
 
 
 def make_nodes(handle: NodeHandle) -> dict[str, Node]:
-    """Return mocap_node; what it publishes is what the fleet file says, and what is configured.
+    """Return mocap_node, which publishes the bodies of the fleet file and those configured.
 
     Raises
     ------

@@ -10,14 +10,14 @@ from crazyflie_fleet.vehicle_nodes import INHIBITION
 from crazyflie_fleet.vehicle_states import VehicleStates
 from crazyflie_utils import Node, NodeHandle
 
-_PERIOD = 0.2  #: Between two looks, s.
+_PERIOD = 0.2  #: Period of the checks (s).
 
 
 class PlacementNode(Node):
-    """Refuse takeoffs of vehicles that a fleet file has start at one place until they are apart.
+    """Refuses takeoffs of vehicles with one start point in the fleet file until they are apart.
 
     ``names`` are of the vehicles that are flown in this process. Two that have been seen apart are
-    not looked at again.
+    not checked again.
     """
 
     def __init__(self, names: Collection[str], fleet: FleetConfig, states: VehicleStates):

@@ -1,4 +1,4 @@
-"""ROS interface of straight moves, and of what keeps vehicles apart."""
+"""ROS interface of straight moves, and of the collision avoidance."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import is_finite, to_tuple
 
-SILENCE_PERIOD = 5.0  #: Between two warnings about a vehicle whose states do not come, s.
+SILENCE_PERIOD = 5.0  #: Period of warnings about a vehicle whose states do not come (s).
 
 
 class ReferencesParameters(Parameters):
@@ -53,15 +53,15 @@ class _TrackedVehicle:
     move_time: float = 0.0
     is_held: bool = False
     is_to_land: bool = False
-    # Where its takeoffs end by the fleet file, if the file does not say where it starts, m.
+    # End of its takeoffs by the fleet file, if the file has no start point for it (m).
     hover_point: tuple[float, float, float] | None = None
 
 
 class ReferencesNode(Node):
-    """Pass on the references of vehicles, unless they lead one too near to another.
+    """Passes on the references of vehicles, unless they lead one too near to another.
 
     ``vehicles`` are flown in this process and keep apart from ``others``, flown elsewhere, too.
-    ``vectorized`` are topics that have the states of several vehicles in one message. The attribute
+    ``vectorized`` are topics with the states of several vehicles in one message. The attribute
     ``states`` has those of all. Vehicles named in ``unplaced`` take off from where they are seen.
     """
 
@@ -142,7 +142,7 @@ class ReferencesNode(Node):
         if tracked.is_to_land and self._is_flying(tracked):
             return
         if not is_finite(message.state):
-            # The controller decides what follows from it.
+            # The controller handles invalid references.
             tracked.publisher.publish(message)
             return
         if tracked.hover_point == to_tuple(message.state)[:3]:

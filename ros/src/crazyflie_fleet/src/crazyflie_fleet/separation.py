@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from crazyflie_fleet.fleet_config import DOWNWASH, close_pairs
 
-#: How far ahead vehicles are extrapolated, s: what a controller needs to stop one.
+#: Time by which motions are extrapolated (s): the time in which a controller stops a vehicle.
 LOOK_AHEAD = 0.5
-#: Vehicles that are held are released at this distance, in sums of their buffers.
+#: Distance at which held vehicles are released, over the sum of their buffers.
 RELEASE_RATIO = 1.1
 
 
@@ -19,12 +19,12 @@ class ClosePair(NamedTuple):
 
     first: int
     second: int
-    distance: float  # Now, m; heights count as in `close_pairs`.
-    limit: float  # Sum of their buffers, m.
+    distance: float  # Present distance, with heights as in `close_pairs` (m).
+    limit: float  # Sum of their buffers (m).
 
 
 class Separation:
-    """Decide which vehicles must not follow their references.
+    """Decides which vehicles must not follow their references.
 
     A vehicle is held while it is too close to another, now or `LOOK_AHEAD` from now at the present
     velocities, and its reference approaches the other. One whose reference moves away is not held.
@@ -51,7 +51,7 @@ class Separation:
         Parameters
         ----------
         positions, velocities, goals : (n, 3) array
-            Of vehicles and of their references, m and m/s, fixed frame. A vehicle whose position
+            Those of vehicles and references, m and m/s, fixed frame. A vehicle whose position
             is NaN is ignored; the goal of one without a reference is its position.
         """
         known = np.flatnonzero(np.isfinite(positions).all(axis=1))

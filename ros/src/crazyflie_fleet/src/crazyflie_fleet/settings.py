@@ -22,15 +22,15 @@ from crazyflie_utils.parameters.types import (
 )
 from crazyflie_utils.text import number_from_text
 
-#: Help of settings that are read, and of which a remark is made.
+#: Help of settings that are read and reported in a remark.
 WITHOUT_EFFECT = "crazyswarm2's; has no effect here"
-#: How motion capture knows a vehicle: its system does, or by the only marker of the vehicle.
+#: Tracking of a vehicle: by the motion capture system, or by the vehicle's only marker.
 VENDOR, SINGLE_MARKER = "vendor", "single_marker"
 #: Marker configurations with one marker.
 _SINGLE_MARKERS = ("default_single_marker", SINGLE_MARKER)
 LOCAL = "local"  #: Default machine of vehicles.
 
-#: Key in ``default_topics`` -> standard topic of the driver; empty where it has none.
+#: Key in ``default_topics`` -> standard topic of the driver; empty if there is no such topic.
 DEFAULT_TOPICS = {
     "imu": "imu",
     "temperature": "temperature",
@@ -65,7 +65,7 @@ class _Pattern(ParameterType):
         return self._expected
 
 
-#: Of its namespace and of its frame; /all/takeoff is a service for all.
+#: Name of a vehicle's namespace and frame; /all/takeoff is a service for all vehicles.
 VEHICLE_NAME = _Pattern(
     re.compile(r"(?!all$)[A-Za-z][A-Za-z0-9_]*"),
     "letters, digits and underscores, the first a letter, and not 'all'",
@@ -73,7 +73,7 @@ VEHICLE_NAME = _Pattern(
 
 
 class VehicleUri(ParameterType):
-    """A vehicle's address as `crazyflie_link` takes it; crazyswarm2's ``*`` is any dongle."""
+    """A vehicle's address for `crazyflie_link`; crazyswarm2's ``*`` is any dongle."""
 
     label = "string"
 
@@ -90,7 +90,7 @@ class VehicleUri(ParameterType):
 
 
 def vehicle_key(uri: str) -> str:
-    """Return what addresses of one vehicle have in common; `ValueError` if it is malformed."""
+    """Return a key that is equal for all addresses of a vehicle; `ValueError` if malformed."""
     try:
         return Address.parse(uri.replace("radio://*/", "radio://0/")).key
     except AddressError:
@@ -211,7 +211,7 @@ class Settings(Parameters):
 
     @property
     def has_single_marker(self) -> bool:
-        """Whether motion capture knows the vehicle by its only marker."""
+        """Whether motion capture tracks the vehicle by its only marker."""
         if self.mocap_tracking == "librigidbodytracker":
             return self.mocap_marker in _SINGLE_MARKERS
         return self.mocap_tracking == SINGLE_MARKER
@@ -237,7 +237,7 @@ class RobotSettings(PartialSettings):
 
 
 class BroadcastSettings(Parameters):
-    """How commands to all vehicles of a radio are sent."""
+    """Broadcasts of commands to all vehicles of a radio."""
 
     repeats: int = parameter(Integer(1, 100), "of each command", 5, "num_repeats")
     period_ms: float = parameter(
@@ -249,7 +249,7 @@ class BroadcastSettings(Parameters):
 
 
 class MachineSettings(Parameters):
-    """Another computer, as roslaunch's tag ``machine`` has it."""
+    """Another computer, with the attributes of roslaunch's tag ``machine``."""
 
     address: str = parameter(TEXT, "name or number in the network")
     env_loader: str = parameter(TEXT, "script there that sets ROS's environment")

@@ -14,14 +14,14 @@ from crazyflie_model.trajectory import (
 )
 from crazyflie_utils.refusal import RefusalError
 
-MAX_SPEED = 2.0  #: Peak speed of a move, m/s: controllers with the default gains follow it.
-#: Peak acceleration of a move, m/s^2: controllers tilt by 15 degrees at most, which is 2.6 m/s^2.
+MAX_SPEED = 2.0  #: Peak speed of a move (m/s): controllers with the default gains follow it.
+#: Peak acceleration of a move (m/s^2): controllers tilt by 15 degrees at most, which is 2.6 m/s^2.
 MAX_ACCELERATION = 2.0
 _PEAK_BRAKING = 3.94  #: Peak acceleration of the braking, in speeds per duration.
 
 
 def braking_time(speed: float) -> float:
-    """Return how long a move brakes that begins at a speed (m/s), s: at half `MAX_ACCELERATION`."""
+    """Return the braking time of a speed (m/s), s: at half of `MAX_ACCELERATION`."""
     return _PEAK_BRAKING * speed / (MAX_ACCELERATION / 2.0)
 
 
@@ -49,14 +49,14 @@ class StraightMove:
     Raises
     ------
     RefusalError
-        It asks for too much speed or acceleration.
+        The move needs too much speed or acceleration.
     """
 
-    #: start, goal: m.
+    #: start, goal: Positions (m).
     start: NDArray[np.float64]
     goal: NDArray[np.float64]
-    duration: float  #: s, > 0.
-    #: At the start, m/s.
+    duration: float  #: Duration, > 0 (s).
+    #: Velocity at the start (m/s).
     velocity: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
@@ -69,12 +69,12 @@ class StraightMove:
 
     @property
     def distance(self) -> float:
-        """From start to goal, m."""
+        """Distance from start to goal, m."""
         return float(np.linalg.norm(self.goal - self.start))
 
     @property
     def speed(self) -> float:
-        """At the start, m/s."""
+        """Speed at the start, m/s."""
         return float(np.linalg.norm(self.velocity))
 
 
@@ -87,7 +87,7 @@ def evaluate(
     ----------
     moves : sequence of StraightMove
     times : sequence of float
-        Since the start of each, s.
+        Time since the start of each move, s.
     """
     durations = np.array([move.duration for move in moves])
     value, slope = minimum_jerk(np.clip(np.array(times) / durations, 0.0, 1.0)[:, None])

@@ -42,11 +42,11 @@ from crazyflie_utils.vectors import to_tuple
 
 YAW = 6
 
-#: Topic, below the node's name, of all its vehicles' states in one message: for each in the order
-#: of the file a row of x, y, z, x_dot, y_dot, z_dot and yaw.
+#: Topic, below the node's name, with the states of all its vehicles in one message: in the order of
+#: the file, rows of x, y, z, x_dot, y_dot, z_dot and yaw.
 ALL_STATES = "states"
 
-#: Models of which vehicles can be flown together.
+#: Models whose vehicles can be simulated together.
 MODELS: dict[str, type[SevenDimensional]] = {"near_hover": NearHover, "coupled_7d": Coupled7D}
 
 
@@ -146,7 +146,7 @@ class VectorizedSimulatorParameters(Parameters):
 
 
 class VectorizedSimulatorNode(Node):
-    """Fly vehicles of one model of 7 states, one of `MODELS`; each has its own topics."""
+    """Flies vehicles of one of `MODELS`, with 7 states; each vehicle has its own topics."""
 
     needed_in_flight = True
 
@@ -307,7 +307,7 @@ class VectorizedSimulatorNode(Node):
 def _estimates(
     time_before: float, before: NDArray[np.float64], time: float, states: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the states as finite differences of poses know them, shape (n, 7)."""
+    """Return the states, with velocities by finite differences of poses, shape (n, 7)."""
     estimates = states.copy()
     estimates[:, 3:6] = (states[:, :3] - before[:, :3]) / (time - time_before)
     estimates[:, YAW] = wrap_to_pi(states[:, YAW])

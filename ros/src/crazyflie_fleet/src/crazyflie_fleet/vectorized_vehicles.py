@@ -13,15 +13,15 @@ _NEVER = np.iinfo(np.int64).max
 
 
 class VectorizedVehicles:
-    """Vehicles that each do what `crazyflie_simulator.vehicle.SimulatedVehicle` does, on one clock.
+    """Vehicles that each fly like a `crazyflie_simulator.vehicle.SimulatedVehicle`, on one clock.
 
     Parameters
     ----------
     dynamics : SevenDimensional
     positions : array_like, shape (n, 3)
-        Where they stand at the beginning, m, fixed frame.
+        Positions at the beginning, m, fixed frame.
     time : float
-        Their time at the beginning, s.
+        Time at the beginning, s.
     """
 
     def __init__(self, dynamics: SevenDimensional, positions: ArrayLike, time: float):
@@ -55,21 +55,21 @@ class VectorizedVehicles:
         return np.stack(self._effective_control()[:2], axis=1)
 
     def command(self, vehicle: int, u: Sequence[float], time: float) -> None:
-        """Give one vehicle a control (4 numbers), which counts from ``time`` (s) on.
+        """Set the control (4 numbers) of one vehicle from ``time`` (s) on.
 
-        Of several that come between two calls of `advance_to` the last one counts.
+        If several come between two calls of `advance_to`, the last one is used.
         """
         self._next_u[:, vehicle] = u
         self._next_since[vehicle] = max(math.floor((time - self._start) / STEP + 1e-6), 0)
 
     def skip(self, duration: float) -> None:
-        """Have ``duration`` (s) passed without anything having happened."""
+        """Advance the time by ``duration`` (s) without motion."""
         self._start += duration
 
     def advance_to(self, time: float) -> None:
         """Integrate to the last whole step before ``time`` (s).
 
-        A ``time`` in the past counts as a reset of the clock: the vehicles go on from there.
+        A ``time`` in the past is a reset of the clock: the vehicles continue from there.
         """
         steps = math.floor((time - self.time) / STEP + 1e-6)
         if steps < -1:
@@ -98,5 +98,5 @@ class VectorizedVehicles:
         self._steps += 1
 
     def _effective_control(self):
-        # `_NEVER` makes an age far below zero: that of a control that counts.
+        # `_NEVER` gives an age far below zero: that of a valid control.
         return watchdog_control([*self._u], self._steps - self._since)

@@ -18,7 +18,7 @@ from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNo
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils import Node
 
-Tree = dict[str, Any]  #: Parameters as the parameter server has them.
+Tree = dict[str, Any]  #: Parameters in the structure of the parameter server.
 
 REFERENCE, SAFE_REFERENCE = "ref", "ref_safe"
 DESCENT, SAFE_DESCENT = f"{REFERENCE}_descent", f"{REFERENCE}_descent_safe"
@@ -26,9 +26,9 @@ STATE, LQR_CONTROL = "state", "control/lqr"
 TAKEOFF_CONTROL, FINAL_CONTROL = "control/takeoff", "control/final"
 IN_FLIGHT = "in_flight"
 FLIGHT_STATUS = f"{IN_FLIGHT}_flight_status"  #: Topics and services of a vehicle, below its name.
-#: Topic below a vehicle's name: why its takeoffs are refused; empty if they are not.
+#: Topic below a vehicle's name: the reason for refusing takeoffs; empty if they are allowed.
 INHIBITION = "takeoff_inhibition"
-#: Parameter below a vehicle's name: its place in the fleet file, from 0.
+#: Parameter below a vehicle's name: its index in the fleet file, from 0.
 PLACE = "place_in_fleet"
 
 SIMULATORS: dict[str, type[Node]] = {

@@ -21,7 +21,7 @@ _IN_FLIGHT = (FlightStatus.TAKING_OFF, FlightStatus.FLYING, FlightStatus.DESCEND
 class VehicleStates:
     """The last states and flight states of vehicles, which have numbers in the order given.
 
-    ``vectorized`` are topics that have the states of several of them in one message.
+    ``vectorized`` are topics with the states of several of them in one message.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class VehicleStates:
         self.names = [vehicle.name for vehicle in vehicles]
         #: Shape (n,); `FlightStatus.state` of each; UNKNOWN before the first.
         self.flight_states = np.full(len(vehicles), FlightStatus.UNKNOWN)
-        #: Why each would refuse a takeoff; empty if it would not.
+        #: Reason for which each vehicle would refuse a takeoff; empty if it would not.
         self.takeoff_refusals = [
             f"nothing has come on /{name}/{FLIGHT_STATUS}" for name in self.names
         ]
@@ -77,7 +77,7 @@ class VehicleStates:
         return Goal((x, y, z), tuple(velocity), (0.0, 0.0, 0.0), 0.0, 0.0)
 
     def are_in_flight(self) -> NDArray[np.bool_]:
-        """Return from which vehicles others have to keep apart, shape (n,)."""
+        """Return which vehicles are in flight, so that others must keep apart, shape (n,)."""
         return np.isin(self.flight_states, _IN_FLIGHT)
 
     def flying(self) -> set[str]:

@@ -1,4 +1,4 @@
-"""A process of virtual vehicles, and of a motion capture system that sees them."""
+"""A process with virtual vehicles and a motion capture system that measures them."""
 
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_fleet.mocap_process import bodies

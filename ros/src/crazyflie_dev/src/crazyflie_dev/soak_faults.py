@@ -348,7 +348,9 @@ def live_parameters(graph: FakeGraph) -> dict[str, Any]:
         f"{service.removesuffix(_SET)}/{name}": value
         for service in graph.services()
         if service.endswith(_SET)
-        for updates in graph.latched(f"{service.removesuffix(_SET)}/parameter_updates", excluding="")
+        for updates in graph.latched(
+            f"{service.removesuffix(_SET)}/parameter_updates", excluding=""
+        )
         for name, value in decode_config(updates).items()
         if name != "groups"
     }

@@ -1,16 +1,16 @@
 #!/usr/bin/env python
-"""How far apart vehicles behind the driver begin what they are told together.
+"""Measures the skew with which vehicles behind the driver begin a common command.
 
 Run it in a shell that has sourced the workspace:
 
     python3 ros/src/crazyflie_mission_api/bench/start_skew.py 2 5 10
 
 The vehicles are stand-ins behind the radio's protocol, by UDP; between them and this script is the
-driver, in a process of its own. The script commands all of them as a mission does, and each notes
-when its packet comes: the time from the first to the last is the skew. With `--broadcast` they are
-commanded by the driver's service for all, and their number is the largest. Prints a line for each
-number of vehicles, ms. A Crazyradio sends one packet after the other, which is not in it. Nothing
-is asserted.
+driver, in a process of its own. The script commands all of them as a mission does, and each records
+the arrival of its packet: the time from the first to the last is the skew. With `--broadcast` they
+are commanded by the driver's service for all, and their number is the largest. Prints a line for
+each number of vehicles (ms). It does not include that a Crazyradio sends one packet after the
+other. Nothing is asserted.
 """
 
 import argparse
@@ -35,11 +35,11 @@ ALL = "/crazyflie_server/all/go_to"
 _RELATIVE = GoToRequest(relative=True, duration=genpy.Duration(1))
 
 SERVICES = ("go_to", "emergency")
-PAUSE = 0.2  #: From one command to all to the next, s.
+PAUSE = 0.2  #: Time between two commands to all vehicles (s).
 
 
 class Vehicle(FakeVehicle):
-    """A stand-in that notes when commands come, s of the machine's clock."""
+    """A stand-in that records the arrival of commands, s of the machine's clock."""
 
     def __init__(self) -> None:
         self.times: list[float] = []
@@ -52,7 +52,7 @@ class Vehicle(FakeVehicle):
 
 
 def main() -> None:
-    """Measure as the command line asks, and print."""
+    """Measure by the options of the command line, and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("n", nargs="+", type=int, help="of vehicles")
     parser.add_argument("--commands", type=int, default=100, help="to all of them (100)")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python
 """Eight vehicles fly figures of eight side by side, every other one the other way round.
 
-Usage: figure_eights.py [NAME ...], the vehicles; by default cf1 ... cf8. They have to stand 1.8 m
+Usage: figure_eights.py [NAME ...], the vehicles; by default cf1 ... cf8. They must stand 1.8 m
 apart along x and 1.2 m along y.
 """
 

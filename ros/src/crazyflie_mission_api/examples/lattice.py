@@ -1,8 +1,8 @@
 #!/usr/bin/env python
 """Many vehicles rise from a square on the floor into a lattice, turn it into a ring, and come back.
 
-Usage: lattice.py [N], how many; by default 100: cf1, cf2, ... as sw_swarm.launch has them. With
-the word "dry_run" behind it nothing flies, and no ROS is needed.
+Usage: lattice.py [N], the number of vehicles; by default 100: cf1, cf2, ... as in sw_swarm.launch.
+With the word "dry_run" after it nothing flies, and no ROS is needed.
 """
 
 import math
@@ -15,8 +15,8 @@ from crazyflie_mission_api.formations import Array, circle, lattice
 from crazyflie_mission_api.group_state import Rules
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 
-SPACING = 0.7  #: Between neighbours, m.
-LAYERS = DOWNWASH * SPACING  #: From one layer of the lattice to the next, m.
+SPACING = 0.7  #: Distance of neighbours (m).
+LAYERS = DOWNWASH * SPACING  #: Distance of the layers of the lattice (m).
 
 LIMITS = Limits(speed=1.0, acceleration=1.5)
 
@@ -45,7 +45,7 @@ def mission(fleet: VehicleGroup) -> None:
 
 
 def square(n: int) -> Array:
-    """Return where the vehicles stand, m."""
+    """Return the start points of the vehicles, m."""
     side = math.ceil(math.sqrt(n))
     return lattice((side, side, 1), 1.0, (0.0, 0.0, 0.0))[:n]
 

@@ -1,4 +1,4 @@
-"""Dry runs: missions of ideal vehicles, with the checks of a flight, in no time."""
+"""Dry runs: missions of ideal vehicles, with the checks of a flight, without waiting."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -12,7 +12,7 @@ from crazyflie_mission_api.mission_vehicle import Clock
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_model.angles import Triple
 
-_STEP = 0.05  #: Of time, s.
+_STEP = 0.05  #: Time step (s).
 
 
 class DryRunClock(Clock):
@@ -37,7 +37,7 @@ class DryRunClock(Clock):
 class DryRun(VehicleGroup):
     """A group of ideal vehicles.
 
-    By the names of vehicles: ``starts``, positions before takeoff, m; fences (``bounds``);
+    Mappings by vehicle name: ``starts``, positions before takeoff, m; fences (``bounds``);
     ``headings``, rad, 0 by default; ``start_skews``, s, 0 by default. ``on_step(group)`` is called
     whenever time passes.
     """

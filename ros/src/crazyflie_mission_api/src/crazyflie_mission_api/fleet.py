@@ -41,7 +41,7 @@ from crazyflie_utils.parameters.types import BOOLEAN, FRAME, Number
 from crazyflie_utils.process import Process
 from crazyflie_utils.timers import Timer
 
-_FROZEN = 10.0  #: How long simulated time may stand still, s of the machine's clock.
+_FROZEN = 10.0  #: Longest time that /clock may stand still (s of the machine's clock).
 
 _SERVICES = (
     "takeoff",
@@ -57,13 +57,13 @@ _SERVICES = (
     "arm",
 )
 
-#: How long messages of all missions are awaited at the start, s of the machine's clock: the nodes
-#: of those that were killed are known to the master, and send none.
+#: Longest time to wait for messages of all missions at the start (s of the machine's clock): killed
+#: missions, whose nodes are still registered with the master, send none.
 _MISSIONS_LIMIT = 1.0
 
-_OBSTACLE_LIMIT = 1.0  #: For the position of another mission's vehicle, s of the machine's clock.
+_OBSTACLE_LIMIT = 1.0  #: Timeout for positions of other missions' vehicles (s, machine's clock).
 
-_POLL = 0.2  #: Between two searches for vehicles, s.
+_POLL = 0.2  #: Period of the search for vehicles (s).
 
 _YAW_STATE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 
@@ -101,27 +101,27 @@ class RosClock(Clock):
 
 
 class Fleet(VehicleGroup):
-    """The vehicles of a mission, as they are on the ROS graph.
+    """The vehicles of a mission on the ROS graph.
 
     A vehicle ``NAME`` is flown by the services that it offers: those of a `HighLevelNode`,
     ``/NAME/high_level/go_to`` and so on; or the driver's, ``/NAME/go_to``; or, where there is
     only a takeoff server, by a `HighLevelNode` in this process. ``"/"`` is a vehicle without a
-    namespace. To be used in a with block, at the end of which all have landed.
+    namespace. Use it in a with block; at the end of the block, all vehicles land.
 
     Parameters
     ----------
     names : sequence of str, or str or Path
         Names of vehicles; or a fleet file (see `crazyflie_fleet.fleet_file`), NAME.yaml.
     bounds : Bounds, optional
-        Where they may fly; a vehicle's geofence counts as well.
+        Box that they may fly in; a vehicle's geofence limits it, too.
     limits : Limits, optional
         Of trajectories.
     separation, tolerance, arrival_timeout : float
         See `Rules`.
     startup_timeout : float
-        Until all vehicles are found, s of the machine's clock.
+        Longest time until all vehicles are found, s of the machine's clock.
     process : Process, optional
-        By default this script becomes a node, unless it is one.
+        By default this script is made a node, unless it is one.
 
     Raises
     ------
@@ -182,7 +182,7 @@ class Fleet(VehicleGroup):
 
     @override
     def adopt(self, name: str) -> None:
-        """Note that a vehicle flies by other commands: it is landed at the end."""
+        """Register a vehicle that flies by other commands: it is landed at the end."""
         self.observer.check()
         is_new = name not in self.flying
         super().adopt(name)
@@ -224,7 +224,7 @@ class Fleet(VehicleGroup):
     # Other missions.
 
     def _claim_vehicles(self):
-        """Have other missions know the vehicles, unless another one has them."""
+        """Claim the vehicles, unless another mission has them."""
         if self.observer.dry_runs_only:
             return
         end = time.monotonic() + _MISSIONS_LIMIT
@@ -354,7 +354,7 @@ def _connect(process, handle, names, timeout):
 
 
 def _how_seen(handle, name, services):
-    """Return of a vehicle what `RosVehicleState` asks for: uses_driver, frames, has_yaw."""
+    """Return the arguments of `RosVehicleState` for a vehicle: uses_driver, frames, has_yaw."""
     top = prefix(name)
     if f"{top}/high_level/go_to" in services:
         has_yaw = handle.get_param(f"{top}/high_level/reference/yaw", BOOLEAN, False)
@@ -381,7 +381,7 @@ def _vehicle(process, handle, name, services, synchronized_start):
 
 
 def _frames(handle, commander):
-    # In a fleet, one message on /tf has where all are.
+    # In a fleet, one message on /tf has the poses of all vehicles.
     fixed, own = (
         handle.get_param(f"{commander}/frames/{frame}", FRAME, None) for frame in ("fixed", "robot")
     )
@@ -389,12 +389,12 @@ def _frames(handle, commander):
 
 
 def topic_types(handle: NodeHandle) -> dict[str, str]:
-    """Return the types of all topics, as the master knows them."""
+    """Return the types of all topics that are registered with the master."""
     return dict(rosgraph.Master(handle.name).getTopicTypes())
 
 
 def mission_nodes(handle: NodeHandle) -> int:
-    """Return how many nodes have had missions, those included that were killed."""
+    """Return the number of mission nodes, including killed ones."""
     publishers, _, _ = rosgraph.Master(handle.name).getSystemState()
     return sum(len(nodes) for topic, nodes in publishers if topic == MISSION_TOPIC)
 
@@ -408,7 +408,7 @@ def _below(top):
 
 
 def catch_signals() -> None:
-    """Have SIGINT and SIGTERM raise, so that what lands at the end of a script is reached."""
+    """Make SIGINT and SIGTERM raise, so that a script lands its vehicles at the end."""
     # Also where the script is a node of rospy's.
     if threading.current_thread() is not threading.main_thread():
         return

@@ -22,9 +22,9 @@ def lattice(
     Parameters
     ----------
     counts : tuple, 3 components
-        How many along x, y and z.
+        Numbers along x, y and z.
     spacing : float or sequence, 3 components
-        Between neighbours, m; along x, y and z.
+        Distance of neighbours, m; along x, y and z.
     center : sequence, 3 components
         m.
 
@@ -58,7 +58,7 @@ def assign(places: Mapping[str, Sequence[float]], goals: Array) -> dict[str, Poi
     Parameters
     ----------
     places : mapping of str to x, y, z
-        Where each vehicle is, m.
+        Position of each vehicle, m.
     goals : ndarray, shape (n, 3)
         As many as vehicles, m.
     """

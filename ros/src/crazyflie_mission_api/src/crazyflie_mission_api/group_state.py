@@ -20,12 +20,12 @@ from crazyflie_model.angles import Triple
 class Rules:
     """Limits of all commands of a mission."""
 
-    limits: Limits = field(default_factory=Limits)  # Of every vehicle.
-    bounds: Bounds = EVERYWHERE  # Of every vehicle; its own fence counts as well.
-    separation: float = 0.3  # Between any two vehicles in flight, m.
-    tolerance: float = 0.15  # Distance from the goal at which a vehicle has arrived, m.
-    arrival_timeout: float = 15.0  # How long a vehicle may take beyond the planned duration, s.
-    # Collision buffers of vehicles that a fleet process keeps apart, m; see `Clearance`.
+    limits: Limits = field(default_factory=Limits)  # Limits of every vehicle.
+    bounds: Bounds = EVERYWHERE  # Box of every vehicle; its own fence limits it, too.
+    separation: float = 0.3  # Distance between any two vehicles in flight (m).
+    tolerance: float = 0.15  # Distance from the goal at which a vehicle has arrived (m).
+    arrival_timeout: float = 15.0  # Longest time of a vehicle beyond the planned duration (s).
+    # Collision buffers of vehicles that a fleet process keeps apart (m); see `Clearance`.
     buffers: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -42,7 +42,7 @@ class Rules:
 class Obstacle(NamedTuple):
     """A vehicle of another mission."""
 
-    position: Triple | None  #: m; None when it is not known.
+    position: Triple | None  #: Position (m); None if it is not known.
     is_flying: bool
 
 
@@ -57,7 +57,7 @@ class GroupState:
         self._all_vehicles = self._vehicles
         self._clock = clock
         self.rules = rules or Rules()
-        # Of all vehicles in flight; shared with subgroups.
+        # Trajectories of all vehicles in flight; shared with subgroups.
         self._commanded: dict[str, TimedTrajectory] = {}
         self.observer = MissionObserver()  #: Called at each command.
         #: Returns the vehicles of other missions, by name.
@@ -90,12 +90,12 @@ class GroupState:
         return self._clock
 
     def adopt(self, name: str) -> None:
-        """Note that a vehicle flies by other commands: it is landed at the end."""
+        """Register a vehicle that flies by other commands: it is landed at the end."""
         place = self._vehicles[name].position() or (0.0, 0.0, 0.0)
         self._commanded[name] = TimedTrajectory.hover(place)
 
     def release(self, name: str) -> None:
-        """Note that a vehicle that was adopted has landed."""
+        """Unregister an adopted vehicle that has landed."""
         self._commanded.pop(name, None)
 
     def time(self) -> float:
@@ -116,7 +116,7 @@ class GroupState:
 
     @command
     def wait(self, seconds: float) -> None:
-        """Let time pass, s, while the vehicles fly on."""
+        """Wait, s, while the vehicles fly on."""
         self._wait(never, self.time() + number(seconds, "wait", 0.0))
 
     def arrive(self) -> None:
@@ -143,7 +143,7 @@ class GroupState:
             self._commanded.pop(name, None)
         raise_failures("emergency", failures)
 
-    # What commands have in common.
+    # Common parts of commands.
 
     def _shortest_duration(self, pieces):
         return trajectory.duration(within_limits(pieces, self.rules.limits))
@@ -154,7 +154,7 @@ class GroupState:
     def _check_apart(self, changed):
         """Check trajectories together with those of all other vehicles.
 
-        Vehicles of other missions count where they are: those missions check them among each other.
+        Vehicles of other missions have fixed positions: their missions check them among each other.
         """
         on_ground = {
             name: vehicle.position()
@@ -182,7 +182,7 @@ class GroupState:
     def _answers(self, command, names=None):
         """Return why ``command(name)`` was refused: name to reason; by default of all vehicles."""
         futures = {name: command(name) for name in (self._vehicles if names is None else names)}
-        # Their limit is one of the machine's clock: simulated time may fly past a slow answer.
+        # Their timeout is by the machine's clock: simulated time may run faster than a slow answer.
         self._clock.wait_until(lambda: all(f.done() for f in futures.values()), math.inf)
         errors = {name: future.exception() for name, future in futures.items()}
         return {name: str(error) for name, error in errors.items() if error is not None}

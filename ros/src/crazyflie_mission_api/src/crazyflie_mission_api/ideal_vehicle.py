@@ -1,4 +1,4 @@
-"""A vehicle that is always where its plan says: of dry runs, and of Crazyswarm's --sim."""
+"""A vehicle that follows its plan without an error: for dry runs and Crazyswarm's --sim."""
 
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -14,7 +14,7 @@ from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_model.trajectory import Pieces, Trajectory
 
-_MIN_DURATION = 0.01  #: Of a plan, s, as the firmware's.
+_MIN_DURATION = 0.01  #: Shortest duration of a plan, as in the firmware (s).
 
 
 class IdealVehicle(MissionVehicle):
@@ -26,7 +26,7 @@ class IdealVehicle(MissionVehicle):
     time : callable
         Returns the time, s.
     position : tuple, 3 components
-        At the beginning, on the ground, m.
+        Position at the beginning, on the ground, m.
     yaw : float
         rad.
     bounds, start_skew
@@ -56,7 +56,7 @@ class IdealVehicle(MissionVehicle):
         return self._flies or self._time() < self.trajectory.end
 
     def planned(self) -> Goal[float]:
-        """Return where the plan is now; the next one begins there."""
+        """Return the present goal of the plan, at which the next plan begins."""
         return self.trajectory.goal(self._time())
 
     @override

@@ -1,4 +1,4 @@
-"""Landing of the vehicles of a group: in rounds, from below, none on another."""
+"""Landing of the vehicles of a group: in rounds, the lowest first, none on another."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,14 +14,14 @@ from crazyflie_mission_api.mission_vehicle import never
 from crazyflie_mission_api.observer import command
 from crazyflie_mission_api.trajectories import TimedTrajectory, check_with_skew, straight
 
-_DESCENT_SPEED = 0.3  #: Mean speed of landings, m/s.
-_SHORTEST_LANDING = 2.0  #: s.
+_DESCENT_SPEED = 0.3  #: Mean speed of landings (m/s).
+_SHORTEST_LANDING = 2.0  #: Shortest duration of a landing (s).
 
-#: A moving vehicle stops at its goal of this much later, within this duration, s: so it begins with
-#: the speed that it has.
+#: A moving vehicle stops at its goal of this time ahead, within this duration (s): it begins with
+#: its present speed.
 _STOP_AHEAD, _STOP_DURATION = 1.0, 2.0
 
-_PERIOD = 0.05  #: Between two looks at vehicles that land, s.
+_PERIOD = 0.05  #: Period of the checks of vehicles that land (s).
 
 
 class LandingGroup(GroupState):
@@ -38,7 +38,7 @@ class LandingGroup(GroupState):
         Raises
         ------
         MissionError
-            Two would meet; or some cannot land, and which.
+            Two would come too near; or some cannot land, which are named.
         """
         raise_failures("land", self._land_all(is_checked=True))
 
@@ -80,7 +80,7 @@ class LandingGroup(GroupState):
         for name, vehicle in self._all_vehicles.items():
             measured = vehicle.position()
             if name in self._commanded:
-                # Commanded positions were checked; a vehicle that is not there counts where it is.
+                # Commanded positions were checked; a vehicle away from its own has the real one.
                 places[name] = commanded = self._commanded[name].goal(self.time()).position
                 if measured is None or math.dist(measured, commanded) <= self.rules.tolerance:
                     continue
@@ -115,7 +115,7 @@ class _Landing(LandingSide):
         self.arrival_timeout = group.rules.arrival_timeout
         self._group = group
         self._is_checked = is_checked
-        # Those that were told to land, and when they should be down, s.
+        # Vehicles that were commanded to land, and the planned end of their landing (s).
         self._descending: list[str] = []
         self._end = 0.0
 

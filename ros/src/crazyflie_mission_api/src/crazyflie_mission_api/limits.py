@@ -20,20 +20,20 @@ SCALE = np.array([1.0, 1.0, 1.0 / DOWNWASH])
 
 
 class MissionError(Exception):
-    """A mission cannot be flown; the text names what, its value, and what was expected."""
+    """A mission cannot be flown; the text names the cause, its value and the expected one."""
 
 
 @dataclass(frozen=True)
 class Limits:
     """Largest demands of a trajectory on a vehicle."""
 
-    #: speed, acceleration: m/s, m/s^2.
+    #: speed, acceleration: Largest ones (m/s, m/s^2).
     speed: float = 0.5
     acceleration: float = 1.0
-    yaw_rate: float = 1.5  #: rad/s.
-    #: Of the thrust against the vertical, rad; as much as controllers ask for.
+    yaw_rate: float = 1.5  #: Largest yaw rate (rad/s).
+    #: Largest angle between thrust and vertical (rad), that of controllers.
     tilt: float = MAX_TILT
-    #: min_thrust, max_thrust: m/s^2, as much as controllers ask for.
+    #: min_thrust, max_thrust: Range of the thrust (m/s^2), that of controllers.
     min_thrust: float = MIN_THRUST
     max_thrust: float = MAX_THRUST
 
@@ -52,7 +52,7 @@ class Limits:
 class Bounds:
     """The box that vehicles may fly in."""
 
-    #: lower, upper: Its corners, m, in the frame of the vehicles' states.
+    #: lower, upper: Corners, in the frame of the vehicles' states (m).
     lower: tuple[float, float, float]
     upper: tuple[float, float, float]
 
@@ -69,7 +69,7 @@ class Bounds:
             )
 
     def within(self, other: "Bounds") -> "Bounds":
-        """Return the box that is in both."""
+        """Return the intersection of both boxes."""
         lower = np.maximum(self.lower, other.lower).tolist()
         return Bounds(tuple(lower), tuple(np.minimum(self.upper, other.upper).tolist()))
 
@@ -81,7 +81,7 @@ class Bounds:
         positions : ndarray, shape (3,) or (n, 3)
             m.
         what : str
-            What they are, for the text of the error.
+            Name of the positions for the text of the error.
 
         Raises
         ------
@@ -97,7 +97,7 @@ class Bounds:
                     )
 
 
-#: Above the ground.
+#: All positions above the ground.
 EVERYWHERE = Bounds((-math.inf, -math.inf, 0.0), (math.inf, math.inf, math.inf))
 
 
@@ -107,7 +107,7 @@ def point(value: Sequence[float], what: str) -> Array:
     Raises
     ------
     MissionError
-        It is no three finite numbers.
+        The value is not three finite numbers.
     """
     try:
         array = np.asarray(value, dtype=float)
@@ -137,18 +137,18 @@ def number(value: float, what: str, minimum: float = -math.inf, above: float = -
 
 @dataclass(frozen=True)
 class Clearance:
-    """Distances that the vehicles of a mission keep, m.
+    """Distances between the vehicles of a mission, m.
 
     A fleet process holds a vehicle that comes nearer to another than both their ``buffers``, and
     releases it when it is `crazyflie_fleet.separation.RELEASE_RATIO` times as far away: a mission
     keeps that distance.
     """
 
-    separation: float = 0.3  # Of any two; `DOWNWASH` times as much one above the other.
+    separation: float = 0.3  # Distance of any two; `DOWNWASH` times as much vertically (m).
     buffers: Mapping[str, float] = field(default_factory=dict)
 
     def limits(self, names: Sequence[str]) -> Array:
-        """Return how far apart each two of n vehicles have to be, shape (n, n), m."""
+        """Return the distance that each two of n vehicles must keep, shape (n, n), m."""
         radii = np.array([self.buffers.get(name, -np.inf) for name in names])
         return np.maximum(self.separation, RELEASE_RATIO * (radii[:, None] + radii))
 
@@ -160,13 +160,13 @@ class Clearance:
         Parameters
         ----------
         names : sequence of str
-            Of n vehicles, two at least.
+            Names of n vehicles, two at least.
         times : ndarray, shape (m,)
-            From now, s.
+            Times from now, s.
         places : ndarray, shape (n, m, 3)
-            Where each is then, m.
+            Positions of the vehicles at these times, m.
         resting : collection of str
-            Those on the ground with their motors off: two of them may be at any distance.
+            Vehicles on the ground with their motors off: two of them may be at any distance.
 
         Raises
         ------
@@ -187,7 +187,7 @@ class Clearance:
         self._check_speeds(names, times, places)
 
     def _check_speeds(self, names, times, places):
-        """Refuse what the fleet would hold, which extrapolates positions."""
+        """Refuse motions at which the fleet, which extrapolates positions, would hold vehicles."""
         watched = [k for k, name in enumerate(names) if name in self.buffers]
         if len(watched) < 2 or len(times) < 3:
             return

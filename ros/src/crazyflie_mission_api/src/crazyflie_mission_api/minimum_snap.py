@@ -3,12 +3,12 @@
 Of all curves that pass points at given times, at rest at both ends, the one with the least
 integral of the squared fourth derivative (snap) is the spline of degree 7 whose first three
 derivatives vanish at the ends: the theorem of Holladay for splines of odd degree (de Boor, A
-Practical Guide to Splines). So scipy's interpolation finds it, and its pieces are what a
-vehicle's memory holds.
+Practical Guide to Splines). So scipy's interpolation calculates it, and a vehicle's memory can
+hold its pieces.
 
-How the time is shared among the ways between waypoints is what makes the snap least, too, with
-the whole time given. Both from Mellinger and Kumar, Minimum Snap Trajectory Generation and
-Control for Quadrotors (ICRA 2011). Without it the curve swings out far beyond its waypoints.
+For a given total time, the durations between waypoints are chosen for the least snap, too.
+Otherwise the curve swings out far beyond its waypoints. Both are from Mellinger and Kumar, Minimum
+Snap Trajectory Generation and Control for Quadrotors (ICRA 2011).
 """
 
 import itertools
@@ -27,8 +27,8 @@ _REST = [(order, np.zeros(4)) for order in (1, 2, 3)]
 
 #: Gauss's rule of 4 points is exact up to degree 7; squared snap has degree 6.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
-_ITERATIONS = 20  #: Of the search for the times; later ones change little.
-_NEAREST = 1e-3  #: Distance of two waypoints below which they are the same, m or rad.
+_ITERATIONS = 20  #: Number of iterations of the search for the times; later ones change little.
+_NEAREST = 1e-3  #: Distance below which two waypoints are the same (m or rad).
 
 
 def plan(
@@ -39,23 +39,23 @@ def plan(
     Parameters
     ----------
     waypoints : sequence of [x, y, z] or [x, y, z, yaw]
-        At least two, m and rad; the heading of one without is that of the one before, or 0.
+        At least two, m and rad; without a yaw, a waypoint has that of the one before, or 0.
     limits : Limits, optional
         The trajectory is as quick as they allow.
     what : str
-        What a waypoint is called in errors.
+        Name of a waypoint in errors.
 
     Raises
     ------
     MissionError
-        There are too few; one is not what is expected; or two that follow each other are the same.
+        There are too few waypoints, one is invalid, or two in a row are the same.
     """
     points = _points(waypoints, what)
     return within_limits(_pieces(points, best_times(points)), limits or Limits())
 
 
 def best_times(points: Array) -> Array:
-    """Return when to be at the points, shape (n,), in parts of the whole time.
+    """Return the times of the points, shape (n,), as fractions of the total time.
 
     Parameters
     ----------

@@ -23,15 +23,15 @@ from crazyflie_mission_api import Fleet, Limits, MissionError, observer
 from crazyflie_mission_api.observer import NO_DRY_RUN, MissionObserver
 from crazyflie_utils import ParameterError
 
-_HEIGHT = 1.0  #: Of a trajectory's takeoff, m.
-#: Of trajectories in files: they are flown as they are, or not at all.
+_HEIGHT = 1.0  #: Height of the takeoff before a trajectory (m).
+#: Limits of trajectories in files, which are flown unchanged or refused.
 _LIMITS = Limits(speed=1.5, acceleration=2.5)
-_PERIOD = 0.2  #: From one point of a path that is shown to the next, s.
-_SHOWN_NAMES = 4  #: More vehicles than these are counted, not named.
+_PERIOD = 0.2  #: Time between two points of a displayed path (s).
+_SHOWN_NAMES = 4  #: Largest number of vehicles that are named; more are counted.
 
 
 class Done(BaseException):
-    """The dry run has been made: the script is to go no further."""
+    """Ends the script after its dry run."""
 
 
 class _Printer(MissionObserver):
@@ -44,7 +44,7 @@ class _Printer(MissionObserver):
         self._first = time if self._first is None else self._first
         count = len(vehicles)
         names = ", ".join(vehicles) if count <= _SHOWN_NAMES else f"{count} vehicles"
-        # Where the output leads to a program that has ended; the vehicles still have to land.
+        # The program that reads the output may have ended; the vehicles must land all the same.
         with contextlib.suppress(OSError):
             print(f"{time - self._first:7.1f} s  {command}: {names}", flush=True)
 
@@ -84,7 +84,7 @@ def main(arguments: list[str]) -> int:
     if not os.path.isfile(path):
         parser.error(f"there is no file {path}; expected a script, or a trajectory (CSV)")
     observer.of_process = _DryRunReport() if is_dry else _Printer()
-    # As for a program that is started by its own name.
+    # As if the program were started directly.
     sys.argv, sys.path[0] = [path, *others], os.path.dirname(os.path.abspath(path))
     try:
         if path.endswith(".csv"):

@@ -1,4 +1,4 @@
-"""What missions ask of a vehicle, and of its clock."""
+"""Interfaces of a vehicle, and of its clock, for missions."""
 
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -8,11 +8,11 @@ from crazyflie_mission_api.limits import Bounds
 from crazyflie_model.angles import Triple
 from crazyflie_model.trajectory import Pieces
 
-MEMORY = 31  #: Pieces that the memory of a vehicle holds.
+MEMORY = 31  #: Number of pieces that fit into the memory of a vehicle.
 
 
 class HighLevelCommands(Protocol):
-    """What missions and Crazyswarm's scripts command; see `crazyflie_py.backend`.
+    """Commands of missions and of Crazyswarm's scripts; see `crazyflie_py.backend`.
 
     A ``group_mask`` other than 0 restricts a command to members of these groups.
     """
@@ -48,8 +48,8 @@ class MissionVehicle(HighLevelCommands, Protocol):
     """
 
     name: str
-    bounds: Bounds  #: Its fence.
-    #: How much later than others that are called to `start` in a row it may begin, s.
+    bounds: Bounds  #: Box of its fence.
+    #: Largest delay of its start if several vehicles are called to `start` in a row (s).
     start_skew: float
 
     def position(self) -> Triple | None:
@@ -65,7 +65,7 @@ class MissionVehicle(HighLevelCommands, Protocol):
         """Return whether the vehicle is on the ground, with its motors off."""
 
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
-        """Take a trajectory, to be uploaded or streamed."""
+        """Prepare a trajectory, to be uploaded or streamed."""
 
     def start(self) -> "Future[Any]":
         """Fly the trajectory that was prepared last."""

@@ -1,4 +1,4 @@
-"""What the program that runs a user's mission is told of it, and allows it."""
+"""Observer of a user's mission, by which the program that runs it follows and restricts it."""
 
 import functools
 from collections.abc import Callable
@@ -15,19 +15,19 @@ class MissionObserver:
     """Is called at each command of fleets; does nothing itself."""
 
     dry_runs_only = False  #: Fleets refuse every command; `Fleet.fly` makes its dry run.
-    command = ""  #: The command that is carried out; those that it is made of are not told.
+    command = ""  #: The command that is carried out; its parts are not reported.
 
     def begin(self, command: str, vehicles: list[str], time: float) -> None:
-        """Hear that a command to vehicles begins, at their time (s)."""
+        """Process the beginning of a command to vehicles, at their time (s)."""
 
     def end(self, command: str, vehicles: list[str], time: float) -> None:
-        """Hear that a command has ended or failed."""
+        """Process the end or failure of a command."""
 
     def step(self, group: Any) -> None:
-        """Hear that time passes in a dry run, of a `DryRun`."""
+        """Process a time step of a dry run; ``group`` is its `DryRun`."""
 
     def passed(self, vehicles: list[str], duration: float) -> None:
-        """Hear that `Fleet.fly` has made a dry run, which took a duration (s)."""
+        """Process the end of a dry run by `Fleet.fly`, which took a duration (s)."""
 
     def check(self) -> None:
         """Raise MissionError if vehicles must not be commanded."""
@@ -39,7 +39,7 @@ of_process = MissionObserver()  #: The observer of each `Fleet` that is made fro
 
 
 def command(method: _Method) -> _Method:
-    """Have the observer of a group called before and after a method."""
+    """Wrap a method so that the observer of its group is called before and after it."""
     name = method.__name__
 
     @functools.wraps(method)

@@ -29,20 +29,20 @@ from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.parameters.types import FINITE
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 
-_LANDED_HEIGHT = 0.1  #: Above the start, m: a vehicle below has landed.
-#: States after a flight.
+_LANDED_HEIGHT = 0.1  #: Largest height above the start of a vehicle that has landed (m).
+#: Flight states after the flight.
 _ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
 
-_STEP = 0.02  #: Vehicles that are to start within this time, s, are named in one message.
+_STEP = 0.02  #: Time within which starts of vehicles are combined in one message (s).
 ALL_OF_FLEET = f"/all/{HIGH_LEVEL}"  #: Namespace of a fleet's services for all.
-CALL_TIMEOUT = 60.0  #: Of a service, s of the machine's clock.
-_SETTLING_TIME = 0.5  #: After the planned end of a landing, s.
+CALL_TIMEOUT = 60.0  #: Timeout of a service (s of the machine's clock).
+_SETTLING_TIME = 0.5  #: Time after the planned end of a landing until the vehicle is down (s).
 _HIGH_LEVEL = "commander/enHighLevel"  #: The firmware parameter that enables high-level commands.
-_HOLD_DURATION = 0.5  #: Of the go_to at the end of a stream, to where the vehicle is, s.
-_HOLD_TIMEOUT = 3.0  #: Of its answer, s of the machine's clock; the driver's own timeout is 1 s.
+_HOLD_DURATION = 0.5  #: Duration of the go_to to the vehicle's place at the end of a stream (s).
+_HOLD_TIMEOUT = 3.0  #: Timeout of its answer (s of the machine's clock); the driver's is 1 s.
 
-#: How long a landing is tried while setpoints are streamed, s: without an answer they would end
-#: with the mission, and the vehicle would fall.
+#: Time for which a landing is retried while setpoints are streamed (s): without an answer they
+#: would end with the mission, and the vehicle would fall.
 _LANDING_RETRY_TIME = 10.0
 
 
@@ -62,7 +62,7 @@ def velocity_between(first: Pose, last: Pose) -> Triple:
 
 
 class RosVehicleState:
-    """Where a vehicle is, whether it can fly on, and whether it has landed.
+    """Pose of a vehicle, whether it can fly on, and whether it has landed.
 
     The driver publishes its pose and status; otherwise the takeoff server its status, and an
     estimator its state. ``frames`` are the fixed and its own frame, if its position comes by tf;
@@ -82,12 +82,12 @@ class RosVehicleState:
         self._handle = handle
         self.uses_driver = uses_driver
         self.has_yaw = has_yaw
-        #: flight_status, driver_status: The last ones.
+        #: flight_status, driver_status: The last messages.
         self.flight_status = FlightStatus()
         self.driver_status = VehicleStatus(link=VehicleStatus.CONNECTING)
         self._pose: Pose | None = None
         self._seen_at = -math.inf
-        # Of the last takeoff, m, and of the last landing, s.
+        # Height of the ground at the last takeoff (m), and planned end of the last landing (s).
         self._ground = 0.0
         self._landing_end = 0.0
         top = prefix(name)
@@ -113,7 +113,7 @@ class RosVehicleState:
         return 0.0 if pose is None else heading(*pose.rotation)
 
     def pose(self) -> Pose | None:
-        """Return where the vehicle is; None when that is not known."""
+        """Return the pose of the vehicle; None if it is not known."""
         if self._handle.time() - self._seen_at < MAX_POSITION_AGE:
             return self._pose
         if self._lookup is None:
@@ -124,7 +124,7 @@ class RosVehicleState:
             return None
         # tf keeps the last pose of a vehicle that is not tracked any more.
         age = (self._handle.nanoseconds() - pose.stamp) * 1e-9
-        # A pose far ahead of now is one from before the clock was set back.
+        # A pose far ahead of now is from before the clock was set back.
         if not -MAX_FUTURE_STAMP_SIMULATED <= age < MAX_POSITION_AGE:
             return None
         return Pose(pose.position, pose.rotation, pose.stamp * 1e-9)
@@ -158,7 +158,7 @@ class RosVehicleState:
             is_down = not is_flying
         else:
             is_down = place is not None and place[2] < self._ground + _LANDED_HEIGHT
-        # Then the mission stops the motors: not in the last centimetres.
+        # Then the mission stops the motors, which must not happen in the last centimetres.
         return is_down and self._handle.time() >= self._landing_end
 
     def _on_pose(self, message):
@@ -194,7 +194,7 @@ class SynchronizedStart:
         handle.timer(_STEP, self._on_timer)
 
     def start(self, node: str) -> None:
-        """Have a `HighLevelNode` start its uploaded trajectory 0."""
+        """Make a `HighLevelNode` start its uploaded trajectory 0."""
         self._handle.submit(lambda: self._names.append(node))
 
     def _on_timer(self):
@@ -206,7 +206,7 @@ class SynchronizedStart:
 class BroadcastStart:
     """Starts the uploaded trajectory 0 of all vehicles of a driver by its service for all.
 
-    Fewer than all, which are called within `_STEP`, are called one by one.
+    If fewer vehicles are to start within `_STEP`, they are called one by one.
     """
 
     def __init__(self, handle: NodeHandle, top: str, names: Collection[str]):
@@ -305,7 +305,7 @@ class RosVehicle(RosVehicleState, MissionVehicle):
 
         if not self.uses_driver:
             return climb()
-        # The first call waits for the driver to have read the parameters, which it sets then.
+        # The first call waits until the driver has read the parameters, which it sets then.
         parameter = f"{prefix(self.name)}/{_HIGH_LEVEL}"
         return in_turn(
             lambda: self.call("update_params", srv.UpdateParams, []),
@@ -404,5 +404,5 @@ def fence(handle: NodeHandle, top: str) -> Bounds:
 
 
 def seconds(duration: float) -> genpy.Duration:
-    """Return a duration, s, as ROS has it."""
+    """Return a duration, s, as a ROS duration."""
     return genpy.Duration.from_sec(duration)

@@ -16,13 +16,13 @@ from crazyflie_model.polynomials import Goal
 from crazyflie_model.trajectory import Pieces
 from crazyflie_utils import NodeHandle
 
-STEP = 0.02  #: From one setpoint to the next, s.
+STEP = 0.02  #: Period of the setpoints (s).
 
-#: Of a command, s. From `OVERLAP` after it the driver passes setpoints on again, which take the
-#: vehicle back from the command: one that is accepted later than this is sent again.
+#: Longest time until a command is accepted (s): a later one is sent again. From `OVERLAP` after a
+#: command, the driver passes setpoints on again, which override the command.
 MAX_ANSWER_TIME = OVERLAP / 2.0
 
-RETRY_PERIOD = 1.0  #: From a command that has failed to the next try, s.
+RETRY_PERIOD = 1.0  #: Time from a failed command to the next try (s).
 
 Send = Callable[[], "Future[Any]"]
 
@@ -39,7 +39,7 @@ class _Command:
 
 
 class SetpointStream:
-    """Full-state setpoints along a trajectory, then of rest at its end.
+    """Full-state setpoints along a trajectory, then at rest at its end.
 
     Setpoints have priority over the firmware's high-level commander, which they stop; without any,
     the firmware levels out after 0.5 s and stops the motors after 2 s. So they go on until the
@@ -51,11 +51,11 @@ class SetpointStream:
     ----------
     handle : NodeHandle
     topic : str
-        The driver's, of crazyflie_driver/FullState.
+        The driver's topic of crazyflie_driver/FullState.
     frame : str
-        Of the setpoints.
+        Frame of the setpoints.
     hold : callable
-        ``hold(goal)`` has the vehicle stay at a `Goal`; it returns the future of the answer.
+        ``hold(goal)`` commands the vehicle to stay at a `Goal`; it returns the answer's future.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class SetpointStream:
         return command.outcome
 
     def stop(self) -> None:
-        """End the setpoints at once, whatever becomes of the vehicle."""
+        """End the setpoints at once, without a command that takes over."""
         self._trajectory = None
 
     def fault(self) -> str:

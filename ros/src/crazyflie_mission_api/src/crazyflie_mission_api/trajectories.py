@@ -1,4 +1,4 @@
-"""Trajectories of polynomials: their demands on a vehicle, who is where at a time, and checks."""
+"""Trajectories of polynomials: demands on a vehicle, positions over time, and checks."""
 
 import math
 from collections.abc import Callable, Collection, Mapping
@@ -12,7 +12,7 @@ from crazyflie_model.polynomials import Goal, PolynomialPiece, at_rest, evaluate
 from crazyflie_model.trajectory import Pieces, Trajectory, duration, stretched
 from crazyflie_model.units import GRAVITY
 
-SAMPLES = 30  #: Points of a piece that are evaluated.
+SAMPLES = 30  #: Number of points of a piece that are evaluated.
 
 _UNITS = {
     "speed": "m/s",
@@ -24,9 +24,9 @@ _UNITS = {
 }
 _TOLERANCE = 1e-6
 
-_SHORTEST = 1e-3  #: Of a trajectory, s: one that does not move has no demands.
+_SHORTEST = 1e-3  #: Shortest duration of a trajectory (s): one without motion has no demands.
 
-_STEP = 0.05  #: Between two times at which distances are checked, s.
+_STEP = 0.05  #: Time between two checks of distances (s).
 
 START_SKEW = 0.15
 """Largest difference between the starts of vehicles behind the driver, s.
@@ -64,7 +64,7 @@ def demands(values: Array) -> dict[str, Array]:
     Parameters
     ----------
     values : ndarray, shape (3, 4, n)
-        As of `sampled`.
+        As from `sampled`.
     """
     _, velocity, acceleration = values
     thrust = acceleration[:3] + [[0.0], [0.0], [GRAVITY]]
@@ -91,7 +91,7 @@ def excess(pieces: Pieces, limits: Limits) -> dict[str, tuple[float, float]]:
 
 
 def check_numbers(pieces: Pieces, what: str) -> None:
-    """Refuse what is no trajectory: without pieces, or with numbers that mean nothing.
+    """Refuse an invalid trajectory: without pieces, or with numbers that are not finite.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def check_numbers(pieces: Pieces, what: str) -> None:
 def check(pieces: Pieces, limits: Limits, bounds: Bounds, what: str, slower: str) -> None:
     """Refuse a trajectory that demands too much, or leaves the bounds.
 
-    The error has ``what`` it is, and what would make it ``slower``.
+    The error names ``what`` it is, and a remedy that makes it ``slower``.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def within_limits(pieces: Pieces, limits: Limits) -> list[PolynomialPiece]:
 class TimedTrajectory:
     """A trajectory from ``begin`` (s) on, then rest at its end.
 
-    ``start_skew`` is how much later the vehicle may begin, s.
+    ``start_skew`` is the largest delay of the vehicle's start, s.
     """
 
     def __init__(self, plan: Pieces | Trajectory, begin: float, start_skew: float = 0.0):
@@ -191,7 +191,7 @@ class TimedTrajectory:
         return self._trajectory.evaluate(math.inf)
 
     def later(self, delay: float) -> "TimedTrajectory":
-        """Return the trajectory of a vehicle that begins later, s."""
+        """Return the trajectory with a delay, s."""
         return TimedTrajectory(self._trajectory, self.begin + delay, self.start_skew)
 
     def positions(self, times: Array) -> Array:
@@ -206,7 +206,7 @@ def check_with_skew(
     now: float,
     check: Callable[[Mapping[str, TimedTrajectory]], None],
 ) -> None:
-    """Check trajectories, also with each vehicle that may begin late later than the others.
+    """Check trajectories, also with a delay of each vehicle that may begin late.
 
     ``check(trajectories)`` raises `MissionError`; ``now`` is in s.
     """

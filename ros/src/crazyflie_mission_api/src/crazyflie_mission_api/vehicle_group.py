@@ -21,9 +21,9 @@ from crazyflie_model.trajectory import Pieces, duration, moved, stretched
 
 Point = Sequence[float]
 
-_SHORTEST_CLIMB = 2.0  #: s.
-_MIN_CLIMB = 0.1  #: Lowest takeoff, above the start, m.
-_CLIMB_STEP = 0.1  #: Between two heights of a climb at which distances are checked, m.
+_SHORTEST_CLIMB = 2.0  #: Shortest duration of a takeoff (s).
+_MIN_CLIMB = 0.1  #: Least height of a takeoff above the start (m).
+_CLIMB_STEP = 0.1  #: Difference of the heights of a climb at which distances are checked (m).
 
 
 class VehicleGroup(LandingGroup):
@@ -54,7 +54,7 @@ class VehicleGroup(LandingGroup):
             climb = straight((x, y, z), goal, heading, heading)
             climbs[name] = stretched(climb, max(_SHORTEST_CLIMB, self._shortest_duration(climb)))
         self._check_climbs(height)
-        # Noted first: vehicles that have begun to take off must be landed after any error.
+        # Stored first: vehicles that have begun to take off must be landed after any error.
         self._commanded.update({n: TimedTrajectory(c, self.time()) for n, c in climbs.items()})
 
         def take_off(name):
@@ -90,7 +90,7 @@ class VehicleGroup(LandingGroup):
         duration : float, optional
             s; by default as short as the limits allow.
         relative : bool
-            Goals and ``yaw`` count from the commanded pose of each vehicle.
+            Goals and ``yaw`` are relative to the commanded pose of each vehicle.
         wait : bool
         """
         places = self._goals(goals, relative)
@@ -139,9 +139,9 @@ class VehicleGroup(LandingGroup):
         timescale : float
             2 takes twice as long.
         relative : bool
-            Move each to the commanded position of its vehicle; otherwise it has to begin there.
+            Move each to the commanded position of its vehicle; otherwise it must begin there.
         stream : bool
-            Send a real vehicle setpoint by setpoint; otherwise pieces are uploaded.
+            Stream setpoints to a real vehicle; otherwise pieces are uploaded.
         wait : bool
         """
         factor = number(timescale, "follow: timescale", 1e-3)
@@ -192,10 +192,10 @@ class VehicleGroup(LandingGroup):
         self.go_to(chosen, duration=duration, wait=wait)
         return chosen
 
-    # What commands have in common.
+    # Common parts of commands.
 
     def _check_climbs(self, height):
-        # Servers and vehicles decide how long a takeoff takes: the whole way has to be free.
+        # Servers and vehicles decide the duration of a takeoff: the whole path must be free.
         starts = {name: self.position(name) for name in self._vehicles}
         highest = max(height - z for _, _, z in starts.values())
         for climb in np.linspace(0.0, highest, math.ceil(highest / _CLIMB_STEP) + 1).tolist():

@@ -18,7 +18,7 @@ Pose = tuple[float, Triple, Quaternion]
 
 
 class MotionCapture:
-    """Poses as they are measured: with noise, some of them late, some never.
+    """Measured poses: with noise, latency and dropouts.
 
     All attributes may be changed at any time. The same ``seed`` gives the same errors to the same
     poses.
@@ -32,10 +32,10 @@ class MotionCapture:
         dropout: float = 0.0,
         seed: int | Sequence[int] = 0,
     ):
-        self.position_noise = position_noise  #: Standard deviation along each axis, m.
+        self.position_noise = position_noise  #: Standard deviation along each axis (m).
         #: Standard deviation of the rotation about each axis of the body, rad.
         self.attitude_noise = attitude_noise
-        self.latency = latency  #: Time from a measurement to its arrival, s.
+        self.latency = latency  #: Time from a measurement to its arrival (s).
         self.dropout = dropout  #: Probability in [0, 1] that a pose is lost.
         self._seed = seed
         self._in_transit: deque[Pose] = deque()
@@ -46,7 +46,7 @@ class MotionCapture:
 
     @property
     def is_perfect(self) -> bool:
-        """Whether poses arrive as they are, each at once."""
+        """Whether poses arrive without errors and latency."""
         errors = (self.position_noise, self.attitude_noise, self.latency, self.dropout)
         return not (any(errors) or self._in_transit)
 
@@ -68,7 +68,7 @@ class MotionCapture:
         self._in_transit.append((time, position, quaternion))
 
     def arrivals(self, time: float) -> list[Pose]:
-        """Return the poses that have arrived since the call before, oldest first."""
+        """Return the poses that have arrived since the last call, oldest first."""
         arrived = []
         while self._in_transit and self._in_transit[0][0] + self.latency <= time + 1e-9:
             arrived.append(self._in_transit.popleft())

@@ -26,10 +26,10 @@ from crazyflie_utils.parameters.types import (
 from crazyflie_utils.vectors import to_tuple
 
 LATENESS = 0.1
-"""A tick that comes later than this is late, s: poses of the time before are left out."""
+"""Delay above which a tick is late (s): poses of the time before are left out."""
 
 LATE_TICKS, WINDOW = 5, 10.0
-"""So many late ticks within so many seconds are reported."""
+"""Number of late ticks, and period (s), that are reported."""
 
 
 class RealTimeWatch:
@@ -41,7 +41,7 @@ class RealTimeWatch:
         self._late: deque[float] = deque(maxlen=LATE_TICKS)
 
     def tick(self, period: float) -> None:
-        """Note a tick that was due ``period`` (s) after the one before."""
+        """Record a tick that was due ``period`` (s) after the last one."""
         now = self._handle.time()
         interval, self._last = now - self._last, now
         if interval <= period + LATENESS:
@@ -57,11 +57,11 @@ class RealTimeWatch:
             )
 
 
-#: Longest time that is integrated at once, s; more, after a jump of the clock, is skipped.
+#: Longest time that is integrated at once (s); more, after a jump of the clock, is skipped.
 MAX_CATCH_UP = 1.0
-#: Poses of the last so many seconds are broadcast late when the machine was busy.
+#: Age up to which poses are broadcast late after the machine was busy (s).
 MAX_LATENESS = 0.1
-IDLE_PERIOD = 0.1  #: Period at which a simulator without pose consumers checks for them, s.
+IDLE_PERIOD = 0.1  #: Period at which a simulator without pose consumers checks for them (s).
 
 
 class MotionCaptureParameters(Parameters):
@@ -118,14 +118,14 @@ class SimulatorParameters(Parameters):
 
 
 class SimulatorNode(Node):
-    """Fly a vehicle on the controls of a topic and broadcast its pose to tf.
+    """Simulates a vehicle with the controls of a topic, and broadcasts its pose to tf.
 
     A subclass defines the vehicle's model in `make_dynamics`.
     """
 
     needed_in_flight = True
 
-    #: A subclass of `SimulatorParameters`, where a model has parameters of its own.
+    #: `SimulatorParameters`, or a subclass if the model has parameters of its own.
     parameters_type: type[SimulatorParameters] = SimulatorParameters
     max_tilt = math.inf  #: See `SimulatedVehicle`; for models that can turn over.
 
@@ -155,7 +155,7 @@ class SimulatorNode(Node):
         self._parameters = parameters
         self._motion_capture = MotionCapture(
             **vars(parameters.mocap),
-            # Vehicles with the same seed do not make the same errors.
+            # Vehicles with the same seed have different errors.
             seed=(parameters.seed, zlib.crc32(handle.name.encode())),
         )
         self._dynamics = self.make_dynamics(parameters)
@@ -187,7 +187,7 @@ class SimulatorNode(Node):
         # would be ahead of the poses that are still to be broadcast.
         now = self._handle.time()
         self._catch_up(now)
-        # Without a clock of its own, the vehicle has to catch up all the way, so that the
+        # Without a clock of its own, the vehicle must catch up completely, so that the
         # control takes effect now and not at the last tick.
         if not self._parameters.publishes_clock:
             self._advance_to(now)
@@ -233,7 +233,7 @@ class SimulatorNode(Node):
 
     def _has_no_consumers(self):
         """Return whether poses need not be broadcast before they are looked up."""
-        # Errors are those of a sequence of poses.
+        # Errors are drawn pose by pose, in sequence.
         return self._motion_capture.is_perfect and not self._handle.has_pose_consumers()
 
     def _tick_time(self, tick):
@@ -270,7 +270,7 @@ class SimulatorNode(Node):
         if parameters.real_time_factor > 0.0:
             return 1
         wait = self._handle.next_event() - self._tick_time(self._ticks)
-        # A new consumer does not miss much.
+        # A new consumer soon gets poses.
         wait = min(max(wait, 0.0), IDLE_PERIOD)
         return max(math.ceil((wait - 1e-6) / parameters.time_step), 1)
 

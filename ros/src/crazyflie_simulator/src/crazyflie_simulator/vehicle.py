@@ -1,4 +1,4 @@
-"""A vehicle simulated in fixed steps, independent of when its state is asked for."""
+"""A vehicle simulated in fixed steps, independently of the times at which its state is read."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class SimulatedVehicle:
     """One simulated vehicle, with the firmware's watchdog.
 
     It stays put at ``position`` (m, fixed frame), from ``time`` (s) on, until the first control.
-    When controls stop coming it does what the firmware does; see `watchdog_control`. A vehicle that
+    When controls stop coming it reacts like the firmware; see `watchdog_control`. A vehicle that
     is tilted more than ``max_tilt`` (rad) has crashed: its motors stay off until `recover`.
 
     Two vehicles that are given the same controls at the same times fly the same, to the last bit,
@@ -55,25 +55,25 @@ class SimulatedVehicle:
         return self._dynamics.pose(self._x, self._effective_control())
 
     def command(self, u: Sequence[float]) -> None:
-        """Take a control, u_dim components, from the present step on."""
+        """Set the control, u_dim components, from the present step on."""
         self._u = _floats(u)
         self._control_step = self._steps
 
     def recover(self) -> None:
-        """Let a vehicle that has crashed obey the next control again."""
+        """Enable the motors of a crashed vehicle from the next control on."""
         self.has_crashed = False
         if self._control_step is not None:
             self._u = _OFF
 
     def skip(self, duration: float) -> None:
-        """Have ``duration`` (s) passed without anything having happened."""
+        """Advance the time by ``duration`` (s) without motion."""
         self._start += duration
 
     def advance_to(self, time: float) -> None:
         """Integrate to the last whole step before ``time`` (s).
 
-        A ``time`` in the past counts as a reset of the clock: the vehicle goes
-        on from there.
+        A ``time`` in the past is a reset of the clock: the vehicle continues
+        from there.
         """
         steps = math.floor((time - self.time) / STEP + 1e-6)
         if steps < -1:

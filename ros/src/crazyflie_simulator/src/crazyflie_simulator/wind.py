@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike
 
 from crazyflie_model.angles import Triple
 
-_WAVES = 64  #: Waves that a gust is made of, along each axis.
+_WAVES = 64  #: Number of waves of a gust along each axis.
 
 
 class Wind:
-    """Velocity of the air, everywhere the same, as a function of time.
+    """Velocity of the air, uniform in space, as a function of time.
 
     Along each axis the gust is a sum of cosines of equal amplitude and random phase, whose
     frequencies are spread over the spectrum of a first-order Gauss-Markov process (M. Shinozuka and

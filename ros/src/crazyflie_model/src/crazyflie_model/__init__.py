@@ -1,1 +1,1 @@
-"""What a Crazyflie is, without ROS: constants, limits, conventions, dynamics, inner loops."""
+"""Model of a Crazyflie, without ROS: constants, limits, conventions, dynamics, inner loops."""

@@ -18,7 +18,7 @@ from crazyflie_model.elementwise import Many, Number, clip, functions
 Triple = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
-_SMALLEST_COSINE = 1e-6  #: Of a pitch at which roll and yaw are distinct.
+_SMALLEST_COSINE = 1e-6  #: Least cosine of a pitch at which roll and yaw are distinct.
 
 
 @overload
@@ -34,7 +34,7 @@ def wrap_to_pi(angle: Many) -> Many:
     turned = angle + math.pi
     if isinstance(turned, float):
         return turned % (2.0 * math.pi) - math.pi
-    # The remainder, by what anything else that takes part in numpy's functions knows, too.
+    # The remainder, by functions that other types with numpy's protocols support, too.
     return turned - 2.0 * math.pi * np.floor(turned / (2.0 * math.pi)) - math.pi
 
 

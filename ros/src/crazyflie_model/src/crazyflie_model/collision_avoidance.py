@@ -15,7 +15,7 @@ from crazyflie_model.angles import Triple
 
 Array = NDArray[np.float64]
 
-#: How far within its cell a vehicle stays, m, so that two that touch do not overlap by rounding.
+#: Distance of a vehicle from the wall of its cell (m), so that two do not overlap by rounding.
 _CLEARANCE = 1e-6
 
 
@@ -23,17 +23,17 @@ _CLEARANCE = 1e-6
 class AvoidanceSettings:
     """Settings; names of the firmware's parameter group colAv in brackets."""
 
-    radii: Triple  #: Of the ellipsoid that others stay out of, m (ellipsoidX, Y, Z).
+    radii: Triple  #: Radii of the ellipsoid that others stay out of, m (ellipsoidX, Y, Z).
     #: box_min, box_max: Corners of the box that the vehicle stays in, m (bboxMinX, ... bboxMaxZ).
     box_min: Triple = (-math.inf,) * 3
     box_max: Triple = (math.inf,) * 3
-    horizon: float = 1.0  #: How far ahead motion is limited, s (horizon).
-    max_speed: float = 0.5  #: Of each axis, m/s (maxSpeed).
+    horizon: float = 1.0  #: Time over which motion is limited, s (horizon).
+    max_speed: float = 0.5  #: Largest speed of each axis, m/s (maxSpeed).
     #: Distance from a wall of the cell at which a sidestep to the right begins, m (sidestepThrsh).
     sidestep_threshold: float = 0.25
-    #: How far outside of its cell a point counts as inside, in tenths of m (vorTol).
+    #: Largest distance outside of the cell of a point that is inside, in tenths of m (vorTol).
     tolerance: float = 1e-5
-    max_iterations: int = 100  #: Of the projection into the cell (vorIters).
+    max_iterations: int = 100  #: Largest number of iterations of the projection (vorIters).
 
 
 class CollisionAvoidance:
@@ -92,7 +92,7 @@ class _Cell:
         radii = np.array(settings.radii)
         to_others = (others - position) / radii
         distances = np.linalg.norm(to_others, axis=1)
-        # Which way to leave a vehicle at the very same place is not defined.
+        # For a vehicle at the same place, the direction is not defined.
         apart = distances > 0.0
         to_others, distances = to_others[apart], distances[apart]
         faces = to_others / radii / distances[:, None]
@@ -115,7 +115,7 @@ class _Cell:
         return np.clip(position, *self._box)
 
     def ray(self, origin, direction):
-        """Return how often a direction fits between a point inside and the wall."""
+        """Return the distance from a point inside to the wall, in lengths of a direction."""
         rates = self._normals @ direction
         ahead = rates > 0.0
         room = self._limits[ahead] - self._normals[ahead] @ origin
@@ -131,7 +131,7 @@ class _Cell:
         if scale >= 1.0 and not is_velocity:
             return goal
         length = float(np.linalg.norm(goal))
-        # Of no velocity there is no direction in which the wall is.
+        # Without a velocity, there is no direction to a wall.
         distance = scale * length if length > 0.0 else math.inf
         threshold = self._settings.sidestep_threshold
         if distance <= threshold and threshold > 0.0:
@@ -140,7 +140,7 @@ class _Cell:
         return self.project(goal)
 
     def project(self, point):
-        """Return the nearest point of the cell, or None if it has none.
+        """Return the nearest point of the cell, or None if the cell is empty.
 
         Least distance programming by non-negative least squares: Lawson and Hanson, Solving Least
         Squares Problems, chapter 23.

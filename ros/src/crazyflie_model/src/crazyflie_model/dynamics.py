@@ -1,8 +1,8 @@
-"""What a simulated vehicle needs to know of its model; the 7-dimensional models.
+"""Interface of the models of a simulated vehicle; the 7-dimensional models.
 
 State x = (x, y, z, x_dot, y_dot, z_dot, yaw) in the fixed frame (z up), m, m/s
 and rad. Control u = (roll, pitch, yaw_dot, thrust) in rad, rad/s and m/s^2
-(mass-normalised): the attitude is taken to follow its command at once.
+(mass-normalised): the attitude is assumed to follow its command at once.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Rates = Callable[[float, Vector[Number], Vector[Number]], Vector[Number]]
 def rk4_step(
     rates: Rates[Number], t: float, x: Vector[Number], u: Vector[Number], dt: float
 ) -> Vector[Number]:
-    """Return the state one classical Runge-Kutta step (4th order) of ``dt`` (s) later.
+    """Return the state after one classical Runge-Kutta step (4th order) of ``dt`` (s).
 
     ``rates(t, x, u)`` is the time derivative of every component of the state x at time t (s); the
     control u is constant over the step.
@@ -40,7 +40,7 @@ def rk4_step(
     ]
 
 
-STEP = 0.001  #: Integration step of every model, s.
+STEP = 0.001  #: Integration step of every model (s).
 
 #: Friction coefficient of a 7-dimensional vehicle on the ground: dry plastic on a hard floor, for
 #: which tables have 0.3 to 0.6.
@@ -50,8 +50,8 @@ GROUND_FRICTION = 0.5
 class Dynamics(ABC):
     """A model, for one vehicle or for many.
 
-    States and controls are lists of components (see `elementwise`), but for
-    `derivative`, which takes arrays whose last axis counts the components.
+    States and controls are lists of components (see `elementwise`), except in
+    `derivative`, which takes arrays whose last axis is that of the components.
     """
 
     x_dim: int
@@ -89,7 +89,7 @@ class Dynamics(ABC):
 
 
 class SevenDimensional(Dynamics):
-    """What the models with this state have in common."""
+    """Common base of the models with this state."""
 
     x_dim = 7
 
@@ -101,10 +101,10 @@ class SevenDimensional(Dynamics):
     def apply_ground_contact(self, x: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.apply_ground_contact`; the ground also takes horizontal speed, by friction.
 
-        It takes `GROUND_FRICTION` times the downward speed that it takes (Coulomb's law: the
-        impulse of the friction is at most so many times that of the contact). At rest that is
-        what weight less lift gives in a step, so that speed goes at `GROUND_FRICTION` (g -
-        thrust), m/s^2; where thrust carries the vehicle, nothing is taken.
+        The horizontal speed decreases by `GROUND_FRICTION` times the decrease of the downward speed
+        (Coulomb's law: the impulse of the friction is at most this multiple of that of the
+        contact). At rest the latter is that of weight minus lift in a step, so that the speed
+        decreases at `GROUND_FRICTION` (g - thrust), m/s^2, and not if thrust carries the vehicle.
         """
         px, py, z, vx, vy, vz, yaw = x
         below = z <= 0.0
@@ -116,7 +116,7 @@ class SevenDimensional(Dynamics):
         slides = speed > loss
         share = where(slides, 1.0 - loss / where(slides, speed, 1.0), 0.0)
         share = where(stopped, share, 1.0)
-        # What was lost in speed was also flown too far, or tilt would creep along.
+        # The position is corrected for the lost speed; otherwise a tilted vehicle would creep.
         back = (1.0 - share) * (STEP / 2.0)
         return [
             px - back * vx,
@@ -134,7 +134,7 @@ class SevenDimensional(Dynamics):
 
 
 class NearHover(SevenDimensional):
-    """Small angles about hover, yaw kept apart: tilt does not cost lift."""
+    """Small angles about hover, independent yaw: tilt does not reduce lift."""
 
     def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.rates`.
@@ -174,7 +174,7 @@ class NearHover(SevenDimensional):
 
 
 class Coupled7D(SevenDimensional):
-    """Tilt in the heading frame, and at the cost of lift: thrust, tilt and yaw are coupled."""
+    """Tilt in the heading frame, which reduces lift: thrust, tilt and yaw are coupled."""
 
     def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.rates` and `coupled_acceleration`; the yaw rate is commanded."""
@@ -186,7 +186,7 @@ def coupled_acceleration(u: Sequence[Number], yaw: Number) -> Vector[Number]:
 
     The thrust T, tilted by roll and pitch about the heading (``yaw``, rad), and gravity: x_ddot = T
     (sin(pitch) cos(yaw) + sin(roll) sin(yaw)), y_ddot = T (-sin(roll) cos(yaw) + sin(pitch)
-    sin(yaw)), z_ddot = T cos(roll) cos(pitch) - g. The yaw rate is of no consequence.
+    sin(yaw)), z_ddot = T cos(roll) cos(pitch) - g. The yaw rate has no effect.
     """
     roll, pitch, _, thrust = u
     trigonometry = functions(roll)

@@ -2,9 +2,9 @@
 
 The models take a state or a control as the list of its *components*: floats
 for one vehicle, on which Python is several times quicker than numpy; arrays of
-shape (n,), or of any shape that broadcasts, for many. What differs between the
-two is in this module. Anything else that takes part in numpy's ``sin``, ``where``
-and ``clip`` (NEP 13, NEP 18) is taken as well.
+shape (n,), or of any shape that broadcasts, for many. The differences between the
+two are in this module. Any other type that supports numpy's ``sin``, ``where``
+and ``clip`` (NEP 13, NEP 18) is accepted as well.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from typing import TypeAlias, TypeVar, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-#: A component of many vehicles: an array, or a float that holds for all of them.
+#: A component of many vehicles: an array, or a float that is the same for all of them.
 Many: TypeAlias = float | NDArray[np.float64]
-#: A component of one vehicle or of many: what is made of floats only is a float.
+#: A component of one vehicle or of many: results of floats only are floats.
 Number = TypeVar("Number", float, Many)
 #: The components of a state, a control or a vector: ``Vector[float]`` is one vehicle's.
 Vector = list[Number]
@@ -36,7 +36,7 @@ def join(components: Sequence[Many]) -> NDArray[np.float64]:
     return np.stack(np.broadcast_arrays(*components), axis=-1)
 
 
-#: numpy's functions by math's names, which numpy itself knows since version 2 only.
+#: numpy's functions by math's names, which numpy itself has since version 2 only.
 _NUMPY_FUNCTIONS = SimpleNamespace(
     sin=np.sin,
     cos=np.cos,
@@ -71,7 +71,7 @@ def where(condition: bool | NDArray[np.bool_], value: Many, other: Many) -> Many
 
 
 def nowhere(condition: bool | NDArray[np.bool_]) -> bool:
-    """Tell whether a condition surely holds for no vehicle: then there is nothing to compute."""
+    """Return whether a condition certainly holds for no vehicle: nothing is to be computed."""
     if isinstance(condition, bool):
         return not condition
     return isinstance(condition, np.ndarray) and not condition.any()

@@ -1,10 +1,9 @@
-"""The inner loops of the vehicle: attitude and rates, as the firmware has them.
+"""The inner loops of the vehicle: attitude and rates, as in the firmware.
 
 Cascaded PID controllers at 500 Hz. Structure and gains are those of the
 Crazyflie 2.1's firmware (2022 to 2024, controller "PID"): a controller of the
-attitude sets body rates, one of the rates sets what is added to and subtracted
-from the thrust of the four motors. A commanded yaw rate moves the heading that
-is held.
+attitude sets body rates, one of the rates sets the differences of the thrusts of
+the four motors. A commanded yaw rate moves the heading setpoint.
 
 The gains are in the firmware's degrees; `update` has angles in radians and,
 unlike the firmware, positive pitch is nose down (accelerates forward).
@@ -28,7 +27,7 @@ class Gains:
     kp: float
     ki: float
     kd: float
-    #: Of the integral's magnitude, unit of the error times s. The default is the firmware's.
+    #: Limit of the integral's magnitude, unit of the error times s. The default is the firmware's.
     limit: float = 5000.0
 
 
@@ -38,8 +37,8 @@ def terms(
     """Return the proportional, integral and derivative part of the output, and the integral.
 
     ``error`` is the desired minus the measured value, ``integral`` the error's, as returned by the
-    last update ``dt`` s ago, ``slope`` the rate of change of the measurement. Any object with the
-    attributes of `Gains` does.
+    last update ``dt`` s ago, ``slope`` the rate of change of the measurement. ``gains`` may be any
+    object with the attributes of `Gains`.
     """
     integral = clip(integral + error * dt, -gains.limit, gains.limit)
     return gains.kp * error, gains.ki * integral, -gains.kd * slope, integral
@@ -48,8 +47,8 @@ def terms(
 def mix(thrust: Number, about_x: Number, about_y: Number, about_z: Number) -> Vector[Number]:
     """Return the requests to motors 1 to 4, PWM, not limited.
 
-    From the thrust of each motor and the outputs of the rate controllers about forward, left and
-    up, PWM.
+    Arguments: the thrust of each motor, and the outputs of the rate controllers about forward, left
+    and up, PWM.
     """
     x, y, z = about_x / 2.0, about_y / 2.0, about_z
     return [
@@ -72,15 +71,15 @@ def limit(requested: Sequence[Number], idle: float = 0.0) -> Vector[Number]:
     return [clip(request - excess, idle, FULL_PWM) for request in requested]
 
 
-PERIOD = 0.002  #: Time between two samples, s.
+PERIOD = 0.002  #: Time between two samples (s).
 OUTPUT_LIMIT = 32767.0  #: Largest output of a rate controller, PWM: 16 bits in the firmware.
 TILT = Gains(6.0, 3.0, 0.0, 20.0)  #: Roll and pitch, deg, to body rates, deg/s.
 HEADING = Gains(6.0, 1.0, 0.35, 360.0)  #: Yaw, deg, to body rate, deg/s.
 TILT_RATE = Gains(250.0, 500.0, 2.5, 33.3)  #: Rates about forward and left, deg/s, to PWM.
 HEADING_RATE = Gains(120.0, 16.7, 0.0, 166.7)  #: Rate about up, deg/s, to PWM.
 
-#: What the loops remember: integrals of the attitude errors (3), of the rate errors (3), last body
-#: rates about forward and left (2), heading that is held.
+#: Length of the loops' memory: integrals of the attitude errors (3), of the rate errors (3), last
+#: body rates about forward and left (2), heading setpoint.
 MEMORY_DIM = 9
 
 _DEGREE = math.pi / 180.0
@@ -112,7 +111,7 @@ def update(
 ) -> tuple[Vector[Number], Vector[Number]]:
     """Return memory and motor commands (PWM, of motors 1 to 4) after one sample.
 
-    Without thrust the motors are off and the loops begin anew. ``memory`` is what was returned
+    Without thrust the motors are off and the loops are reset. ``memory`` is the one returned
     `PERIOD` ago; ``setpoint`` is roll and pitch in rad, yaw rate in rad/s, thrust in m/s^2;
     ``attitude`` is roll, pitch and yaw of `angles.zyx_from_quaternion`, rad; ``rates`` are the
     body's, rad/s.

@@ -1,25 +1,25 @@
-"""What a Crazyflie can do, what its firmware lets it do, and what it is asked for at most."""
+"""Limits of a Crazyflie: of the hardware, of the firmware, and of commands."""
 
 FULL_PWM = 65535.0  #: Largest command of a motor and of the radio link, 16 bits.
 
-#: Most thrust of an attitude setpoint, PWM: firmware and driver lower what is above it, and leave
+#: Largest thrust of an attitude setpoint (PWM): firmware and driver limit it to this, and leave
 #: the rest to the attitude loops (MAX_THRUST of crtp_commander_rpyt.c).
 MAX_SETPOINT_PWM = 60000.0
 
 MAX_TILT = 0.2618  #: Largest roll and pitch that controllers ask for, rad (15 degrees).
 
-#: Most yaw rate of a control, rad/s (200 degrees/s), as of crazyflie_controller and of
+#: Largest yaw rate of a control, rad/s (200 degrees/s), as in crazyflie_controller and in
 #: teleoperation.
 MAX_YAW_RATE = 3.4907
 
 #: A vehicle that is tilted more than this, rad (60 degrees), has crashed or is about to.
 CRASH_TILT = 1.0472
 
-#: Range of the thrust that controllers ask for in flight, m/s^2: with less a vehicle stands on the
-#: ground or has its motors off, more than that it cannot do.
+#: Range of the thrust that controllers ask for in flight (m/s^2): with less a vehicle is on the
+#: ground or has its motors off, and it cannot produce more.
 MIN_THRUST, MAX_THRUST = 4.0, 16.0
 
-MAX_SPEED = 5.0  #: The fastest that a vehicle is believed to fly, m/s.
+MAX_SPEED = 5.0  #: Largest plausible speed of a vehicle (m/s).
 
 #: Age of the last setpoint from which the firmware levels a flying vehicle out, and from which it
 #: stops its motors, s (COMMANDER_WDT_TIMEOUT_STABILIZE and _SHUTDOWN of commander.h).

@@ -32,7 +32,7 @@ def smooth_piece(
 def straight_piece(
     start: Goal[float], position: Triple, yaw: float, duration: float
 ) -> PolynomialPiece:
-    """Return the piece that goes there at constant speed; see `smooth_piece`."""
+    """Return the piece to a position and heading at constant speed; see `smooth_piece`."""
     turn = math.remainder(yaw - start.yaw, 2.0 * math.pi)
     ends = (*position, start.yaw + turn)
     starts = (*start.position, start.yaw)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from crazyflie_model.elementwise import Number
 
-COEFFICIENTS = 8  #: Most coefficients of a polynomial, the constant first.
+COEFFICIENTS = 8  #: Largest number of coefficients of a polynomial, the constant first.
 #: Bytes of a piece in the vehicle's memory: 4 times 8 coefficients and the duration, float32.
 PIECE_SIZE = 132
 
@@ -24,9 +24,9 @@ _PIECE = struct.Struct("<33f")
 def evaluate(
     coefficients: Sequence[Number] | NDArray[np.float64], t: Number, derivatives: int = 2
 ) -> list[Number]:
-    """Return the value at t and as many derivatives of a polynomial, by Horner's scheme.
+    """Return the value at t and derivatives of a polynomial, by Horner's scheme.
 
-    Of its coefficients, the constant is the first.
+    The constant is the first of its coefficients.
     """
     terms = [0.0 * t] * (derivatives + 1)
     for c in reversed(coefficients):
@@ -84,13 +84,13 @@ def bezier(points: Sequence[float], duration: float) -> tuple[float, ...]:
 
 
 class Goal(NamedTuple, Generic[Number]):
-    """Where a trajectory is at one time, or at many."""
+    """Position and heading of a trajectory, with derivatives, at one time or at many."""
 
-    #: position, velocity, acceleration: m, m/s, m/s^2.
+    #: position, velocity, acceleration: x, y, z in m, m/s and m/s^2.
     position: tuple[Number, Number, Number]
     velocity: tuple[Number, Number, Number]
     acceleration: tuple[Number, Number, Number]
-    #: yaw, yaw_rate: rad, rad/s.
+    #: yaw, yaw_rate: Heading and its rate (rad and rad/s).
     yaw: Number
     yaw_rate: Number
 
@@ -105,7 +105,7 @@ def at_rest(position: Sequence[float], yaw: float = 0.0) -> Goal[float]:
 class PolynomialPiece:
     """One piece of a trajectory: four polynomials of the time since it began."""
 
-    duration: float  #: s.
+    duration: float  #: Duration (s).
     #: x, y, z, yaw: Up to `COEFFICIENTS`, the constant first: m and rad, in powers of s.
     x: Sequence[float]
     y: Sequence[float]
@@ -135,7 +135,7 @@ class PolynomialPiece:
         return cls(duration, *(numbers[i : i + COEFFICIENTS] for i in range(0, 32, 8)))
 
     def pack(self) -> bytes:
-        """Return the piece as the vehicle's memory holds it."""
+        """Return the piece in the format of the vehicle's memory."""
         return _PIECE.pack(*(c for axis in self.padded_axes for c in axis), self.duration)
 
     def evaluate(self, time: Number) -> Goal[Number]:

@@ -21,9 +21,9 @@ from crazyflie_model.limits import FULL_PWM
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 
 BODY_DIM = 17  #: Components of the airframe's state.
-STILL_AIR = (0.0, 0.0, 0.0)  #: No wind, m/s.
+STILL_AIR = (0.0, 0.0, 0.0)  #: No wind (m/s).
 
-_LEAST_NORM = 1e-9  #: Of the part of an attitude that is a heading.
+_LEAST_NORM = 1e-9  #: Least norm of the heading's part of an attitude.
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,12 @@ class QuadrotorParameters:
     agree with [F] in the torque of a rotor. [L] has four times as much.
     """
 
-    mass: float = 0.027  #: kg, with battery [B, L].
+    mass: float = 0.027  #: Mass with battery, kg [B, L].
     #: inertia_x, inertia_y, inertia_z: Principal moments about forward, left and up, kg m^2 [L].
     inertia_x: float = 1.395e-5
     inertia_y: float = 1.436e-5
     inertia_z: float = 2.173e-5
-    arm: float = 0.046  #: From the centre to a rotor's axis, m: half of motor to motor [B].
+    arm: float = 0.046  #: Distance from centre to rotor axis (m): half of motor to motor [B].
     #: Thrust of a rotor over its speed squared, N s^2 [L].
     thrust_constant: float = 3.1582e-10 * (30.0 / math.pi) ** 2
     torque_per_thrust: float = 0.005964552  #: Torque of a rotor over its thrust, m [F].
@@ -56,7 +56,7 @@ class QuadrotorParameters:
     #: Of the first-order lag between commanded and true speed, s [F: discrete pole at 0.9695404
     #: with 500 Hz].
     motor_time_constant: float = -0.002 / math.log(0.9695404)
-    #: rad/s [L, at full PWM].
+    #: Largest rotor speed, rad/s [L, at full PWM].
     max_rotor_speed: float = (0.2685 * FULL_PWM + 4070.3) * math.pi / 30.0
 
     @cached_property

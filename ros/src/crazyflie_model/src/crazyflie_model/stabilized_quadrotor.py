@@ -51,7 +51,7 @@ class StabilizedQuadrotor(Dynamics):
         return body + inner_loops.initial_memory(0.0) + body[-4:]
 
     def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
-        """See `Dynamics.rates`: of what is continuous; the rest is constant between samples."""
+        """See `Dynamics.rates`: of continuous states; others are constant between samples."""
         body = self.airframe.rates(t, x[:BODY_DIM], x[-4:] + [*self._wind(t)])
         return body + [0.0] * (self.x_dim - BODY_DIM)
 
@@ -74,7 +74,7 @@ class StabilizedQuadrotor(Dynamics):
 
     def _sample(self, body, memory, u):
         attitude = zyx_from_quaternion(body[6:10])
-        # A real vehicle rocks on its feet until its loops are content. This one
+        # A real vehicle rocks on its feet until its loops have settled. This one
         # is held upright, so its loops are reset: they would wind up.
         standing = body[2] <= 0.0
         resting = inner_loops.initial_memory(attitude[2])

@@ -1,4 +1,4 @@
-"""What the firmware's supervisor says of a vehicle."""
+"""State of a vehicle by the firmware's supervisor."""
 
 import enum
 from typing import Any
@@ -11,7 +11,7 @@ _LEVEL_STEPS, _OFF_STEPS = round(LEVEL_AGE / STEP), round(OFF_AGE / STEP)
 
 
 def watchdog_control(u: Vector[Any], age: Any) -> Vector[Any]:
-    """Return what a vehicle flies of a control (see `Dynamics`) that is ``age`` steps old.
+    """Return the effective control for a control (see `Dynamics`) that is ``age`` steps old.
 
     From `LEVEL_AGE` on it is level and keeps its thrust, from `OFF_AGE` on its motors are off.
     """
@@ -49,8 +49,8 @@ class SupervisorState(enum.IntFlag):
     def reports_planner(self) -> bool:
         """Whether the firmware reports its high-level commander; before protocol 12 it does not.
 
-        In all recordings of firmware that does, one of its flags is set at any time, but while a
-        stream keeps out a plan whose time has not run out.
+        In all recordings of such firmware, one of its flags is always set, except while a stream
+        overrides a plan whose time has not run out.
         """
         cls = SupervisorState
         reported = cls.HIGH_LEVEL_ACTIVE | cls.TRAJECTORY_FINISHED | cls.HIGH_LEVEL_DISABLED

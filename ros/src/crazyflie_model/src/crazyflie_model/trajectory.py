@@ -10,7 +10,7 @@ from crazyflie_model.angles import Triple
 from crazyflie_model.elementwise import Number, clip, where
 from crazyflie_model.polynomials import Goal, PolynomialPiece
 
-#: Flown one after the other: as in the CSV files of crazyflie_demo and in a vehicle's memory.
+#: Pieces flown one after the other, as in CSV files of crazyflie_demo and in a vehicle's memory.
 Pieces = Sequence[PolynomialPiece]
 
 
@@ -30,7 +30,7 @@ MINIMUM_JERK_ACCELERATION = 10.0 / math.sqrt(3.0)
 
 
 def duration(pieces: Pieces) -> float:
-    """Return how long pieces take, s."""
+    """Return the duration of pieces, s."""
     return sum(piece.duration for piece in pieces)
 
 
@@ -76,7 +76,7 @@ class Trajectory:
     """Pieces flown one after the other, then rest at the last position."""
 
     pieces: Pieces  #: At least one.
-    time_scale: float = 1.0  #: > 0; 2 is half as fast.
+    time_scale: float = 1.0  #: Factor of the duration, > 0; 2 is half as fast.
     backwards: bool = False  #: From the end to the beginning.
 
     @property

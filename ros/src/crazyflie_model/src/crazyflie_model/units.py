@@ -2,7 +2,7 @@
 
 from crazyflie_model.elementwise import Number
 
-GRAVITY = 9.81  #: Acceleration of free fall, m/s^2; also the mass-normalised thrust of hover.
+GRAVITY = 9.81  #: Acceleration of free fall (m/s^2); also the mass-normalised thrust of hover.
 HOVER_PWM = 42000.0  #: Thrust command of the radio link (0..65535) at which the vehicle hovers.
 
 

@@ -26,7 +26,7 @@ TAKEOFF_CONTROL_LIMIT = 0.5  #: Age of a takeoff control up to which it excludes
 #: Age up to which no control is late (s): three periods of a controller at 100 Hz.
 SHORTEST_HOLD = 0.03
 LAST_STATE = 0.7  #: Age of the oldest state from which the filter predicts the motion (s).
-RESET_DELAY = 2.0  #: Time after an emergency in which a vehicle may still fall, s.
+RESET_DELAY = 2.0  #: Time after an emergency in which a vehicle may still fall (s).
 
 Control = TypeVar("Control")
 
@@ -63,7 +63,7 @@ class Event(enum.Enum):
 class LossTimeouts:
     """Timeouts after a loss, s."""
 
-    hold: float  # From the last control until the filter holds; at least `SHORTEST_HOLD`.
+    hold: float  # Time from the last control until the filter holds; at least `SHORTEST_HOLD`.
     recovery: float  # Then until the descent: without a state, and in a takeoff or a landing.
     descent: float  # Then until the motors stop; plus the duration of the descent if it is known.
     place: float  # The same as ``recovery`` for a vehicle in flight whose state is known.
@@ -108,7 +108,7 @@ class FilterMachine(Generic[Control]):
         self.state = FilterState.PASSING
         self.reason = ""  # Why the state is not PASSING.
         self.elapsed = 0.0  # Time since the state began (s).
-        # Age of the last commanded control, s. It begins at 0, since a filter that starts in flight
+        # Age of the last commanded control (s). It begins at 0, since a filter that starts in flight
         # is not connected at once.
         self.silence = 0.0
         self.is_needed = False  # Whether the vehicle would fall without the controller.

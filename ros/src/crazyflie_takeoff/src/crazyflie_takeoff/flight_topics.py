@@ -60,7 +60,7 @@ class FlightTopicParameters(Parameters):
 
     box_topic: str | None = parameter(
         TOPIC,
-        "the geofence's live parameters, of which the box counts in the place of box/min and "
+        "the geofence's live parameters, whose box replaces box/min and "
         "box/max: the name of its node + `/parameter_updates`",
         None,
         "topics/box",

@@ -16,11 +16,11 @@ from crazyflie_takeoff.safe_control import (
 )
 
 CLIMB_RESPONSE = 0.1  #: Time constant with which a climb approaches its limit (s).
-CLIMB_BRAKING = 4.0  #: Deceleration of a climb below the highest position, m/s^2.
+CLIMB_BRAKING = 4.0  #: Deceleration of a climb below the highest position (m/s^2).
 RETURN_RATE = 0.5  #: Rate at which a vehicle above the highest position returns to it (1/s).
-LANDING_CLIMB = 0.5  #: Fastest climb of a vehicle that is to land, m/s.
+LANDING_CLIMB = 0.5  #: Fastest climb of a vehicle that is to land (m/s).
 CLIMB_TIMEOUT = 2.0  #: Time of controls that climb too fast after which the flight is ended (s).
-MAX_SPEED_CHANGE = 0.5  #: Change of the speed by a control while the filter does not run, m/s.
+MAX_SPEED_CHANGE = 0.5  #: Change of the speed by a control while the filter does not run (m/s).
 
 #: Largest difference between the thrust of a control and that of hover (m/s^2).
 _MAX_EXCESS = MAX_THRUST - (1.0 - HOVER_RANGE) * GRAVITY
@@ -35,7 +35,7 @@ GAP_MEMORY = 2.0  #: Time constant with which a gap is forgotten (s).
 STARVED_SHARE, STARVATION_MEMORY = 0.5, 3.0
 
 OVERLAP = 0.5  #: Time after a message of one node in which one of another node is contention (s).
-MEMORY = 5.0  #: Time after which that is forgotten, s.
+MEMORY = 5.0  #: Time after which a change of the node is forgotten (s).
 
 DESCENT_TIMEOUT = 1.5  #: Longest time that a vehicle which is to land may stay up (s).
 PROGRESS = 0.02  #: Least decrease of the height in a descent (m).
@@ -68,9 +68,9 @@ class Limits:
 
     box: Box  # The geofence at the start.
     outside: float  # Largest distance outside the box (m).
-    floor: float  # Lowest z, m, fixed frame.
+    floor: float  # Lowest z (m, fixed frame).
     climb: float  # Largest z_dot that controls may reach (m/s).
-    height: float  # Largest height above the ground that controls may reach, m.
+    height: float  # Largest height above the ground that controls may reach (m).
 
 
 class Walls:

@@ -8,9 +8,9 @@ from crazyflie_utils.clock import CLOCK_STEP
 MAX_FEEDBACK_AGE = 0.2  #: Oldest state that controls the vehicle and its limits (s).
 MAX_POSITION_AGE = 0.5  #: Age up to which a position is that of the vehicle (s).
 DRIFT = 0.1  #: Rate at which the usual age of messages may grow (s/s).
-MIN_AGE = -0.05  #: Least age of a message that is on time, by its stamp, s.
+MIN_AGE = -0.05  #: Least age of a message that is on time, by its stamp (s).
 TOUCHDOWN_HEIGHT = 0.05  #: Largest height of a vehicle that is down where it took off (m).
-ON_GROUND_HEIGHT = 0.1  #: Largest height of a vehicle that has not been flown, m.
+ON_GROUND_HEIGHT = 0.1  #: Largest height of a vehicle that has not been flown (m).
 TOUCHDOWN_SPEED = 0.1  #: Largest speed of a vehicle that is down (m/s).
 #: Thrust with which no vehicle stays in the air, as a fraction of that of hover: it passes through
 #: speeds below `TOUCHDOWN_SPEED` within 0.1 s.

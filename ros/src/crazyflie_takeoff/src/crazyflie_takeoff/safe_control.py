@@ -27,22 +27,22 @@ AVERAGING = 2.0  #: Time constant of the mean of the commanded thrust (s).
 #: then a vehicle meets the ground at 0.7 m/s from 1 m, and at 1.0 m/s from 2 m.
 SINK_RATE = 0.3
 SINK_SPEED = 0.4  #: Speed of a descent while z_dot is measured (m/s).
-PRESS_RATE = 4.0  #: Decrease of the thrust of a vehicle that does not sink, m/s^2 per s.
+PRESS_RATE = 4.0  #: Decrease of the thrust of a vehicle that does not sink (m/s^2 per s).
 SETTLING = 0.3  #: Time constant with which z_dot follows its target (s).
-MAX_CORRECTION = 0.2 * GRAVITY  #: Largest thrust above hover, m/s^2.
+MAX_CORRECTION = 0.2 * GRAVITY  #: Largest thrust above hover (m/s^2).
 MAX_BRAKING = 0.4 * GRAVITY  #: Largest thrust below hover, which ends a climb (m/s^2).
 
 POSITION_GAIN = 0.25 * GRAVITY  #: 0.25 rad/m, as in the softer gains (K_manual.txt) (1/s^2).
-#: 0.3 rad/(m/s), which damps `POSITION_GAIN` critically, 1/s. The softer gains have more, by which
+#: 0.3 rad/(m/s), which damps `POSITION_GAIN` critically (1/s). The softer gains have more, by which
 #: noise of the velocity becomes tilt.
 VELOCITY_GAIN = 0.3 * GRAVITY
 MAX_DISTANCE = 0.5  #: Largest position error (m): the vehicle returns at 0.4 m/s at most.
 MAX_SAFE_TILT = 0.15  #: Largest roll and pitch (rad).
-STOPPING_TIME = 0.5  #: Time in which the vehicle is to stop horizontally, s.
+STOPPING_TIME = 0.5  #: Time in which the vehicle is to stop horizontally (s).
 HEIGHT_GAIN = 1.0  #: Target of z_dot over height error (1/s).
-MAX_HEIGHT_SPEED = 0.3  #: Largest such target, m/s.
+MAX_HEIGHT_SPEED = 0.3  #: Largest such target (m/s).
 MAX_SUBSTITUTE = (1.0 + HOVER_RANGE) * GRAVITY  #: Largest thrust of the filter's own (m/s^2).
-RETURN_TIME = 0.2  #: Time in which the control changes over from the filter's own, s.
+RETURN_TIME = 0.2  #: Time in which the control changes over from the filter's own (s).
 
 
 class Setpoint(NamedTuple):

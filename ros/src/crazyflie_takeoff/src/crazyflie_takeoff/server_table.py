@@ -19,18 +19,18 @@ LIFT_OFF_THRUST = GRAVITY + 0.2  #: Thrust of the open-loop part of a takeoff (m
 #: Time after which a vehicle that is still on the ground is unable to fly (s).
 LIFT_OFF_TIME = 3.0
 RAMP_DURATION = 1.0  #: Duration of the thrust ramp of a landing; zero thrust follows (s).
-RAMP_RATE = 5.0  #: Decrease of the thrust in that ramp, which begins at g, m/s^2 per s.
+RAMP_RATE = 5.0  #: Decrease of the thrust in that ramp, which begins at g (m/s^2 per s).
 RAMP_DROP = 0.1  #: A vehicle that sinks further in the ramp was not on the ground (m).
-TOUCHDOWN_LIMIT = 2.0  #: Longest time from the end of the ramp to the touchdown, s.
+TOUCHDOWN_LIMIT = 2.0  #: Longest time from the end of the ramp to the touchdown (s).
 ZERO_THRUST_PERIOD = 0.1  #: Period of zero thrust on the ground (s).
-#: Height above which a vehicle is in flight if no flight state is remembered, m.
+#: Height above which a vehicle is in flight if no flight state is remembered (m).
 FLYING_HEIGHT = 0.15
 FILTER_LIMIT = 60.0  #: Longest time for which the filter may hold or land the vehicle (s).
-ROUNDING = 1e-6  #: Tolerance of comparisons between times, s.
+ROUNDING = 1e-6  #: Tolerance of comparisons between times (s).
 
 SHORTEST_DESCENT = 1.0  #: Least duration of a descent with a time limit (s).
 DESCENT_MARGIN = 3.0  #: Time that a descent may take beyond its calculated duration (s).
-#: Depth of the last reference of a descent below the ground, m: the vehicle meets the ground with
+#: Depth of the last reference of a descent below the ground (m): the vehicle meets the ground with
 #: its speed also when it hangs above the reference.
 PRESS_DEPTH = 0.3
 #: In a descent to an unknown ground, a vehicle that has not sunk for this time is down (s). The
@@ -157,7 +157,7 @@ class Plan:
 
     hover: Position
     open_loop: float  # Duration of `LIFT_OFF_THRUST` (s).
-    settle: float  # Time for the controller to reach the hover point, s.
+    settle: float  # Time for the controller to reach the hover point (s).
     descent_speed: float  # m/s; 0 for a landing without a descent, by the ramp alone.
 
 
@@ -318,7 +318,7 @@ class Output:
     """Messages to publish after a tick."""
 
     thrust: float | None = None  # Takeoff control with level attitude (m/s^2).
-    reference: tuple[float, ...] | None = None  # x, y, z, m, and x_dot, y_dot, z_dot, m/s.
+    reference: tuple[float, ...] | None = None  # x, y, z (m) and x_dot, y_dot, z_dot (m/s).
     toggle: bool = False  # Whether in_flight changes.
 
 
@@ -332,14 +332,14 @@ class FlightStateMachine:
         self.ground = 0.0  #: Height (z) of the ground where the vehicle took off (m).
         self.ground_is_known = True  # False where the vehicle has sunk further.
         self.time = -math.inf  # Time of the last tick (s).
-        self.begun: float | None = None  # Begin of the present state, s; None until the next tick.
+        self.begun: float | None = None  # Begin of the present state (s); None until the next tick.
         self.measured: Position | None = None  # Present position (m); None if it is not known.
         self.reference: tuple[float, ...] | None = None  # See `Output`.
         self.descent: Descent | None = None
         self.descent_speed = 0.0  # Planned speed when the present state began (m/s).
         self.descent_end = math.inf  # Latest end of a descent, s after it began.
         self.ramp_height: float | None = None  # First height measured in the ramp of a landing (m).
-        self.zero_sent = -math.inf  # When zero thrust was sent last, s.
+        self.zero_sent = -math.inf  # When zero thrust was sent last (s).
         # The last known position, in a descent also by dead reckoning.
         self._position: Position | None = None
         self._in_flight = self._is_in_flight()  # As in_flight has been toggled.

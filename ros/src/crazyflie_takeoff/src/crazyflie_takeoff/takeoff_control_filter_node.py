@@ -28,15 +28,15 @@ from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import stamped
 
 TIME_STEP = 0.01  #: Period of the filter's own controls (s).
-NOMINAL_TIME_STEP = 0.04  #: Period of the ticks in a nominal flight, s.
+NOMINAL_TIME_STEP = 0.04  #: Period of the ticks in a nominal flight (s).
 
 #: Time that a filter listens when it starts, before it passes commanded controls (s): some periods
 #: of the zero thrust on the ground, and less than a vehicle flies on without controls.
 LISTENING_TIME = 0.4
 SERVER_LIMIT = 2.0  #: Longest time that it waits for a server that recovers the flight state (s).
-FRESH_TIME = 5.0  #: Time after the start in which commanded controls do not prove a flight, s.
+FRESH_TIME = 5.0  #: Time after the start in which commanded controls do not prove a flight (s).
 CONTROLLER_POLL_PERIOD = 0.1  #: Period of the search for publishers of controls (s).
-BUSY_GAP = 0.1  #: Gap after which the log says that the computer is too busy, s.
+BUSY_GAP = 0.1  #: Gap after which the log says that the computer is too busy (s).
 REPETITION = 10.0  #: Shortest time between two such messages (s).
 
 

@@ -38,9 +38,9 @@ from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import from_vector, stamped
 
 TIME_STEP = 0.01  #: Period of the server (s).
-CRUISE_TIME_STEP = 0.1  #: Period in flight, where it only watches the battery, s.
+CRUISE_TIME_STEP = 0.1  #: Period in flight, where it only watches the battery (s).
 STATUS_PERIOD = 0.1  #: Period at which the status is compared with the published one (s).
-RECOVERY_LIMIT = 1.0  #: Time that a server waits for evidence of the flight when it starts, s.
+RECOVERY_LIMIT = 1.0  #: Time that a server waits for evidence of the flight when it starts (s).
 
 #: Longest descent when the process is to end (s): together with the ramp that is less than the 10 s
 #: for which a process with a flight goes on.

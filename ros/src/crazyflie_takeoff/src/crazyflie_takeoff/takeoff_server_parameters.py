@@ -12,7 +12,7 @@ from crazyflie_utils import parameter
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
 
 SLOWEST_DESCENT = 0.05  #: A slower descent would hardly ever end (m/s).
-FASTEST_DESCENT = 1.0  #: A vehicle meets the ground with the speed of its descent, m/s.
+FASTEST_DESCENT = 1.0  #: A vehicle meets the ground with the speed of its descent (m/s).
 #: Without a controller a vehicle climbs by 2.5 m in this time (s): half of 0.2 m/s^2 times t^2.
 LONGEST_OPEN_LOOP = 5.0
 
@@ -73,7 +73,7 @@ class TakeoffServerParameters(FlightTopicParameters):
     own_vehicle_status_topic: str | None = parameter(
         TOPIC,
         "the vehicle's state; /takeoff of one that is locked, crashed or overturned is refused. "
-        "By default `vehicle_status` beside topics/connected",
+        "By default `vehicle_status` next to topics/connected",
         None,
         "topics/vehicle_status",
     )
@@ -115,7 +115,7 @@ class TakeoffServerParameters(FlightTopicParameters):
     )
     battery_duration: float = parameter(
         DURATION,
-        "how long the voltage has to be lower; with 0 a single low voltage is enough",
+        "how long the voltage must be lower; with 0 a single low voltage is enough",
         5.0,
         "battery/duration",
     )

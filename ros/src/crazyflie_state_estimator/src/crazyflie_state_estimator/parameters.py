@@ -28,7 +28,7 @@ class StateEstimatorParameters(Parameters):
     )
     control_topic: str | None = parameter(
         TOPIC,
-        "the vehicle's control, such as /control/final: poses have to follow it, and the Kalman "
+        "the vehicle's control, such as /control/final: poses must follow it, and the Kalman "
         "filter uses it",
         None,
         "topics/control",

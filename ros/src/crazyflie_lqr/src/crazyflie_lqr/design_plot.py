@@ -11,7 +11,7 @@ from crazyflie_lqr.design import Design
 from crazyflie_lqr.margins import loop_response
 from crazyflie_lqr.models import CONTROLS, LinearModel
 
-#: What a reference may step in, and the control that answers.
+#: State in which a reference may step, and the control that responds.
 _OUTPUTS = {"x": "pitch", "y": "roll", "z": "thrust", "yaw": "yaw_dot"}
 
 _UNITS = {"roll": "rad", "pitch": "rad", "yaw_dot": "rad/s", "thrust": "m/s²"}

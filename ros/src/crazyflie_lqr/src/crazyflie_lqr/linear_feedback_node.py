@@ -69,7 +69,7 @@ class LinearFeedbackParameters(Parameters):
     )
     max_age: float = parameter(
         Number("s", above=0.0),
-        "older states are not answered; of stamps of another clock, a minute off, the delay counts",
+        "older states are not answered; for stamps of another clock, a minute off, by their delay",
         HOLD_LIMIT,
         name="state/max_age",
     )

@@ -70,14 +70,14 @@ def test_a_master_that_is_started_anew_is_told_of_this_process(world):
     world.master.is_there, world.master.known, world.master.pid = True, False, 2000
     for _ in range(3):
         world.watch.look()
-    assert world.said[1:] == ["the ROS master was started anew; registering with it"]
+    assert world.said[1:] == ["the ROS master was restarted; registering with it"]
     assert world.registered == 1
 
 
 def test_so_is_one_that_was_away_too_shortly_to_be_missed(world):
     world.master.known, world.master.pid = False, 2000
     world.watch.look()
-    assert world.said == ["the ROS master was started anew; registering with it"]
+    assert world.said == ["the ROS master was restarted; registering with it"]
     assert world.registered == 1
 
 

@@ -46,7 +46,7 @@ class _Takeoff:
 
 
 class FleetServicesNode(Node):
-    """Offers services for all vehicles, each of which calls those of the vehicles.
+    """Offers services for all vehicles, which call the services of each vehicle.
 
     A call is answered when all vehicles have answered, with an error that names each one that
     has refused. A fleet takes off as a whole or not at all. Vehicles above each other land one

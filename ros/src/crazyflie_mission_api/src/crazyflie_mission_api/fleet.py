@@ -154,7 +154,7 @@ class Fleet(VehicleGroup):
         try:
             vehicles = _connect(process, self._handle, chosen, startup_timeout)
             clock = RosClock(self._handle, lambda: process.exit_status is not None)
-            # Of the fleet process that flies them, if one does.
+            # The buffers of the fleet process that flies them, if one does.
             watched = {name: _buffer(self._handle, name) for name in chosen}
             buffers |= {name: max(b, buffers.get(name, b)) for name, b in watched.items() if b}
             rules = Rules(

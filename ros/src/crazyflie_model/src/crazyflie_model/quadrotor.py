@@ -53,7 +53,7 @@ class QuadrotorParameters:
     #: and along the rotors' axes, kg [F].
     drag_horizontal: float = 9.1785e-7
     drag_vertical: float = 10.311e-7
-    #: Of the first-order lag between commanded and true speed, s [F: discrete pole at 0.9695404
+    #: Lag (first order) between commanded and true speed, s [F: discrete pole at 0.9695404
     #: with 500 Hz].
     motor_time_constant: float = -0.002 / math.log(0.9695404)
     #: Largest rotor speed, rad/s [L, at full PWM].

@@ -77,7 +77,7 @@ class Trajectory:
 
     pieces: Pieces  #: At least one.
     time_scale: float = 1.0  #: Factor of the duration, > 0; 2 is half as fast.
-    backwards: bool = False  #: From the end to the beginning.
+    backwards: bool = False  #: Whether it is flown from the end to the beginning.
 
     @property
     def duration(self) -> float:

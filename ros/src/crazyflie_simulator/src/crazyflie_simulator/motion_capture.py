@@ -33,7 +33,7 @@ class MotionCapture:
         seed: int | Sequence[int] = 0,
     ):
         self.position_noise = position_noise  #: Standard deviation along each axis (m).
-        #: Standard deviation of the rotation about each axis of the body, rad.
+        #: Standard deviation of the rotation about each axis of the body (rad).
         self.attitude_noise = attitude_noise
         self.latency = latency  #: Time from a measurement to its arrival (s).
         self.dropout = dropout  #: Probability in [0, 1] that a pose is lost.

@@ -140,7 +140,7 @@ class MasterWatch:
             if self._pid in (None, pid):
                 rospy.logwarn("the ROS master does not know this node any more; registering again")
             else:
-                rospy.logwarn("the ROS master was started anew; registering with it")
+                rospy.logwarn("the ROS master was restarted; registering with it")
             register()
         self._pid = pid
 

@@ -69,7 +69,8 @@ class LinearFeedbackParameters(Parameters):
     )
     max_age: float = parameter(
         Number("s", above=0.0),
-        "older states are not answered; for stamps of another clock, a minute off, by their delay",
+        "older states are not answered; the age of stamps of another clock, a minute off, is their "
+        "delay",
         HOLD_LIMIT,
         name="state/max_age",
     )

@@ -108,8 +108,8 @@ class FilterMachine(Generic[Control]):
         self.state = FilterState.PASSING
         self.reason = ""  # Why the state is not PASSING.
         self.elapsed = 0.0  # Time since the state began (s).
-        # Age of the last commanded control (s). It begins at 0, since a filter that starts in flight
-        # is not connected at once.
+        # Age of the last commanded control (s). It begins at 0, since a filter that starts in
+        # flight is not connected at once.
         self.silence = 0.0
         self.is_needed = False  # Whether the vehicle would fall without the controller.
         # Whether a flight was ended because no control came, and none has come since.

@@ -66,11 +66,14 @@ def test_two_that_are_sent_to_each_other_keep_apart(places):
     first, second = places["cf1"], places["cf2"]
     distances = []
 
-    def note(_):
-        distances.append(math.dist(places["cf1"], places["cf2"]))
+    def note(message):
+        # Of one moment: states come one by one, and simulated time passes quickly.
+        at = {each.child_frame_id: each.transform.translation for each in message.transforms}
+        a, b = at["cf1"], at["cf2"]
+        distances.append(math.dist((a.x, a.y, a.z), (b.x, b.y, b.z)))
 
     with peer.listening("/fleet/waiting", String) as waiting:
-        watcher = rospy.Subscriber("/cf1/state", PositionVelocityYawStateStamped, note)
+        watcher = rospy.Subscriber("/tf", TFMessage, note)
         go_to("cf1", second)
         go_to("cf2", first)
         assert waiting.next(lambda message: message.data == "cf1 cf2")

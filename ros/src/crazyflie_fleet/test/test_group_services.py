@@ -157,6 +157,17 @@ def test_if_one_refuses_against_its_word_the_others_land_again(swarm):
     assert states == ["on_ground"] * 3
 
 
+def test_a_vehicle_that_has_not_begun_does_not_fly(swarm):
+    for name in ("cf2", "cf3"):
+        swarm.call(f"/{name}/emergency")
+    swarm.process.advance(0.5)
+    for name in ("cf2", "cf3"):
+        status(swarm.process, name, "")
+    with pytest.raises(ServiceError, match="no vehicle takes off") as error:
+        swarm.call("/takeoff_all", seconds=20.0)
+    assert "MAY STILL FLY" not in str(error.value)
+
+
 def test_a_second_call_takes_the_rest(swarm):
     swarm.call("/cf2/takeoff")
     swarm.call("/takeoff_all")

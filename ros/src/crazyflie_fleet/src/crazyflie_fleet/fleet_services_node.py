@@ -189,7 +189,13 @@ class FleetServicesNode(Node):
             text = f"{text}; those that had begun have landed"
 
         def on_landed(done):
-            left = f"; MAY STILL FLY: {self._text(done.result())}" if done.result() else ""
+            # A vehicle that has not begun refuses to land, too.
+            failures = {
+                name: reason
+                for name, reason in done.result().items()
+                if self._state(name) != FlightStatus.ON_GROUND
+            }
+            left = f"; MAY STILL FLY: {self._text(failures)}" if failures else ""
             takeoff.answer.set_exception(ServiceError(text + left))
 
         self._lander.land(begun).add_done_callback(on_landed)

@@ -12,6 +12,7 @@ from workspaces import TOP
 PAGE = TOP / "docs" / "faults.md"
 LIMIT = re.compile(r"`([a-z_]+/[a-z_/]+)` (-?[0-9.]+)")
 FLAG = re.compile(r"`([a-z_]+)` (false|true)")
+LINK = re.compile(r"\[([^]]+)\]\(\.\./ros/src/([^)]+)\)")
 
 
 def rows():
@@ -22,7 +23,12 @@ def rows():
 
 
 def test_there_are_rows():
-    assert len(rows()) > 25
+    assert len(rows()) > 100
+
+
+def test_every_row_has_a_fault_what_happens_and_links_to_tests():
+    wrong = [row[0] for row in rows() if len(row) != 3 or LINK.sub("", row[2]).strip(", ")]
+    assert wrong == [], "| fault | what happens | [words of the test's name](../ros/src/FILE), ... |"
 
 
 @functools.cache
@@ -40,13 +46,14 @@ def checks(function):
 
 @pytest.mark.parametrize("row", rows(), ids=lambda row: row[0][:40])
 def test_every_row_names_test_functions(row):
-    for named in row[-1].split(", "):
-        file, _, name = named.partition("::")
+    links = LINK.findall(row[-1])
+    assert links, row[-1]
+    for words, file in links:
+        name = "test_" + words.replace(" ", "_")
         path = TOP / "ros" / "src" / file
-        assert path.is_file(), named
-        assert name.startswith("test_"), named
-        assert name in functions(path), named
-        assert checks(functions(path)[name]), named
+        assert path.is_file(), file
+        assert name in functions(path), f"{file} has no {name}"
+        assert checks(functions(path)[name]), name
 
 
 def test_an_empty_test_is_none():

@@ -5,6 +5,10 @@ import time
 from concurrent.futures import Future
 from dataclasses import replace
 
+from geometry_msgs.msg import Point, Vector3
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker
+
 from crazyflie_dashboard.control import ControlError, PageControl
 from crazyflie_dashboard.moves import formation
 from crazyflie_dashboard.page_data import (
@@ -16,14 +20,16 @@ from crazyflie_dashboard.page_data import (
 )
 from crazyflie_dashboard.snapshot import (
     Action,
+    Fence,
     Frame,
     LogLine,
+    Placed,
     Reference,
     Scene,
     Sentence,
-    Solid,
     VehicleSnapshot,
 )
+from crazyflie_dashboard.surroundings import grouped
 from crazyflie_utils.refusal import RefusalError
 
 ACTIONS = frozenset(
@@ -86,18 +92,11 @@ class FakeDashboard:
 
     def set_vehicles(self, *vehicles, **details):
         """Show these vehicles."""
+        pole = Marker(type=Marker.CYLINDER, scale=Vector3(0.2, 0.2, 1.5))
+        pole.color, pole.pose.position = ColorRGBA(0.6, 0.7, 0.8, 1.0), Point(1.2, 1.2, 0.75)
         known = {
-            "fences": (((-2.5, -2.5, 0.0), (2.5, 2.5, 2.2)),),
-            "solids": (
-                Solid(
-                    "pole",
-                    "cylinder",
-                    (1.2, 1.2, 0.75),
-                    (0, 0, 0, 1),
-                    (0.2, 0.2, 1.5),
-                    (0.6, 0.7, 0.8, 1.0),
-                ),
-            ),
+            "fences": (Fence((-2.5, -2.5, 0.0), (2.5, 2.5, 2.2)),),
+            "solids": (Placed(grouped([pole])[0][0][1]),),
             "images": ("/cf1/image_raw",),
             "frames": (Frame("wand", (-1.5, 1.2, 0.3), (0, 0, 0, 1)),),
             "sentences": (Sentence("warn", "doctor", "cf2 has a weak link", "move the antenna"),),

@@ -2,19 +2,20 @@
 
 import math
 
+import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.msg import Config
 from fake_fleet import STATE, FakeFleet
 from genpy.dynamic import generate_dynamic
-from geometry_msgs.msg import Point, PoseStamped
+from geometry_msgs.msg import Point, PoseStamped, Vector3
 from rosgraph_msgs.msg import Log
-from std_msgs.msg import String
+from std_msgs.msg import ColorRGBA, String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from crazyflie_dashboard import surroundings
 from crazyflie_dashboard.discovery import Graph
+from crazyflie_dashboard.snapshot import Fence
 from crazyflie_msgs.msg import ControlStamped, FlightStatus, PositionVelocityYawStateStamped
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose
 
@@ -166,15 +167,36 @@ def test_geofences_are_drawn_as_long_as_they_are_there(fleet):
         add_topic(fleet, topic, Config._type)
         fleet.process.publish(topic, encode_config({**BOX, "margin": 0.5}))
     fleet.process.advance(0.05)
-    assert fleet.dashboard.scene().fences == (((-1.0,) * 3, (2.0,) * 3),)
+    assert fleet.dashboard.scene().fences == (Fence((-1.0,) * 3, (2.0,) * 3),)
     assert len(fleet.process.transport.subscribers[topic]) == 1
     fleet.process.publish(topic, encode_config({"box/max/x": 3.0}))
     fleet.process.advance(0.05)
-    assert fleet.dashboard.scene().fences[1] == ((-14.0,) * 3, (3.0, 14.0, 14.0))
+    assert fleet.dashboard.scene().fences[1] == Fence((-14.0,) * 3, (3.0, 14.0, 14.0))
     topics = {k: v for k, v in fleet.graph.topics.items() if k != topic}
     fleet.graph = Graph(topics, services=fleet.graph.services)
     fleet.process.advance(2.1)
-    assert fleet.dashboard.scene().fences == (((-1.0,) * 3, (2.0,) * 3),)
+    assert fleet.dashboard.scene().fences == (Fence((-1.0,) * 3, (2.0,) * 3),)
+
+
+def test_geofences_are_drawn_where_the_frame_of_their_vehicles_is():
+    fleet, topic, half = FakeFleet(), "/cf1/geofence/parameter_updates", math.sqrt(0.5)
+    fleet.process.advance(0.1)
+    stamp = fleet.process.clock.nanoseconds()
+    above = StampedPose("map", "world", stamp, (5.0, 0.0, 0.0), (0.0, 0.0, half, half))
+    # The body of motion capture moves, and the vehicle's own frame is fixed to it.
+    own = StampedPose("body", "cf1", stamp, (0.0, 0.0, -0.02), (0.0, 0.0, 0.0, 1.0))
+    fleet.process.publish("/tf_static", PoseCodec().encode([above, own]))
+    places = {"body": (0.5, 0.0, 1.0), "cf2": (1.0, 0.0, 1.0)}
+    fleet.send_poses(places=places)
+    add_topic(fleet, topic, Config._type)
+    fleet.process.publish(topic, encode_config(BOX))
+    fleet.send_poses(places=places)
+    scene = fleet.dashboard.scene()
+    assert scene.fixed_frame == "map"
+    assert scene.vehicles["cf1"].position == pytest.approx((5.0, 0.5, 0.98))
+    (fence,) = scene.fences
+    assert fence[:3] == ((-1.0,) * 3, (2.0,) * 3, pytest.approx((5.0, 0.0, 0.0)))
+    assert fence.rotation == pytest.approx((0.0, 0.0, half, half))
 
 
 @pytest.mark.parametrize("topic", ["/sweep/markers", "/cf1/high_level/plan/markers"])
@@ -283,21 +305,55 @@ def test_a_master_that_does_not_answer_is_said_until_it_does():
     assert fleet.dashboard.scene().sentences == ()
 
 
-def test_markers_are_drawn_up_to_a_number_and_made_once(fleet, monkeypatch):
-    made = []
-    solid = surroundings._solid
-    monkeypatch.setattr(surroundings, "_solid", lambda *a: made.append(a) or solid(*a))
+def test_markers_are_drawn_up_to_a_number_and_made_once(fleet):
     add_topic(fleet, "/world/markers", MarkerArray._type)
     cube = Marker(type=Marker.CUBE)
     cube.header.frame_id = "world"
+    cube.pose.orientation.w = 1.0
+    cube.color.a = 1.0
     moving = Marker(type=Marker.SPHERE)
     moving.header.frame_id = "cf3"
-    fleet.process.publish("/world/markers", MarkerArray([moving, *(99_999 * [cube])]))
+    fleet.process.publish("/world/markers", MarkerArray([moving, *(100_100 * [cube])]))
+    made = []
     for k in range(20):
         fleet.send_poses(places={"cf1": (0.0, 0.0, 1.0), "cf3": (2.0, 0.0, 0.1 * k)})
+        made.append([each.what for each in fleet.dashboard.scene().solids])
+    assert made == 20 * [made[0]]
     scene = fleet.dashboard.scene()
-    assert len(scene.solids) == 2000
-    assert sum(each.position[2] for each in scene.solids) == pytest.approx(1.9)
-    assert len(made) < 2100
+    ball, cubes = scene.solids
+    assert (ball.what.shape, ball.position[2]) == ("ball", pytest.approx(1.9))
+    assert (cubes.what.shape, len(cubes.what.rows)) == ("box", 99_999)
     (sentence,) = [each for each in scene.sentences if "markers" in each.text]
-    assert sentence.text == "100000 markers on /world/markers; 2000 are drawn"
+    assert sentence.text == "100101 markers and points on /world/markers; 100000 are drawn"
+
+
+def listed(fleet, kind, points, **details):
+    add_topic(fleet, "/world/markers", MarkerArray._type)
+    marker = Marker(type=kind, points=[Point(*each) for each in points], **details)
+    marker.header.frame_id = "world"
+    marker.pose.orientation.z = 1.0
+    marker.pose.position.x = 1.0
+    fleet.process.publish("/world/markers", MarkerArray([marker]))
+    fleet.process.advance(0.05)
+    return fleet.dashboard.scene().solids
+
+
+def test_lists_of_markers_are_one_thing_each(fleet):
+    bad = (math.nan, 0.0, 0.0)
+    size = Vector3(0.1, 0.2, 0.3)
+    colours = [ColorRGBA(1.0, 0.0, 0.0, 0.5), ColorRGBA(), ColorRGBA(0.0, 2.0, 0.2, 0.5)]
+    rows = ((0.5, 0.0, 0.0), bad, (0.0, 0.5, 1.0))
+    ((cubes, *_),) = listed(fleet, Marker.CUBE_LIST, rows, scale=size, colors=colours)
+    # The marker turns them half about z.
+    expected = [
+        [0.5, 0.0, 0.0, 0, 0, 1, 0, 0.1, 0.2, 0.3],
+        [1.0, -0.5, 1.0, 0, 0, 1, 0, 0.1, 0.2, 0.3],
+    ]
+    assert cubes.rows == pytest.approx(np.array(expected), abs=1e-6)
+    assert cubes.colours.tolist() == [[255, 0, 0], [0, 255, 51]]
+    assert cubes.opacity == 0.5
+    ((points, *_),) = listed(fleet, Marker.POINTS, 100_000 * [(0.0, 0.0, 1.0)], scale=size)
+    assert (points.shape, points.rows.shape, points.width) == ("points", (100_000, 3), 0.1)
+    ((lines, *_),) = listed(fleet, Marker.LINE_LIST, (*rows[::2], rows[0], bad, rows[0]))
+    assert lines.rows == pytest.approx(np.array([[0.5, 0.0, 0.0], [1.0, -0.5, 1.0]]), abs=1e-6)
+    assert listed(fleet, Marker.SPHERE_LIST, [bad]) == ()

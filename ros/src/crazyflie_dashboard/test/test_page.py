@@ -11,11 +11,15 @@ import cv2
 import numpy as np
 import pytest
 from fake_dashboard import vehicle
+from geometry_msgs.msg import Point, Vector3
 from pages import wait_for
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker
 
-from crazyflie_dashboard.snapshot import Action, LogLine, Sentence
+from crazyflie_dashboard.snapshot import Action, Fence, LogLine, Placed, Sentence
+from crazyflie_dashboard.surroundings import grouped
 
 
 def test_vehicles_take_off_go_where_the_floor_is_clicked_and_land(browser, server):
@@ -338,6 +342,28 @@ def test_what_has_not_changed_is_not_sent_again(browser, driver):
         browser.tab(tab)
         driver.execute_script("window.seen = []")
         wait_for(lambda: driver.execute_script(last), f"nothing but the clock in {tab}")
+
+
+def test_a_hundred_thousand_points_are_one_thing_in_the_scene(browser, server):
+    browser.has("3 vehicles")
+    cloud = Marker(type=Marker.POINTS, scale=Vector3(0.02, 0.02, 0.0))
+    cloud.points = 100_000 * [Point(1.0, 0.5, 0.2)]
+    cubes = Marker(type=Marker.CUBE_LIST, scale=Vector3(0.1, 0.2, 0.3), color=ColorRGBA(a=1.0))
+    cubes.points = 1000 * [Point(0.5, 0.0, 0.0)]
+    turned = (1.0, 0.0, 0.0), (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
+    solids = tuple(Placed(grouped([each])[0][0][1], *turned) for each in (cloud, cubes))
+    fence = Fence((-1.0, -1.0, 0.0), (2.0, 1.0, 1.0), *turned)
+    server.dashboard.set_vehicles(vehicle("cf1", 0.0), solids=solids, fences=(fence,))
+    parts = "surroundings.solids.children"
+    wait_for(lambda: browser.in_scene(f"{parts}.length") == 2, "two objects")
+    assert browser.in_scene(f"{parts}[0].geometry.attributes.position.count") == 100_000
+    assert browser.in_scene(f"{parts}[1].count") == 1000
+    wait_for(lambda: browser.in_scene(f"{parts}[1].position.x") == 1.0, "their frame")
+    frame = "surroundings.fences.children[0]"
+    assert browser.in_scene(f"{frame}.position.toArray()") == pytest.approx([1.0, 0.0, 0.0])
+    assert browser.in_scene(f"{frame}.quaternion.z") == pytest.approx(math.sqrt(0.5))
+    drawn = "renderer.info.render.calls"
+    assert browser.in_scene(drawn) < 40
 
 
 NEXT_PICTURES = """

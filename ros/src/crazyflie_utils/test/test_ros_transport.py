@@ -22,6 +22,7 @@ from crazyflie_utils.ros1 import calls, patches
 from crazyflie_utils.ros1.calls import wait_for_answer
 from crazyflie_utils.ros1.own_topics import OwnSubscription
 from crazyflie_utils.ros1.transport import RosTransport
+from crazyflie_utils.testing.waiting import wait_until
 
 
 def ignore(text, key):
@@ -127,3 +128,32 @@ allow_many_topics()
 files = [open("/dev/null") for _ in range(200)]
 """
     subprocess.run([sys.executable, "-c", program], check=True, timeout=60.0)
+
+
+def test_callbacks_subscribe_without_waiting_for_the_master(monkeypatch):
+    answers, done = threading.Event(), []
+
+    class Subscriber:
+        def __init__(self, name, *_, **__):
+            answers.wait(20.0)
+            done.append(f"subscribed to {name}")
+
+        def unregister(self):
+            done.append("unsubscribed")
+
+        def get_num_connections(self):
+            return 1
+
+    monkeypatch.setattr("rospy.Subscriber", Subscriber)
+    transport = RosTransport()
+    transport.is_in_callback = lambda: True
+    subscriber = transport.subscribe("/a", String, print)
+    assert not subscriber.has_publishers()
+    subscriber.close()
+    # What comes after it, from wherever, does not overtake it.
+    transport.is_in_callback = lambda: False
+    transport.subscribe("/b", String, print)
+    assert done == []
+    answers.set()
+    wait_until(lambda: len(done) == 3, "the master's answers", 20.0)
+    assert done == ["subscribed to /a", "unsubscribed", "subscribed to /b"]

@@ -107,6 +107,15 @@ class Frames:
         pose = None if name is None else self.poses.get(name)
         return None if pose is None else pose.stamped.parent
 
+    def home(self, name: str | None) -> str | None:
+        """Return the frame in which a frame moves: above the topmost one that is not static."""
+        found = None
+        for each in self._tree.chain(name):
+            pose = self.poses.get(each)
+            if pose is not None and not pose.is_static:
+                found = pose.stamped.parent
+        return found
+
     def root(self, name: str) -> str:
         """Return the frame at the top of a frame's tree."""
         *_, top = self._tree.chain(name)
@@ -114,6 +123,8 @@ class Frames:
 
     def in_fixed(self, name: str, fixed: str) -> tuple[Triple, Rotation] | None:
         """Return position and rotation of a frame in another one; None if that is not known."""
+        if name == fixed:
+            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
         if name not in self.poses:
             return None
         pose = self._tree.latest(fixed, name)

@@ -233,7 +233,9 @@ class GraphModel:
             fixed_frame=fixed,
             vehicles=snapshots,
             solids=self._surroundings.solids(frames, fixed),
-            fences=self._surroundings.fences,
+            fences=self._surroundings.fences(
+                frames, fixed, {m.vehicle.namespace: m.frame for m in self.models.values()}
+            ),
             frames=tuple(others),
             paths={**self._surroundings.paths(frames, fixed), **self.paths},
             sentences=self._own_sentences() + self._diagnostics.sentences() + self.sentences,

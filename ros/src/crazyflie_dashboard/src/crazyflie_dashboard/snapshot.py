@@ -7,6 +7,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 Triple = tuple[float, float, float]
 Rotation = tuple[float, float, float, float]
@@ -79,19 +83,38 @@ class VehicleSnapshot:
     actions: frozenset[Action] = frozenset()  #: What it offers.
 
 
-@dataclass(frozen=True)
-class Solid:
-    """A wall, an obstacle, or a part of another display: a box, a cylinder or a ball.
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """Walls, obstacles, points or lines of one kind, drawn together. Equal only to itself.
 
-    ``size`` is along its own x, y, z (m); ``colour`` red, green, blue and opacity, 0 to 1.
+    ``rows`` has position (m), quaternion (x, y, z, w) and size along its own x, y, z (m) of each
+    box, cylinder or ball, shape (n, 10); of points and ends of lines the position, shape (n, 3).
+    ``colours`` are red, green and blue, 0 to 255, shape (n, 3); ``opacity`` is 0 to 1, and
+    ``width`` (m) that of a point.
     """
 
-    name: str
-    shape: str  # "box", "cylinder" or "ball".
-    position: Triple
-    rotation: Rotation
-    size: Triple
-    colour: tuple[float, float, float, float]
+    shape: str  #: "box", "cylinder", "ball", "points" or "lines".
+    rows: NDArray[np.float32]
+    colours: NDArray[np.uint8]
+    opacity: float = 1.0
+    width: float = 0.0
+
+
+class Placed(NamedTuple):
+    """What is drawn in a frame, and where that frame is: m, and a quaternion (x, y, z, w)."""
+
+    what: Solids
+    position: Triple = (0.0, 0.0, 0.0)
+    rotation: Rotation = (0.0, 0.0, 0.0, 1.0)
+
+
+class Fence(NamedTuple):
+    """A geofence: lower and upper corner (m) in a frame, and where that frame is."""
+
+    lower: Triple
+    upper: Triple
+    position: Triple = (0.0, 0.0, 0.0)
+    rotation: Rotation = (0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -141,8 +164,8 @@ class Scene:
     fixed_frame: str = "world"
     #: By name, in the order in which they are shown.
     vehicles: Mapping[str, VehicleSnapshot] = field(default_factory=dict)
-    solids: tuple[Solid, ...] = ()  #: Changes rarely: compare it by ``is``.
-    fences: tuple[tuple[Triple, Triple], ...] = ()  #: Lower and upper corners of geofences.
+    solids: tuple[Placed, ...] = ()
+    fences: tuple[Fence, ...] = ()
     frames: tuple[Frame, ...] = ()
     #: Planned trajectories, by the vehicle's name or by topic. Changes rarely.
     paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)

@@ -1,8 +1,10 @@
 """What is drawn around the vehicles: solids, planned paths and geofences of the graph."""
 
 import math
-from typing import Any
+from collections import defaultdict
+from collections.abc import Mapping
 
+import numpy as np
 import roslib.message
 from geometry_msgs.msg import Point
 from std_msgs.msg import String
@@ -10,7 +12,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.frames import Frames
-from crazyflie_dashboard.snapshot import Solid, Triple
+from crazyflie_dashboard.snapshot import Fence, Placed, Solids, Triple
 from crazyflie_model.angles import rotate
 from crazyflie_takeoff.flight_topics import follow_box
 from crazyflie_takeoff.limits import Box
@@ -23,9 +25,16 @@ _HELD = "fleet/waiting"  #: How the topic with the names of vehicles that a flee
 
 _FAR = 14.0  #: Where a wall is drawn that a fence does not have, m: the end of the floor.
 _MAX_POINTS = 1000  #: Of a path.
-_MAX_MARKERS = 2000  #: Of one topic that are drawn: a browser draws each by itself.
+#: Of one topic that are drawn, points of lists counted one by one.
+MAX_PARTS = 100_000
 
 _SHAPES = {Marker.CUBE: "box", Marker.CYLINDER: "cylinder", Marker.SPHERE: "ball"}
+_LISTS = {
+    Marker.CUBE_LIST: "box",
+    Marker.SPHERE_LIST: "ball",
+    Marker.POINTS: "points",
+    Marker.LINE_LIST: "lines",
+}
 
 
 class Surroundings:
@@ -39,14 +48,11 @@ class Surroundings:
     def __init__(self, handle: NodeHandle):
         self._handle = handle
         self._topics: set[str] = set()
-        # By topic: markers by their frame, and how many there are.
-        self._markers: dict[str, tuple[dict[str, list[Marker]], int]] = {}
+        # By topic: what is drawn in which frame, and how many parts there are.
+        self._markers: dict[str, tuple[list[tuple[str, Solids]], int]] = {}
         self._paths: dict[str, tuple[str, tuple[Triple, ...]]] = {}
         self._fences: dict[str, Box] = {}
         self._held: dict[str, frozenset[str]] = {}
-        # By topic and frame: markers, where the frame was, and what was made of them.
-        self._made: dict[tuple[str, str], tuple[Any, Any, tuple[Solid, ...]]] = {}
-        self._solids: tuple[Solid, ...] = ()
 
     def follow(self, graph: Graph) -> None:
         """Subscribe to topics that are new on the graph; forget those that are gone."""
@@ -59,25 +65,14 @@ class Surroundings:
             if topic not in self._topics:
                 self._subscribe(topic, kind)
 
-    def solids(self, frames: Frames, fixed: str) -> tuple[Solid, ...]:
-        """Return walls and obstacles in the frame ``fixed``; the same object until they change."""
-        made = {}
-        for topic, (by_frame, _) in self._markers.items():
-            for frame, markers in by_frame.items():
-                # What moves is drawn in its own frame, at its origin.
-                place = ((0.0, 0.0, 0.0),) if frame == fixed else frames.in_fixed(frame, fixed)
-                if place is None:
-                    continue
-                key, at = (topic, frame), (frame == fixed, place[0])
-                before, where, solids = self._made.get(key, (None, None, ()))
-                if before is not markers or where != at:
-                    solids = tuple(s for m in markers if (s := _solid(m, *at)) is not None)
-                made[key] = markers, at, solids
-        is_new = [each[2] for each in made.values()] != [each[2] for each in self._made.values()]
-        self._made = made
-        if is_new:
-            self._solids = tuple(each for *_, solids in made.values() for each in solids)
-        return self._solids
+    def solids(self, frames: Frames, fixed: str) -> tuple[Placed, ...]:
+        """Return what is drawn of markers, in the frame ``fixed``."""
+        return tuple(
+            Placed(solids, *place)
+            for found, _ in self._markers.values()
+            for frame, solids in found
+            if (place := frames.in_fixed(frame or fixed, fixed)) is not None
+        )
 
     @property
     def held(self) -> frozenset[str]:
@@ -88,26 +83,36 @@ class Surroundings:
     def too_many(self) -> tuple[str, ...]:
         """What is not drawn, in words."""
         return tuple(
-            f"{count} markers on {topic}; {_MAX_MARKERS} are drawn"
+            f"{count} markers and points on {topic}; {MAX_PARTS} are drawn"
             for topic, (_, count) in self._markers.items()
-            if count > _MAX_MARKERS
+            if count > MAX_PARTS
         )
 
     def paths(self, frames: Frames, fixed: str) -> dict[str, tuple[Triple, ...]]:
         """Return planned paths, m, in the frame ``fixed``, by the name of the topic."""
         found = {}
         for name, (frame, points) in self._paths.items():
-            placed = None if frame == fixed else frames.in_fixed(frame, fixed)
-            if placed is not None:
-                found[name] = tuple(_moved(point, *placed) for point in points)
-            elif frame == fixed:
+            if frame == fixed:
                 found[name] = points
+            elif (placed := frames.in_fixed(frame, fixed)) is not None:
+                found[name] = tuple(_moved(point, *placed) for point in points)
         return found
 
-    @property
-    def fences(self) -> tuple[tuple[Triple, Triple], ...]:
-        """Lower and upper corners of the geofences, m, each once."""
-        return tuple(dict.fromkeys(_drawn(box) for box in self._fences.values()))
+    def fences(
+        self, frames: Frames, fixed: str, vehicles: Mapping[str, str | None]
+    ) -> tuple[Fence, ...]:
+        """Return the geofences in the frame ``fixed``, each once.
+
+        ``vehicles`` has the frame of each vehicle by its namespace: the box of its fence is in the
+        frame in which it moves.
+        """
+        found = []
+        for topic, box in self._fences.items():
+            own = (frame for name, frame in vehicles.items() if topic.startswith(f"{name}/"))
+            home = frames.home(next(own, None)) or fixed
+            if (place := frames.in_fixed(home, fixed)) is not None:
+                found.append(Fence(*_drawn(box), *place))
+        return tuple(dict.fromkeys(found))
 
     def box(self, namespace: str) -> Box | None:
         """Return the box of a vehicle's geofence; None if it has none."""
@@ -130,13 +135,10 @@ class Surroundings:
         self._topics.add(topic)
 
     def _draw(self, topic, message):
-        by_frame: dict[str, list[Marker]] = {}
-        for marker in message.markers[:_MAX_MARKERS]:
-            by_frame.setdefault(marker.header.frame_id.strip("/"), []).append(marker)
-        self._markers[topic] = by_frame, len(message.markers)
+        self._markers[topic] = grouped(message.markers)
         for key in [key for key in self._paths if key.partition(" ")[0] == topic]:
             del self._paths[key]
-        for marker in message.markers[:_MAX_MARKERS]:
+        for marker in message.markers:
             if marker.type == Marker.LINE_STRIP and marker.action == Marker.ADD:
                 key = f"{topic} {marker.ns} {marker.id}"
                 self._paths[key] = marker.header.frame_id.strip("/"), _path(marker.points)
@@ -165,11 +167,63 @@ def _moved(point, position, rotation):
     return position[0] + x, position[1] + y, position[2] + z
 
 
-def _solid(marker: Marker, is_fixed: bool, place: Triple) -> Solid | None:
-    shape = _SHAPES.get(marker.type)
-    if shape is None or marker.action != Marker.ADD:
-        return None
-    p, q, size, c = marker.pose.position, marker.pose.orientation, marker.scale, marker.color
-    position = (p.x, p.y, p.z) if is_fixed else place
-    rotation, colour = (q.x, q.y, q.z, q.w), (c.r, c.g, c.b, c.a)
-    return Solid(marker.ns, shape, position, rotation, (size.x, size.y, size.z), colour)
+def grouped(markers: list[Marker]) -> tuple[list[tuple[str, Solids]], int]:
+    """Return what is drawn of markers, with its frame, and how many parts they have.
+
+    Markers of one shape, opacity and frame are drawn at once, and so are the points of a list.
+    """
+    single: dict[tuple[str, str, float], list[tuple[float, ...]]] = defaultdict(list)
+    found, count = [], 0
+    for marker in markers:
+        if marker.action != Marker.ADD:
+            continue
+        frame, left = marker.header.frame_id.strip("/"), max(0, MAX_PARTS - count)
+        if shape := _SHAPES.get(marker.type):
+            count += 1
+            if left:
+                p, s, c = marker.pose.position, marker.scale, marker.color
+                row = (p.x, p.y, p.z, *_rotation(marker), s.x, s.y, s.z, c.r, c.g, c.b)
+                single[frame, shape, c.a].append(row)
+        elif shape := _LISTS.get(marker.type):
+            count += len(marker.points)
+            if left and marker.points:
+                found.append((frame, _listed(shape, marker, left)))
+    for (frame, shape, opacity), rows in single.items():
+        table = np.array(rows)
+        found.append((frame, _solids(shape, table[:, :10], table[:, 10:], opacity)))
+    return [each for each in found if len(each[1].rows)], count
+
+
+def _listed(shape, marker, most):
+    p, s, rotation = marker.pose.position, marker.scale, _rotation(marker)
+    points = np.array([(each.x, each.y, each.z) for each in marker.points[:most]])
+    rows = np.stack(rotate(rotation, tuple(points.T)), axis=1) + (p.x, p.y, p.z)
+    if shape in ("box", "ball"):
+        rows = np.hstack([rows, np.tile((*rotation, s.x, s.y, s.z), (len(rows), 1))])
+    has_own = len(marker.colors) == len(marker.points)
+    colours = marker.colors[:most] if has_own else [marker.color]
+    table = np.broadcast_to([(each.r, each.g, each.b) for each in colours], (len(rows), 3))
+    if shape == "lines":
+        pairs = len(rows) // 2
+        rows, table = rows[: 2 * pairs].reshape(pairs, 6), table[: 2 * pairs].reshape(pairs, 6)
+    return _solids(shape, rows, table, colours[0].a, s.x)
+
+
+def _solids(shape, rows, colours, opacity, width=0.0):
+    """Return those of the rows that are finite."""
+    are_finite = np.isfinite(rows).all(axis=1) & np.isfinite(colours).all(axis=1)
+    size = 10 if shape in _SHAPES.values() else 3
+    numbers = np.rint(255.0 * np.clip(colours[are_finite], 0.0, 1.0)).astype(np.uint8)
+    return Solids(
+        shape,
+        rows[are_finite].astype(np.float32).reshape(-1, size),
+        numbers.reshape(-1, 3),
+        opacity,
+        width,
+    )
+
+
+def _rotation(marker):
+    """Return the quaternion (x, y, z, w) of a marker; many leave it at zero."""
+    q = marker.pose.orientation
+    return (q.x, q.y, q.z, q.w) if any((q.x, q.y, q.z, q.w)) else (0.0, 0.0, 0.0, 1.0)

@@ -28,6 +28,7 @@ class ProcessContext:
     ):
         self.transport = transport
         self.executor = Executor()
+        transport.is_in_callback = lambda: self.executor.is_running_here
         self.topics = Topics(transport)
         self.clock: SimulatedClock | SteadyClock = clock or (
             SimulatedClock() if use_sim_time else SteadyClock()

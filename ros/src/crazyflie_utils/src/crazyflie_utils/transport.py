@@ -48,6 +48,9 @@ class ExternalSubscriber(ABC):
 class Transport(ABC):
     """Parameters, topics, services, logging and life time, by absolute names."""
 
+    #: Whether this thread runs callbacks, which must not wait for the master.
+    is_in_callback: Callable[[], bool] = staticmethod(lambda: False)
+
     def starting(self) -> AbstractContextManager[None]:
         """Return a with block that initializes nodes; other processes see them at its end."""
         return nullcontext()

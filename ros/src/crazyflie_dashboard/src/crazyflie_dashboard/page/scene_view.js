@@ -139,7 +139,9 @@ export default {
       this.change(() => this.setVehicles(names));
       if (this.poses) this.update(this.poses);
     },
-    setWorld(solids, fences) { this.change(() => this.surroundings.setWorld(solids, fences)); },
+    setSolids(solids) { this.change(() => this.surroundings.setSolids(solids)); },
+    placeSolids(places) { this.change(() => this.surroundings.placeSolids(places)); },
+    setFences(fences) { this.change(() => this.surroundings.setFences(fences)); },
     setPaths(paths) { this.change(() => this.surroundings.setPaths(paths)); },
     setFrames(frames) { this.change(() => this.surroundings.setFrames(frames)); },
     setGoal(goal) { this.change(() => this.goal.show(goal)); },

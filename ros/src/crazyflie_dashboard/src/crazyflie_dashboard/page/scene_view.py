@@ -2,6 +2,7 @@
 
 import math
 import time
+from base64 import b64encode
 from collections import deque
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
@@ -13,11 +14,12 @@ import roslib.packages
 from nicegui import core, ui
 from nicegui.element import Element
 
-from crazyflie_dashboard.snapshot import Rotation, Scene, Triple, VehicleSnapshot
+from crazyflie_dashboard.snapshot import Rotation, Scene, Solids, Triple, VehicleSnapshot
 
 FOLDER = Path(__file__).parent
 MAX_UNANSWERED = 3  #: Scenes that a browser has not taken, before no more is sent,
 ANSWER_LIMIT = 2.0  #: for so long, s.
+PART_TIME = 1e-5  #: From sending walls, obstacles and points to sending others, s for each.
 DIGITS = 4  #: Of positions in m and of quaternions, for the browser.
 
 ui.scene  # noqa: B018  Registers three.js.
@@ -75,22 +77,28 @@ class SceneView(
         super().__init__()
         self._props["model"] = vehicle_model()
         self._shown: dict[str, Any] = {}
-        self._world: tuple[Any, Any] = (None, None)
+        self._solids: list[Solids] = []
+        self._solids_at = 0.0  # From when on others may be sent, s.
         self._unanswered: deque[float] = deque()
         self.on("ready", self._begin)
 
     def _begin(self) -> None:
         self._shown.clear()
         self._unanswered.clear()
-        self._world = (None, None)
+        self._solids, self._solids_at = [], 0.0
 
     async def show(self, scene: Scene, chosen: set[str], extra_paths: Mapping[str, Any]) -> None:
         """Draw a scene; what has not changed since the last one is not sent."""
         self._send("setNames", [list(scene.vehicles)])
-        # They may be many, and are the same objects until they change.
-        if scene.solids is not self._world[0] or scene.fences != self._world[1]:
-            self._world = scene.solids, scene.fences
-            self._send("setWorld", [[_solid(each) for each in scene.solids], scene.fences])
+        solids = [each.what for each in scene.solids]
+        if solids != self._solids and time.monotonic() >= self._solids_at:
+            self._solids = solids
+            count = sum(len(each.rows) for each in solids)
+            self._solids_at = time.monotonic() + PART_TIME * count
+            self.run_method("setSolids", [_packed(each) for each in solids])
+        if solids == self._solids:
+            self._send("placeSolids", [[[e.position, e.rotation] for e in scene.solids]])
+        self._send("setFences", [[list(each) for each in scene.fences]])
         self._send("setPaths", [[*scene.paths.values(), *extra_paths.values()]])
         frames = [[each.name, *_pose(each.position, each.rotation)] for each in scene.frames]
         self._send("setFrames", [frames])
@@ -145,10 +153,10 @@ def condition(vehicle: VehicleSnapshot) -> int:
     return 2 if vehicle.is_stale else int(vehicle.is_in_flight)
 
 
-def _solid(solid):
-    *rgb, opacity = solid.colour
-    color = "#" + "".join(f"{round(255 * min(1, max(0, part))):02x}" for part in rgb)
-    return [solid.shape, solid.position, solid.rotation, solid.size, color, opacity]
+def _packed(solids):
+    """Return solids as the browser takes them: arrays as base64, since they may be long."""
+    rows, colours = (b64encode(each).decode() for each in (solids.rows, solids.colours))
+    return [solids.shape, rows, colours, solids.opacity, solids.width]
 
 
 def _pose(position: Triple | None, rotation: Rotation) -> list[Any]:

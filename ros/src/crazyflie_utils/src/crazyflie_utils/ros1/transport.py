@@ -3,10 +3,12 @@
 import contextlib
 import math
 import resource
+import threading
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import Future
 from functools import partial
+from queue import SimpleQueue
 from typing import Any
 
 import genpy
@@ -51,14 +53,27 @@ class _RosPublisher(ExternalPublisher):
 
 
 class _RosSubscriber(ExternalSubscriber):
-    def __init__(self, subscriber: rospy.Subscriber):
-        self._subscriber = subscriber
+    """What ``register()`` returns; ``run(work)`` has work done that waits for the master."""
+
+    def __init__(
+        self, register: Callable[[], rospy.Subscriber], run: Callable[[Callable[[], None]], None]
+    ):
+        self._register, self._run = register, run
+        self._subscriber: rospy.Subscriber | None = None
+        run(self._begin)
+
+    def _begin(self):
+        self._subscriber = self._register()
 
     def has_publishers(self) -> bool:
-        return self._subscriber.get_num_connections() > 0
+        return self._subscriber is not None and self._subscriber.get_num_connections() > 0
 
     def close(self) -> None:
-        self._subscriber.unregister()
+        self._run(self._end)
+
+    def _end(self):
+        if self._subscriber is not None:
+            self._subscriber.unregister()
 
 
 class RosTransport(Transport):
@@ -82,6 +97,7 @@ class RosTransport(Transport):
         self._sets_clock = False
         self._caller = ServiceCaller()
         self._parameter_writer = ParameterWriter(_write_param, partial(self.log, "warn"))
+        self._for_master: SimpleQueue[Callable[[], None]] | None = None
         self._services_at_start: dict[str, str] | None = None
         self._is_starting = False
 
@@ -141,18 +157,38 @@ class RosTransport(Transport):
     def subscribe(
         self, topic: str, message_type: type, deliver: Callable[[Any], None]
     ) -> ExternalSubscriber:
-        """Register a subscriber with the master."""
+        """Register a subscriber with the master, from a callback without waiting for it."""
 
         def is_handed_over():
             return self._published[topic] > 0
 
-        patches.own_subscription(
-            topic, message_type, is_handed_over, self._refuse, self._limits_rate
-        )
-        callback = OwnCallback(deliver, is_handed_over)
-        return _RosSubscriber(
-            rospy.Subscriber(self._rospy_name(topic), message_type, callback, tcp_nodelay=True)
-        )
+        def register():
+            patches.own_subscription(
+                topic, message_type, is_handed_over, self._refuse, self._limits_rate
+            )
+            callback = OwnCallback(deliver, is_handed_over)
+            name = self._rospy_name(topic)
+            return rospy.Subscriber(name, message_type, callback, tcp_nodelay=True)
+
+        return _RosSubscriber(register, self._run)
+
+    def _run(self, work):
+        """Do what waits for the master: in callbacks, and after them, by a thread, in order."""
+        if self._for_master is None:
+            if not self.is_in_callback():
+                work()
+                return
+            self._for_master = SimpleQueue()
+            threading.Thread(target=self._run_queued, args=(self._for_master,), daemon=True).start()
+        self._for_master.put(work)
+
+    def _run_queued(self, queue):
+        while True:
+            work = queue.get()
+            try:
+                work()
+            except Exception as error:
+                self.log("error", f"a subscription has failed: {error!r}")
 
     def advertise_service(
         self,

@@ -3,41 +3,86 @@
 import { THREE } from "nicegui-scene";
 import { label } from "./vehicles.js";
 
+const MANY = 1000;  // More balls or cylinders have fewer triangles.
 const SHAPES = {
   box: () => new THREE.BoxGeometry(),
-  cylinder: () => new THREE.CylinderGeometry(0.5, 0.5, 1, 32).rotateX(Math.PI / 2),
-  ball: () => new THREE.SphereGeometry(0.5, 32, 16),
+  cylinder: (detail) => new THREE.CylinderGeometry(0.5, 0.5, 1, 8 * detail).rotateX(Math.PI / 2),
+  ball: (detail) => new THREE.SphereGeometry(0.5, 8 * detail, 4 * detail),
 };
+
+// Return numbers of an array that came as base64.
+const unpacked = (text, type) => new type(Uint8Array.from(atob(text), (each) => each.charCodeAt(0)).buffer);
+
+// Return solids as one object, whatever their number; see Solids of snapshot.py.
+function drawn([shape, packedRows, packedColors, opacity, width]) {
+  const rows = unpacked(packedRows, Float32Array), colors = unpacked(packedColors, Uint8Array);
+  const look = { opacity, transparent: opacity < 1, depthWrite: opacity >= 1 }, tint = new THREE.Color();
+  const color = (k) => tint.setRGB(colors[3 * k] / 255, colors[3 * k + 1] / 255, colors[3 * k + 2] / 255, THREE.SRGBColorSpace);
+  if (!SHAPES[shape]) {
+    const geometry = new THREE.BufferGeometry(), tints = new Float32Array(rows.length);
+    for (let k = 0; k < rows.length / 3; k++) color(k).toArray(tints, 3 * k);
+    geometry.setAttribute("position", new THREE.BufferAttribute(rows, 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(tints, 3));
+    Object.assign(look, { vertexColors: true });
+    return shape === "points" ? new THREE.Points(geometry, new THREE.PointsMaterial({ ...look, size: width }))
+      : new THREE.LineSegments(geometry, new THREE.LineBasicMaterial(look));
+  }
+  const count = rows.length / 10, detail = count > MANY ? 1 : 4;
+  const mesh = new THREE.InstancedMesh(SHAPES[shape](detail), new THREE.MeshLambertMaterial(look), count);
+  const position = new THREE.Vector3(), rotation = new THREE.Quaternion(), size = new THREE.Vector3();
+  const matrix = new THREE.Matrix4();
+  for (let k = 0, i = 0; k < count; k++, i += 10) {
+    position.fromArray(rows, i);
+    rotation.fromArray(rows, i + 3);
+    size.fromArray(rows, i + 7);
+    mesh.setMatrixAt(k, matrix.compose(position, rotation, size));
+    mesh.setColorAt(k, color(k));
+  }
+  return mesh;
+}
 
 // Take all out of a group, with what the graphics card holds of it.
 function empty(group) {
-  for (const child of group.children) child.geometry?.dispose();
+  for (const child of group.children) {
+    child.geometry?.dispose();
+    child.dispose?.();  // Of an instanced mesh.
+  }
   group.clear();
 }
 
 export class Surroundings extends THREE.Group {
   constructor() {
     super();
-    this.world = new THREE.Group();
+    this.solids = new THREE.Group();
+    this.fences = new THREE.Group();
     this.paths = new THREE.Group();
     this.frames = new Map();
-    this.add(this.world, this.paths);
+    this.add(this.solids, this.fences, this.paths);
   }
 
-  // Replace walls, obstacles and fences; a solid is [shape, position, rotation, size, color, opacity].
-  setWorld(solids, fences) {
-    empty(this.world);
-    for (const [shape, position, rotation, size, color, opacity] of solids) {
-      const solid = new THREE.Mesh(SHAPES[shape](), new THREE.MeshLambertMaterial(
-        { color, opacity, transparent: opacity < 1, depthWrite: opacity >= 1 }));
-      solid.position.set(...position);
-      solid.quaternion.set(...rotation);
-      solid.scale.set(...size);
-      this.world.add(solid);
-    }
-    for (const fence of fences) {
-      const box = new THREE.Box3(...fence.map((corner) => new THREE.Vector3(...corner)));
-      this.world.add(new THREE.Box3Helper(box, "#e0a030"));
+  // Replace walls, obstacles, points and lines.
+  setSolids(solids) {
+    empty(this.solids);
+    this.solids.add(...solids.map(drawn));
+  }
+
+  // Put them where their frames are: positions and quaternions, in the same order.
+  placeSolids(places) {
+    places.forEach(([position, rotation], k) => {
+      this.solids.children[k].position.set(...position);
+      this.solids.children[k].quaternion.set(...rotation);
+    });
+  }
+
+  // Replace the geofences: two corners in a frame, and its position and quaternion.
+  setFences(fences) {
+    empty(this.fences);
+    for (const [lower, upper, position, rotation] of fences) {
+      const box = new THREE.Box3(new THREE.Vector3(...lower), new THREE.Vector3(...upper));
+      const frame = new THREE.Group().add(new THREE.Box3Helper(box, "#e0a030"));
+      frame.position.set(...position);
+      frame.quaternion.set(...rotation);
+      this.fences.add(frame);
     }
   }
 

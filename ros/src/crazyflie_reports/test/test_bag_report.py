@@ -8,27 +8,6 @@ import bags
 import pytest
 from std_msgs.msg import String
 
-from crazyflie_reports.bag_report import main
-
-
-@pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
-    """Return a function that runs the program: status, what it prints, the tables of flights."""
-
-    def run(*arguments):
-        out = tmp_path / "out"
-        monkeypatch.setattr("sys.argv", ["flight_report", *map(str, arguments), "--out", str(out)])
-        status = main()
-        data = out / "report.json"
-        return (
-            status,
-            "".join(capsys.readouterr()),
-            json.loads(data.read_text()) if data.exists() else [],
-        )
-
-    run.folder = tmp_path
-    return run
-
 
 def values(flight):
     """Return the figures of a flight of report.json by name."""

@@ -22,6 +22,7 @@ from crazyflie_reports.bag_topics import (
     topic_of,
     transform_row,
 )
+from crazyflie_reports.usd_log import UsdConnection, UsdLogFile, is_usd_log
 
 POSE_PERIOD = 0.009  #: Of transforms, which may come at 1 kHz, one in this time is kept, s.
 
@@ -44,6 +45,7 @@ class Spool:
         self._path, self.fields = path, fields
         self._buffer = array("d")
         self.count = 0  #: Of rows.
+        self.offset = 0.0  #: Of the times of recording that are returned, s.
         self.last_time = float("-inf")
 
     def append(self, time: float, stamp: float, number: int, row: Sequence[float]) -> None:
@@ -63,6 +65,7 @@ class Spool:
         """Return all rows in the order of their times, shape (count, 3 + len(fields))."""
         self._flush()
         rows = np.fromfile(self._path).reshape(-1, 3 + len(self.fields))
+        rows[:, 0] += self.offset
         # Bags that were merged may be in another order.
         is_sorted = (np.diff(rows[:, 0]) >= 0.0).all()
         return rows if is_sorted else rows[np.argsort(rows[:, 0], kind="stable")]
@@ -128,10 +131,7 @@ def read(
     numbers of bytes. `BagError`: it cannot be read, or has none of the topics.
     """
     reader = _Reader(path.name, folder, names or {})
-    files = [
-        Ros2BagFile(each, folder) if each.name.endswith(SUFFIXES) else BagFile(each)
-        for each in files_of(path)
-    ]
+    files = [_opened(each, folder) for each in files_of(path)]
     remarks = []
     for file in files:
         for connection, time, data in file.messages(reader.is_wanted, progress):
@@ -159,6 +159,12 @@ def read(
     return logs
 
 
+def _opened(path, folder):
+    if path.name.endswith(SUFFIXES):
+        return Ros2BagFile(path, folder)
+    return UsdLogFile(path) if is_usd_log(path) else BagFile(path)
+
+
 class _Reader:
     """Puts messages where they belong."""
 
@@ -173,7 +179,8 @@ class _Reader:
     def is_wanted(self, connection):
         if connection not in self._topics:
             try:
-                topic = topic_of(connection, self._names)
+                is_usd = isinstance(connection, UsdConnection)
+                topic = connection.entry() if is_usd else topic_of(connection, self._names)
             except TopicError as error:
                 topic = None
                 self._errors[connection.topic] = str(error)

@@ -21,6 +21,8 @@ from crazyflie_reports.bag_file import BagError
 from crazyflie_reports.bag_flights import Flight, flights, vehicle_namespaces, vehicles
 from crazyflie_reports.bag_topics import ROLES
 from crazyflie_reports.figures import Figure, figures
+from crazyflie_reports.usd_log import is_usd_log
+from crazyflie_reports.usd_overlay import lay_over
 
 PAGE, FIGURES, EVENTS, DATA = "report.html", "figures.csv", "events.csv", "report.json"
 MCAP = "mcap"  #: Folder of the recordings as MCAP.
@@ -134,28 +136,34 @@ def make(
 ) -> list[str]:
     """Write a report on recordings; return what went wrong with any of them.
 
-    A path is a bag, or a folder of bags that follow each other; for ``names`` see `bag_log.read`.
+    A path is a bag, a folder of bags that follow each other, or a log of a vehicle's micro SD card,
+    which is laid over the bag that it fits; for ``names`` see `bag_log.read`.
     With ``has_mcap`` each recording is written as MCAP, too.
     `ReportError`: none of the recordings can be read, or the folder cannot be written.
     """
     report, problems, written = Report(), [], []
+    logs: list[bag_log.BagLog] = []
+    on_board: list[bag_log.BagLog] = []  # Of vehicles' micro SD cards.
     try:
         folder.mkdir(parents=True, exist_ok=True)
         # Beside the report, since /tmp may be in memory.
         with tempfile.TemporaryDirectory(dir=folder) as place:
             for number, path in enumerate(paths):
                 try:
-                    logs = _read(path, Path(place, str(number)), names)
+                    found = _read(path, Path(place, str(number)), names)
                 except BagError as error:
                     problems.append(str(error))
                     continue
-                for log in logs:
+                for log in found:
                     # Bags of several folders may have the same name.
                     if [each.name for each in paths].count(path.name) > 1:
                         log.name = str(path) + log.name.removeprefix(path.name)
-                    report.add(log)
-                    if has_mcap:
-                        written.append(bag_mcap.write(log, _new_folder(folder / MCAP, log.name)))
+                (on_board if path.is_file() and is_usd_log(path) else logs).extend(found)
+            alone = [log for log in on_board if not lay_over(log, logs)]
+            for log in [*logs, *alone]:
+                report.add(log)
+                if has_mcap:
+                    written.append(bag_mcap.write(log, _new_folder(folder / MCAP, log.name)))
         if not report.recordings:
             raise ReportError("\n".join(problems))
         report.write(folder)
@@ -177,7 +185,8 @@ def main() -> int:
         nargs="+",
         type=Path,
         metavar="BAG",
-        help="of ROS 1, or of ROS 2 (*.mcap, *.db3), or a folder of bags that follow each other",
+        help="of ROS 1, or of ROS 2 (*.mcap, *.db3), or a folder of bags that follow each other; "
+        "or a log of a vehicle's micro SD card, which is laid over the bag that it fits",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("flight_report"), help="folder of the report (%(default)s)"

@@ -3,8 +3,4 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(
-    **generate_distutils_setup(
-        packages=["crazyflie_dev", "crazyflie_dev.bench"], package_dir={"": "src"}
-    )
-)
+setup(**generate_distutils_setup(packages=["crazyflie_dev"], package_dir={"": "src"}))

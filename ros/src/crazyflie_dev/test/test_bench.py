@@ -5,10 +5,8 @@ import os
 
 import pytest
 
-from crazyflie_dev.bench import __main__ as bench
-from crazyflie_dev.bench import flights
-from crazyflie_dev.bench.__main__ import Row
-from crazyflie_dev.bench.listener import take_stamps
+from crazyflie_dev import bench, bench_flights
+from crazyflie_dev.bench import Row
 
 
 @pytest.fixture
@@ -28,8 +26,8 @@ def run(monkeypatch, tmp_path):
         return bench.main(), json.loads(out.read_text())["rows"]
 
     monkeypatch.setattr(bench, "ROWS", rows)
-    monkeypatch.setattr(flights, "bad", fail, raising=False)
-    monkeypatch.setattr(flights, "good", measure, raising=False)
+    monkeypatch.setattr(bench_flights, "bad", fail, raising=False)
+    monkeypatch.setattr(bench_flights, "good", measure, raising=False)
     yield run
     assert "FACTOR" not in os.environ
 
@@ -52,11 +50,4 @@ def test_a_reference_is_measured_in_its_own_environment(run, tmp_path, capsys):
 
 
 def test_every_row_has_a_flight():
-    assert {row.flight.split()[0] for row in bench.ROWS} <= vars(flights).keys()
-
-
-def test_stamps_are_taken_from_complete_messages_only():
-    message = (12).to_bytes(4, "little") + b"".join(k.to_bytes(4, "little") for k in (7, 2, 3))
-    received = bytearray(message + message[:9])
-    assert take_stamps(received, stamp_at=4) == [2_000_000_003]
-    assert received == message[:9]
+    assert {row.flight.split()[0] for row in bench.ROWS} <= vars(bench_flights).keys()

@@ -15,7 +15,7 @@ import time
 import rospy
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_dev.bench import graph
+from crazyflie_dev import bench_flights
 from crazyflie_msgs.msg import (
     ControlStamped,
     PositionVelocityStateStamped,
@@ -60,10 +60,10 @@ def main() -> None:
         time.sleep(_DURATION)
         return len(controls) / (time.monotonic() - start)
 
-    processes = [graph.process_of(f"/{name}") for name in _NODES]
+    processes = [bench_flights.process_of(f"/{name}") for name in _NODES]
 
     def memory():
-        return [graph.memory([process]) for process in processes]
+        return [bench_flights.memory([process]) for process in processes]
 
     print(
         f"{'attack':<18}{'before':>8}{'control, Hz':>13}{'sent, Hz':>14}   memory, MiB, of", *_NODES

@@ -13,22 +13,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from crazyflie_dev.bench import flights
-from crazyflie_dev.bench.graph import NotMeasuredError
-
-_HOVER_FIGURES = [
-    ("cpu", "CPU of the graph", "% of a core"),
-    ("cpu_watched", "the same with listeners outside", "% of a core"),
-    ("memory", "memory (PSS)", "MiB"),
-    ("latency_p50", "state to final control, outside, p50", "ms"),
-    ("latency_p99", "state to final control, outside, p99", "ms"),
-    ("tf_rate", "rate of /tf", "Hz"),
-    ("pose_p50", "stamp of the pose to final control, p50", "ms"),
-]
+from crazyflie_dev import bench_flights
 
 
 class Row(NamedTuple):
-    """A figure, which a function of `flights` measures, and its goal."""
+    """A figure, which a function of `bench_flights` measures, and its goal."""
 
     flight: str  #: The function, with its argument, if it has one.
     name: str  #: A word for the command line, and the key of the value.
@@ -44,48 +33,20 @@ class Row(NamedTuple):
         return ", ".join(f"{sign} {b:g}" for sign, b in bounds if math.isfinite(b)) or "-"
 
 
-def _hover(name, text, **most):
-    return [
-        Row(f"hover {name}", f"{key}_{name}", f"{words}, {text}", unit, most.get(key, math.inf))
-        if key != "tf_rate"
-        else Row(f"hover {name}", f"{key}_{name}", f"{words}, {text}", unit, 1001.0, 999.0)
-        for key, words, unit in _HOVER_FIGURES
-    ]
-
-
-def _simulated(name, text, least):
-    flight = f"simulated {name}"
-    return [
-        Row(flight, f"simulated_time{name}", f"simulated time, {text}", "x real time", least=least),
-        Row(flight, f"simulated_cpu{name}", f"the same per CPU time, {text}", "s/s", least=least),
-    ]
-
-
-def _fleet(n):
-    return [
-        Row(f"fleet {n}", f"fleet_{n}_cpu", f"{n} vehicles, one process, CPU", "% of a core"),
-        Row(f"fleet {n}", f"fleet_{n}_period", f"{n} vehicles, p99 of the period", "ms", 12.0),
-        Row(f"fleet {n}", f"fleet_{n}_memory", f"{n} vehicles, memory (PSS)", "MiB"),
-    ]
-
-
 ROWS = [
-    Row("machine", "machine", "an empty loop of 10 ms, p99 of the period", "ms"),
-    *_hover("separate", "five processes", cpu=22.0, memory=190.0),
-    *_hover("composed", "one process", cpu=7.0, memory=45.0, latency_p50=0.15, latency_p99=0.4),
-    *_hover("arrival", "one process, on arrival", pose_p50=1.0),
-    *_simulated("", "without a listener", 100.0),
-    *_simulated("_watched", "with a listener on /clock", 40.0),
+    Row("hover separate", "cpu_separate", "CPU, five processes", "% of a core", 22.0),
+    Row("hover separate", "memory_separate", "memory (PSS), five processes", "MiB", 190.0),
+    Row("hover composed", "cpu_composed", "CPU, one process", "% of a core", 7.0),
+    Row("hover composed", "memory_composed", "memory (PSS), one process", "MiB", 45.0),
+    Row("simulated", "simulated_time", "simulated time", "x real time", least=100.0),
+    Row("simulated", "simulated_cpu", "the same per CPU time", "s/s", least=100.0),
     Row("start", "start", "from roslaunch to /takeoff, one process", "s", 1.5),
-    *_fleet(60),
-    *_fleet(100),
-    Row("vehicles", "vehicles", "vehicles in real time, p99 of the period < 12 ms", "", least=100),
-    Row("batch", "batch_many", "batch, n = 10 000: steps of 13 states", "1/s", least=10e6),
-    Row("batch", "batch_one", "batch, n = 1: steps of 13 states", "1/s", least=500e3),
+    Row("fleet 60", "fleet_60_cpu", "60 vehicles, one process, CPU", "% of a core"),
+    Row("fleet 60", "fleet_60_memory", "60 vehicles, memory (PSS)", "MiB"),
+    Row("fleet 100", "fleet_100_cpu", "100 vehicles, one process, CPU", "% of a core"),
+    Row("fleet 100", "fleet_100_memory", "100 vehicles, memory (PSS)", "MiB"),
     Row("dashboard", "dashboard_idle", "dashboard of 100 in motion, no page", "% of a core", 1.0),
     Row("dashboard", "dashboard_page", "dashboard of 100 in motion, a page", "% of a core", 15.0),
-    Row("dashboard", "dashboard_period", "p99 of the period with a page, minus without", "ms", 1.0),
-    Row("dashboard", "dashboard_latency", "p99 of pose to control, minus without", "ms", 1.0),
 ]
 
 
@@ -108,8 +69,8 @@ def measure(
     own = dict(os.environ)
     for flight, group in itertools.groupby(rows, lambda row: row.flight):
         function, *arguments = flight.split(" ")
-        here: list[flights.Figures] = []
-        there: list[flights.Figures] = []
+        here: list[bench_flights.Figures] = []
+        there: list[bench_flights.Figures] = []
         outcome: dict[str, object] = {}
         try:
             for _ in range(rounds):
@@ -117,8 +78,8 @@ def measure(
                     if environment is not None:
                         os.environ.clear()
                         os.environ.update(environment)
-                        measured.append(getattr(flights, function)(*arguments))
-        except NotMeasuredError as error:
+                        measured.append(getattr(bench_flights, function)(*arguments))
+        except bench_flights.NotMeasuredError as error:
             outcome = {"reason": str(error)}
         # Whatever it is, the other figures can still be had.
         except Exception as error:
@@ -146,7 +107,7 @@ def _compare(row, here, there):
 
 
 def _print(row, result):
-    shown = f"{row.text:55} {result.get('value', math.nan):10.4g} {row.unit:12}"
+    shown = f"{row.text:40} {result.get('value', math.nan):10.4g} {row.unit:12}"
     if "reason" in result:
         shown += result["reason"]
     elif "ratio" in result:

@@ -1,1 +1,0 @@
-"""Measures how quick and how small the running graph is, from outside; see README.md."""

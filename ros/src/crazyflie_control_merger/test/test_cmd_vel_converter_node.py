@@ -103,3 +103,30 @@ def test_a_simulation_that_has_died_is_in_nobody_s_way():
     assert process.launch(CmdVelConverterNode(), "/cmd_vel_converter", PARAMETERS)
     answer = process.call("/control/final/vehicle", TriggerRequest())
     assert answer.message == "a real vehicle, by /cmd_vel_converter"
+
+
+def test_a_thrust_of_9_81_carries_the_vehicle_of_a_model(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("type: cf21_markers\nmass: 0.045\ntrim: {roll: 0.02, pitch: -0.01}\n")
+    process = FakeProcess()
+    parameters = {**PARAMETERS, "model": str(path)}
+    assert process.launch(CmdVelConverterNode(), "/cmd_vel_converter", parameters)
+    process.publish("/control/final", ControlStamped(control=Control(0.0, 0.0, 0.0, 9.81)))
+    (sent,) = process.published("/crazyflie/cmd_vel")
+    fraction = sent.linear.z / 65535.0
+    lift = 4.0 * (0.067673604 * fraction + 0.091492681 * fraction**2)
+    assert lift == pytest.approx(0.045 * 9.81)
+    assert (sent.linear.y, sent.linear.x) == pytest.approx(
+        (math.degrees(0.02), math.degrees(-0.01))
+    )
+
+
+def test_a_mass_in_grams_is_refused(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("mass: 33\n")
+    process = FakeProcess()
+    parameters = {**PARAMETERS, "model": str(path)}
+    assert not process.launch(CmdVelConverterNode(), "/cmd_vel_converter", parameters)
+    (error,) = process.logged("error")
+    assert "/cmd_vel_converter/model is" in error
+    assert "is 33; expected a finite number >= 0.005" in error

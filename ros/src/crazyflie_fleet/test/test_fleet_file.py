@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import LogTopic
+from crazyflie_fleet.vehicle_nodes import parameters
 from crazyflie_utils import ParameterError
 
 EXAMPLE = Path(rospkg.RosPack().get_path("crazyflie_fleet")) / "config" / "example.yaml"
@@ -326,3 +327,39 @@ def test_a_grid(n):
 def test_no_grid(arguments, text):
     with pytest.raises(ParameterError, match=text):
         fleet_file.grid(*arguments)
+
+
+def test_a_model_file_is_relative_to_the_fleet_file(tmp_path):
+    (tmp_path / "heavy.yaml").write_text("type: cf21_markers\nmass: 0.045\n")
+    file = tmp_path / "fleet.yaml"
+    text = (
+        "robots: {a: {initial_position: [0, 0, 0], type: heavy},\n"
+        " b: {initial_position: [1, 0, 0], model: cf21plus}, c: {initial_position: [2, 0, 0]}}\n"
+        "robot_types: {heavy: {model: heavy.yaml}}\n"
+    )
+    file.write_text(text)
+    fleet = fleet_file.load(file)
+    found = [(v.settings.dynamics, v.settings.vehicle_model) for v in fleet.vehicles]
+    heavy = str(tmp_path / "heavy.yaml")
+    assert found == [("quadrotor", heavy), ("quadrotor", "cf21plus"), ("near_hover", "cf21")]
+    tree = parameters(fleet["a"], {}, {"lqr_controller": {"K_file": "K_manual.txt"}})
+    assert tree["cmd_vel_converter"]["model"] == tree["simulator"]["model"] == heavy
+    assert tree["lqr_controller"]["K_file"] == heavy
+    tree = parameters(fleet["c"], {}, {"lqr_controller": {"K_file": "K_manual.txt"}})
+    assert tree["lqr_controller"]["K_file"] == "K_manual.txt"
+
+
+@pytest.mark.parametrize(
+    ("model", "expected"),
+    [
+        ("grams.yaml", r"fleet.yaml:1: robots/a/model .*grams.yaml:1.* is 33; expected a finite"),
+        ("none.yaml", r"fleet.yaml:1: robots/a/model .*none.yaml"),
+        ("bolt", r"robots/a/model .*is 'bolt'; expected one of near_hover.*a Bolt has"),
+    ],
+)
+def test_a_model_that_is_none_is_named_with_its_line(tmp_path, model, expected):
+    (tmp_path / "grams.yaml").write_text("mass: 33\n")
+    file = tmp_path / "fleet.yaml"
+    file.write_text(f"robots: {{a: {{initial_position: [0, 0, 0], model: {model}}}}}\n")
+    with pytest.raises(ParameterError, match=expected):
+        fleet_file.load(file)

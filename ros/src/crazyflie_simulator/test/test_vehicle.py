@@ -142,3 +142,18 @@ def test_what_is_skipped_has_not_happened():
     skipped.advance_to(1e6 + 0.3)
     np.testing.assert_array_equal(skipped.state, flown.state)
     assert skipped.time == pytest.approx(1e6 + 0.3)
+
+
+def test_a_control_acts_after_the_delay():
+    late, prompt = (SimulatedVehicle(NearHover(), (0, 0, 1), 0.0, delay=d) for d in (0.03, 0.0))
+    late.command([0.0, 0.1, 0.0, 9.81])
+    late.advance_to(0.030)
+    assert late.state[:6] == pytest.approx([0, 0, 1, 0, 0, 0])
+    late.command([0.0, 0.0, 0.0, 9.81])
+    late.advance_to(0.130)
+    prompt.command([0.0, 0.1, 0.0, 9.81])
+    prompt.advance_to(0.030)
+    prompt.command([0.0, 0.0, 0.0, 9.81])
+    prompt.advance_to(0.100)
+    assert prompt.state[3] > 0.01
+    np.testing.assert_array_equal(late.state, prompt.state)

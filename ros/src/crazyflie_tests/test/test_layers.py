@@ -117,10 +117,12 @@ IN_FUNCTIONS = {
     "crazyflie_mission_api/__init__.py",
     # Chosen by the command line: a node, or a program that does without ROS.
     "crazyflie_py/crazyswarm_py.py",
-    # Optional: pictures, pages, schedulers and motion capture that may not be installed.
+    # Optional: pictures, pages, schedulers and motion capture that may not be installed; gains that
+    # are designed at the start.
     "crazyflie_batch/monte_carlo_command.py",
     "crazyflie_dashboard/dashboard_node.py",
     "crazyflie_lqr/design_command.py",
+    "crazyflie_lqr/gain_file.py",
     "crazyflie_py/visualizer.py",
     "mocap_optitrack/library_worker.py",
     # Programs without ROS have parameters, but no names of topics.

@@ -1,5 +1,6 @@
 """The body: motion, battery, ranging sensors, quaternions."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from virtual_bench import Bench
 
 from crazyflie_model.angles import zyx_from_quaternion
+from crazyflie_model.quadrotor import TYPES
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 from crazyflie_utils import ParameterError
 from crazyflie_virtual.body import (
@@ -26,6 +28,8 @@ from crazyflie_virtual.body import (
 from crazyflie_virtual.firmware.supervisor import LOW, ON_BATTERY, PowerMonitor
 from crazyflie_virtual.log import log_variables
 from crazyflie_virtual.quaternions import compress_quaternion, decompress_quaternion
+from crazyflie_virtual.settings import VehicleSettings
+from crazyflie_virtual.vehicle import VirtualVehicle
 
 
 def fly(physics, commands, duration, voltage=FULL_VOLTAGE):
@@ -315,3 +319,23 @@ def test_compressed_quaternions_come_back(components):
     returned = np.array(decompress_quaternion(compress_quaternion(quaternion)))
     # The same rotation, perhaps with the other sign; 9 bits of magnitude.
     assert abs(np.dot(returned, quaternion)) > 1.0 - 1e-5
+
+
+def test_a_model_hovers_where_its_thrust_curve_carries_its_mass():
+    model = dataclasses.replace(TYPES["cf21_markers"], mass=0.045)
+    fraction = 0.78877  # The root of 4 (0.0677 f + 0.0915 f^2) = 0.045 g.
+    for factor, lifts in ((0.99, False), (1.01, True)):
+        physics = Physics(model=model)
+        fly(physics, (factor * fraction * 65535.0,) * 4, 1.0, voltage=4.2)
+        assert (physics.position[2] > 0.0) is lifts
+
+
+def test_a_virtual_vehicle_of_a_model_file_flies_it(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("type: cf21_markers\nmass: 0.045\n")
+    vehicle = VirtualVehicle(VehicleSettings.from_mapping({"model": str(path), "observer/port": 0}))
+    fly(vehicle.physics, (0.99 * 0.78877 * 65535.0,) * 4, 1.0, voltage=4.2)
+    assert vehicle.physics.position[2] == 0.0
+    with pytest.raises(ParameterError, match="mass .* is 33"):
+        path.write_text("mass: 33\n")
+        VehicleSettings.from_mapping({"model": str(path)})

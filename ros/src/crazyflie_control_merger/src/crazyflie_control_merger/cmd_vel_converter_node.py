@@ -5,25 +5,33 @@ import math
 from geometry_msgs.msg import Twist, Vector3
 from typing_extensions import override
 
-from crazyflie_model.units import pwm_from_thrust
+from crazyflie_model.quadrotor import CRAZYFLIE, QuadrotorParameters
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.types import TOPIC
+from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 from crazyflie_utils.vectors import to_vector
 
 Vector = tuple[float, float, float]
 
 
 def cmd_vel_from_control(
-    roll: float, pitch: float, yaw_dot: float, thrust: float
+    roll: float,
+    pitch: float,
+    yaw_dot: float,
+    thrust: float,
+    model: QuadrotorParameters = CRAZYFLIE,
 ) -> tuple[Vector, Vector]:
-    """Return the two vectors of the twist that carries a control.
+    """Return the two vectors of the twist that carries a control for a vehicle.
 
     From rad, rad/s (counter-clockwise) and m/s^2 to linear (pitch in degrees, roll in degrees,
-    thrust in PWM, which the driver limits) and angular (0, 0, yaw rate in deg/s, clockwise).
+    thrust in PWM, which the driver limits) and angular (0, 0, yaw rate in deg/s, clockwise). A
+    thrust of 9.81 carries the vehicle of the model, whose trims are added.
     """
+    roll, pitch = roll + model.roll_trim, pitch + model.pitch_trim
     return (
-        (math.degrees(pitch), math.degrees(roll), float(pwm_from_thrust(thrust))),
+        (math.degrees(pitch), math.degrees(roll), float(model.pwm(thrust))),
         (0.0, 0.0, -math.degrees(yaw_dot)),
     )
 
@@ -35,6 +43,11 @@ class CmdVelConverterParameters(Parameters):
     cmd_vel_topic: str = parameter(
         TOPIC, "where commands of the radio driver go", name="topics/cmd_vel"
     )
+    model: str = parameter(
+        VEHICLE_MODEL,
+        "type of the vehicle, or model file: its thrust curve, mass and trims",
+        "cf21",
+    )
 
 
 class CmdVelConverterNode(Node):
@@ -45,6 +58,7 @@ class CmdVelConverterNode(Node):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(CmdVelConverterParameters)
+        self._model = vehicle_model.load(self._parameters.model)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -55,5 +69,6 @@ class CmdVelConverterNode(Node):
         )
 
     def _on_control(self, message):
-        linear, angular = cmd_vel_from_control(*map(float, to_vector(message.control)))
+        roll, pitch, yaw_dot, thrust = map(float, to_vector(message.control))
+        linear, angular = cmd_vel_from_control(roll, pitch, yaw_dot, thrust, self._model)
         self._publisher.publish(Twist(linear=Vector3(*linear), angular=Vector3(*angular)))

@@ -1,5 +1,6 @@
 """Parser of fleet files."""
 
+import dataclasses
 import difflib
 from collections.abc import Iterable, Sequence
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ import yaml
 from crazyflie_fleet.fleet_config import FleetConfig, LogTopic, VehicleConfig, close_pairs
 from crazyflie_fleet.settings import (
     DEFAULT_TOPICS,
+    DYNAMICS,
     LOCAL,
     VEHICLE_NAME,
     WITHOUT_EFFECT,
@@ -23,8 +25,10 @@ from crazyflie_fleet.settings import (
     RobotSettings,
     vehicle_key,
 )
+from crazyflie_model.quadrotor import TYPES
 from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters.types import BOOLEAN, ParameterType
+from crazyflie_utils.parameters.vehicle_model import load
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_utils.text import shortened, shown
 
@@ -267,7 +271,21 @@ class FleetParser:
         if settings is None:
             return None
         self._check_voltages(merged, settings)
+        settings = self._with_model_path(merged, settings)
         return VehicleConfig(name, settings.position, settings, *self._firmware(merged))
+
+    def _with_model_path(self, merged, settings):
+        """Return the settings with the path of a model file, which is relative to this one."""
+        if settings.model in DYNAMICS or settings.model in TYPES:
+            return settings
+        path = str((self._top.file.parent / settings.model).resolve())
+        try:
+            load(path)
+        except ParameterError as error:
+            self._errors += [
+                merged["model"].error(str(each)).complaints[0] for each in error.complaints
+            ]
+        return dataclasses.replace(settings, model=path)
 
     def _check_voltages(self, merged, settings):
         # Only here it is known whether each comes from the robot, its type or ``all``.

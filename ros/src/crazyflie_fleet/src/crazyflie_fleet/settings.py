@@ -7,7 +7,8 @@ from typing_extensions import override
 
 from crazyflie_link.address import EXPECTED, Address
 from crazyflie_link.errors import AddressError
-from crazyflie_utils import Parameters, parameter
+from crazyflie_model.quadrotor import TYPES
+from crazyflie_utils import ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FINITE,
@@ -20,6 +21,7 @@ from crazyflie_utils.parameters.types import (
     ParameterType,
     Text,
 )
+from crazyflie_utils.parameters.vehicle_model import load
 from crazyflie_utils.text import number_from_text
 
 #: Help of settings that are read and reported in a remark.
@@ -133,6 +135,32 @@ class FirmwareNumber(ParameterType):
         return "a finite number"
 
 
+#: Dynamics in simulation; on hardware they are the default type of vehicle.
+DYNAMICS = ("near_hover", "coupled_7d", "quadrotor")
+
+
+class FleetModel(ParameterType):
+    """Dynamics in simulation, a type of vehicle, or a model file."""
+
+    label = "string"
+    range = ", ".join(f"`{name}`" for name in (*DYNAMICS, *TYPES)) + ", or a file"
+
+    @override
+    def __call__(self, value: Any) -> str:
+        if not isinstance(value, str):
+            raise ValueError
+        if value not in DYNAMICS and not value.endswith((".yaml", ".yml")):
+            try:
+                load(value)
+            except ParameterError as error:
+                raise ValueError(str(error)) from None
+        return value
+
+    @override
+    def __str__(self) -> str:
+        return f"one of {', '.join((*DYNAMICS, *TYPES))}, or a model file"
+
+
 class LogTopicSettings(Parameters):
     """A topic of firmware variables."""
 
@@ -150,7 +178,10 @@ class Settings(Parameters):
     """Settings of a vehicle, which override those of its type, which override those of ``all``."""
 
     model: str = parameter(
-        Text(("near_hover", "coupled_7d", "quadrotor")), "dynamics in simulation", "near_hover"
+        FleetModel(),
+        "dynamics in simulation; or a type of vehicle or a model file, relative to this file, for "
+        "simulation (as a quadrotor), hardware and gains",
+        "near_hover",
     )
     buffer: float = parameter(
         Number("m", above=0.0), "radius of the space that is the vehicle's own", 0.15
@@ -208,6 +239,16 @@ class Settings(Parameters):
     )
     big_quad: bool = parameter(BOOLEAN, WITHOUT_EFFECT, False)
     reference_frame: str = parameter(TEXT, WITHOUT_EFFECT, "world")
+
+    @property
+    def dynamics(self) -> str:
+        """Dynamics in simulation, one of `DYNAMICS`."""
+        return self.model if self.model in DYNAMICS else "quadrotor"
+
+    @property
+    def vehicle_model(self) -> str:
+        """Type of the vehicle, or path of its model file."""
+        return "cf21" if self.model in DYNAMICS else self.model
 
     @property
     def has_single_marker(self) -> bool:

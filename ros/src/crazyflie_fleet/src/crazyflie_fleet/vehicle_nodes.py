@@ -48,7 +48,7 @@ HOVER_NODES: dict[str, type[Node]] = {
 def node_classes(vehicle: VehicleConfig, is_simulated: bool) -> dict[str, type[Node]]:
     """Return the classes of a vehicle's nodes, by their names below the vehicle's."""
     if is_simulated:
-        return {"simulator": SIMULATORS[vehicle.settings.model], **HOVER_NODES}
+        return {"simulator": SIMULATORS[vehicle.settings.dynamics], **HOVER_NODES}
     return {"cmd_vel_converter": CmdVelConverterNode, **HOVER_NODES}
 
 
@@ -60,14 +60,18 @@ def parameters(
     ``frames`` are the names of the tf frames, fixed and robot; ``common`` the parameters of all
     vehicles, node by node.
     """
-    hover = vehicle.hover_point
+    hover, model = vehicle.hover_point, vehicle.settings.vehicle_model
     own: Tree = {
         "simulator": {
             "frames": frames,
             "init": dict(zip("xyz", vehicle.position, strict=True)),
             "topics": {"control": FINAL_CONTROL},
+            "model": model,
         },
-        "cmd_vel_converter": {"topics": {"control": FINAL_CONTROL, "cmd_vel": "cmd_vel"}},
+        "cmd_vel_converter": {
+            "topics": {"control": FINAL_CONTROL, "cmd_vel": "cmd_vel"},
+            "model": model,
+        },
         "state_estimator": {
             "x_dim": 7,
             "frames": frames,
@@ -107,6 +111,8 @@ def parameters(
             "srv": {"emergency": "emergency", "emergency_reset": "emergency_reset"},
         },
     }
+    if model != "cf21":
+        own["lqr_controller"]["K_file"] = model
     return merged(common, own)
 
 

@@ -47,6 +47,7 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
             {
                 "port": config.virtual_port + number,
                 "init": {"x": x, "y": y},
+                "model": vehicle.settings.vehicle_model,
                 "mass_error": config.mass_error,
                 "thrust_error": config.thrust_error,
                 "seed": number,

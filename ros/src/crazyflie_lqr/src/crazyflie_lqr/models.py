@@ -9,14 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from crazyflie_model import inner_loops
+from crazyflie_model.first_order_quadrotor import TILT_LAG, lags
+from crazyflie_model.quadrotor import QuadrotorParameters
 from crazyflie_model.units import GRAVITY
 
 CONTROLS = ("roll", "pitch", "yaw_dot", "thrust")
-
-#: Lag of roll and pitch behind their commands in `full_state` (s): the firmware's
-#: attitude loop turns an error into a rate, and its rate loop is much faster.
-ATTITUDE_TIME_CONSTANT = 1.0 / inner_loops.TILT.kp
 
 #: Lag of the measured angular rates in `full_state` (s): they are differences of attitudes 10 ms
 #: apart.
@@ -75,7 +72,7 @@ def full_state() -> LinearModel:
     on them their gains are therefore zero, and the noise of differentiated
     attitudes stays out of the control.
     """
-    follow, measure = 1.0 / ATTITUDE_TIME_CONSTANT, 1.0 / RATE_TIME_CONSTANT
+    follow, measure = 1.0 / TILT_LAG, 1.0 / RATE_TIME_CONSTANT
     both = follow * measure
     rates = {
         "x": {"x_dot": 1.0},
@@ -92,6 +89,30 @@ def full_state() -> LinearModel:
         "yaw_dot": {"u_yaw_dot": measure, "yaw_dot": -measure},
     }
     return _model("full_state", rates)
+
+
+def vehicle_plant(model: QuadrotorParameters) -> LinearModel:
+    """Return a vehicle with its lags and its drag, without its delay.
+
+    ``turn`` is the yaw rate, ``lift`` the thrust over the mass above that of hover.
+    """
+    roll, pitch, yaw = (1.0 / lag for lag in lags(model))
+    motor = 1.0 / model.motor_time_constant
+    horizontal, vertical = model.drag_rates
+    rates = {
+        "x": {"x_dot": 1.0},
+        "y": {"y_dot": 1.0},
+        "z": {"z_dot": 1.0},
+        "x_dot": {"pitch": GRAVITY, "x_dot": -horizontal},
+        "y_dot": {"roll": -GRAVITY, "y_dot": -horizontal},
+        "z_dot": {"lift": 1.0, "z_dot": -vertical},
+        "yaw": {"turn": 1.0},
+        "roll": {"u_roll": roll, "roll": -roll},
+        "pitch": {"u_pitch": pitch, "pitch": -pitch},
+        "turn": {"u_yaw_dot": yaw, "turn": -yaw},
+        "lift": {"u_thrust": motor, "lift": -motor},
+    }
+    return _model("vehicle", rates)
 
 
 #: Name -> function that returns the model.

@@ -10,7 +10,7 @@ unlike the firmware, positive pitch is nose down (accelerates forward).
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from crazyflie_model.elementwise import Number, Vector, clip, functions, where
@@ -108,13 +108,14 @@ def update(
     setpoint: Vector[Number],
     attitude: tuple[Number, Number, Number],
     rates: Vector[Number],
+    pwm: Callable[[Number], Number] = pwm_from_thrust,
 ) -> tuple[Vector[Number], Vector[Number]]:
     """Return memory and motor commands (PWM, of motors 1 to 4) after one sample.
 
     Without thrust the motors are off and the loops are reset. ``memory`` is the one returned
     `PERIOD` ago; ``setpoint`` is roll and pitch in rad, yaw rate in rad/s, thrust in m/s^2;
     ``attitude`` is roll, pitch and yaw of `angles.zyx_from_quaternion`, rad; ``rates`` are the
-    body's, rad/s.
+    body's, rad/s; ``pwm(thrust)`` is the motor command for a thrust over the mass.
     """
     roll_i, pitch_i, yaw_i, p_i, q_i, r_i, p_before, q_before, heading = memory
     roll_set, pitch_set, yaw_dot_set, thrust = setpoint
@@ -135,7 +136,7 @@ def update(
 
     on = thrust > 0.0
     outputs = [clip(about, -OUTPUT_LIMIT, OUTPUT_LIMIT) for about in (about_x, about_y, about_z)]
-    motors = limit(mix(pwm_from_thrust(thrust), *outputs))
+    motors = limit(mix(pwm(thrust), *outputs))
     commands = [where(on, motor, 0.0) for motor in motors]
     running = [roll_i, pitch_i, yaw_i, p_i, q_i, r_i, p, q, heading]
     reset = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, p, q, yaw]

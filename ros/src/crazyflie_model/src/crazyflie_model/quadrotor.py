@@ -17,7 +17,7 @@ from functools import cached_property
 from crazyflie_model.angles import Triple
 from crazyflie_model.dynamics import rk4_step
 from crazyflie_model.elementwise import Number, Vector, clip, functions, where
-from crazyflie_model.limits import FULL_PWM
+from crazyflie_model.limits import FULL_PWM, MAX_SETPOINT_PWM
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 
 BODY_DIM = 17  #: Components of the airframe's state.
@@ -58,6 +58,19 @@ class QuadrotorParameters:
     motor_time_constant: float = -0.002 / math.log(0.9695404)
     #: Largest rotor speed, rad/s [L, at full PWM].
     max_rotor_speed: float = (0.2685 * FULL_PWM + 4070.3) * math.pi / 30.0
+    #: thrust_linear, thrust_quadratic: Thrust of a rotor over the command as a fraction f of full
+    #: PWM, thrust_linear f + thrust_quadratic f^2, N. `HOVER_PWM` carries the default mass.
+    thrust_linear: float = 0.027 * GRAVITY / 4.0 * FULL_PWM / HOVER_PWM
+    thrust_quadratic: float = 0.0
+    delay: float = 0.0  #: From the arrival of a command at the driver to the motion, s.
+    #: roll_lag, pitch_lag, yaw_lag: First-order lag of roll, pitch and yaw rate behind their
+    #: commands, s; None: as the inner loops lead to it.
+    roll_lag: float | None = None
+    pitch_lag: float | None = None
+    yaw_lag: float | None = None
+    #: roll_trim, pitch_trim: Added to a command, so that the vehicle does not drift, rad.
+    roll_trim: float = 0.0
+    pitch_trim: float = 0.0
 
     @cached_property
     def hover_speed(self) -> float:
@@ -65,17 +78,37 @@ class QuadrotorParameters:
         squared = self.mass * GRAVITY / (4.0 * self.thrust_constant)
         return functions(squared).sqrt(squared)
 
-    @cached_property
-    def _speed_squared_per_pwm(self):
-        return self.hover_speed**2 / HOVER_PWM
+    def thrust(self, pwm: Number) -> Number:
+        """Return the thrust of all rotors over the mass (m/s^2) for a motor command (PWM)."""
+        return self._force(pwm / FULL_PWM) * (4.0 / self.mass)
+
+    def pwm(self, thrust: Number) -> Number:
+        """Return the motor command (PWM) for a thrust over the mass (m/s^2).
+
+        Below 0 it is linear, and not limited.
+        """
+        a, b, force = self.thrust_linear, self.thrust_quadratic, thrust * (self.mass / 4.0)
+        # The root of b f^2 + a f = force that is right also for b = 0.
+        root = functions(force).sqrt(a * a + 4.0 * b * clip(force, 0.0, math.inf))
+        return 2.0 * force / (a + root) * FULL_PWM
+
+    @property
+    def max_thrust(self) -> float:
+        """Largest thrust over the mass that an attitude setpoint can ask for, m/s^2."""
+        return self.thrust(MAX_SETPOINT_PWM)
 
     def rotor_speed(self, pwm: Number) -> Number:
-        """Return the speed (rad/s) that a motor command (PWM) asks for.
+        """Return the speed (rad/s) that a motor command (PWM, from 0 on) asks for."""
+        return functions(pwm).sqrt(self._force(pwm / FULL_PWM) / self.thrust_constant)
 
-        Thrust, which goes with the square of the speed, is linear in the
-        command, through zero; `HOVER_PWM` hovers.
-        """
-        return functions(pwm).sqrt(self._speed_squared_per_pwm * pwm)
+    def _force(self, fraction):
+        return (self.thrust_linear + self.thrust_quadratic * fraction) * fraction
+
+    @cached_property
+    def drag_rates(self) -> tuple[float, float]:
+        """Deceleration over airspeed in hover, horizontally and vertically, 1/s."""
+        scale = 4.0 * self.hover_speed / self.mass
+        return self.drag_horizontal * scale, self.drag_vertical * scale
 
     def with_errors(self, mass_error: float, thrust_error: float) -> "QuadrotorParameters":
         """Return a vehicle with more mass and thrust constant, as fractions > -1 of these."""
@@ -87,6 +120,27 @@ class QuadrotorParameters:
 
 
 CRAZYFLIE = QuadrotorParameters()  #: The Crazyflie 2.1.
+
+
+def _with_top(curve: tuple[float, float], **figures: float) -> QuadrotorParameters:
+    """Return a type whose rotors reach the speed that a full command asks for."""
+    parameters = replace(CRAZYFLIE, thrust_linear=curve[0], thrust_quadratic=curve[1], **figures)
+    return replace(parameters, max_rotor_speed=parameters.rotor_speed(FULL_PWM))
+
+
+#: Types of vehicles by name. Where Bitcraze publishes no figure, it is that of `CRAZYFLIE`.
+#: Sources, of crazyflie-firmware (2025): [P] platform_defaults_cf2.h (of the 2.1+ propellers) and
+#: platform_defaults_cf21bl.h, whose firmware makes the thrust linear in the command, up to
+#: THRUST_MAX; [D] pwmToThrustA and B of power_distribution_quadrotor.c.
+TYPES = {
+    "cf21": CRAZYFLIE,
+    # With markers and battery 33 g, which the curve of [D] carries at `HOVER_PWM`.
+    "cf21_markers": _with_top((0.067673604, 0.091492681), mass=0.033),
+    "cf21plus": _with_top((0.1125, 0.0), mass=0.029),
+    "brushless": _with_top(
+        (0.2, 0.0), mass=0.0393, arm=0.050, torque_per_thrust=0.00569278844371417
+    ),
+}
 
 
 class Airframe:

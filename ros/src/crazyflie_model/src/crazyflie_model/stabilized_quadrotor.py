@@ -9,6 +9,7 @@ from crazyflie_model.angles import Quaternion, Triple, zyx_from_quaternion
 from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Number, Vector, where
 from crazyflie_model.quadrotor import BODY_DIM, CRAZYFLIE, STILL_AIR, Airframe, QuadrotorParameters
+from crazyflie_model.units import pwm_from_thrust
 
 _STEPS_PER_SAMPLE = round(inner_loops.PERIOD / STEP)
 
@@ -43,6 +44,8 @@ class StabilizedQuadrotor(Dynamics):
     ):
         self.airframe = Airframe(parameters.with_errors(mass_error, thrust_error))
         self._nominal = parameters
+        # Of the default type the link's own conversion: the same, and quicker.
+        self._pwm = pwm_from_thrust if parameters == CRAZYFLIE else parameters.pwm
         self._wind = wind
 
     def initial_state(self, position: Sequence[Number]) -> Vector[Number]:
@@ -80,5 +83,5 @@ class StabilizedQuadrotor(Dynamics):
         resting = inner_loops.initial_memory(attitude[2])
         memory = [where(standing, a, b) for a, b in zip(resting, memory, strict=True)]
         setpoint = [where(standing, 0.0, part) for part in u[:3]] + [u[3]]
-        memory, pwm = inner_loops.update(memory, setpoint, attitude, body[10:13])
+        memory, pwm = inner_loops.update(memory, setpoint, attitude, body[10:13], self._pwm)
         return memory, [self._nominal.rotor_speed(motor) for motor in pwm]

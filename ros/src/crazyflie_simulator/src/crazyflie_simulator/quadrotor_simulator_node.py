@@ -3,14 +3,17 @@
 from typing_extensions import override
 
 from crazyflie_model.dynamics import Dynamics
+from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
 from crazyflie_model.limits import CRASH_TILT
-from crazyflie_model.quadrotor import CRAZYFLIE, Airframe
+from crazyflie_model.quadrotor import Airframe
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_simulator.simulator_node import SimulatorNode, SimulatorParameters
 from crazyflie_simulator.wind import Wind
 from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import Number
+from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 
 _ERROR = Number(minimum=-0.5, maximum=0.5)
 _SPEED = Number("m/s", minimum=-100.0, maximum=100.0)
@@ -36,6 +39,11 @@ class WindParameters(Parameters):
 class QuadrotorSimulatorParameters(SimulatorParameters):
     """Parameters of `QuadrotorSimulatorNode`."""
 
+    model: str = parameter(
+        VEHICLE_MODEL,
+        "type of the vehicle, or model file; one with lags is flown without the inner loops",
+        "cf21",
+    )
     mass_error: float = parameter(
         _ERROR, "how much heavier than nominal the vehicle is, as a fraction", 0.0, live=True
     )
@@ -46,7 +54,10 @@ class QuadrotorSimulatorParameters(SimulatorParameters):
 
 
 class QuadrotorSimulatorNode(SimulatorNode):
-    """A full Crazyflie: a rigid body with four motors and the firmware's inner loops."""
+    """A full Crazyflie: a rigid body with four motors and the firmware's inner loops.
+
+    A model with lags, as `identify` finds them, is a `FirstOrderQuadrotor` with its delay.
+    """
 
     parameters_type = QuadrotorSimulatorParameters
     max_tilt = CRASH_TILT
@@ -56,7 +67,13 @@ class QuadrotorSimulatorNode(SimulatorNode):
         wind = parameters.wind
         # The air is the same for all vehicles with the same seed.
         self._wind = Wind((wind.x, wind.y, wind.z), wind.gust, wind.gust_time, parameters.seed)
+        model = self._model = vehicle_model.load(parameters.model)
+        if model.roll_lag is not None:
+            self.delay = model.delay
+            self._quadrotor = None
+            return FirstOrderQuadrotor(model)
         self._quadrotor = StabilizedQuadrotor(
+            model,
             mass_error=parameters.mass_error,
             thrust_error=parameters.thrust_error,
             wind=self._wind.velocity,
@@ -68,6 +85,7 @@ class QuadrotorSimulatorNode(SimulatorNode):
         super().reconfigure(parameters)
         wind = parameters.wind
         self._wind.change((wind.x, wind.y, wind.z), wind.gust, wind.gust_time)
-        self._quadrotor.airframe = Airframe(
-            CRAZYFLIE.with_errors(parameters.mass_error, parameters.thrust_error)
-        )
+        if self._quadrotor is not None:
+            self._quadrotor.airframe = Airframe(
+                self._model.with_errors(parameters.mass_error, parameters.thrust_error)
+            )

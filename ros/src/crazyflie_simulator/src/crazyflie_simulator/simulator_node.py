@@ -128,6 +128,7 @@ class SimulatorNode(Node):
     #: `SimulatorParameters`, or a subclass if the model has parameters of its own.
     parameters_type: type[SimulatorParameters] = SimulatorParameters
     max_tilt = math.inf  #: See `SimulatedVehicle`; for models that can turn over.
+    delay = 0.0  #: From a control to its effect, s.
 
     def __init__(self) -> None:
         self._ticks = 0
@@ -166,7 +167,9 @@ class SimulatorNode(Node):
         handle.claim_controls(parameters.control_topic, "simulated")
         position = (parameters.init_x, parameters.init_y, parameters.init_z)
         self._start = handle.time()
-        self._vehicle = SimulatedVehicle(self._dynamics, position, self._start, self.max_tilt)
+        self._vehicle = SimulatedVehicle(
+            self._dynamics, position, self._start, self.max_tilt, self.delay
+        )
         self._broadcast = handle.broadcast_poses(lambda: self._catch_up(handle.time()))
         if parameters.publishes_clock:
             self._set_clock = handle.clock_publisher()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,6 +21,7 @@ class SimulatedVehicle:
     """One simulated vehicle, with the firmware's watchdog.
 
     It stays put at ``position`` (m, fixed frame), from ``time`` (s) on, until the first control.
+    A control acts ``delay`` (s) after its command.
     When controls stop coming it reacts like the firmware; see `watchdog_control`. A vehicle that
     is tilted more than ``max_tilt`` (rad) has crashed: its motors stay off until `recover`.
 
@@ -28,7 +30,12 @@ class SimulatedVehicle:
     """
 
     def __init__(
-        self, dynamics: Dynamics, position: Sequence[float], time: float, max_tilt: float = math.inf
+        self,
+        dynamics: Dynamics,
+        position: Sequence[float],
+        time: float,
+        max_tilt: float = math.inf,
+        delay: float = 0.0,
     ):
         self.has_crashed = False
         self._least_upright = math.cos(max_tilt) if math.isfinite(max_tilt) else -math.inf
@@ -38,6 +45,9 @@ class SimulatedVehicle:
         self._start = time
         self._steps = 0
         self._control_step: int | None = None
+        self._delay_steps = round(delay / STEP)
+        # The controls that are still on their way, with the steps from which they act.
+        self._pending: deque[tuple[int, Vector[float]]] = deque()
 
     @property
     def time(self) -> float:
@@ -55,7 +65,10 @@ class SimulatedVehicle:
         return self._dynamics.pose(self._x, self._effective_control())
 
     def command(self, u: Sequence[float]) -> None:
-        """Set the control, u_dim components, from the present step on."""
+        """Set the control, u_dim components, from the present step and the delay on."""
+        if self._delay_steps:
+            self._pending.append((self._steps + self._delay_steps, _floats(u)))
+            return
         self._u = _floats(u)
         self._control_step = self._steps
 
@@ -78,12 +91,16 @@ class SimulatedVehicle:
         steps = math.floor((time - self.time) / STEP + 1e-6)
         if steps < -1:
             self._start, self._steps = time, 0
+            self._pending.clear()
             self._control_step = None if self._control_step is None else 0
-        elif self._control_step is None:
+        elif self._control_step is None and not self._pending:
             self._steps += max(steps, 0)
         else:
             for _ in range(steps):
-                self._x = self._dynamics.step(self._steps, self._x, self._effective_control())
+                while self._pending and self._pending[0][0] <= self._steps:
+                    self._control_step, self._u = self._pending.popleft()
+                if self._control_step is not None:
+                    self._x = self._dynamics.step(self._steps, self._x, self._effective_control())
                 self._steps += 1
                 self._notice_crash()
 

@@ -15,7 +15,7 @@ from crazyflie_model.angles import (
 )
 from crazyflie_model.elementwise import Vector
 from crazyflie_model.inner_loops import PERIOD
-from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe
+from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe, QuadrotorParameters
 from crazyflie_model.units import GRAVITY
 from crazyflie_world.world import World
 
@@ -115,7 +115,7 @@ _OVERTURNING = 0.5  #: Cosine of the tilt on the ground beyond which a vehicle l
 class Physics:
     """Rigid body, four motors, ground; it begins at a position (m) and heading (rad).
 
-    The errors are how much more mass and thrust the vehicle has than it should, as a fraction.
+    The errors are how much more mass and thrust the vehicle has than its ``model``, as a fraction.
     """
 
     def __init__(
@@ -124,8 +124,10 @@ class Physics:
         yaw: float = 0.0,
         mass_error: float = 0.0,
         thrust_error: float = 0.0,
+        model: QuadrotorParameters = CRAZYFLIE,
     ):
-        self._airframe = Airframe(CRAZYFLIE.with_errors(mass_error, thrust_error))
+        self._model = model
+        self._airframe = Airframe(model.with_errors(mass_error, thrust_error))
         x = self._airframe.initial_state([float(part) for part in position])
         x[6:10] = [0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)]
         x[13:17] = [0.0] * 4
@@ -163,7 +165,7 @@ class Physics:
     @property
     def load(self) -> float:
         """Mean of the third powers of the rotor speeds over the hover speed's."""
-        return sum((speed / CRAZYFLIE.hover_speed) ** 3 for speed in self._x[13:17]) / 4.0
+        return sum((speed / self._model.hover_speed) ** 3 for speed in self._x[13:17]) / 4.0
 
     def put_upright(self) -> None:
         """Pick the vehicle up and put it on its feet."""
@@ -172,11 +174,11 @@ class Physics:
 
     def step(self, commands: MotorCommands, voltage: float) -> None:
         """Advance by `STEP`; the battery's voltage (V) limits the speed of the motors."""
-        top = CRAZYFLIE.max_rotor_speed * voltage / FULL_VOLTAGE
+        top = self._model.max_rotor_speed * voltage / FULL_VOLTAGE
         before = self._x
         if self.is_overturned:
             commands = OFF
-        speeds = [min(top, CRAZYFLIE.rotor_speed(command)) for command in commands]
+        speeds = [min(top, self._model.rotor_speed(command)) for command in commands]
         after = self._airframe.step(0.0, before, speeds, STILL_AIR, STEP)
         if after[2] <= 0.0:
             after = tip(self._airframe, before, after, STEP)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, METRES, TEXT, Integer, Number, Text
+from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 from crazyflie_virtual.firmware.estimator import DECK, NONE
 from crazyflie_virtual.observer import DEFAULT_PORT
 
@@ -62,6 +63,11 @@ class VehicleSettings(Parameters):
     )
     sensor_noise: bool = parameter(BOOLEAN, "noise of gyroscope, accelerometer and barometer", True)
     seed: int = parameter(Integer(0, 2**31 - 1), "of the noise, and of which packets are lost", 0)
+    model: str = parameter(
+        VEHICLE_MODEL,
+        "type of the vehicle, or model file; link and firmware have their own delay and lags",
+        "cf21",
+    )
     mass_error: float = parameter(
         _FRACTION, "how much heavier than nominal it is, as a fraction", 0.0
     )

@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 
+from crazyflie_utils.parameters import vehicle_model
 from crazyflie_virtual import crtp, ports
 from crazyflie_virtual.body import LOW_CHARGE, OFF, STEP, Battery, Physics
 from crazyflie_virtual.crtp import Packet, Port
@@ -126,6 +127,7 @@ class VirtualVehicle:
             settings.init_yaw,
             settings.mass_error,
             settings.thrust_error,
+            vehicle_model.load(settings.model),
         )
         if settings.world:
             self.physics.world = world_file.load(settings.world)

@@ -1,0 +1,51 @@
+"""Gains for a vehicle with a model."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from crazyflie_lqr import vehicle_gains
+from crazyflie_lqr.design import DesignError
+from crazyflie_lqr.gain_file import MatrixFile
+from crazyflie_lqr.vehicle_gains import LEAST_DELAY, LEAST_MODULUS, bandwidth, design, gains
+from crazyflie_model.quadrotor import CRAZYFLIE, TYPES
+
+
+def vehicle(delay, lag):
+    return dataclasses.replace(CRAZYFLIE, delay=delay, roll_lag=lag, pitch_lag=lag, yaw_lag=lag)
+
+
+@pytest.mark.parametrize(("delay", "lag"), [(0.0, 0.03), (0.03, 0.167), (0.06, 0.12)])
+def test_they_bear_more_delay_than_the_vehicle_has(delay, lag):
+    _, loops = design(vehicle(delay, lag))
+    assert min(loop.delay for loop in loops) >= LEAST_DELAY
+    assert min(loop.modulus for loop in loops) >= LEAST_MODULUS
+
+
+def test_a_vehicle_that_answers_later_is_flown_more_slowly():
+    widths = [bandwidth(gains(vehicle(delay, 0.08))) for delay in (0.0, 0.06)]
+    assert widths == sorted(widths, reverse=True)
+    assert widths[0] > 1.3 * widths[1]
+
+
+def test_where_no_gains_bear_enough_it_says_so(monkeypatch):
+    monkeypatch.setattr(vehicle_gains, "LEAST_MODULUS", 0.999)
+    with pytest.raises(
+        DesignError, match="no gains bear a delay of 0 ms and lags of 100, 100, 100"
+    ):
+        design(vehicle(0.0, 0.1))
+
+
+def test_a_controller_takes_a_model_for_a_gain_file(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("lag: {roll: 0.05, pitch: 0.05}\ndelay: 0.03\n")
+    found = MatrixFile(4, 7)(str(path))
+    assert found.shape == (4, 7)
+    np.testing.assert_array_equal(found != 0.0, gains(CRAZYFLIE) != 0.0)
+    np.testing.assert_array_equal(MatrixFile(4, 7)("brushless"), gains(TYPES["brushless"]))
+    path.write_text("mass: 33\n")
+    with pytest.raises(ValueError, match="mass .* is 33; expected"):
+        MatrixFile(4, 7)(str(path))
+    with pytest.raises(ValueError, match="7 states"):
+        MatrixFile(4, 12)("brushless")

@@ -7,7 +7,7 @@ import pytest
 
 from crazyflie_lqr import vehicle_gains
 from crazyflie_lqr.design import DesignError
-from crazyflie_lqr.gain_file import MatrixFile
+from crazyflie_lqr.linear_feedback_node import Gains
 from crazyflie_lqr.vehicle_gains import LEAST_DELAY, LEAST_MODULUS, bandwidth, design, gains
 from crazyflie_model.quadrotor import CRAZYFLIE, TYPES
 
@@ -40,12 +40,10 @@ def test_where_no_gains_bear_enough_it_says_so(monkeypatch):
 def test_a_controller_takes_a_model_for_a_gain_file(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text("lag: {roll: 0.05, pitch: 0.05}\ndelay: 0.03\n")
-    found = MatrixFile(4, 7)(str(path))
+    found = Gains(4, 7)(str(path))
     assert found.shape == (4, 7)
     np.testing.assert_array_equal(found != 0.0, gains(CRAZYFLIE) != 0.0)
-    np.testing.assert_array_equal(MatrixFile(4, 7)("brushless"), gains(TYPES["brushless"]))
+    np.testing.assert_array_equal(Gains(4, 7)("brushless"), gains(TYPES["brushless"]))
     path.write_text("mass: 33\n")
     with pytest.raises(ValueError, match="mass .* is 33; expected"):
-        MatrixFile(4, 7)(str(path))
-    with pytest.raises(ValueError, match="7 states"):
-        MatrixFile(4, 12)("brushless")
+        Gains(4, 7)(str(path))

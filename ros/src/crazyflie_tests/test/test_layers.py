@@ -122,7 +122,7 @@ IN_FUNCTIONS = {
     "crazyflie_batch/monte_carlo_command.py",
     "crazyflie_dashboard/dashboard_node.py",
     "crazyflie_lqr/design_command.py",
-    "crazyflie_lqr/gain_file.py",
+    "crazyflie_lqr/linear_feedback_node.py",
     "crazyflie_py/visualizer.py",
     "mocap_optitrack/library_worker.py",
     # Programs without ROS have parameters, but no names of topics.

@@ -14,8 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 
-from crazyflie_utils.parameters import vehicle_model
-from crazyflie_utils.parameters.declaration import ParameterError
 from crazyflie_utils.parameters.types import TEXT, ParameterType
 from crazyflie_utils.text import number_from_text, shortened, shown
 
@@ -68,10 +66,7 @@ def save_matrix(path: str, matrix: ArrayLike, comment: str = "") -> None:
 
 @dataclass(frozen=True)
 class MatrixFile(ParameterType):
-    """The path of a gain file; the value is its matrix, of this shape.
-
-    For a type of vehicle, or a model file, it is that of `vehicle_gains`.
-    """
+    """The path of a gain file; the value is its matrix, of this shape."""
 
     rows: int
     columns: int
@@ -79,19 +74,7 @@ class MatrixFile(ParameterType):
 
     @override
     def __call__(self, value: Any) -> NDArray[np.float64]:
-        path = TEXT(value)
-        if not vehicle_model.is_model(path):
-            return load_matrix(path, self.rows, self.columns)
-        # Here, since python-control takes a second to load, and most controllers read a file.
-        from crazyflie_lqr.vehicle_gains import gains
-
-        try:
-            designed = gains(vehicle_model.load(path))
-        except ParameterError as error:
-            raise ValueError(str(error)) from None
-        if designed.shape != (self.rows, self.columns):
-            raise ValueError("a model has gains for 7 states")
-        return designed
+        return load_matrix(TEXT(value), self.rows, self.columns)
 
     def __str__(self) -> str:
         return f"the path of a text file with {self.rows} rows of {self.columns} numbers"

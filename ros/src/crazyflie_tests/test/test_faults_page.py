@@ -28,7 +28,9 @@ def test_there_are_rows():
 
 def test_every_row_has_a_fault_what_happens_and_links_to_tests():
     wrong = [row[0] for row in rows() if len(row) != 3 or LINK.sub("", row[2]).strip(", ")]
-    assert wrong == [], "| fault | what happens | [words of the test's name](../ros/src/FILE), ... |"
+    assert wrong == [], (
+        "| fault | what happens | [words of the test's name](../ros/src/FILE), ... |"
+    )
 
 
 @functools.cache

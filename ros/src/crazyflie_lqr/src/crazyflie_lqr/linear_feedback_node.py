@@ -52,8 +52,8 @@ class LinearFeedbackParameters(Parameters):
     u_dim: int = parameter(Integer(4, 4), "length of the control")
     K: NDArray[np.float64] = parameter(
         Gains(4, 7),
-        "gain file, `u_dim` rows of `x_dim` numbers; or a type of vehicle or its model file, for which "
-        "gains are designed",
+        "gain file, `u_dim` rows of `x_dim` numbers; or a type of vehicle or a model file, for "
+        "which gains are designed",
         name="K_file",
         live=True,
     )

@@ -1,8 +1,12 @@
 """Pictures of the screen: how they are taken, and what is found on them."""
 
+import re
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 
+from crazyflie_dev.render_demo import HEIGHT, WIDTH, animation, projected, timed
 from crazyflie_dev.render_rviz import (
     background_of,
     crop_to_scene,
@@ -57,3 +61,37 @@ def test_reads_colours_where_they_are_set(tmp_path):
         '<robot name="x"><material name="front"><color rgba="1 0.35 0.05 1"/></material></robot>'
     )
     assert material_of(model, "front") == list(ORANGE)
+
+
+LINES = [(0.1, "launching it"), (9.0, "rosservice call /takeoff"), (13.0, "landed <in> peace")]
+
+
+def test_the_start_of_a_launch_is_shortened_and_the_flight_is_not():
+    (launch, _), (takeoff, _), (end, text) = timed(LINES)
+    assert launch == 0.0
+    assert 0.0 < takeoff < 2.0
+    assert (end - takeoff, text) == (pytest.approx(4.0), "landed <in> peace")
+
+
+def test_a_demo_that_did_not_take_off_has_no_picture():
+    with pytest.raises(ValueError, match="not taken off"):
+        timed(LINES[:1])
+
+
+def test_the_vehicle_of_the_animation_flies_and_each_line_comes_in_its_time():
+    flight = np.array([[0.0, 0.1, 0.2, 0.0], [2.0, 0.1, 0.2, 1.0], [4.0, 0.1, 0.2, 0.0]])
+    picture = ElementTree.fromstring(animation(timed(LINES), flight))
+    prompt, *texts = picture.findall(".//{*}text")
+    assert prompt.text == "$ ./run demo"
+    assert [text.text for text in texts] == [text for _, text in LINES]
+    shown = [animate for text in texts for animate in text]
+    starts = [float(each.get("keyTimes").split(";")[1]) for each in shown]
+    assert starts == sorted(starts)
+    assert len(starts) == 2
+    *_, vehicle = picture.findall(".//{*}animateTransform")
+    places = np.array([place.split(",") for place in vehicle.get("values").split(";")], dtype=float)
+    ground, top = projected(np.array([[0.1, 0.2, 0.0], [0.1, 0.2, 1.0]]))
+    np.testing.assert_allclose(places[[0, -1]], [ground, ground], atol=0.6)
+    assert places[:, 1].min() == pytest.approx(top[1], abs=4.0)
+    assert ((places > 0.0) & (places < (WIDTH, HEIGHT))).all()
+    assert not re.search("nan|inf", vehicle.get("values"))

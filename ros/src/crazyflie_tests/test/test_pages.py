@@ -199,12 +199,12 @@ def test_the_launch_file_of_the_software_example_has_its_table():
 
 @pytest.mark.parametrize("path", find_package_paths(str(TOP / "ros" / "src")))
 def test_every_package_is_named(path):
-    readme = Page(TOP / "README.md")
-    cells = [cell for table in readme.tables for row in table.rows for cell in row]
+    page = Page(TOP / "docs" / "organisation.md")
+    cells = [cell for table in page.tables for row in table.rows for cell in row]
     # The stand-ins share a README.
     folder = path.replace("stand_ins/joy", "stand_ins").replace("stand_ins/xacro", "stand_ins")
     assert any(f"/{folder}/README.md)" in cell for cell in cells)
-    tree = Page(TOP / "docs" / "organisation.md").blocks[0].text
+    tree = page.blocks[0].text
     assert re.search(rf"^ +{path.rpartition('/')[2]}\b", tree, re.MULTILINE)
 
 

@@ -1,5 +1,8 @@
 """Texts of cflib's drivers, explained to the operator."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from crazyflie_link.errors import (
@@ -55,3 +58,10 @@ def test_unknown_names_come_with_a_suggestion():
     assert "did you mean stateEstimate.x" in text
     assert "did you mean" not in str(unknown_name("log variable", "motor.m1", ["pm.vbat"]))
     assert "did you mean pm.vbat" in str(unknown_name("log variable", "pm.q", ["pm.vbat"]))
+
+
+@pytest.mark.parametrize("device", ["1915:7777", "1915:0101", "0483:5740"])
+def test_users_may_open_the_radio_its_boot_loader_and_a_vehicle_on_usb(device):
+    rules = (Path(__file__).parents[1] / "udev" / "99-crazyflie.rules").read_text()
+    ids = re.findall(r'idVendor}=="(\w+)".*idProduct}=="(\w+)".*GROUP="plugdev"', rules)
+    assert device in [":".join(pair) for pair in ids]

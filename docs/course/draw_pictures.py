@@ -19,7 +19,14 @@ import rosgraph
 import rospy
 from matplotlib.figure import Figure
 from PIL import Image
-from plots import draw_four_vehicles, draw_lanes, draw_main_loop, draw_sweep
+from plots import (
+    GRAPHS,
+    draw_four_vehicles,
+    draw_graph,
+    draw_lanes,
+    draw_main_loop,
+    draw_sweep,
+)
 from std_srvs.srv import Empty
 
 from crazyflie_dev.render_rviz import background_of, crop_to_scene
@@ -111,8 +118,8 @@ def draw_steps(path: Path, log: Path) -> None:
     for name in ("K_quadrotor.txt", "K_calm.txt"):
         data = log.with_name(f"{name}.npz")
         if os.fork() == 0:
-            folder = COURSE / "solutions" if name == "K_calm.txt" else gains_folder()
-            record = step(folder / name, log)
+            calm = COURSE / "solutions" / "8" / "my_pd" / "config" / "K.txt"
+            record = step(calm if name == "K_calm.txt" else gains_folder() / name, log)
             end = record.events["land"]
             start = record.reference.times[record.reference.column("x") == 0.5][0]
             after, sent = (
@@ -219,6 +226,7 @@ PICTURES = {
     "sw_swarm": draw_swarm,
     "pole": draw_pole,
     "steps": draw_steps,
+    **dict.fromkeys(GRAPHS, draw_graph),
 }
 
 

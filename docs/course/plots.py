@@ -24,11 +24,85 @@ def draw_main_loop(path: Path, _log: Path) -> None:
         [(topic, sorted(MAIN_LOOP & set(nodes))) for topic, nodes in part if topic in LOOP_TOPICS]
         for part in example_graph()
     )
-    graph = dot(published, subscribed).replace("rankdir=LR", "rankdir=LR; nodesep=0.1")
+    _draw_graph(dot(published, subscribed).replace("rankdir=LR", "rankdir=LR; nodesep=0.1"), path)
+
+
+def _draw_graph(graph: str, path: Path) -> None:
     subprocess.run(
         ["dot", "-Tpng", "-Gdpi=80", "-o", str(path)], input=graph, text=True, check=True
     )
 
+
+def draw_graph(path: Path, _log: Path) -> None:
+    """Draw one of the graphs below, by the name of the picture."""
+    _draw_graph(f"digraph {{ {_STYLE} {GRAPHS[path.stem]} }}", path)
+
+
+_STYLE = """
+  rankdir=LR; bgcolor=white; nodesep=0.15; ranksep=0.35; fontname=Helvetica; fontsize=12;
+  node [fontname=Helvetica, fontsize=11, shape=box, height=0.3];
+  edge [fontname=Helvetica, fontsize=10];
+"""
+
+GRAPHS = {
+    "workspace": """
+      subgraph cluster_ours { label="this repository"; style=rounded; margin=12;
+        packages [label="ros/src: packages"]; ours [label="ros/devel", style=dashed];
+        packages -> ours [label="./run build"];
+      }
+      subgraph cluster_yours { label="~/my_workspace (yours)"; style=rounded; margin=12;
+        subgraph cluster_package { label="src/spike_filter (a package)"; color=steelblue;
+          about [shape=plain, label="package.xml: needed packages\\lCMakeLists.txt: the build\\l"];
+          code [shape=plain, label="median.py: the algorithm\\lmedian_node.py: the node\\l"];
+          tests [shape=plain, label="test/: tests of both\\l"];
+        }
+        devel [label="devel", style=dashed];
+      }
+      code -> devel [label="catkin_make"];
+      ours -> devel [label="is below", style=dashed, constraint=false];
+    """,
+    "formation": """
+      circle [shape=ellipse, label="/leader/circle"];
+      topic [label="/leader/cmd_vel"];
+      circle -> topic;
+      subgraph cluster_left { label="group ns=left"; style=rounded;
+        left [shape=ellipse, label="/left/composed"];
+        left_name [label="/left/cmd_vel", style=dotted, fontcolor=gray50];
+      }
+      subgraph cluster_right { label="group ns=right"; style=rounded;
+        right [shape=ellipse, label="/right/composed"];
+        right_name [label="/right/cmd_vel", style=dotted, fontcolor=gray50];
+      }
+      topic -> left [label="remapped"]; topic -> right [label="remapped"];
+      left_name -> left [style=dotted, color=gray50, label="without remap"];
+      right_name -> right [style=dotted, color=gray50, label="without remap"];
+    """,
+    "service": """
+      ranksep=1.6;
+      client [shape=ellipse, label="client\\nServiceProxy"];
+      server [shape=ellipse, label="server\\nadvertise_service"];
+      client -> server [label="request: float32 x"];
+      server -> client [label="response: float32 vel, or an error"];
+    """,
+    "virtual": """
+      subgraph cluster_same { label="the same nodes everywhere"; style=rounded;
+        flight [shape=ellipse, label="estimator, controller,\\ntakeoff server, filter"];
+      }
+      subgraph cluster_simulated { label="simulated: sw_hover.launch"; style=rounded;
+        color=seagreen;
+        simulator [shape=ellipse, label="/simulator"]; }
+      driver [shape=ellipse, label="/cmd_vel_converter,\\n/crazyflie_server,\\n/mocap_node"];
+      subgraph cluster_virtual { label="virtual: virtual_hw_hover.launch"; style=rounded;
+        color=darkorange; vehicle [label="/virtual_crazyflie,\\n/virtual_mocap"]; }
+      subgraph cluster_real { label="real: hw_hover.launch"; style=rounded; color=firebrick;
+        real [label="Crazyflie, cameras"]; }
+      flight -> simulator [dir=both, label="controls, /tf"];
+      flight -> driver [dir=both, label="controls, /tf"];
+      driver -> vehicle [dir=both, label="radio protocol, poses"];
+      driver -> real [dir=both, label="radio, poses"];
+    """,
+}
+"""Pictures of lessons 2, 4, 5 and 14, in the language of graphviz."""
 
 MAIN_LOOP = {"/simulator", "/state_estimator", "/lqr_controller", "/takeoff_control_filter"}
 LOOP_TOPICS = {"/tf", "/state", "/control/lqr", "/control/final"}
@@ -67,18 +141,18 @@ def draw_four_vehicles(path: Path, _log: Path) -> None:
 def draw_lanes(path: Path, _log: Path) -> None:
     """Draw the lanes of lesson 6, and the oscillator's velocity along one of them."""
     sys.path.insert(0, str(COURSE / "solutions" / "6" / "my_sweep" / "src"))
-    from my_sweep.lanes import corners
     from my_sweep.oscillator import velocity
-    from my_sweep.sweep_node import AREA, WIDTH
+    from my_sweep.sweep_node import HEIGHT, path_from
 
     figure = Figure(figsize=(8, 3.4), layout="constrained")
     plan, graph = figure.subplots(1, 2)
-    lanes = np.array([(0.0, 0.0), *corners(AREA, WIDTH)])
+    whole = path_from((0.0, 0.0, HEIGHT))
+    lanes = np.array([whole.at(s)[0][:2] for s in np.linspace(0.0, whole.length, 600)])
     plan.add_patch(Rectangle((-1.5, -1.5), 3.0, 3.0, color="0.93"))
     arrow = {"arrowstyle": "-|>", "color": "C0"}
-    for p, q in zip(lanes, lanes[1:], strict=False):
-        plan.plot(*zip(p, q, strict=True), color="C0")
-        plan.annotate("", (0.4 * p + 0.6 * q), (0.6 * p + 0.4 * q), arrowprops=arrow)
+    plan.plot(*lanes.T, color="C0")
+    for k in range(60, 600, 60):
+        plan.annotate("", lanes[k + 4], lanes[k], arrowprops=arrow)
     plan.plot(0.0, 0.0, "o", color="C2")
     plan.annotate("take off", (0.0, 0.0), (6, 6), textcoords="offset points")
     plan.plot(*lanes[-1], "s", color="C3")

@@ -3,7 +3,7 @@ case $(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd) in
   *[[:space:]]*) echo "catkin cannot build in a path with a space; move the workspace to one without" >&2; return 1 ;;
 esac
 # It knows the workspace, and what is built in ~/my_workspace.
-COURSE=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+export COURSE=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 if ! source "$COURSE/../../ros/devel/setup.bash"; then
   echo "The workspace is not built yet: ./run build builds it." >&2
   return 1
@@ -41,7 +41,8 @@ solution() {
 
 course_files() {
   local folder=$COURSE/$1 file mine
-  find "$folder" -type f -not -path '*/__pycache__/*' | while read -r file; do
+  # Some solutions are links to files of the workspace.
+  find -L "$folder" -type f -not -path '*/__pycache__/*' | while read -r file; do
     mine=~/my_workspace/src/${file#"$folder/"}
     if [ -e "$mine" ]; then
       [ "$2" = keep ] && continue

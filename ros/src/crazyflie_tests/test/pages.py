@@ -10,6 +10,7 @@ PAGES = [
     TOP / "README.md",
     *sorted((TOP / "docs").glob("*.md")),
     *sorted((TOP / "docs" / "course").glob("*.md")),
+    *sorted((TOP / "docs" / "course" / "solutions").glob("*.md")),
 ]
 """The pages whose commands are run."""
 

@@ -1,5 +1,6 @@
 """Step 4: the mission, with a vehicle that is where its reference is."""
 
+import math
 from concurrent.futures import Future
 
 import pytest
@@ -45,17 +46,26 @@ def test_is_silent_on_the_ground(process):
     assert references(process) == []
 
 
-def test_flies_all_lanes_then_lands_once(process):
+def test_flies_all_lanes_and_arcs_then_lands_once(process):
     process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
     process.advance(60.0)
     points = references(process)
     assert points[0] == pytest.approx((0.0, 0.0, 1.0), abs=0.1)
-    for corner in ((-1.5, -1.0), (1.5, -1.0), (1.5, 0.0), (-1.5, 0.0), (-1.5, 1.0)):
-        assert min((x - corner[0]) ** 2 + (y - corner[1]) ** 2 for x, y, _ in points) < 0.1**2
+    for place in ((-1.5, -1.0), (1.5, -1.0), (2.0, -0.5), (1.5, 0.0), (-2.0, 0.5), (-1.5, 1.0)):
+        assert min((x - place[0]) ** 2 + (y - place[1]) ** 2 for x, y, _ in points) < 0.1**2
     assert points[-1] == pytest.approx((1.5, 1.0, 1.0))
-    steps = [abs(b[0] - a[0]) for a, b in zip(points, points[1:], strict=False)]
+    steps = [math.dist(a, b) for a, b in zip(points, points[1:], strict=False)]
     assert max(steps) == pytest.approx(0.07, abs=1e-6)
     assert process.landings == [True]
+
+
+def test_the_reference_says_how_fast_it_moves(process):
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    process.advance(10.0)
+    before, state = (message.state for message in process.published("/ref")[-2:])
+    moved = (state.x - before.x, state.y - before.y)
+    assert (state.x_dot, state.y_dot) == pytest.approx([each / 0.1 for each in moved], abs=0.1)
+    assert math.hypot(state.x_dot, state.y_dot) > 0.1
 
 
 def test_hovers_without_the_service():

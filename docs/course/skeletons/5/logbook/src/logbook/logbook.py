@@ -40,15 +40,15 @@ class Logbook:
 
     def begin(self, time: float) -> None:
         """Begin a flight at ``time`` (s), unless one goes on."""
-        raise NotImplementedError("step 1")
+        raise NotImplementedError("step 3")
 
     def add(self, position: tuple[float, float, float]) -> None:
         """Take the next position (x, y, z), m, of the flight that goes on."""
-        raise NotImplementedError("step 2")
+        raise NotImplementedError("step 4")
 
     def end(self, time: float) -> FlightEntry | None:
         """End the flight at ``time`` (s); return it, or None if there was none."""
-        raise NotImplementedError("step 3")
+        raise NotImplementedError("step 5")
 
     def flight(self, number: int) -> FlightEntry:
         """Return a flight that has ended.
@@ -58,4 +58,4 @@ class Logbook:
         RefusalError
             There is none with this number.
         """
-        raise NotImplementedError("step 4")
+        raise NotImplementedError("step 6")

@@ -34,8 +34,8 @@ class LogbookNode(Node):
         self._book.add((message.state.x, message.state.y, message.state.z))
 
     def _on_get_flight(self, request):
-        # Step 5: return a GetFlightResponse; _message makes the message of an entry.
-        raise NotImplementedError("step 5")
+        # Step 7: return a GetFlightResponse; _message makes the message of an entry.
+        raise NotImplementedError("step 7")
 
 
 def _message(entry: FlightEntry) -> Flight:

@@ -1,4 +1,4 @@
-"""Step 1: the velocity of a harmonic oscillator."""
+"""Step 1: the velocity of a harmonic oscillator, and its scale."""
 
 BEGIN, END = 2.0, 9.0
 
@@ -21,4 +21,12 @@ def velocity(x: float) -> float:
     RefusalError
         ``x`` is outside.
     """
-    raise NotImplementedError("step 1")
+    raise NotImplementedError("step 1a")
+
+
+def service_position(x: float, x_min: float, x_max: float) -> float:
+    """Return where x (m) is on the oscillator's scale: x_min is 2, x_max is 9.
+
+    What is beyond an end of the lane, such as an arc, is at that end.
+    """
+    raise NotImplementedError("step 1b")

@@ -1,5 +1,7 @@
 """Step 4: the mission."""
 
+import math
+
 from typing_extensions import override
 
 from crazyflie_msgs.msg import (
@@ -7,10 +9,11 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_sweep.sweep_parameters import Area
 from crazyflie_utils import Node, NodeHandle
-from my_sweep.lanes import Area, Walker, corners
+from my_sweep.lanes import LanePath, Line, Point, sweep
 
-AREA = Area(-1.5, 1.5, -1.5, 1.5)
+AREA = Area.from_mapping({"x_min": -1.5, "x_max": 1.5, "y_min": -1.5, "y_max": 1.5})
 WIDTH = 1.0
 HEIGHT = 1.0
 """Of the lanes, and above the ground, m."""
@@ -25,18 +28,32 @@ TIME_STEP = 0.1
 LANDING_LIMIT = 30.0
 """s."""
 
+NEAR = 0.01
+"""From here to the first lane no line is needed, m."""
+
+
+def path_from(start: Point) -> LanePath:
+    """Return the path: a straight line from ``start`` to the first lane, then the sweep."""
+    lanes = sweep(AREA, WIDTH, HEIGHT)
+    begin, _ = lanes.at(0.0)
+    if math.dist(start, begin) < NEAR:
+        return lanes
+    return LanePath([Line(start, begin, is_lane=False), *lanes.segments])
+
 
 class SweepNode(Node):
     """Sweep the area while the vehicle flies, then land it."""
 
     def __init__(self) -> None:
-        self._position: tuple[float, float] | None = None
-        self._walker: Walker | None = None
+        self._position: Point | None = None
+        self._path: LanePath | None = None
+        self._way = 0.0
+        """Along the path, m."""
         self._speed = 0.0
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        """There are none."""
+        """There are no parameters."""
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -46,20 +63,20 @@ class SweepNode(Node):
         handle.timer(TIME_STEP, self._on_timer)
 
     def _on_state(self, message):
-        self._position = (message.state.x, message.state.y)
+        self._position = (message.state.x, message.state.y, HEIGHT)
 
     def _on_flight_status(self, message):
         if message.state != FlightStatus.FLYING:
-            self._walker = None
-        elif self._walker is None and self._position is not None:
-            self._walker, self._speed = Walker(self._position, corners(AREA, WIDTH)), 0.0
+            self._path = None
+        elif self._path is None and self._position is not None:
+            self._path, self._way, self._speed = path_from(self._position), 0.0, 0.0
 
     def _on_timer(self):
-        if self._walker is None or self._walker.is_done:
+        if self._path is None or self._way >= self._path.length:
             return
-        # Step 4: advance the walker and publish the reference; at the end call /land; otherwise
-        # call /my_oscillator: handle.call_service(name, type, request, limit) returns a Future, and
-        # future.add_done_callback(self._on_velocity) has its answer handed on.
+        # Step 4: move self._way on by what self._speed makes in TIME_STEP; publish where the path
+        # is there, with its velocity. At the end call /land (std_srvs/Empty), otherwise call
+        # /my_oscillator, and have the answer handed to self._on_velocity.
 
     def _on_velocity(self, answer):
         # Step 5: set self._speed, from SLOWEST to FASTEST; 0 if answer.exception() is not None.

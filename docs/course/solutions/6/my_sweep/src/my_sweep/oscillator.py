@@ -1,4 +1,4 @@
-"""Step 1: the velocity of a harmonic oscillator."""
+"""Step 1: the velocity of a harmonic oscillator, and its scale."""
 
 import math
 
@@ -28,3 +28,12 @@ def velocity(x: float) -> float:
     if not BEGIN <= x <= END:
         raise RefusalError(f"x is {x:g}; expected {BEGIN:g} to {END:g}")
     return 0.1 + 2.0 * math.sin(math.pi * (x - BEGIN) / (END - BEGIN))
+
+
+def service_position(x: float, x_min: float, x_max: float) -> float:
+    """Return where x (m) is on the oscillator's scale: x_min is 2, x_max is 9.
+
+    What is beyond an end of the lane, such as an arc, is at that end.
+    """
+    share = (x - x_min) / (x_max - x_min)
+    return BEGIN + (END - BEGIN) * min(max(share, 0.0), 1.0)

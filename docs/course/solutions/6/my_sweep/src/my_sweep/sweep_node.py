@@ -1,5 +1,7 @@
 """Step 4: the mission."""
 
+import math
+
 from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
@@ -9,11 +11,13 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_sweep.sweep_parameters import Area
 from crazyflie_tutorial_msgs.srv import VelocityAt, VelocityAtRequest
 from crazyflie_utils import Node, NodeHandle
-from my_sweep.lanes import Area, Walker, corners
+from my_sweep.lanes import LanePath, Line, Point, sweep
+from my_sweep.oscillator import service_position
 
-AREA = Area(-1.5, 1.5, -1.5, 1.5)
+AREA = Area.from_mapping({"x_min": -1.5, "x_max": 1.5, "y_min": -1.5, "y_max": 1.5})
 WIDTH = 1.0
 HEIGHT = 1.0
 """Of the lanes, and above the ground, m."""
@@ -28,18 +32,32 @@ TIME_STEP = 0.1
 LANDING_LIMIT = 30.0
 """s."""
 
+NEAR = 0.01
+"""From here to the first lane no line is needed, m."""
+
+
+def path_from(start: Point) -> LanePath:
+    """Return the path: a straight line from ``start`` to the first lane, then the sweep."""
+    lanes = sweep(AREA, WIDTH, HEIGHT)
+    begin, _ = lanes.at(0.0)
+    if math.dist(start, begin) < NEAR:
+        return lanes
+    return LanePath([Line(start, begin, is_lane=False), *lanes.segments])
+
 
 class SweepNode(Node):
     """Sweep the area while the vehicle flies, then land it."""
 
     def __init__(self) -> None:
-        self._position: tuple[float, float] | None = None
-        self._walker: Walker | None = None
+        self._position: Point | None = None
+        self._path: LanePath | None = None
+        self._way = 0.0
+        """Along the path, m."""
         self._speed = 0.0
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        """There are none."""
+        """There are no parameters."""
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -49,27 +67,28 @@ class SweepNode(Node):
         handle.timer(TIME_STEP, self._on_timer)
 
     def _on_state(self, message):
-        self._position = (message.state.x, message.state.y)
+        self._position = (message.state.x, message.state.y, HEIGHT)
 
     def _on_flight_status(self, message):
         if message.state != FlightStatus.FLYING:
-            self._walker = None
-        elif self._walker is None and self._position is not None:
-            self._walker, self._speed = Walker(self._position, corners(AREA, WIDTH)), 0.0
+            self._path = None
+        elif self._path is None and self._position is not None:
+            self._path, self._way, self._speed = path_from(self._position), 0.0, 0.0
 
     def _on_timer(self):
-        if self._walker is None or self._walker.is_done:
+        if self._path is None or self._way >= self._path.length:
             return
-        self._walker.advance(self._speed * TIME_STEP)
-        x, y = self._walker.position
-        message = PositionVelocityStateStamped(state=PositionVelocityState(x=x, y=y, z=HEIGHT))
+        self._way += self._speed * TIME_STEP
+        (x, y, z), (ux, uy, _) = self._path.at(self._way)
+        state = PositionVelocityState(x, y, z, self._speed * ux, self._speed * uy, 0.0)
+        message = PositionVelocityStateStamped(state=state)
         message.header.stamp = self._handle.stamp()
         self._reference.publish(message)
-        if self._walker.is_done:
+        if self._way >= self._path.length:
             self._handle.info("all lanes are flown; landing")
             self._handle.call_service("land", Empty, EmptyRequest(), LANDING_LIMIT)
             return
-        request = VelocityAtRequest(AREA.service_position(x))
+        request = VelocityAtRequest(service_position(x, AREA.x_min, AREA.x_max))
         answer = self._handle.call_service("my_oscillator", VelocityAt, request, 0.5)
         answer.add_done_callback(self._on_velocity)
 

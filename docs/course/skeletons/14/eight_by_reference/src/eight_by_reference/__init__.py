@@ -1,0 +1,1 @@
+"""Figures of eight, by references."""

@@ -1,0 +1,1 @@
+"""First nodes, in plain rospy."""

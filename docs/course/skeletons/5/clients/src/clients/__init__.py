@@ -1,0 +1,1 @@
+"""Clients of services, in plain rospy."""

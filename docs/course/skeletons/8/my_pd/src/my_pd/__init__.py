@@ -1,0 +1,1 @@
+"""A controller: proportional and derivative, with feed-forward."""

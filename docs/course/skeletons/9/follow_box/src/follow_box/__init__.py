@@ -1,0 +1,1 @@
+"""Following an object with a range sensor."""

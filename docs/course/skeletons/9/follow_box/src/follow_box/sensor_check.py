@@ -1,0 +1,33 @@
+"""Step 5: does a range sensor work? The algorithm of the check."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a sensor said.
+
+    Attributes
+    ----------
+    time : float
+        When it came, s.
+    distance : float
+        m; infinity where nothing is.
+    """
+
+    time: float
+    distance: float
+
+
+def faults(readings: list[Reading], min_range: float, max_range: float, rate: float) -> list[str]:
+    """Return what is wrong with the readings of 2 s; an empty list if nothing is.
+
+    Of these texts, those that apply, in this order:
+
+    * "silent": there are fewer than 2 readings; no other text then;
+    * "too slow": there are fewer than 80 % of what ``rate`` (Hz) makes in 2 s;
+    * "out of range": a finite reading is below ``min_range`` or above ``max_range`` (m), or one is
+      not a number (nan);
+    * "stuck": all readings are finite, and equal to the last digit. A sensor that works has noise.
+    """
+    raise NotImplementedError("step 5")

@@ -1,0 +1,1 @@
+../../../../../../../ros/src/crazyflie_tutorials/crazyflie_vision/src/crazyflie_vision/trackers.py

@@ -119,6 +119,24 @@ def test_a_build_finds_what_was_installed_after_the_last_one(tmp_path):
     assert [Path(each).name for each in found] == ["TOOL-NOTFOUND", "tool"]
 
 
+def test_a_section_on_demand_is_not_installed_with_all_others(tmp_path):
+    shutil.copy(TOP / "run", tmp_path)
+    (tmp_path / "ros").mkdir()
+    debian = "# [a] what all need\nbash\n\n# [b] on demand: no such package\nno-such-package\n"
+    (tmp_path / "ros" / "debian.txt").write_text(debian)
+    (tmp_path / "ros" / "requirements.txt").write_text("# none\n")
+    installed = subprocess.run(
+        ["./run", "install"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+        check=False,
+    )
+    assert installed.returncode == 0, installed.stderr
+    assert "no-such-package" not in installed.stderr
+
+
 def test_words_used_elsewhere_exist():
     usage = subprocess.run([TOP / "run", "help"], capture_output=True, text=True, check=True).stdout
     words = set(re.findall(r"^  (\w+) ", usage, re.MULTILINE))

@@ -4,7 +4,6 @@ import enum
 from pathlib import Path
 
 import pytest
-import rospkg
 
 from crazyflie_dev.state_diagrams import diagram, with_diagrams
 from crazyflie_takeoff.transition_table import Transition
@@ -55,8 +54,8 @@ def test_a_diagram_takes_the_place_of_the_old_one():
     assert with_diagrams(made) == made
 
 
-@pytest.mark.parametrize("package", ["crazyflie_takeoff"])
-def test_diagrams_of_the_pages_are_those_of_the_code(package):
-    page = (Path(rospkg.RosPack().get_path(package)) / "README.md").read_text()
+@pytest.mark.parametrize("name", ["ros/src/crazyflie_takeoff/README.md", "docs/safety.md"])
+def test_diagrams_of_the_pages_are_those_of_the_code(name):
+    page = (Path(__file__).resolve().parents[4] / name).read_text()
     assert "<!-- states: " in page
     assert with_diagrams(page) == page

@@ -113,7 +113,7 @@ def test_code_stands_so_in_its_file(path):
         if block.comment.startswith("from: "):
             source = (TOP / block.comment.removeprefix("from: ")).read_text()
             assert is_in(block.lines, source.splitlines()), where
-        else:
+        elif not block.comment.startswith("states: "):
             assert block.language in ("sh", "text", "diff"), (
                 f"{where}: say from which file the code is"
             )
@@ -160,7 +160,7 @@ def test_every_picture_is_on_a_page():
 @named(PAGES)
 def test_comments_are_understood(path):
     page = Page(path)
-    known = f"{RUN.pattern}|prints$|end$|apply$|every shell: |from: |arguments of: "
+    known = f"{RUN.pattern}|prints$|end$|apply$|every shell: |from: |arguments of: |states: "
     for part in page.parts:
         assert not isinstance(part, str) or re.match(known, part), part
     for comment, follower in zip(page.parts, page.parts[1:], strict=False):

@@ -1,5 +1,7 @@
 """The process that flies a fleet, without ROS: all nodes on hand-moved time."""
 
+import math
+
 import pytest
 import rospy
 from geometry_msgs.msg import Point
@@ -8,6 +10,7 @@ from simulated_fleet import GAINS, NODES, Swarm
 from crazyflie_driver.srv import GoToRequest
 from crazyflie_fleet.fleet_process import make_nodes
 from crazyflie_fleet.vectorized_simulator_node import VectorizedSimulatorNode
+from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, ParameterError, ServiceError
 from crazyflie_utils.parameters.types import FRAME, Number
 from crazyflie_utils.testing import FakeProcess
@@ -118,7 +121,7 @@ def test_models_are_mixed(tmp_path):
     file = tmp_path / "fleet.yaml"
     file.write_text(
         "robots:\n  a: {initial_position: [0, 0, 0], model: coupled_7d}\n"
-        "  b: {initial_position: [0, 1, 0]}\n"
+        "  b: {initial_position: [0, 1, 0], model: near_hover}\n"
         "  c: {initial_position: [0, 2, 0], model: quadrotor}\n"
     )
     quadrotor = {"lqr_controller": {"K_file": str(GAINS / "K_quadrotor.txt")}}
@@ -166,3 +169,49 @@ def test_controls_of_another_launch_fly_none_of_these_vehicles():
 def test_bad_parameters(parameters, text):
     with pytest.raises(ParameterError, match=text):
         Swarm(**parameters)
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_vehicles_turn_and_fly_on_at_any_heading(together):
+    swarm = Swarm(fleet={"n": 2}, together=together)
+    assert swarm.process.transport.parameters["/cf1/high_level/reference/yaw"] is True
+
+    def heading():
+        return swarm.process.published("/cf1/state")[-1].state.yaw
+
+    def move(x, y, yaw):
+        request = GoToRequest(0, False, Point(x, y, 1.0), yaw, rospy.Duration(3.0))
+        swarm.call("/cf1/go_to", request)
+        swarm.process.advance(4.0)
+        assert swarm.position("cf1") == pytest.approx((x, y, 1.0), abs=0.05)
+
+    swarm.call("/all/takeoff")
+    swarm.process.advance(1.0)
+    x, y, _ = swarm.position("cf1")
+    move(x, y, math.pi / 2.0)
+    assert heading() == pytest.approx(math.pi / 2.0, abs=0.02)
+    # In this direction a controller that does not know the heading would fly to the side.
+    move(x + 0.4, y - 0.3, 2.5)
+    assert heading() == pytest.approx(2.5, abs=0.02)
+    # A reference that has no heading keeps it, and so do hold and landing.
+    state = PositionVelocityState(x=x, y=y, z=1.0)
+    swarm.process.publish("/cf1/ref", PositionVelocityStateStamped(state=state))
+    swarm.process.advance(3.0)
+    assert swarm.position("cf1") == pytest.approx((x, y, 1.0), abs=0.05)
+    assert heading() == pytest.approx(2.5, abs=0.02)
+    swarm.call("/all/land", seconds=10.0)
+    assert swarm.position("cf1")[2] == pytest.approx(0.0, abs=0.02)
+    assert heading() == pytest.approx(2.5, abs=0.05)
+    # The next takeoff does not turn it back.
+    swarm.call("/all/takeoff")
+    assert heading() == pytest.approx(2.5, abs=0.05)
+
+
+def test_a_model_without_a_heading_refuses_one(tmp_path):
+    file = tmp_path / "fleet.yaml"
+    file.write_text("robots: {a: {initial_position: [0, 0, 0], model: near_hover}}\n")
+    swarm = Swarm(fleet={"file": str(file)})
+    request = GoToRequest(0, True, Point(0.0, 0.0, 0.1), 0.5, rospy.Duration(2.0))
+    for service in ("/a/go_to", "/a/high_level/go_to"):
+        with pytest.raises(ServiceError, match="the controller keeps the heading 0; expected 0"):
+            swarm.call(service, request)

@@ -61,4 +61,5 @@ def test_takeoffs_end_above_where_the_vehicle_is_seen():
     assert (followed.x, followed.y, followed.z) == (2.0, 1.0, 1.0)
     there = PositionVelocityStateStamped(state=PositionVelocityState(x=3.0, z=1.0))
     scene.process.publish("/c/ref", there)
-    assert scene.process.published("/c/ref_safe")[-1] is there
+    followed = scene.process.published("/c/ref_safe")[-1].state
+    assert (followed.x, followed.y, followed.z) == (3.0, 0.0, 1.0)

@@ -9,6 +9,7 @@ from std_msgs.msg import Float64MultiArray
 
 from crazyflie_driver.srv import GoToRequest
 from crazyflie_fleet import fleet_file
+from crazyflie_fleet.high_level_node import HighLevelNode
 from crazyflie_fleet.references_node import ReferencesNode
 from crazyflie_msgs.msg import (
     FlightStatus,
@@ -19,6 +20,7 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.vectors import to_tuple
 
 
 def flight_status(state):
@@ -28,7 +30,7 @@ def flight_status(state):
 class Flight:
     """Two vehicles, cf1 and cf2, 1 m apart along y."""
 
-    def __init__(self, own=2, vectorized=None):
+    def __init__(self, own=2, vectorized=None, has_yaw=True):
         self.process = FakeProcess()
         node = ReferencesNode(
             fleet_file.grid(2).vehicles[:own],
@@ -37,6 +39,9 @@ class Flight:
             vectorized,
         )
         assert self.process.launch(node, "/fleet/references")
+        for vehicle in node.vehicles:
+            name = f"/{vehicle.name}/high_level"
+            assert self.process.launch(HighLevelNode(vehicle), name, {"reference/yaw": has_yaw})
         self.states = {}
         for name, y in (("cf1", 0.0), ("cf2", 1.0)):
             self.process.publish(f"/{name}/in_flight_flight_status", flight_status("FLYING"))
@@ -44,8 +49,8 @@ class Flight:
                 self.see(name, y)
         self.process.add_timer(0.05, self.repeat_states)
 
-    def see(self, name, y, y_dot=0.0):
-        self.states[name] = PositionVelocityYawState(y=y, z=1.0, y_dot=y_dot)
+    def see(self, name, y, y_dot=0.0, yaw=0.0):
+        self.states[name] = PositionVelocityYawState(y=y, z=1.0, y_dot=y_dot, yaw=yaw)
         self.repeat_states()
 
     def repeat_states(self):
@@ -79,7 +84,9 @@ def flight():
 
 def test_references_pass_as_they_are(flight):
     wanted = flight.want("cf1", 0.3)
-    assert flight.followed("cf1") == [wanted]
+    (followed,) = flight.followed("cf1")
+    assert followed.header == wanted.header
+    assert to_tuple(followed.state) == (*to_tuple(wanted.state), 0.0)
     invalid = PositionVelocityStateStamped(state=PositionVelocityState(x=math.nan))
     flight.process.publish("/cf1/ref", invalid)
     assert math.isnan(flight.followed("cf1")[-1].state.x)
@@ -208,7 +215,7 @@ def test_go_to(flight):
     flight.process.advance(1.0)
     middle = flight.followed("cf1")[-1].state
     assert (middle.y, middle.z) == (pytest.approx(0.25, abs=0.01), 1.0)
-    assert middle.y_dot == pytest.approx(0.5 / 2.0 * 15.0 / 8.0, abs=0.01)
+    assert middle.y_dot == pytest.approx(0.5 / 2.0 * 35.0 / 16.0, abs=0.01)
     flight.process.advance(1.1)
     end = flight.followed("cf1")[-1].state
     assert (end.y, end.y_dot) == (pytest.approx(0.5), 0.0)
@@ -223,7 +230,7 @@ def test_a_way_in_a_move_begins_as_the_move_is(flight):
     flight.go_to(goal=(0.3, 0.25, 1.0), seconds=3.0)
     flight.process.advance(0.02)
     after = flight.followed("cf1")[-1].state
-    assert before.y_dot == pytest.approx(0.469, abs=0.01)
+    assert before.y_dot == pytest.approx(0.547, abs=0.01)
     assert after.y_dot == pytest.approx(before.y_dot, abs=0.01)
     assert after.y == pytest.approx(before.y + 0.02 * before.y_dot, abs=1e-3)
     for _ in range(10):
@@ -260,7 +267,9 @@ def test_a_way_that_cannot_be_braked_for_is_refused(flight):
     flight.go_to(goal=(0.0, 0.5, 1.0), seconds=2.0)
     flight.process.advance(1.0)
     flight.see("cf1", 0.25)
-    with pytest.raises(ServiceError, match=r"0.25 m in 0.5 s; expected a duration of at least 1\."):
+    with pytest.raises(
+        ServiceError, match=r"0.25 m in 0.5 s; expected a duration of at least 2\.15"
+    ):
         flight.go_to(goal=(0.0, 0.0, 1.0), seconds=0.5)
 
 
@@ -268,9 +277,11 @@ def test_go_to_relative_and_another_reference_ends_it(flight):
     flight.go_to("cf2", goal=(0.0, 0.5, 0.0), relative=True)
     flight.process.advance(0.5)
     assert 1.0 < flight.followed("cf2")[-1].state.y < 1.5
-    wanted = flight.want("cf2", 1.2)
+    flight.want("cf2", 1.2)
+    count = len(flight.followed("cf2"))
     flight.process.advance(0.5)
-    assert flight.followed("cf2")[-1] is wanted
+    assert flight.followed("cf2")[-1].state.y == 1.2
+    assert len(flight.followed("cf2")) == count
 
 
 def test_a_landing_ends_a_way(flight):
@@ -285,15 +296,65 @@ def test_a_landing_ends_a_way(flight):
 def test_go_to_is_refused(flight):
     with pytest.raises(ServiceError, match=r"/cf1/go_to refused: 0.50 m in 0.1 s; expected a dur"):
         flight.go_to(seconds=0.1)
-    with pytest.raises(ServiceError, match="expected finite numbers"):
+    with pytest.raises(ServiceError, match="/cf1/go_to refused: nan is among the numbers"):
         flight.go_to(goal=(math.nan, 0.0, 1.0))
-    with pytest.raises(ServiceError, match="the yaw is 1; expected 0"):
-        flight.go_to(yaw=1.0)
     flight.silence("cf1")
     flight.process.advance(0.6)
-    with pytest.raises(ServiceError, match="/cf1/go_to refused: the vehicle is not in flight"):
+    with pytest.raises(ServiceError, match="/cf1/go_to refused: no state has come on /cf1/state"):
         flight.go_to()
     flight.process.publish("/cf2/in_flight_flight_status", flight_status("ON_GROUND"))
     flight.see("cf2", 1.0)
-    with pytest.raises(ServiceError, match="/cf2/go_to refused: the vehicle is not in flight"):
+    with pytest.raises(ServiceError, match="/cf2/go_to refused: the vehicle is on the ground"):
         flight.go_to("cf2")
+
+
+def test_references_without_a_heading_keep_it_and_moves_turn(flight):
+    flight.see("cf1", 0.0, yaw=0.5)
+    flight.want("cf1", 0.1)
+    assert flight.followed("cf1")[-1].state.yaw == 0.5
+    # Not what is measured a moment later.
+    flight.see("cf1", 0.0, yaw=0.6)
+    flight.want("cf1", 0.0)
+    assert flight.followed("cf1")[-1].state.yaw == 0.5
+    flight.go_to(goal=(0.0, 0.3, 1.0), seconds=2.0, yaw=-0.5)
+    flight.process.advance(1.0)
+    assert flight.followed("cf1")[-1].state.yaw == pytest.approx(0.0, abs=0.02)
+    flight.process.advance(1.1)
+    assert flight.followed("cf1")[-1].state.yaw == pytest.approx(-0.5)
+    flight.go_to(goal=(0.0, 0.0, 1.0), seconds=2.0, yaw=math.nan)
+    flight.process.advance(2.1)
+    assert flight.followed("cf1")[-1].state.yaw == pytest.approx(-0.5)
+    flight.want("cf1", 0.1)
+    assert flight.followed("cf1")[-1].state.yaw == pytest.approx(-0.5)
+    # The next flight keeps the heading that the vehicle has then.
+    flight.process.publish("/cf1/in_flight_flight_status", flight_status("ON_GROUND"))
+    flight.see("cf1", 0.0, yaw=1.0)
+    flight.process.advance(0.1)
+    flight.process.publish("/cf1/in_flight_flight_status", flight_status("TAKING_OFF"))
+    flight.want("cf1", 0.0)
+    assert flight.followed("cf1")[-1].state.yaw == 1.0
+
+
+def test_a_vehicle_whose_model_has_no_yaw_refuses_one():
+    flight = Flight(has_yaw=False)
+    with pytest.raises(ServiceError, match="yaw is 1 rad, and the controller keeps the heading 0"):
+        flight.go_to(yaw=1.0)
+    flight.go_to(yaw=math.nan)
+
+
+def test_both_services_fly_the_same_move():
+    flown = []
+    for service in ("go_to", "high_level/go_to"):
+        flight = Flight()
+        flight.go_to(goal=(0.0, 0.5, 1.0), seconds=4.0, yaw=0.4)
+        flight.process.advance(1.5)
+        flight.see("cf1", flight.followed("cf1")[-1].state.y)
+        # In the move, back: it brakes first.
+        request = GoToRequest(0, False, Point(0.0, -0.5, 1.0), -0.4, rospy.Duration(6.0))
+        flight.process.call(f"/cf1/{service}", request)
+        for _ in range(31):
+            flight.process.advance(0.2)
+            flight.see("cf1", flight.followed("cf1")[-1].state.y)
+        flown.append([to_tuple(each.state) for each in flight.followed("cf1")])
+    assert flown[0] == flown[1]
+    assert flown[0][-1] == pytest.approx((0.0, -0.5, 1.0, 0.0, 0.0, 0.0, -0.4))

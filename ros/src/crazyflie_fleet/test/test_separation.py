@@ -6,14 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_fleet.straight_move import (
-    MAX_ACCELERATION,
-    MAX_SPEED,
-    StraightMove,
-    evaluate,
-    shortest_duration,
-)
-from crazyflie_utils.refusal import RefusalError
 
 STILL = np.zeros((2, 3))
 APART = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
@@ -101,73 +93,3 @@ def test_no_reference_leads_nearer_to_a_vehicle_that_is_too_close(rows):
             leads_nearer = (goals[i] - positions[i]) * scale @ between > 1e-9
             if i != j and np.linalg.norm(between) < 0.8 - 1e-9 and leads_nearer:
                 assert waits[i]
-
-
-SPEED = st.floats(-1.0, 1.0)
-
-
-@given(PLACE, PLACE, st.tuples(SPEED, SPEED, SPEED))
-def test_a_way_that_begins_in_a_move_is_smooth_and_not_too_fast(start, goal, velocity):
-    start, goal, velocity = (np.array(each) for each in (start, goal, velocity))
-    duration = shortest_duration(
-        float(np.linalg.norm(goal - start)), float(np.linalg.norm(velocity))
-    )
-    way = StraightMove(start, goal, duration + 1e-9, velocity)
-    times = np.linspace(0.0, way.duration, 2001)
-    positions, velocities = evaluate([way] * len(times), times)
-    assert positions[0] == pytest.approx(start)
-    assert velocities[0] == pytest.approx(velocity)
-    assert positions[-1] == pytest.approx(goal, abs=1e-6)
-    assert velocities[-1] == pytest.approx(np.zeros(3), abs=1e-6)
-    accelerations = np.linalg.norm(np.gradient(velocities, times, axis=0), axis=1)
-    assert accelerations.max() <= MAX_ACCELERATION + 0.05
-    assert np.linalg.norm(velocities, axis=1).max() <= MAX_SPEED + 1e-6
-    assert np.gradient(positions, times, axis=0)[1:-1] == pytest.approx(velocities[1:-1], abs=1e-3)
-
-
-def test_braking_does_not_take_longer_because_the_way_does():
-    way = StraightMove(np.zeros(3), np.zeros(3), 60.0, np.array([1.0, 0.0, 0.0]))
-    positions, _ = evaluate([way] * 600, np.linspace(0.0, 60.0, 600))
-    assert 0.25 < positions[:, 0].max() < 1.0
-
-
-@given(PLACE, PLACE, st.floats(0.0, 1.0))
-def test_a_way_is_smooth_and_not_too_fast(start, goal, share):
-    start, goal = np.array(start), np.array(goal)
-    duration = shortest_duration(float(np.linalg.norm(goal - start))) + 0.1
-    way = StraightMove(start, goal, duration)
-    assert evaluate([way], [0.0])[0][0] == pytest.approx(start)
-    assert evaluate([way], [2.0 * duration])[0][0] == pytest.approx(goal)
-    for time in (0.0, duration):
-        assert evaluate([way], [time])[1][0] == pytest.approx(np.zeros(3))
-    time = share * duration
-    (position,), (velocity,) = evaluate([way], [time])
-    assert np.linalg.norm(velocity) <= MAX_SPEED
-    wide = 1e-3
-    later = evaluate([way], [min(time + wide, duration)])[1][0]
-    assert np.linalg.norm(later - velocity) / wide <= MAX_ACCELERATION + 0.05
-    step = 1e-6
-    assert (evaluate([way], [time + step])[0][0] - position) / step == pytest.approx(
-        velocity, abs=1e-3
-    )
-
-
-@pytest.mark.parametrize(
-    ("distance", "seconds"),
-    # Calculated by hand: 15/8 d / 2 m/s, and sqrt(10/sqrt(3) d / 2 m/s^2).
-    [(0.5, 1.2014), (1.0, 1.6990), (10.0, 9.375)],
-)
-def test_the_shortest_way_keeps_speed_and_acceleration(distance, seconds):
-    assert shortest_duration(distance) == pytest.approx(seconds, abs=1e-4)
-    way = StraightMove(np.zeros(3), np.array([distance, 0.0, 0.0]), shortest_duration(distance))
-    times = np.linspace(0.0, way.duration, 2001)
-    speeds = evaluate([way] * len(times), times)[1][:, 0]
-    accelerations = np.gradient(speeds, times)
-    assert speeds.max() <= MAX_SPEED + 1e-9
-    assert np.abs(accelerations).max() <= MAX_ACCELERATION + 1e-2
-
-
-@pytest.mark.parametrize("duration", [0.0, -1.0, 1.6, float("nan")])
-def test_no_way(duration):
-    with pytest.raises(RefusalError, match=r"expected a duration of at least 1.70 s \(at most 2 m"):
-        StraightMove(np.zeros(3), np.array([1.0, 0.0, 0.0]), duration)

@@ -8,8 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
-from crazyflie_model.planner import smooth_piece, spiral_piece, straight_piece
-from crazyflie_model.polynomials import Goal
+from crazyflie_model.planner import (
+    MAX_ACCELERATION,
+    MAX_SPEED,
+    braking_time,
+    move,
+    shortest_duration,
+    smooth_piece,
+    spiral_piece,
+    straight_piece,
+)
+from crazyflie_model.polynomials import Goal, at_rest
+from crazyflie_model.trajectory import Trajectory
 
 ZERO = (0.0, 0.0, 0.0)
 NUMBER = st.floats(-3.0, 3.0)
@@ -116,3 +126,60 @@ def test_spiral_piece(p, yaw, angle, radii, ascent, duration, sideways, clockwis
         assert abs(complex(*goal.velocity[:2]) - velocity) < 1e-3
         acceleration = (near[2] - 2 * near[1] + near[0]) / (h * duration) ** 2
         assert abs(complex(*goal.acceleration[:2]) - acceleration) < 1e-2 * (1 + abs(acceleration))
+
+
+SPEED = st.floats(-1.0, 1.0)
+
+
+def sampled(pieces):
+    """Return times, and positions, velocities and headings on a trajectory."""
+    trajectory = Trajectory(pieces)
+    times = np.linspace(0.0, trajectory.duration, 2001)
+    goals = [trajectory.evaluate(time) for time in times.tolist()]
+    parts = ([goal[k] for goal in goals] for k in (0, 1, 3))
+    return (times, *map(np.array, parts))
+
+
+@given(VECTOR, VECTOR, st.tuples(SPEED, SPEED, SPEED), NUMBER, NUMBER)
+def test_a_move_in_flight_is_smooth_and_keeps_the_limits(start, end, velocity, yaw, end_yaw):
+    seconds = shortest_duration(math.dist(start, end), math.hypot(*velocity)) + 1e-9
+    seconds = max(seconds, 0.1)
+    pieces = move(Goal(start, velocity, ZERO, yaw, 0.3), end, end_yaw, seconds)
+    times, positions, velocities, yaws = sampled(pieces)
+    assert times[-1] == pytest.approx(seconds)
+    assert (positions[0], positions[-1]) == (pytest.approx(start), pytest.approx(end, abs=1e-6))
+    assert velocities[0] == pytest.approx(velocity)
+    assert velocities[-1] == pytest.approx(ZERO, abs=1e-6)
+    turn = math.remainder(end_yaw - yaw, 2.0 * math.pi)
+    assert (yaws[0], yaws[-1]) == (pytest.approx(yaw), pytest.approx(yaw + turn, abs=1e-6))
+    assert np.gradient(positions, times, axis=0)[1:-1] == pytest.approx(velocities[1:-1], abs=2e-3)
+    accelerations = np.linalg.norm(np.gradient(velocities, times, axis=0), axis=1)
+    assert accelerations.max() <= MAX_ACCELERATION + 0.05
+    assert np.linalg.norm(velocities, axis=1).max() <= MAX_SPEED + 1e-6
+
+
+@given(VECTOR, VECTOR, NUMBER, DURATION)
+def test_a_move_from_rest_is_the_firmwares(start, end, yaw, seconds):
+    (piece,) = move(at_rest(start, 0.2), end, yaw, seconds)
+    assert piece == smooth_piece(at_rest(start, 0.2), end, yaw, seconds)
+
+
+def test_braking_does_not_take_longer_because_the_move_does():
+    start = Goal(ZERO, (1.0, 0.0, 0.0), (0.5, 0.0, 0.0), 0.0, 0.0)
+    _, positions, velocities, _ = sampled(move(start, ZERO, 0.0, 60.0))
+    assert 0.25 < positions[:, 0].max() < 1.0
+    assert braking_time(1.0) == pytest.approx(3.94)
+    assert velocities[200] == pytest.approx(ZERO, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("distance", "seconds"),
+    # Calculated by hand: 35/16 d / 2 m/s, and sqrt(7.5132 d / 2 m/s^2).
+    [(0.5, 1.3705), (1.0, 1.9382), (10.0, 10.9375)],
+)
+def test_the_shortest_move_keeps_speed_and_acceleration(distance, seconds):
+    assert shortest_duration(distance) == pytest.approx(seconds, abs=1e-4)
+    times, _, velocities, _ = sampled(move(at_rest(ZERO), (distance, 0.0, 0.0), 0.0, seconds))
+    accelerations = np.gradient(velocities[:, 0], times)
+    assert velocities.max() <= MAX_SPEED + 1e-3
+    assert np.abs(accelerations).max() <= MAX_ACCELERATION + 1e-2

@@ -22,6 +22,18 @@ cf1.goTo([0.0, 0.0, -1.0], 0.0, 2.0)
 """
 
 
+BELOW_GROUND = """
+from pycrazyswarm import Crazyswarm
+
+swarm = Crazyswarm()
+swarm.allcfs.takeoff(0.8, 2.0)
+swarm.timeHelper.sleep(4.0)
+swarm.allcfs.crazyflies[0].goTo([0.0, -0.5, -1.0], 0.0, 2.0)
+swarm.allcfs.land(0.04, 2.5)
+swarm.timeHelper.sleep(3.0)
+"""
+
+
 def lands(track):
     """Return whether vehicles are above their first places, on the ground or nearly so.
 
@@ -69,11 +81,43 @@ def test_setpoints():
     assert track[-1, :2] == pytest.approx(track[0, :2], abs=NEAR)
 
 
-def test_what_is_refused_is_a_warning_if_it_is_asked_for():
-    printed = run(EXAMPLES / "dance.py", status=1)
-    assert "a yaw of 0.393: its controller keeps the heading 0; expected 0" in printed
-    printed = run(EXAMPLES / "dance.py", "--unchecked")
-    assert "a yaw of 0.393" in printed
+TURNING = """
+import math
+from pycrazyswarm import Crazyswarm
+
+swarm = Crazyswarm()
+cf1, cf2 = swarm.allcfs.crazyflies
+swarm.allcfs.takeoff(1.0, 2.5)
+swarm.timeHelper.sleep(4.0)
+print("begins at", round(cf1.yaw(), 1))
+cf1.goTo([0.0, -0.5, 1.0], math.pi / 2.0, 2.0)
+swarm.timeHelper.sleep(3.0)
+print("turned to", round(cf1.yaw(), 1), [round(each, 1) for each in cf1.position()])
+cf1.goTo([0.4, -0.8, 1.0], math.pi / 2.0, 2.0)
+swarm.timeHelper.sleep(3.0)
+print("moved to", round(cf1.yaw(), 1), [round(each, 1) for each in cf1.position()])
+"""
+
+
+def test_vehicles_turn(tmp_path):
+    script = tmp_path / "turning.py"
+    script.write_text(TURNING)
+    printed = run(script)
+    assert "begins at 0.0" in printed
+    assert "turned to 1.6 [0.0, -0.5, 1.0]" in printed
+    assert "moved to 1.6 [0.4, -0.8, 1.0]" in printed
+    # A whole dance, with four turns.
+    track = fly("dance.py")
+    assert track[0] != pytest.approx(track[2], abs=0.1)
+    assert lands(track)
+
+
+def test_what_is_refused_is_a_warning_if_it_is_asked_for(tmp_path):
+    script = tmp_path / "below.py"
+    script.write_text(BELOW_GROUND)
+    text = "cf1: goTo: z is -1 m, out of the fence; expected 0 to inf m"
+    assert text in run(script, status=1)
+    assert text in run(script, "--unchecked")
 
 
 def test_the_end_of_a_script_lands(tmp_path):

@@ -10,7 +10,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_fleet.conversions import reference_message
 from crazyflie_fleet.follower import Follower, Velocity
-from crazyflie_fleet.high_level_services import HighLevelParameters
+from crazyflie_fleet.high_level_services import FleetVehicle, HighLevelParameters
+from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_model.trajectory import Trajectory
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
@@ -65,29 +66,30 @@ class PlanMarker:
 class CommandedReferences:
     """Publishes references while there is something to follow.
 
-    ``measured()`` returns the present state of the vehicle, or None if it is not known; without it
-    the topic of the parameters is subscribed to.
+    A vehicle of a fleet is given; otherwise topics of the parameters are subscribed and published.
     """
 
     def __init__(
         self,
         handle: NodeHandle,
         parameters: HighLevelParameters,
-        measured: Callable[[], Goal[float] | None] | None,
+        vehicle: FleetVehicle | None,
     ):
         self._handle = handle
         self._parameters = parameters
         self.follower = Follower()
         self._is_moving = False
+        self._is_move = False  # Not a trajectory, which other vehicles may fly at the same time.
         # When the last setpoint came; None without a stream.
         self._setpoint_time: float | None = None
         self._timer: Timer | None = None
         self._state: Goal[float] | None = None
         self._state_time = 0.0
-        self._measured = measured or self._received
-        self._publisher = handle.publisher(parameters.reference_topic, parameters.reference_type)
+        self._vehicle = vehicle
         self._plan = PlanMarker(handle, parameters.plan_topic, parameters.fixed_frame)
-        if measured is None:
+        if vehicle is None:
+            reference_type = parameters.reference_type
+            self._publisher = handle.publisher(parameters.reference_topic, reference_type)
             state_type = PositionVelocityYawStateStamped
             handle.subscribe(parameters.state_topic, state_type, self._on_state, finite="state")
 
@@ -99,11 +101,23 @@ class CommandedReferences:
             raise ServiceError(f"no state has come on {topic} for {MAX_POSITION_AGE:g} s")
         return measured
 
+    def adopt(self, goal: Goal[float] | None) -> None:
+        """Begin the next command at a goal of another node, unless there is a goal already."""
+        now = self._handle.time()
+        if goal is not None and self.follower.goal(now) is None:
+            self.follower.take_setpoint(now, goal)
+
+    def ahead(self, time: float) -> Triple | None:
+        """Return where the references lead in a time (s), m; None if they do not move."""
+        goal = self.follower.goal(self._handle.time() + time)
+        return goal.position if goal is not None and self._is_moving else None
+
     def begin(self, command: Callable[..., None], *arguments: Any) -> None:
         """Begin a command of `Follower`; raises `ServiceError` if it is refused."""
         self._command(self.follower, command, arguments)
         self._setpoint_time = None
         self._is_moving = True
+        self._is_move = command is Follower.go_to
         if self.follower.trajectory is not None:
             self._plan.show(self.follower.trajectory)
         self._set_timer()
@@ -114,8 +128,13 @@ class CommandedReferences:
         return (command, *arguments)
 
     def _command(self, follower, command, arguments):
+        present = self.present()
+        if self._is_held():
+            # It is at rest, away from its goal.
+            follower.forget()
+            present = at_rest(present.position, present.yaw)
         try:
-            command(follower, self._handle.time(), self.present(), *arguments)
+            command(follower, self._handle.time(), present, *arguments)
         except RefusalError as reason:
             raise ServiceError(str(reason)) from None
 
@@ -160,10 +179,14 @@ class CommandedReferences:
     def publish(self, goal: Goal[float] | None = None) -> None:
         """Publish a goal as reference, by default that of now."""
         goal = goal or self.follower.goal(self._handle.time())
-        if goal is not None:
-            message = reference_message(goal, self._parameters.has_yaw)
-            message.header.stamp = self._handle.stamp()
-            self._publisher.publish(message)
+        if goal is None:
+            return
+        if self._vehicle is not None:
+            self._vehicle.follow(goal)
+            return
+        message = reference_message(goal, self._parameters.has_yaw)
+        message.header.stamp = self._handle.stamp()
+        self._publisher.publish(message)
 
     def _set_timer(self):
         """Run the timer only while there are references to publish: a fleet has many vehicles."""
@@ -181,7 +204,9 @@ class CommandedReferences:
         last = self._setpoint_time
         if last is not None and not 0.0 <= now - last < SETPOINT_TIMEOUT:
             self.end_setpoints()
-        if self._is_moving:
+        if self._is_move and (self._is_held() or self._measured() is None):
+            self.follower.delay(self._parameters.time_step)
+        elif self._is_moving:
             # The last one, at rest, is published, too.
             self._is_moving = self.follower.is_moving(now)
             self.publish()
@@ -194,6 +219,12 @@ class CommandedReferences:
         self._state = Goal((s.x, s.y, s.z), velocity, (0.0,) * 3, yaw, 0.0)
         self._state_time = self._handle.time()
 
-    def _received(self):
+    def _is_held(self):
+        return self._vehicle is not None and self._vehicle.is_held
+
+    def _measured(self):
+        """Return the present state of the vehicle; None if it is not known."""
+        if self._vehicle is not None:
+            return self._vehicle.goal()
         is_fresh = 0.0 <= self._handle.time() - self._state_time < MAX_POSITION_AGE
         return self._state if is_fresh else None

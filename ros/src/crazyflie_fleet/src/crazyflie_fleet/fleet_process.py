@@ -1,7 +1,6 @@
 """The process that flies the vehicles of a fleet."""
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 from crazyflie_fleet.connect_node import BatteryReportNode
@@ -22,6 +21,7 @@ from crazyflie_fleet.vectorized_simulator_node import (
 from crazyflie_fleet.vehicle_nodes import (
     INHIBITION,
     PLACE,
+    WITHOUT_YAW,
     Tree,
     merged,
     node_classes,
@@ -66,10 +66,11 @@ class _NodeFactory:
         references = ReferencesNode(
             vehicles, others, config.fixed_frame, vectorized, self._unplaced
         )
-        for number, vehicle in enumerate(vehicles):
-            self._add_high_level(vehicle, partial(references.states.goal, number))
         buffers = [vehicle.buffer for vehicle in (*vehicles, *others)]
+        # Before the others: these answer the same references of the takeoff servers.
         self.nodes[f"{handle.name}/references"] = references
+        for vehicle, tracked in zip(vehicles, references.vehicles, strict=True):
+            self._add_high_level(vehicle, tracked)
         self.nodes[f"{handle.name}/descents"] = SafeDescentsNode(
             vehicles, references.states, buffers
         )
@@ -132,12 +133,14 @@ class _NodeFactory:
             self._add(f"/{vehicle.name}/{name}", node_class(), tree[name])
         self._has_clock = True
 
-    def _add_high_level(self, vehicle, measured):
+    def _add_high_level(self, vehicle, tracked):
         name = f"/{vehicle.name}/{HIGH_LEVEL}"
         if name not in self.nodes:
             own = self._common(vehicle.settings.dynamics).get(HIGH_LEVEL, {})
             frames = {"fixed": self._config.fixed_frame, "robot": vehicle.name}
-            self._add(name, HighLevelNode(measured), merged(own, {"frames": frames}))
+            has_yaw = not self._config.is_simulated or vehicle.settings.dynamics not in WITHOUT_YAW
+            known: Tree = {"frames": frames, "reference": {"yaw": has_yaw}}
+            self._add(name, HighLevelNode(tracked), merged(own, known))
 
 
 def _paths(tree: Mapping[str, Any], prefix: str = "") -> list[str]:

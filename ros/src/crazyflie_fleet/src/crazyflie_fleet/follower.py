@@ -3,8 +3,13 @@
 import math
 from typing import NamedTuple
 
-from crazyflie_model.angles import Triple
-from crazyflie_model.planner import smooth_piece
+from crazyflie_model.angles import Triple, rotate_by_yaw
+from crazyflie_model.planner import (
+    MAX_ACCELERATION,
+    MAX_SPEED,
+    move,
+    shortest_duration,
+)
 from crazyflie_model.polynomials import Goal
 from crazyflie_model.trajectory import Pieces, Trajectory
 from crazyflie_utils.refusal import RefusalError
@@ -20,15 +25,16 @@ _MAX_STEP = 0.1  #: Longest time after a setpoint of a velocity in which the goa
 class Velocity(NamedTuple):
     """A setpoint without a position."""
 
-    velocity: Triple  # Velocity of the vehicle in the fixed frame (m/s).
+    velocity: Triple  # In the fixed frame; with a height forward, to the left and up (m/s).
+    yaw_rate: float = 0.0  # Counter-clockwise (rad/s).
     height: float | None = None  # Height above the ground (m).
 
 
 class Follower:
     """The goal of one vehicle, by time.
 
-    Commands, and the trajectories that follow from them, are those of the firmware's high-level
-    commander. Invalid commands raise `RefusalError`.
+    Commands are those of the firmware's high-level commander, and so are trajectories from rest.
+    Invalid commands raise `RefusalError`.
     """
 
     def __init__(self) -> None:
@@ -56,10 +62,17 @@ class Follower:
         start = self._start(time, measured)
         passed = 0.0 if self._setpoint is None else min(max(time - self._begin, 0.0), _MAX_STEP)
         x, y, z = (p + v * passed for p, v in zip(start.position, start.velocity, strict=True))
+        yaw = start.yaw + start.yaw_rate * passed
+        vx, vy, vz = setpoint.velocity
         if setpoint.height is not None:
             z = ground + setpoint.height
+            vx, vy = rotate_by_yaw(vx, vy, yaw)
         still = (0.0, 0.0, 0.0)
-        self.take_setpoint(time, Goal((x, y, z), setpoint.velocity, still, start.yaw, 0.0))
+        self.take_setpoint(time, Goal((x, y, z), (vx, vy, vz), still, yaw, setpoint.yaw_rate))
+
+    def delay(self, duration: float) -> None:
+        """Continue a move, which has been interrupted for a duration (s)."""
+        self._begin += duration
 
     def is_moving(self, time: float) -> bool:
         """Return whether a move or a trajectory has not ended."""
@@ -81,24 +94,37 @@ class Follower:
         time: float,
         measured: Goal[float],
         position: Triple,
-        yaw: float,
+        yaw: float | None,
         duration: float,
         relative: bool = False,
+        is_limited: bool = False,
     ) -> None:
         """Fly to a position (m) and heading (rad), or by them, in ``duration`` (s).
 
         It begins with the position, velocity and acceleration of the present goal; with those of
-        ``measured``, which is where the vehicle is, when that is further away than `NEAR`.
+        ``measured``, which is where the vehicle is, when that is further away than `NEAR`. Without
+        a yaw it keeps the heading. If ``is_limited``, too short a duration is refused; see
+        `crazyflie_model.planner`.
         """
-        _check(*position, yaw)
+        _check(*position, yaw or 0.0)
         if not (math.isfinite(duration) and duration > 0.0):
             raise RefusalError(f"the duration is {duration:g} s; expected more than 0 s")
         start = self._start(time, measured)
         if relative:
             x, y, z = start.position
             position = (x + position[0], y + position[1], z + position[2])
+        if yaw is None:
+            yaw = start.yaw
+        elif relative:
             yaw += start.yaw
-        self._fly(time, Trajectory((smooth_piece(start, position, yaw, duration),)))
+        distance = math.dist(start.position, position)
+        needed = shortest_duration(distance, math.hypot(*start.velocity))
+        if is_limited and duration < needed:
+            raise RefusalError(
+                f"{distance:.2f} m in {duration:g} s; expected a duration of at least "
+                f"{needed:.2f} s (at most {MAX_SPEED:g} m/s and {MAX_ACCELERATION:g} m/s^2)"
+            )
+        self._fly(time, Trajectory(move(start, position, yaw, duration)))
 
     def upload(self, number: int, pieces: Pieces) -> None:
         """Store a trajectory under a number."""

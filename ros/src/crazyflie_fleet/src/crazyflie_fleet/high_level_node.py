@@ -1,7 +1,6 @@
 """The driver's high-level services for a vehicle that the workspace's controller flies."""
 
 import math
-from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
@@ -15,13 +14,14 @@ from crazyflie_fleet.commanded_references import CommandedReferences
 from crazyflie_fleet.conversions import from_message
 from crazyflie_fleet.follower import Follower
 from crazyflie_fleet.high_level_services import (
+    FleetVehicle,
     Groups,
     HighLevelParameters,
     SetpointSubscribers,
     relay,
 )
 from crazyflie_model.polynomials import Goal, at_rest
-from crazyflie_msgs.msg import FlightStatus
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityStateStamped
 from crazyflie_utils import Node, NodeHandle, ServiceError, flight_status
 from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.last_valid import HOLD_LIMIT
@@ -50,14 +50,14 @@ class HighLevelNode(Node):
 
     In its own namespace it offers the services of the driver for a real vehicle, so that the same
     clients fly simulated vehicles. It is silent on the ground and during landing.
-    ``measured()`` returns the present state, or None if it is not known; without it the node
-    subscribes to the topic.
+    In the process of a fleet it is given the vehicle; then it offers /NAME/go_to, too: the same
+    with limits of speed and acceleration.
     """
 
     needed_in_flight = True
 
-    def __init__(self, measured: Callable[[], Goal[float] | None] | None = None) -> None:
-        self._measured = measured
+    def __init__(self, vehicle: FleetVehicle | None = None) -> None:
+        self._vehicle = vehicle
         self._status = FlightStatus()
         self._groups = Groups()
         self._takeoff: _Takeoff | None = None
@@ -71,7 +71,7 @@ class HighLevelNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
-        self._references = CommandedReferences(handle, parameters, self._measured)
+        self._references = CommandedReferences(handle, parameters, self._vehicle)
         for name, service_type, callback in (
             ("takeoff", srv.Takeoff, self._on_takeoff),
             ("land", srv.Land, self._on_land),
@@ -97,7 +97,13 @@ class HighLevelNode(Node):
             parameters.flight_state_topic,
             self._on_flight_status,
         )
-        handle.subscribe(parameters.reference_topic, parameters.reference_type, self._on_reference)
+        reference_type = parameters.reference_type
+        if self._vehicle is not None:
+            reference_type = PositionVelocityStateStamped
+            self._vehicle.on_interruption = self._references.forget
+            self._vehicle.ahead = self._references.ahead
+            handle.advertise_service("go_to", srv.GoTo, self._on_limited_go_to)
+        handle.subscribe(parameters.reference_topic, reference_type, self._on_reference)
         handle.subscribe(parameters.start_topic, String, self._on_start_all)
         SetpointSubscribers(handle, self._on_setpoint, parameters.has_yaw)
 
@@ -238,14 +244,26 @@ class HighLevelNode(Node):
         return srv.StopResponse()
 
     def _on_go_to(self, request):
-        if request.yaw and not self._parameters.has_yaw:
+        self._execute(Follower.go_to, *self._move(request))
+        return srv.GoToResponse()
+
+    def _on_limited_go_to(self, request):
+        move = self._move(request)
+        try:
+            self._go(Follower.go_to, *move, True)
+        except ServiceError as reason:
+            raise ServiceError(f"{self._handle.resolve('go_to')} refused: {reason}") from None
+        return srv.GoToResponse()
+
+    def _move(self, request):
+        """Return the arguments of `Follower.go_to`."""
+        if request.yaw and not self._parameters.has_yaw and not math.isnan(request.yaw):
             raise ServiceError(
                 f"yaw is {request.yaw:g} rad, and the controller keeps the heading 0; expected 0"
             )
+        yaw = None if math.isnan(request.yaw) else request.yaw
         goal = (request.goal.x, request.goal.y, request.goal.z)
-        duration = request.duration.to_sec()
-        self._execute(Follower.go_to, goal, request.yaw, duration, request.relative)
-        return srv.GoToResponse()
+        return goal, yaw, request.duration.to_sec(), request.relative
 
     def _on_upload(self, request):
         turns = any(any(piece.poly_yaw) for piece in request.pieces)
@@ -280,7 +298,14 @@ class HighLevelNode(Node):
         return srv.NotifySetpointsStopResponse()
 
     def _execute(self, command, *arguments):
+        if self._vehicle is not None and self._vehicle.is_to_land:
+            raise ServiceError("the fleet lands the vehicle; expected it to fly on")
+        self._go(command, *arguments)
+
+    def _go(self, command, *arguments):
         if self._is_followed():
+            if self._vehicle is not None and self._status.state == FlightStatus.FLYING:
+                self._references.adopt(self._vehicle.commanded())
             self._references.begin(command, *arguments)
         elif self._status.state == FlightStatus.TAKING_OFF:
             self._next = self._references.checked(command, *arguments)
@@ -294,7 +319,8 @@ class HighLevelNode(Node):
             self._handle.error(f"not done: {reason}")
 
     def _on_setpoint(self, setpoint):
-        if self._is_followed():
+        is_to_land = self._vehicle is not None and self._vehicle.is_to_land
+        if self._is_followed() and not is_to_land:
             try:
                 self._references.take(setpoint, self._status.ground)
             except ServiceError as reason:

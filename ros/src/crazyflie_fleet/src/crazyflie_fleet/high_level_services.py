@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any
+from typing import Any, Protocol
 
 from std_msgs.msg import Empty as EmptyMessage
 from std_srvs.srv import Empty, EmptyRequest
@@ -12,6 +12,7 @@ from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
 from crazyflie_fleet.conversions import setpoint_goal
 from crazyflie_fleet.follower import Velocity
+from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
 from crazyflie_utils import NodeHandle, Parameters, parameter
@@ -25,13 +26,37 @@ HIGH_LEVEL = "high_level"
 START_TOPIC = "/all/start_trajectory"
 
 
+#: In place of a yaw, for `HighLevelNode` only: the vehicle keeps its heading.
+KEEP_HEADING = math.nan
+
+
+class FleetVehicle(Protocol):
+    """A vehicle in the process of its fleet, for its `HighLevelNode`."""
+
+    is_held: bool  #: Whether it is kept at its place, since another vehicle is too near.
+    is_to_land: bool  #: Whether only the fleet moves it, until it lands.
+    on_interruption: Callable[[], None]  #: Called when the fleet, or another node, commands it.
+    #: Returns where its own references lead in a time (s), m; None if they do not move.
+    ahead: Callable[[float], Triple | None]
+
+    def goal(self) -> Goal[float] | None:
+        """Return the measured state; None if it is not known."""
+
+    def commanded(self) -> Goal[float] | None:
+        """Return the last reference of any node; None if the vehicle is not near it."""
+
+    def follow(self, goal: Goal[float]) -> None:
+        """Make the vehicle follow a goal."""
+
+
 class HighLevelParameters(Parameters):
     """Parameters of `HighLevelNode`."""
 
     reference_topic: str = parameter(TOPIC, "references of the controller", "ref", "topics/ref")
     has_yaw: bool = parameter(
         BOOLEAN,
-        "references are PositionVelocityYawStateStamped, and not PositionVelocityStateStamped",
+        "the controller follows a heading; references are PositionVelocityYawStateStamped, and not "
+        "PositionVelocityStateStamped, unless the vehicle is one of a fleet",
         default=False,
         name="reference/yaw",
     )
@@ -138,13 +163,17 @@ class SetpointSubscribers:
 
     def _on_velocity(self, message):
         velocity = (message.vel.x, message.vel.y, message.vel.z)
-        self._pass(Velocity(velocity), velocity, message.yawRate)
+        setpoint = Velocity(velocity, self._yaw_rate(message.yawRate))
+        self._pass(setpoint, velocity, message.yawRate)
 
     def _on_hover(self, message):
         velocity = (message.vx, message.vy, 0.0)
-        self._pass(
-            Velocity(velocity, message.zDistance), (*velocity, message.zDistance), message.yawrate
-        )
+        setpoint = Velocity(velocity, self._yaw_rate(message.yawrate), message.zDistance)
+        self._pass(setpoint, (*velocity, message.zDistance), message.yawrate)
+
+    def _yaw_rate(self, clockwise):
+        # The driver's messages have it clockwise, in deg/s.
+        return -math.radians(clockwise) if self._has_yaw else 0.0
 
     def _on_stop(self, _):
         self._handle.warn("ignoring cmd_stop: a vehicle in flight would fall", throttle=1.0)

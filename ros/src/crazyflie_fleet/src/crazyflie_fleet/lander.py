@@ -13,6 +13,7 @@ from typing_extensions import override
 
 from crazyflie_driver.srv import GoTo, GoToRequest
 from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
+from crazyflie_fleet.high_level_services import KEEP_HEADING
 from crazyflie_fleet.landing import (
     SIDE_SPEED,
     LandingSide,
@@ -21,15 +22,21 @@ from crazyflie_fleet.landing import (
     Situation,
     land_in_rounds,
 )
+from crazyflie_fleet.references_node import LANDING_TOPIC
 from crazyflie_fleet.separation import RELEASE_RATIO
-from crazyflie_fleet.straight_move import shortest_duration
 from crazyflie_fleet.vehicle_nodes import DESCENT, SAFE_DESCENT
 from crazyflie_fleet.vehicle_states import VehicleStates
-from crazyflie_msgs.msg import FlightStatus, PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_model.planner import shortest_duration
+from crazyflie_msgs.msg import (
+    FlightStatus,
+    PositionVelocityStateStamped,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_utils import Node, NodeHandle
+from crazyflie_utils.vectors import to_tuple
 
 SERVICE_TIMEOUT = 60.0  #: Timeout of takeoffs and landings (s of the machine's clock).
-LANDING_TOPIC = "/fleet/landing"  #: Names of vehicles that only the fleet moves, until they land.
 _PERIOD = 0.1  #: Period of the updates of a landing (s).
 #: Speed of all vehicles below which a round begins (m/s), and longest wait for it (s).
 _SLOW, _BRAKING_TIMEOUT = 0.3, 3.0
@@ -56,6 +63,7 @@ class SafeDescentsNode(Node):
         self._vehicles = vehicles
         self._states = states
         self._descents = SafeDescents(buffers)
+        self._headings: dict[int, float] = {}  # Number to heading at the beginning (rad).
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -64,10 +72,10 @@ class SafeDescentsNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         for number, vehicle in enumerate(self._vehicles):
-            top, message_type = f"/{vehicle.name}/", PositionVelocityStateStamped
-            publisher = handle.publisher(top + SAFE_DESCENT, message_type)
+            top = f"/{vehicle.name}/"
+            publisher = handle.publisher(top + SAFE_DESCENT, PositionVelocityYawStateStamped)
             on_descent = partial(self._on_descent, number, publisher)
-            handle.subscribe(top + DESCENT, message_type, on_descent)
+            handle.subscribe(top + DESCENT, PositionVelocityStateStamped, on_descent)
 
     def _on_descent(self, number, publisher, message):
         now, states = self._handle.time(), self._states
@@ -75,15 +83,16 @@ class SafeDescentsNode(Node):
             is_descending = states.flight_states == FlightStatus.DESCENDING
             is_landing = is_descending | ~states.are_in_flight()
             distance = self._descents.begin(number, now, states.positions, is_landing)
+            self._headings[number] = float(np.nan_to_num(states.headings[number]))
             if distance > 0.0:
                 self._handle.warn(
                     f"{states.names[number]} lands {distance:.2f} m aside: another vehicle is "
                     "beneath it"
                 )
         aside = self._descents.reference(number, now, message.state.z, message.state.z_dot)
-        if aside is not None:
-            message = PositionVelocityStateStamped(message.header, PositionVelocityState(*aside))
-        publisher.publish(message)
+        numbers = to_tuple(message.state) if aside is None else aside
+        state = PositionVelocityYawState(*numbers, self._headings[number])
+        publisher.publish(PositionVelocityYawStateStamped(message.header, state))
 
 
 class Lander(LandingSide):
@@ -195,7 +204,9 @@ class Lander(LandingSide):
         farthest = max(self.distance(name, goal) for name, goal in goals.items())
         duration = max(_SHORTEST_MOVE, farthest / SIDE_SPEED, 1.1 * shortest_duration(farthest))
         for name, goal in goals.items():
-            request = GoToRequest(0, False, Point(*goal), 0.0, genpy.Duration.from_sec(duration))
+            request = GoToRequest(
+                0, False, Point(*goal), KEEP_HEADING, genpy.Duration.from_sec(duration)
+            )
             self._call(name, "go_to", GoTo, request, self._note_refusal)
         return self.time() + duration
 

@@ -16,8 +16,12 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from crazyflie_fleet.fleet_config import DOWNWASH
-from crazyflie_fleet.straight_move import shortest_duration
-from crazyflie_model.trajectory import minimum_jerk
+from crazyflie_model.planner import MAX_ACCELERATION, MAX_SPEED
+from crazyflie_model.trajectory import (
+    MINIMUM_JERK_ACCELERATION,
+    MINIMUM_JERK_SPEED,
+    minimum_jerk,
+)
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -304,7 +308,10 @@ class SafeDescents:
             index, limits = int(known[:number].sum()), self._limits[np.ix_(known, known)]
             place = np.array(free_place(index, places[known], is_landing[known], limits))
         distance = float(np.nan_to_num(np.linalg.norm(place - start[:2])))
-        duration = _SIDE_DURATION * shortest_duration(distance)
+        duration = _SIDE_DURATION * max(
+            MINIMUM_JERK_SPEED * distance / MAX_SPEED,
+            math.sqrt(MINIMUM_JERK_ACCELERATION * distance / MAX_ACCELERATION),
+        )
         self._descents[number] = _Descent(start, place, duration, time, time)
         return distance
 

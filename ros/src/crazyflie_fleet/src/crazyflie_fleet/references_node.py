@@ -1,8 +1,7 @@
-"""ROS interface of straight moves, and of the collision avoidance."""
+"""Passes on the references of a fleet's vehicles, and keeps the vehicles apart."""
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from functools import partial
+import math
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
@@ -10,51 +9,152 @@ from std_msgs.msg import Header, String
 from tf2_msgs.msg import TFMessage
 from typing_extensions import override
 
-from crazyflie_driver.srv import GoTo, GoToResponse
+from crazyflie_fleet.conversions import reference_message
 from crazyflie_fleet.fleet_config import VehicleConfig
-from crazyflie_fleet.lander import LANDING_TOPIC
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_fleet.straight_move import StraightMove, evaluate
 from crazyflie_fleet.vehicle_nodes import REFERENCE, SAFE_REFERENCE
 from crazyflie_fleet.vehicle_states import VehicleStates
-from crazyflie_msgs.msg import FlightStatus, PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_model.angles import Triple
+from crazyflie_model.polynomials import Goal, at_rest
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityStateStamped
+from crazyflie_msgs.msg import PositionVelocityYawStateStamped as Reference
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
-from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
-from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import is_finite, to_tuple
 
+LANDING_TOPIC = "/fleet/landing"  #: Names of vehicles that only the fleet moves, until they land.
 SILENCE_PERIOD = 5.0  #: Period of warnings about a vehicle whose states do not come (s).
 
 
 class ReferencesParameters(Parameters):
     """Parameters of `ReferencesNode`."""
 
-    move_period: float = parameter(
-        TIME_STEP, "from one reference of a straight move to the next", 0.02, "way_period"
-    )
     watch_period: float = parameter(TIME_STEP, "from one check of the distances to the next", 0.05)
     held_topic: str = parameter(
         TOPIC, "names of the vehicles that are held", "/fleet/waiting", "topics/waiting"
     )
 
 
-@dataclass
-class _TrackedVehicle:
-    """A vehicle whose references pass through the node; times are in s."""
+class TrackedVehicle:
+    """A vehicle whose references pass through `ReferencesNode`; see `FleetVehicle`."""
 
-    number: int
-    name: str
-    buffer: float
-    publisher: Publisher
-    commanded: PositionVelocityStateStamped | None = None
-    move: StraightMove | None = None
-    move_time: float = 0.0
-    is_held: bool = False
-    is_to_land: bool = False
-    # End of its takeoffs by the fleet file, if the file has no start point for it (m).
-    hover_point: tuple[float, float, float] | None = None
+    def __init__(self, number: int, config: VehicleConfig, states: VehicleStates):
+        self.number = number
+        self.name = config.name
+        self.buffer = config.buffer
+        self.is_held = False
+        self.is_to_land = False
+        self.on_interruption: Callable[[], None] = lambda: None
+        self.ahead: Callable[[float], Triple | None] = lambda time: None
+        #: End of its takeoffs by the fleet file, if the file has no start point for it (m).
+        self.hover_point: Triple | None = None
+        self._states = states
+        self._commanded: Goal[float] | None = None
+        self._heading: float | None = None  # Commanded in this flight (rad).
+        self._own: PositionVelocityStateStamped | None = None
+
+    def register(self, handle: NodeHandle, frame: str) -> None:
+        """Create the publishers and the subscriber; ``frame`` is the fixed frame."""
+        top, message_type = f"/{self.name}/", PositionVelocityStateStamped
+        self._handle, self._frame = handle, frame
+        self._safe: Publisher = handle.publisher(top + SAFE_REFERENCE, Reference)
+        self._public: Publisher = handle.publisher(top + REFERENCE, message_type)
+        handle.subscribe(top + REFERENCE, message_type, self._on_reference)
+
+    def goal(self) -> Goal[float] | None:
+        """Return the measured state; None if it is not known."""
+        return self._states.goal(self.number)
+
+    def commanded(self) -> Goal[float] | None:
+        """Return the last reference of any node; None if the vehicle is not near it."""
+        goal, measured = self._commanded, self._states.positions[self.number]
+        is_near = goal is not None and math.dist(goal.position, measured) < self.buffer
+        return goal if is_near else None
+
+    def follow(self, goal: Goal[float]) -> None:
+        """Make the vehicle follow a goal, which is published as a reference, too."""
+        self._own = reference_message(goal, has_yaw=False)
+        self._own.header.stamp = self._handle.stamp()
+        self._own.header.frame_id = self._frame
+        self._heading = goal.yaw
+        self._command(goal, self._own.header)
+        self._public.publish(self._own)
+
+    def destination(self, time: float) -> Triple | None:
+        """Return where the references lead in a time (s), m; None without any.
+
+        Those of other nodes lead to their position: nobody knows whether they go on.
+        """
+        ahead = self.ahead(time)
+        if ahead is not None:
+            return ahead
+        return None if self._commanded is None else self._commanded.position
+
+    def is_flying(self) -> bool:
+        """Return whether it follows references."""
+        return self._states.flight_states[self.number] == FlightStatus.FLYING
+
+    def land(self, is_to_land: bool) -> None:
+        """Hover until its turn to land: only the fleet moves it."""
+        if is_to_land and not self.is_to_land and self.is_flying():
+            self.on_interruption()
+            goal = self.commanded() or at_rest(self._states.positions[self.number].tolist())
+            self._command(at_rest(goal.position, self._present_heading()), None)
+        self.is_to_land = is_to_land
+
+    def hold(self) -> None:
+        """Keep the vehicle where it is, whatever it is commanded."""
+        self.is_held = True
+        x, y, z = self._states.positions[self.number].tolist()
+        self._publish(at_rest((x, y, z), self._present_heading()))
+
+    def release(self) -> None:
+        """Follow the last reference again."""
+        self.is_held = False
+        if self._commanded is not None:
+            # With a new stamp: a controller ignores what is older than the hold.
+            self._publish(self._commanded)
+
+    def forget_heading(self) -> None:
+        """Keep the measured heading in the next flight."""
+        self._heading = None
+
+    def _on_reference(self, message):
+        if message is self._own or (self.is_to_land and self.is_flying()):
+            return
+        self.on_interruption()
+        x, y, z, *rates = to_tuple(message.state)
+        vx, vy, vz = rates
+        if self.hover_point == (x, y, z):
+            x, y, height = self._states.positions[self.number].tolist()
+            z, vx, vy, vz = max(height, z), 0.0, 0.0, 0.0
+        goal = Goal((x, y, z), (vx, vy, vz), (0.0,) * 3, self._present_heading(), 0.0)
+        if is_finite(message.state):
+            self._command(goal, message.header)
+        else:
+            # The controller handles invalid references.
+            self._publish(goal, message.header)
+
+    def _command(self, goal, header):
+        self._commanded = goal
+        if not self.is_held:
+            self._publish(goal, header)
+
+    def _publish(self, goal, header=None):
+        message = reference_message(goal, has_yaw=True)
+        message.header = header or Header(0, self._handle.stamp(), self._frame)
+        self._safe.publish(message)
+
+    def _present_heading(self):
+        """Return the heading that references without one keep, rad."""
+        if self._heading is None:
+            heading = float(self._states.headings[self.number])
+            if not math.isfinite(heading):
+                return 0.0
+            self._heading = heading
+        return self._heading
 
 
 class ReferencesNode(Node):
@@ -75,14 +175,19 @@ class ReferencesNode(Node):
         vectorized: Mapping[str, tuple[VehicleConfig, ...]] | None = None,
         unplaced: Collection[str] = (),
     ):
-        self._unplaced = unplaced
-        self._vehicles = vehicles
+        self._configs = vehicles
         self._fixed_frame = fixed_frame
         # Own ones first.
         all_vehicles = (*vehicles, *others)
         self.states = VehicleStates(all_vehicles, vectorized or {})
         self._separation = Separation([vehicle.buffer for vehicle in all_vehicles])
-        self._tracked: list[_TrackedVehicle] = []
+        #: The own vehicles.
+        self.vehicles = [
+            TrackedVehicle(number, vehicle, self.states) for number, vehicle in enumerate(vehicles)
+        ]
+        for tracked, vehicle in zip(self.vehicles, vehicles, strict=True):
+            if vehicle.name in unplaced:
+                tracked.hover_point = vehicle.hover_point
         self._published_held = ""
 
     @override
@@ -94,126 +199,28 @@ class ReferencesNode(Node):
         parameters = self._parameters
         self._held = handle.publisher(parameters.held_topic, String, latch=True)
         self._publish_mocap_frames(handle)
-        for vehicle in self._vehicles:
-            self._track(handle, vehicle)
+        for tracked in self.vehicles:
+            tracked.register(handle, self._fixed_frame)
         self.states.subscribe(handle)
         handle.subscribe(LANDING_TOPIC, String, self._on_landing)
-        handle.timer(parameters.move_period, self._on_move_timer)
         handle.timer(parameters.watch_period, self._on_watch_timer)
-
-    def _track(self, handle, vehicle):
-        top, message_type = f"/{vehicle.name}/", PositionVelocityStateStamped
-        publisher = handle.publisher(top + SAFE_REFERENCE, message_type)
-        tracked = _TrackedVehicle(len(self._tracked), vehicle.name, vehicle.buffer, publisher)
-        if vehicle.name in self._unplaced:
-            tracked.hover_point = vehicle.hover_point
-        self._tracked.append(tracked)
-        handle.advertise_service(top + "go_to", GoTo, partial(self._on_go_to, tracked))
-        handle.subscribe(top + REFERENCE, message_type, partial(self._on_reference, tracked))
 
     def _publish_mocap_frames(self, handle):
         # The frame of motion capture is the frame of the vehicle, by another name.
         identity = Transform(Vector3(), Quaternion(w=1.0))
         transforms = [
             TransformStamped(Header(0, handle.stamp(), vehicle.mocap_frame), vehicle.name, identity)
-            for vehicle in self._vehicles
+            for vehicle in self._configs
             if vehicle.mocap_frame != vehicle.name
         ]
         if transforms:
             static = handle.publisher("/tf_static", TFMessage, latch=True)
             static.publish(TFMessage(transforms))
 
-    def _is_flying(self, tracked):
-        return self.states.flight_states[tracked.number] == FlightStatus.FLYING
-
-    # References.
-
     def _on_landing(self, message):
         names = message.data.split()
-        for tracked in self._tracked:
-            is_to_land = tracked.name in names
-            if is_to_land and not tracked.is_to_land and self._is_flying(tracked):
-                # It hovers until its turn; only the fleet moves it.
-                tracked.move = None
-                self._command(tracked, self._reference(self._present(tracked), np.zeros(3)))
-            tracked.is_to_land = is_to_land
-
-    def _on_reference(self, tracked, message):
-        if tracked.is_to_land and self._is_flying(tracked):
-            return
-        if not is_finite(message.state):
-            # The controller handles invalid references.
-            tracked.publisher.publish(message)
-            return
-        if tracked.hover_point == to_tuple(message.state)[:3]:
-            x, y, z = self.states.positions[tracked.number].tolist()
-            hover = np.array([x, y, max(z, tracked.hover_point[2])])
-            message = self._reference(hover, np.zeros(3))
-        tracked.move = None
-        self._command(tracked, message)
-
-    def _command(self, tracked, message):
-        tracked.commanded = message
-        if not tracked.is_held:
-            tracked.publisher.publish(message)
-
-    def _reference(self, position, velocity):
-        message = PositionVelocityStateStamped()
-        message.header.stamp = self._handle.stamp()
-        message.header.frame_id = self._fixed_frame
-        message.state = PositionVelocityState(*position.tolist(), *velocity.tolist())
-        return message
-
-    # Straight moves.
-
-    def _on_go_to(self, tracked, request):
-        goal = (request.goal.x, request.goal.y, request.goal.z)
-        name = f"/{tracked.name}/go_to refused"
-        if not (self._is_flying(tracked) and self.states.are_fresh()[tracked.number]):
-            raise ServiceError(f"{name}: the vehicle is not in flight")
-        if not np.isfinite(goal).all():
-            raise ServiceError(f"{name}: the goal is {goal}; expected finite numbers (m)")
-        if request.yaw != 0.0:
-            raise ServiceError(f"{name}: the yaw is {request.yaw:g}; expected 0, which is held")
-        start = self._present(tracked)
-        end = start + goal if request.relative else np.array(goal)
-        velocity = self._present_velocity(tracked, start)
-        try:
-            tracked.move = StraightMove(start, end, request.duration.to_sec(), velocity)
-        except RefusalError as reason:
-            raise ServiceError(f"{name}: {reason}") from None
-        tracked.move_time = 0.0
-        return GoToResponse()
-
-    def _present(self, tracked):
-        """Return the commanded position; the measured one if the vehicle is not near it, m."""
-        measured = self.states.positions[tracked.number].copy()
-        commanded = measured if tracked.commanded is None else _position(tracked.commanded)
-        return commanded if np.linalg.norm(commanded - measured) < tracked.buffer else measured
-
-    def _present_velocity(self, tracked, position):
-        if tracked.is_held:
-            return np.zeros(3)
-        if tracked.commanded is not None and np.array_equal(position, _position(tracked.commanded)):
-            return np.array(to_tuple(tracked.commanded.state)[3:])
-        return np.nan_to_num(self.states.velocities[tracked.number])
-
-    def _on_move_timer(self):
-        fresh = self.states.are_fresh()
-        moving = []
-        for tracked in self._tracked:
-            if not self._is_flying(tracked):
-                tracked.move = None
-            # A move stops while its vehicle is held, or no state of it comes.
-            if tracked.move is not None and not tracked.is_held and fresh[tracked.number]:
-                tracked.move_time += self._parameters.move_period
-                moving.append(tracked)
-        if not moving:
-            return
-        for tracked, position, velocity in zip(moving, *_evaluate(moving), strict=True):
-            self._command(tracked, self._reference(position, velocity))
-            if tracked.move_time >= tracked.move.duration:
-                tracked.move = None
+        for tracked in self.vehicles:
+            tracked.land(tracked.name in names)
 
     # Distances.
 
@@ -225,36 +232,23 @@ class ReferencesNode(Node):
         for number in np.flatnonzero(in_flight & ~fresh).tolist():
             self._warn_of_silence(number)
         goals = positions.copy()
-        moving = [tracked for tracked in self._tracked if tracked.move is not None]
-        for tracked in self._tracked:
-            if tracked.commanded is not None and tracked.move is None:
-                goals[tracked.number] = _position(tracked.commanded)
-        if moving:
-            goals[[tracked.number for tracked in moving]] = _evaluate(moving, LOOK_AHEAD)[0]
+        for tracked in self.vehicles:
+            if (destination := tracked.destination(LOOK_AHEAD)) is not None:
+                goals[tracked.number] = destination
         held, close = self._separation.update(positions, velocities, goals)
         for pair in close:
             self._warn_of_pair(pair)
-        for tracked in self._tracked:
+        for tracked in self.vehicles:
+            if not in_flight[tracked.number]:
+                tracked.forget_heading()
             if held[tracked.number] and not tracked.is_held:
-                self._hold(tracked)
+                tracked.hold()
             elif tracked.is_held and not held[tracked.number]:
-                self._release(tracked)
+                tracked.release()
         self._publish_held()
 
-    def _hold(self, tracked):
-        tracked.is_held = True
-        position = self.states.positions[tracked.number]
-        tracked.publisher.publish(self._reference(position, np.zeros(3)))
-
-    def _release(self, tracked):
-        tracked.is_held = False
-        if tracked.commanded is not None and tracked.move is None:
-            # With a new stamp: a controller ignores what is older than the hold.
-            state = np.array(to_tuple(tracked.commanded.state))
-            tracked.publisher.publish(self._reference(state[:3], state[3:]))
-
     def _publish_held(self):
-        held = " ".join(tracked.name for tracked in self._tracked if tracked.is_held)
+        held = " ".join(tracked.name for tracked in self.vehicles if tracked.is_held)
         if held != self._published_held:
             self._published_held = held
             self._held.publish(String(held))
@@ -280,13 +274,3 @@ class ReferencesNode(Node):
             throttle=SILENCE_PERIOD,
             key=("silence", name),
         )
-
-
-def _position(message):
-    return np.array(to_tuple(message.state)[:3])
-
-
-def _evaluate(moving, ahead=0.0):
-    """Return positions and velocities on the moves of vehicles, a time (s) ahead of now."""
-    moves = [tracked.move for tracked in moving]
-    return evaluate(moves, [tracked.move_time + ahead for tracked in moving])

@@ -181,7 +181,7 @@ class Settings(Parameters):
         FleetModel(),
         "dynamics in simulation; or a type of vehicle or a model file, relative to this file, for "
         "simulation (as a quadrotor), hardware and gains",
-        "near_hover",
+        "coupled_7d",
     )
     buffer: float = parameter(
         Number("m", above=0.0), "radius of the space that is the vehicle's own", 0.15

@@ -29,7 +29,6 @@ from crazyflie_model.limits import MAX_SPEED
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
-    PositionVelocityStateStamped,
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
@@ -208,14 +207,14 @@ class VectorizedSimulatorNode(Node):
         )
         handle.subscribe(
             below + SAFE_REFERENCE,
-            PositionVelocityStateStamped,
+            PositionVelocityYawStateStamped,
             partial(self._on_reference, reference),
             finite="state",
             on_invalid=lambda: reference.invalidate(handle.time()),
         )
         handle.subscribe(
             below + SAFE_DESCENT,
-            PositionVelocityStateStamped,
+            PositionVelocityYawStateStamped,
             partial(self._on_descent, reference),
             finite="state",
         )
@@ -224,12 +223,12 @@ class VectorizedSimulatorNode(Node):
         self._batch.command(number, to_tuple(message.control), self._handle.time())
 
     def _on_reference(self, reference, message):
-        x_ref = (*to_tuple(message.state), 0.0)
+        x_ref = to_tuple(message.state)
         stamp, now = message.header.stamp.to_sec(), self._handle.stamp().to_sec()
         reference.update(x_ref, stamp, now, self._handle.time())
 
     def _on_descent(self, reference, message):
-        reference.descend((*to_tuple(message.state), 0.0), self._handle.time())
+        reference.descend(to_tuple(message.state), self._handle.time())
 
     # Time steps.
 

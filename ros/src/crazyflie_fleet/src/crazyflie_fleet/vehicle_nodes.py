@@ -5,9 +5,8 @@ from typing import Any
 
 from crazyflie_control_merger.cmd_vel_converter_node import CmdVelConverterNode
 from crazyflie_fleet.fleet_config import VehicleConfig
-from crazyflie_lqr.lqr_nodes import (
-    PositionVelocityYawStateLiftLqrNode,
-)
+from crazyflie_lqr.lqr_nodes import PositionVelocityYawStateLiftLqrNode
+from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_simulator.simulator_node import (
     NearHoverSimulatorCoupled7DNode,
@@ -37,9 +36,20 @@ SIMULATORS: dict[str, type[Node]] = {
     "quadrotor": QuadrotorSimulatorNode,
 }
 
+#: Models whose vehicles cannot fly at a heading other than 0: their tilt does not turn with them.
+WITHOUT_YAW = ("near_hover",)
+
+
+class FleetLqrNode(PositionVelocityYawStateLiftLqrNode):
+    """The same controller, to a position, velocity and yaw."""
+
+    reference_type = PositionVelocityYawStateStamped
+    reference_tail = ()
+
+
 HOVER_NODES: dict[str, type[Node]] = {
     "state_estimator": PositionVelocityYawStateEstimatorNode,
-    "lqr_controller": PositionVelocityYawStateLiftLqrNode,
+    "lqr_controller": FleetLqrNode,
     "takeoff_server": TakeoffServerNode,
     "takeoff_control_filter": TakeoffControlFilterNode,
 }

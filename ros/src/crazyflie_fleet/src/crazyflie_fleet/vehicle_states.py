@@ -37,7 +37,7 @@ class VehicleStates:
             f"nothing has come on /{name}/{FLIGHT_STATUS}" for name in self.names
         ]
         self._vectorized = vectorized
-        self._states = np.full((len(vehicles), 6), np.nan)
+        self._states = np.full((len(vehicles), 7), np.nan)
         self._times = np.full(len(vehicles), -np.inf)
 
     @property
@@ -48,7 +48,12 @@ class VehicleStates:
     @property
     def velocities(self) -> NDArray[np.float64]:
         """Last velocities, shape (n, 3), m/s, fixed frame; NaN before the first."""
-        return self._states[:, 3:]
+        return self._states[:, 3:6]
+
+    @property
+    def headings(self) -> NDArray[np.float64]:
+        """Last headings, shape (n,), rad; NaN before the first."""
+        return self._states[:, 6]
 
     def subscribe(self, handle: NodeHandle) -> None:
         """Subscribe to the topics of all vehicles through the handle of a node."""
@@ -70,11 +75,11 @@ class VehicleStates:
         return (age >= 0.0) & (age < MAX_POSITION_AGE) & np.isfinite(self.positions).all(axis=1)
 
     def goal(self, number: int) -> Goal[float] | None:
-        """Return position and velocity of one as a goal with the heading 0; None if not fresh."""
+        """Return position, velocity and heading of one as a goal; None if they are not fresh."""
         if not self.are_fresh()[number]:
             return None
-        x, y, z, *velocity = self._states[number].tolist()
-        return Goal((x, y, z), tuple(velocity), (0.0, 0.0, 0.0), 0.0, 0.0)
+        x, y, z, *velocity, yaw = self._states[number].tolist()
+        return Goal((x, y, z), tuple(velocity), (0.0, 0.0, 0.0), yaw, 0.0)
 
     def are_in_flight(self) -> NDArray[np.bool_]:
         """Return which vehicles are in flight, so that others must keep apart, shape (n,)."""
@@ -85,7 +90,7 @@ class VehicleStates:
         return {self.names[number] for number in np.flatnonzero(self.are_in_flight())}
 
     def _on_state(self, number, message):
-        self._states[number] = to_tuple(message.state)[:6]
+        self._states[number] = to_tuple(message.state)
         self._times[number] = self._handle.time()
 
     def _on_states(self, numbers, message):
@@ -96,7 +101,7 @@ class VehicleStates:
                 key="states",
             )
             return
-        self._states[numbers] = np.reshape(message.data, (-1, 7))[:, :6]
+        self._states[numbers] = np.reshape(message.data, (-1, 7))
         self._times[numbers] = self._handle.time()
 
     def _on_flight_status(self, number, message):

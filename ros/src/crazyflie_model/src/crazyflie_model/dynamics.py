@@ -180,6 +180,30 @@ class Coupled7D(SevenDimensional):
         """See `Dynamics.rates` and `coupled_acceleration`; the yaw rate is commanded."""
         return x[3:6] + coupled_acceleration(u, x[6]) + [u[2]]
 
+    def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
+        """See `Dynamics.step`: as exact as needed, and quick.
+
+        The acceleration turns with the heading; what its integrals have of the third order in the
+        yaw rate is left out: at 3.5 rad/s it is 1e-9 of them.
+        """
+        px, py, pz, vx, vy, vz, yaw = x
+        yaw_dot, half = u[2], STEP / 2.0
+        ax, ay, az = coupled_acceleration(u, yaw + half * yaw_dot)
+        mean = 1.0 - (STEP * yaw_dot) ** 2 / 24.0
+        ax, ay = mean * ax, mean * ay
+        turn = STEP**3 / 12.0 * yaw_dot
+        return self.apply_ground_contact(
+            [
+                px + STEP * (vx + half * ax) + turn * ay,
+                py + STEP * (vy + half * ay) - turn * ax,
+                pz + STEP * (vz + half * az),
+                vx + STEP * ax,
+                vy + STEP * ay,
+                vz + STEP * az,
+                yaw + STEP * yaw_dot,
+            ]
+        )
+
 
 def coupled_acceleration(u: Sequence[Number], yaw: Number) -> Vector[Number]:
     """Return the acceleration, m/s^2, fixed frame, of a vehicle that follows a control at once.

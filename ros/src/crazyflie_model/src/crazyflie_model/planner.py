@@ -1,9 +1,69 @@
-"""The pieces that the firmware's high-level commander plans: smooth, straight, spiral."""
+"""Moves to a point: those of the firmware's high-level commander, and of a fleet's vehicles."""
 
 import math
 
 from crazyflie_model.angles import Triple
-from crazyflie_model.polynomials import Goal, PolynomialPiece, hermite
+from crazyflie_model.polynomials import Goal, PolynomialPiece, at_rest, hermite, shifted
+
+MAX_SPEED = 2.0  #: Peak speed of a limited move (m/s): the default gains follow it.
+#: Peak acceleration of a limited move (m/s^2): controllers tilt by 15 degrees at most, which is 2.6
+#: m/s^2.
+MAX_ACCELERATION = 2.0
+
+#: Peak speed and acceleration of `smooth_piece` from rest, over distance / duration and distance /
+#: duration^2.
+SMOOTH_SPEED = 35.0 / 16.0
+SMOOTH_ACCELERATION = 16.8 / math.sqrt(5.0)
+
+_PEAK_BRAKING = 3.94  #: Peak acceleration of the braking in `move`, over speed / duration.
+_MIN_BRAKING_TIME = 1.0  #: Shortest duration of the braking (s).
+
+
+def move(
+    start: Goal[float], position: Triple, yaw: float, duration: float
+) -> list[PolynomialPiece]:
+    """Return pieces from a goal to rest at a position (m) and heading (rad).
+
+    They are `smooth_piece` from rest. If the start moves, the polynomial of the 5th degree that
+    begins with its velocity and acceleration, and ends after `braking_time` where it began, at
+    rest, is added: the distance that braking takes does not depend on the duration (s, > 0).
+    """
+    path = smooth_piece(at_rest(start.position, start.yaw), position, yaw, duration)
+    rates = (*start.velocity, start.yaw_rate)
+    changes = (*start.acceleration, 0.0)
+    if not any(rates) and not any(changes):
+        return [path]
+    braking = max(braking_time(math.hypot(*start.velocity)), _MIN_BRAKING_TIME)
+    braking = min(braking, duration)
+    axes = []
+    for axis, rate, change in zip(path.axes, rates, changes, strict=True):
+        brake = (*hermite((0.0, rate, change), (0.0, 0.0, 0.0), braking), 0.0, 0.0)
+        axes.append([a + b for a, b in zip(axis, brake, strict=True)])
+    first = PolynomialPiece(braking, *axes)
+    if braking == duration:
+        return [first]
+    rest = (shifted(axis, braking) for axis in path.axes)
+    return [first, PolynomialPiece(duration - braking, *rest)]
+
+
+def braking_time(speed: float) -> float:
+    """Return the time in which a limited move brakes a speed (m/s), s.
+
+    Braking has half of `MAX_ACCELERATION`.
+    """
+    return _PEAK_BRAKING * speed / (MAX_ACCELERATION / 2.0)
+
+
+def shortest_duration(distance: float, speed: float = 0.0) -> float:
+    """Return the shortest duration of a limited move over a distance (m), s.
+
+    If it begins at a speed (m/s), braking has half of the acceleration, and half of the peak speed
+    if it needs it.
+    """
+    acceleration = MAX_ACCELERATION if speed == 0.0 else MAX_ACCELERATION / 2.0
+    by_acceleration = math.sqrt(SMOOTH_ACCELERATION * distance / acceleration)
+    by_speed = SMOOTH_SPEED * distance / (MAX_SPEED - min(speed, MAX_SPEED / 2.0))
+    return max(by_speed, by_acceleration, braking_time(speed))
 
 
 def smooth_piece(

@@ -36,6 +36,12 @@ def evaluate(
     return [math.factorial(k) * term for k, term in enumerate(terms)]
 
 
+def shifted(coefficients: Sequence[float], time: float) -> list[float]:
+    """Return the coefficients of the same polynomial, of the time since ``time`` (s)."""
+    terms = evaluate(coefficients, time, len(coefficients) - 1)
+    return [term / math.factorial(k) for k, term in enumerate(terms)]
+
+
 def hermite(start: Sequence[float], end: Sequence[float], duration: float) -> tuple[float, ...]:
     """Return the coefficients, the constant first, of the polynomial between two ends.
 

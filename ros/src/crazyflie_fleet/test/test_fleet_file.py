@@ -341,7 +341,7 @@ def test_a_model_file_is_relative_to_the_fleet_file(tmp_path):
     fleet = fleet_file.load(file)
     found = [(v.settings.dynamics, v.settings.vehicle_model) for v in fleet.vehicles]
     heavy = str(tmp_path / "heavy.yaml")
-    assert found == [("quadrotor", heavy), ("quadrotor", "cf21plus"), ("near_hover", "cf21")]
+    assert found == [("quadrotor", heavy), ("quadrotor", "cf21plus"), ("coupled_7d", "cf21")]
     tree = parameters(fleet["a"], {}, {"lqr_controller": {"K_file": "K_manual.txt"}})
     assert tree["cmd_vel_converter"]["model"] == tree["simulator"]["model"] == heavy
     assert tree["lqr_controller"]["K_file"] == heavy

@@ -3,7 +3,7 @@
 import pytest
 from dynamic_reconfigure.msg import Config, DoubleParameter
 from flight_words import until_on_ground, word
-from std_msgs.msg import Bool, Float32
+from std_msgs.msg import Bool, Float32, String
 from std_srvs.srv import EmptyRequest
 from takeoff_helpers import SERVER, filter_status, state
 
@@ -54,6 +54,45 @@ def test_a_critical_battery_lands():
     assert word(process) == "descending"
     status = process.published("/in_flight_status")[-1].data
     assert status == "descending: the battery is low, 2.90 V"
+
+
+def with_positioning(z, said):
+    process = FakeProcess()
+    parameters = {**SERVER, "topics/connected": "/cf1/connected"}
+    assert process.launch(TakeoffServerNode(), "/takeoff_server", parameters)
+    process.publish("/in_flight_filter_status", filter_status(said))
+    stay(process, 1.0, z)
+    return process
+
+
+def stay(process, duration, z):
+    for _ in range(round(duration * 10)):
+        process.publish("/cf1/connected", Bool(True))
+        process.publish("/state", state(z))
+        process.advance(0.1)
+
+
+def test_without_positioning_there_is_no_takeoff():
+    process = with_positioning(0.0, "on_ground")
+    process.publish("/cf1/positioning", String("no base station"))
+    with pytest.raises(ServiceError, match="/takeoff refused: no base station"):
+        process.call("/takeoff", EmptyRequest())
+    process.publish("/cf1/positioning", String(""))
+    assert not process.call("/takeoff", EmptyRequest()).done()
+
+
+def test_the_loss_of_positioning_lands_once_it_lasts():
+    process = with_positioning(1.0, "flying")
+    process.publish("/cf1/positioning", String("no base station"))
+    stay(process, 0.2, 1.0)
+    assert word(process) == "flying"
+    process.publish("/cf1/positioning", String(""))
+    stay(process, 1.0, 1.0)
+    assert word(process) == "flying"
+    for k in range(5):
+        process.publish("/cf1/positioning", String(f"deviation {k}"))
+        stay(process, 0.1, 1.0)
+    assert process.published("/in_flight_status")[-1].data.startswith("descending: deviation")
 
 
 def test_a_battery_that_is_silent_or_not_a_number_says_nothing():

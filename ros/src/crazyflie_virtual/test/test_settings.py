@@ -40,7 +40,10 @@ def test_all_types():
         (("--port", "70000"), "--port is 70000; expected an integer from 0 to 65535"),
         (("--port", "many"), "--port is 'many'; expected an integer"),
         (("--init-x", "nan"), "--init-x is nan; expected a finite number"),
-        (("--positioning", "gps"), "--positioning is 'gps'; expected one of deck, none"),
+        (
+            ("--positioning", "gps"),
+            "--positioning is 'gps'; expected one of deck, flow, lighthouse, loco, none",
+        ),
         (("--auto-arm", "1"), "--auto-arm is '1'; expected true or false"),
         (("--wings", "2"), "unrecognized arguments: --wings 2"),
     ],

@@ -232,7 +232,7 @@ def test_without_deck_and_poses_the_estimate_drifts_away():
 
 def test_estimator_can_be_reset(flying):
     variance = flying.firmware.estimator.variance_position
-    flying.firmware.localization.has_deck = False
+    flying.firmware.deck.has_flow = flying.firmware.deck.has_lighthouse = False
     flying.firmware.reset_estimation = 1
     flying.run(0.02)
     assert flying.firmware.reset_estimation == 0

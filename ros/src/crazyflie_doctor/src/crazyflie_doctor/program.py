@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping
 
 import rosgraph
 
-from crazyflie_doctor import computer, graph, installation, running_graph, timing
+from crazyflie_doctor import computer, graph, installation, running_graph, timing, vehicle
 from crazyflie_doctor.finding import ERROR, WARN, Check, Finding, lines, warn
 from crazyflie_doctor.recorder import record
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import parse_arguments
-from crazyflie_utils.parameters.types import Number
+from crazyflie_utils.parameters.types import BOOLEAN, Number, Text
 
 _SECONDS = Number(unit="s", above=0.0)
 
@@ -21,6 +21,14 @@ class DoctorParameters(Parameters):
     """Options of the command line."""
 
     duration: float = parameter(_SECONDS, "how long to record tf, controls and diagnostics", 3.0)
+    vehicle: str = parameter(
+        Text(may_be_empty=True),
+        "address of a vehicle that stands on the ground: it alone is checked, for 10 s",
+        "",
+    )
+    motors: bool = parameter(
+        BOOLEAN, "also the vehicle's self tests of motors and battery: the propellers turn", False
+    )
     timeout: float = parameter(_SECONDS, "when to give up", 40.0)
 
 
@@ -32,14 +40,18 @@ def doctor(arguments: list[str] | None = None) -> int:
         [each for each in given if ":=" not in each],
         "doctor",
         "Check this computer and the graph that runs, print a line for each finding and what to do "
-        "about it. It connects to no vehicle and publishes nothing. Exit status: 0 without errors, "
+        "about it. It publishes nothing, and connects to no vehicle but one that is given. Exit status: 0 without errors, "
         "1 with errors, 2 wrong usage.",
     )
     watchdog = threading.Timer(options.timeout, _give_up, [options.timeout])
     watchdog.daemon = True
     watchdog.start()
     count = {WARN: 0, ERROR: 0}
-    for check in _checks(options.duration):
+    if options.vehicle:
+        examined = vehicle.checks(vehicle.examine(options.vehicle, motors=options.motors))
+    else:
+        examined = _checks(options.duration)
+    for check in examined:
         for level, line in lines(check):
             print(line, flush=True)
             count[level] = count.get(level, 0) + 1

@@ -8,6 +8,7 @@ from std_msgs.msg import Float32
 from typing_extensions import override
 
 from crazyflie_driver.add_node import command_again
+from crazyflie_driver.positioning import FLOW
 from crazyflie_driver.srv import (
     AddCrazyflie,
     UpdateParams,
@@ -15,7 +16,11 @@ from crazyflie_driver.srv import (
     WriteLighthouse,
     WriteLighthouseRequest,
 )
-from crazyflie_driver.vehicle_parameters import STANDARD_TOPICS, VehicleParameters
+from crazyflie_driver.vehicle_parameters import (
+    POSITIONING_PARAMETER,
+    STANDARD_TOPICS,
+    VehicleParameters,
+)
 from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_fleet.vehicle_nodes import PLACE
@@ -69,6 +74,7 @@ def connection(vehicle: VehicleConfig) -> VehicleParameters:
         {
             "uri": vehicle.uri,
             "tf_prefix": vehicle.name,
+            "positioning": vehicle.settings.positioning,
             **switches,
             "genericLogTopics": [topic.name for topic in topics],
             "genericLogTopicFrequencies": [round(1000.0 / topic.frequency) for topic in topics],
@@ -124,7 +130,9 @@ class FleetConnectNode(Node):
         self._open = {vehicle.name for vehicle in self._vehicles}
         self._failed: list[str] = []
         for vehicle in self._vehicles:
-            request = self._connections[vehicle.name].request()
+            connection = self._connections[vehicle.name]
+            handle.set_param(f"{connection.prefix}/{POSITIONING_PARAMETER}", connection.positioning)
+            request = connection.request()
             answer = handle.call_service(ADD, AddCrazyflie, request, TIMEOUT)
             answer.add_done_callback(partial(self._on_added, vehicle))
 
@@ -143,6 +151,11 @@ class FleetConnectNode(Node):
         if vehicle.settings.has_single_marker:
             # Only the Kalman filter uses external positions, and estimates the yaw from them.
             params.setdefault("stabilizer.estimator", 2)
+        if vehicle.settings.positioning == FLOW:
+            # It measures no position: the estimate begins where the vehicle stands.
+            x, y, z = vehicle.position
+            start = {"kalman.initialX": x, "kalman.initialY": y, "kalman.initialZ": z}
+            params = {**start, **params, "kalman.resetEstimation": 1}
         if error is not None or not params:
             self._finish(vehicle, error)
             return

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from crazyflie_driver.positioning import MOCAP
 from crazyflie_fleet.settings import MachineSettings, RobotSettings
 
 #: Vertical distance of two vehicles over their horizontal one: the downwash of the rotors reduces
@@ -57,7 +58,9 @@ class VehicleConfig:
 
     @property
     def mocap_frame(self) -> str:
-        """Name of its tf frame from motion capture."""
+        """Name of its tf frame from motion capture, or of its own estimate."""
+        if self.settings.positioning != MOCAP:
+            return f"{self.name}/estimate"
         return self.settings.mocap_frame or self.name
 
     @property
@@ -95,6 +98,16 @@ class FleetConfig:
                 ),
             )
             for number, vehicle in enumerate(self.vehicles)
+        )
+        return dataclasses.replace(self, vehicles=vehicles)
+
+    def positioned_by(self, source: str) -> "FleetConfig":
+        """Return the same vehicles with another source of their poses, of `SOURCES`."""
+        vehicles = tuple(
+            dataclasses.replace(
+                vehicle, settings=dataclasses.replace(vehicle.settings, positioning=source)
+            )
+            for vehicle in self.vehicles
         )
         return dataclasses.replace(self, vehicles=vehicles)
 

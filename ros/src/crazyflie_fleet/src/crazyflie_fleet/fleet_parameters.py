@@ -5,6 +5,7 @@ from typing import Any
 
 from typing_extensions import override
 
+from crazyflie_driver.positioning import SOURCES
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_utils import Node, ParameterError, Parameters, parameter
@@ -59,6 +60,12 @@ class FleetParameters(Parameters):
         "fleet/virtual_port",
     )
     fixed_frame: str = parameter(FRAME, "tf frame of the world", "world", "frames/fixed")
+    positioning: str = parameter(
+        Text(("", *SOURCES), may_be_empty=True),
+        "source of the poses of all vehicles; empty for that of the file",
+        "",
+        "fleet/positioning",
+    )
 
     def fleet(self) -> FleetConfig:
         """Return all vehicles, those of other machines included.
@@ -69,6 +76,8 @@ class FleetParameters(Parameters):
             About everything that is wrong with the file.
         """
         fleet = fleet_file.load(self.file) if self.file else fleet_file.grid(self.n, self.spacing)
+        if self.positioning:
+            fleet = fleet.positioned_by(self.positioning)
         for vehicle in fleet.vehicles:
             for what, frame in (("name", vehicle.name), ("frame", vehicle.mocap_frame)):
                 if frame == self.fixed_frame:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from crazyflie_driver.positioning import MOCAP
 from crazyflie_fleet.crazyswarm2_files import load_motion_capture, load_server
 from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters, NodeParameters
@@ -53,6 +54,8 @@ def bodies(
     """
     result: dict[str, Any] = {}
     for vehicle in fleet.vehicles:
+        if vehicle.settings.positioning != MOCAP:
+            continue
         frames = {"parent_frame_id": fixed_frame, "child_frame_id": vehicle.mocap_frame}
         if vehicle.settings.has_single_marker:
             result.setdefault("single_markers", {})[vehicle.name] = {

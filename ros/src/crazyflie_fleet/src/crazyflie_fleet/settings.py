@@ -5,6 +5,7 @@ from typing import Any
 
 from typing_extensions import override
 
+from crazyflie_driver.positioning import MOCAP, SOURCES
 from crazyflie_link.address import EXPECTED, Address
 from crazyflie_link.errors import AddressError
 from crazyflie_model.quadrotor import TYPES
@@ -189,6 +190,12 @@ class Settings(Parameters):
     hover_height: float = parameter(
         Number("m", above=0.0), "where a takeoff ends, above the start point", 1.0
     )
+    positioning: str = parameter(
+        Text(SOURCES),
+        "on hardware, source of the pose: motion capture, or the vehicle's own estimate by its "
+        "Lighthouse, Flow or Loco deck",
+        MOCAP,
+    )
     lighthouse: str = parameter(
         Text(may_be_empty=True),
         "file with the geometry of base stations, as cfclient writes it, for the vehicle; relative "
@@ -253,6 +260,8 @@ class Settings(Parameters):
     @property
     def has_single_marker(self) -> bool:
         """Whether motion capture tracks the vehicle by its only marker."""
+        if self.positioning != MOCAP:
+            return False
         if self.mocap_tracking == "librigidbodytracker":
             return self.mocap_marker in _SINGLE_MARKERS
         return self.mocap_tracking == SINGLE_MARKER

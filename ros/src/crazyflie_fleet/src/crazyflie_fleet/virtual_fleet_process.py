@@ -5,6 +5,7 @@ from crazyflie_fleet.mocap_process import bodies
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import Integer, Number
 from crazyflie_virtual.nodes import VirtualCrazyflieNode, VirtualMocapNode
+from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO
 from mocap_optitrack.mocap_node import MocapNode
 
 _UDP_PORT = Integer(1, 65535)
@@ -21,6 +22,10 @@ class VirtualFleetParameters(FleetParameters):
     thrust_error: float = parameter(_FRACTION, "how much more their rotors lift", -0.05)
     position_noise: float = parameter(Number("m", minimum=0.0), "of motion capture", 0.0002)
     attitude_noise: float = parameter(Number("rad", minimum=0.0), "of motion capture", 0.001)
+
+
+#: Positioning of a vehicle -> of the virtual one, where they have different names.
+DECKS = {name: name for name in (FLOW, LIGHTHOUSE, LOCO)}
 
 
 def make_nodes(handle: NodeHandle) -> dict[str, Node]:
@@ -51,6 +56,7 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
                 "mass_error": config.mass_error,
                 "thrust_error": config.thrust_error,
                 "seed": number,
+                "positioning": DECKS.get(vehicle.settings.positioning, DECK),
                 "observer": {
                     "port": config.observer_port,
                     "name": vehicle.name,

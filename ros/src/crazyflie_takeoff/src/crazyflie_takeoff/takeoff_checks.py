@@ -124,6 +124,8 @@ class TakeoffChecks:
         # Reason for which another node refuses takeoffs; empty if it does not.
         self.inhibition = "" if topic is None else f"nothing has come on {resolve(topic)}"
         self._resolve = resolve
+        #: Why the vehicle's own positioning cannot be flown by; empty if it can, or has none.
+        self.positioning = ""
 
     def set_box(self, box: Box) -> None:
         """Set the box of the geofence."""
@@ -150,6 +152,7 @@ class TakeoffChecks:
             hover_complaint(self.parameters.hover, self.box)
             or self._driver_refusal(now)
             or self.driver.cannot_fly(now)
+            or self.positioning
             or self._position_refusal(now)
             or self._controller_refusal()
             or self.inhibition

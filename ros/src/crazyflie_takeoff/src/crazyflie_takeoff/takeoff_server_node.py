@@ -42,6 +42,10 @@ CRUISE_TIME_STEP = 0.1  #: Period in flight, where it only watches the battery (
 STATUS_PERIOD = 0.1  #: Period at which the status is compared with the published one (s).
 RECOVERY_LIMIT = 1.0  #: Time that a server waits for evidence of the flight when it starts (s).
 
+#: A complaint about the vehicle's own positioning that lasts longer ends the flight, s: before the
+#: driver stops to publish poses, so that a landing begins while there are some.
+POSITIONING_PATIENCE = 0.3
+
 #: Longest descent when the process is to end (s): together with the ramp that is less than the 10 s
 #: for which a process with a flight goes on.
 LEAVE_LIMIT = 7.0
@@ -208,6 +212,7 @@ class TakeoffServerNode(Node):
         # Whether nodes that were launched together may not be connected yet.
         self._is_starting = True
         self._calls = Calls()
+        self._positioning_since = 0.0
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -245,6 +250,8 @@ class TakeoffServerNode(Node):
             handle.subscribe(parameters.connected_topic, Bool, self._on_connected)
         if (topic := parameters.vehicle_status_topic) is not None:
             handle.subscribe(topic, VehicleStatus, self._on_vehicle_status)
+        if (topic := parameters.positioning_topic) is not None:
+            handle.subscribe(topic, String, self._on_positioning)
         if parameters.inhibition_topic is not None:
             handle.subscribe(parameters.inhibition_topic, String, self._on_inhibition)
         if parameters.state_topic is not None:
@@ -366,6 +373,11 @@ class TakeoffServerNode(Node):
     def _on_inhibition(self, message):
         self._checks.inhibition = message.data
 
+    def _on_positioning(self, message):
+        if not self._checks.positioning:
+            self._positioning_since = self._handle.time()
+        self._checks.positioning = message.data
+
     def _on_battery(self, message):
         if message.data == message.data:
             self._checks.battery.measure(self._handle.time(), message.data)
@@ -390,6 +402,7 @@ class TakeoffServerNode(Node):
             self._serve_waiting()
         if self._flight.flight_state is not None:
             self._watch_battery()
+            self._watch_positioning()
             self._tick(self._flight.flight_state)
         self._set_pace()
 
@@ -412,6 +425,12 @@ class TakeoffServerNode(Node):
             self._handle.warn(complaint, throttle=30.0, key="battery")
         if self._checks.battery.charge(now) is Charge.CRITICAL:
             self._land(complaint, f"takeoff aborted: {complaint}")
+
+    def _watch_positioning(self):
+        if complaint := self._checks.positioning:
+            lasts = self._handle.time() - self._positioning_since
+            if lasts > POSITIONING_PATIENCE:
+                self._land(complaint, f"takeoff aborted: {complaint}")
 
     def _land(self, reason, failure):
         if self._flight.accepts(Event.LAND):

@@ -54,6 +54,11 @@ class Battery:
         self.voltage = max(0.0, open_circuit_voltage(self.charge) - _RESISTANCE * self.current)
 
 
+def sag(load: float) -> float:
+    """Return by how much the voltage sinks under a load, see `Battery.step`, V."""
+    return _RESISTANCE * _HOVER_CURRENT * load
+
+
 def open_circuit_voltage(charge: float) -> float:
     """Return the voltage without load, V, at a state of charge from 0 to 1."""
     i = min(max(bisect.bisect_right(_CHARGES, charge) - 1, 0), len(_CHARGES) - 2)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from typing_extensions import override
 
+from crazyflie_virtual import settings
 from crazyflie_virtual.firmware.console import FirmwareAssertionError, Warn
 
 _SIZE = 112  #: Size of a one-wire memory (bytes).
@@ -47,13 +48,21 @@ LED_RING_DECK = Deck("bcLedRing", 0x01, "D1")
 MULTIRANGER_DECK = Deck("bcMultiranger", 0x0C, "D")
 FLOW_DECK = Deck("bcFlow2", 0x0F, "C")
 LIGHTHOUSE_DECK = Deck("bcLighthouse4", 0x10, "D")
+LOCO_DECK = Deck("bcDWM1000", 0x06, "B")
+
+_POSITIONING_DECKS = {
+    settings.DECK: (FLOW_DECK, LIGHTHOUSE_DECK),
+    settings.FLOW: (FLOW_DECK,),
+    settings.LIGHTHOUSE: (LIGHTHOUSE_DECK,),
+    settings.LOCO: (LOCO_DECK,),
+}
 
 
-def decks(has_positioning: bool, has_multiranger: bool) -> list[Deck]:
-    """Return the decks of a vehicle."""
+def decks(positioning: str, has_multiranger: bool) -> list[Deck]:
+    """Return the decks of a vehicle with a positioning system of its settings."""
     return [
         LED_RING_DECK,
-        *((FLOW_DECK, LIGHTHOUSE_DECK) if has_positioning else ()),
+        *_POSITIONING_DECKS.get(positioning, ()),
         *((MULTIRANGER_DECK,) if has_multiranger else ()),
     ]
 

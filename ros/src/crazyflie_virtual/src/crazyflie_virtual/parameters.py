@@ -193,7 +193,7 @@ _GROUPS = {
         criticalLowVoltage="power.critical_voltage",
     ),
     "health": [
-        *_rows(U8, startPropTest=0, startBatTest=0),
+        *_rows(U8, startPropTest="health.motors_asked", startBatTest="health.battery_asked"),
         *_persistent(U16, propTestPWMRatio=0, batTestPWMRatio=0),
     ],
     "ring": [
@@ -230,15 +230,15 @@ _GROUPS = {
     "deck": [
         *_read_only(
             U8,
-            bcFlow2="localization.has_deck",
-            bcLighthouse4="localization.has_deck",
+            bcFlow2="deck.has_flow",
+            bcLighthouse4="deck.has_lighthouse",
             bcZRanger2="ranging.has_flow_deck",
+            bcDWM1000="deck.has_loco",
             bcMultiranger="ranging.has_multiranger",
             bcLedRing=1,
             bcActiveMarker=0,
             bcAI=0,
             bcBuzzer=0,
-            bcDWM1000=0,
             bcFlow=0,
             bcLoco=0,
             bcUSD=0,
@@ -257,6 +257,8 @@ _GROUPS = {
         *_limited(FLOAT, 0.0, 3600.0, silence="faults.silence"),
         *_limited(U8, 0, 1, lowBattery="faults.low_battery"),
         *_limited(U8, 0, 4, motorFailure="faults.motor_failure"),
+        *_limited(U8, 0, 3, occluded="faults.occluded"),
+        *_limited(FLOAT, 0.0, 100.0, smooth="faults.smooth"),
     ],
 }
 

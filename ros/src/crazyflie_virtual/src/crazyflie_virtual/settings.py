@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, METRES, TEXT, Integer, Number, Text
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
-from crazyflie_virtual.firmware.estimator import DECK, NONE
 from crazyflie_virtual.observer import DEFAULT_PORT
 
 
@@ -20,12 +19,17 @@ class FaultSwitches:
     silence: float = 0.0
     low_battery: int = 0  #: Not 0: the battery is nearly empty. Emptying cannot be undone.
     motor_failure: int = 0  #: Number of the failed motor, 1 to 4; 0 for none.
+    occluded: int = 0  #: Bit mask of the base stations that the Lighthouse deck does not see.
+    smooth: float = 0.0  #: Radius of a patch of floor without texture (m).
 
     def pass_time(self, dt: float) -> None:
         """Reduce the remaining silence by ``dt`` (s)."""
         if self.silence > 0.0:
             self.silence = max(0.0, self.silence - dt)
 
+
+#: Positioning systems of a vehicle: decks that know the true pose, real decks, and none.
+DECK, FLOW, LIGHTHOUSE, LOCO, NONE = "deck", "flow", "lighthouse", "loco", "none"
 
 FIRST_PORT = 19850  #: UDP port of the first vehicle: clients scan from here to 19859.
 
@@ -43,10 +47,16 @@ class VehicleSettings(Parameters):
     init_y: float = parameter(METRES, "initial position", 0.0, "init/y")
     init_yaw: float = parameter(Number("rad"), "initial heading", 0.0, "init/yaw")
     positioning: str = parameter(
-        Text((DECK, NONE)),
-        "source of the estimate without external poses: the true pose, as from a "
-        "positioning deck, or the inertial sensors only",
+        Text((DECK, FLOW, LIGHTHOUSE, LOCO, NONE)),
+        "source of the estimate without external poses: the true pose (`deck`), a Flow deck, which "
+        "drifts, a Lighthouse or a Loco deck, or the inertial sensors only (`none`)",
         DECK,
+    )
+    smooth_x: float = parameter(METRES, "middle of the patch of `fault/smooth`", 0.0, "smooth/x")
+    smooth_y: float = parameter(METRES, "the same", 0.0, "smooth/y")
+    base_stations: int = parameter(Integer(1, 2), "of Lighthouse", 2)
+    knows_stations: bool = parameter(
+        BOOLEAN, "geometry and calibration of the base stations are on the vehicle", True
     )
     multiranger: bool = parameter(
         BOOLEAN, "carry a Multi-ranger deck, which sees the ground and what is in `world`", False
@@ -133,8 +143,30 @@ class VehicleSettings(Parameters):
         Integer(0, 4), "the failed motor, 1 to 4; 0 for none", 0, "fault/motor_failure", live=True
     )
 
+    occluded: int = parameter(
+        Integer(0, 3),
+        "base stations that the Lighthouse deck does not see: 1 the first, 2 the second, 3 both",
+        0,
+        "fault/occluded",
+        live=True,
+    )
+
+    smooth: float = parameter(
+        Number("m", minimum=0.0),
+        "radius of a patch of floor without texture: no optical flow there",
+        0.0,
+        "fault/smooth",
+        live=True,
+    )
+
     def switches(self) -> FaultSwitches:
         """Return the fault switches as they are at the beginning."""
         return FaultSwitches(
-            self.loss, self.delay, self.silence, int(self.low_battery), self.motor_failure
+            self.loss,
+            self.delay,
+            self.silence,
+            int(self.low_battery),
+            self.motor_failure,
+            self.occluded,
+            self.smooth,
         )

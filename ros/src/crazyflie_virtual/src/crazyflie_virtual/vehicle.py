@@ -10,7 +10,6 @@ from crazyflie_virtual import crtp, ports
 from crazyflie_virtual.body import LOW_CHARGE, OFF, STEP, Battery, Physics
 from crazyflie_virtual.crtp import Packet, Port
 from crazyflie_virtual.firmware.console import FirmwareAssertionError
-from crazyflie_virtual.firmware.estimator import DECK
 from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
 from crazyflie_virtual.log import LogPort
 from crazyflie_virtual.memory import LighthouseMemory, MemoryPort, decks, eeprom, memories
@@ -29,7 +28,7 @@ class Storage:
         self.eeprom = eeprom(_ADDRESS_PREFIX | settings.address)
         self.one_wire = [
             (deck.serial, deck.one_wire())
-            for deck in decks(settings.positioning == DECK, settings.multiranger)
+            for deck in decks(settings.positioning, settings.multiranger)
         ]
         self.lighthouse: dict[int, bytes] = {}
         self.parameters: dict[str, float] = {}

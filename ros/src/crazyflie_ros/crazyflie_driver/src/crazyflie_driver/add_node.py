@@ -6,7 +6,7 @@ from typing_extensions import override
 
 from crazyflie_driver.server_node import ADD
 from crazyflie_driver.srv import AddCrazyflie
-from crazyflie_driver.vehicle_parameters import CrazyflieAddParameters
+from crazyflie_driver.vehicle_parameters import POSITIONING_PARAMETER, CrazyflieAddParameters
 from crazyflie_utils import Node, NodeHandle
 
 _LIMIT = 60.0  #: Time limit of the start of the server and of its connecting, s.
@@ -33,6 +33,7 @@ class CrazyflieAddNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         handle.info(f"adding {parameters.uri} as {parameters.tf_prefix or '/'}")
+        handle.set_param(f"{parameters.prefix}/{POSITIONING_PARAMETER}", parameters.positioning)
         self._answer = handle.call_service(ADD, AddCrazyflie, parameters.request(), _LIMIT)
         self._answer.add_done_callback(self._on_answer)
 

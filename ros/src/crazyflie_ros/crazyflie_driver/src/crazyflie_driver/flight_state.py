@@ -44,7 +44,12 @@ class FlightState:
         return self._log.next_state(_LOGGED_STATE_LIMIT) if state is None else state
 
     def estimator_problem(self) -> str:
-        """Return why the vehicle's Kalman filter has not converged; empty if unknown; blocks."""
+        """Return why its positioning or Kalman filter is not ready; empty if unknown; blocks."""
+        positioning = self._log.positioning
+        if positioning is not None and (
+            problem := positioning.problem(self._context.handle.time())
+        ):
+            return problem
         try:
             estimator = self._context.crazyflie.parameters.values().get(_ESTIMATOR)
         except LinkLostError:

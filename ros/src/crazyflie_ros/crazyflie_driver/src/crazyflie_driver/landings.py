@@ -23,6 +23,7 @@ class Reason(enum.Enum):
     #: them have gone by before the charge is critical.
     BATTERY = "the battery is critical", 5.0
     #: A process waits 10 s for a flight, and the last metre takes its time.
+    POSITIONING = "the vehicle's positioning is lost", 7.0
     SHUTDOWN = "the driver is to end", 7.0
     REMOVAL = "the vehicle is being removed", 7.0
     #: Its caller believes that it failed.
@@ -96,6 +97,8 @@ class Landings:
         obeys_late = self._commands.check_unanswered()
         if is_active and is_critical:
             self.begin(Reason.BATTERY)
+        elif is_active and self._is_position_lost():
+            self.begin(Reason.POSITIONING)
         elif obeys_late:
             self.begin(Reason.NO_ANSWER)
         elif is_active and self._reason is not None:
@@ -117,6 +120,10 @@ class Landings:
             return True
         is_flying = SupervisorState.FLYING in state
         return is_flying and self._setpoints.control is Control.REFERENCE
+
+    def _is_position_lost(self):
+        positioning = self._log.positioning
+        return positioning is not None and positioning.is_lost(self._context.handle.time())
 
     def _refusal(self):
         if self._log.battery.charge is Charge.CRITICAL:

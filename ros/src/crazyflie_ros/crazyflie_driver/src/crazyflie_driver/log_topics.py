@@ -7,16 +7,19 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import genpy
-from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, Transform, TransformStamped, Vector3
 from sensor_msgs.msg import Imu, MagneticField, Temperature
-from std_msgs.msg import Float32, Header
+from std_msgs.msg import Float32, Header, String
 
 from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.monitors import VARIANCES, VARIANCES_PERIOD_MS, Battery, Variances
 from crazyflie_driver.msg import GenericLogData, crtpPacket
+from crazyflie_driver.positioning import PERIOD_MS, SYSTEMS, Positioning, check_deck
+from crazyflie_driver.vehicle_parameters import POSITIONING_TOPIC
 from crazyflie_link.log import PERIOD_STEP_MS, LogBlock, quaternion_from_compressed
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_model.units import GRAVITY
+from crazyflie_utils import ServiceError
 from crazyflie_utils.topics import Publisher
 
 #: Periods of imu and pose, and of the other topics, ms: those of the C++ driver.
@@ -162,8 +165,12 @@ class LogTopics:
     supervisor: SupervisorState | None = None
     #: Variances of the vehicle's Kalman filter, if it has one.
     variances: Variances = field(default_factory=Variances)
+    #: The state of its own positioning; None where it is flown by motion capture.
+    positioning: Positioning | None = None
     _packets: Publisher | None = None
     _heading: Publisher = field(init=False)
+    _broadcast: Callable[[list[TransformStamped]], None] = field(init=False)
+    _positioning_text: str | None = None
     _logs_state: bool = False
     _states: int = 0
     _state_came: threading.Condition = field(default_factory=threading.Condition)
@@ -191,6 +198,8 @@ class LogTopics:
         self._heading = self._publisher("heading", Float32)
         self._start_status(known, self._publisher("rssi", Float32))
         self._start_variances(known)
+        if parameters.is_own_estimate:
+            self._start_positioning(parameters.positioning, known)
         selected = [topic for topic in STANDARD if topic.name in parameters.topics]
         groups, missing = packed(selected, known)
         for name, variables in missing.items():
@@ -255,6 +264,50 @@ class LogTopics:
     def _note_variances(self, _, values):
         self.variances.add(values)
 
+    def _start_positioning(self, source, known):
+        context, system = self._context, SYSTEMS[source]
+        check_deck(source, context.crazyflie.parameters.values())
+        _, pose, *_ = STANDARD
+        if missing := [name for name in (*system.variables, *pose.variables) if name not in known]:
+            raise ServiceError(
+                f"positioning is {source}, and the firmware does not log {', '.join(missing)}; "
+                "update the firmware"
+            )
+        positioning = self.positioning = Positioning(source)
+        publisher = context.handle.publisher(
+            f"{context.prefix}/{POSITIONING_TOPIC}", String, latch=True
+        )
+        self._broadcast = context.handle.broadcast_transforms()
+
+        def follow():
+            text = positioning.problem(context.handle.time())
+            if text != self._positioning_text:
+                if text and self._positioning_text == "":
+                    context.warn(text)
+                self._positioning_text = text
+                publisher.publish(String(text))
+
+        def deliver(_, values):
+            positioning.update(context.handle.time(), values)
+            context.delivery.submit(follow)
+
+        context.crazyflie.add_log_block(
+            LogBlock("positioning", PERIOD_MS, system.variables, deliver)
+        )
+        context.handle.timer(PERIOD_MS / 1000.0, follow)
+
+    def _publish_estimate(self, publisher, message):
+        """Publish the vehicle's own estimate, as motion capture publishes a pose."""
+        publisher.publish(message)
+        assert self.positioning is not None
+        if self.positioning.is_lost(self._context.handle.time()):
+            return
+        pose = message.pose
+        place = Vector3(pose.position.x, pose.position.y, pose.position.z)
+        frame = self._context.parameters.estimate_frame
+        transform = TransformStamped(message.header, frame, Transform(place, pose.orientation))
+        self._broadcast([transform])
+
     def _note_state(self, latest):
         # In the link's thread: the state is waited for where no callback has its turn.
         if "supervisor.info" in latest:
@@ -292,12 +345,16 @@ class LogTopics:
             begin = 0
             for topic, publisher in zip(group, publishers, strict=True):
                 end = begin + len(topic.variables)
-                header = self._header(stamp, topic.in_world)
-                publisher.publish(topic.convert(header, values[begin:end]))
+                message = topic.convert(self._header(stamp, topic.in_world), values[begin:end])
+                if topic.name == "pose" and self.positioning is not None:
+                    self._publish_estimate(publisher, message)
+                else:
+                    publisher.publish(message)
                 begin = end
 
         name = "+".join(topic.name for topic in group)
-        self._add(name, group[0].period_ms, variables, publish)
+        is_estimate = self.positioning is not None and group[0].name == "pose"
+        self._add(name, group[0].period_ms, variables, publish, is_estimate)
 
     def _start_custom(self, block):
         publisher = self._publisher(block.topic_name, GenericLogData)
@@ -315,9 +372,11 @@ class LogTopics:
             )
         self._add(block.topic_name, period, tuple(block.variables), publish)
 
-    def _add(self, name, period_ms, variables, publish):
+    def _add(self, name, period_ms, variables, publish, is_estimate=False):
         def deliver(time_ms, values):
-            self._context.delivery.submit_data(publish, self._stamp(time_ms), values)
+            stamp = self._estimate_stamp(time_ms) if is_estimate else self._stamp(time_ms)
+            if stamp is not None:
+                self._context.delivery.submit_data(publish, stamp, values)
 
         self._context.crazyflie.add_log_block(LogBlock(name, period_ms, variables, deliver))
 
@@ -328,6 +387,12 @@ class LogTopics:
         if self._context.parameters.use_ros_time:
             return self._context.handle.stamp()
         return genpy.Time(*divmod(time_ms * 1_000_000, 1_000_000_000))
+
+    def _estimate_stamp(self, time_ms):
+        handle = self._context.handle
+        assert self.positioning is not None
+        time = self.positioning.local_time(time_ms / 1000.0, handle.time())
+        return None if time is None else handle.stamp(time)
 
     def _header(self, stamp, in_world):
         context = self._context

@@ -251,6 +251,15 @@ class SetpointTopics:
         self._context.handle.subscribe(topic, sender.message_type, partial(callback, name, sender))
 
     def _on_external(self, name, sender, message):
+        if self._log.positioning is not None:
+            # It may be the vehicle's own estimate: it would correct itself by itself.
+            self._context.handle.warn(
+                f"{self._context.name}: ignoring {name}: its positioning is "
+                f"{self._log.positioning.source}",
+                throttle=5.0,
+                key=(self._context.name, name),
+            )
+            return
         self._external_time = self._context.handle.time()
         self._send(name, sender, message)
 

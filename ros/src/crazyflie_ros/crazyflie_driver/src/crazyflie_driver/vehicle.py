@@ -1,5 +1,6 @@
 """One vehicle of the server: its link, topics and services, from adding to removing."""
 
+import dataclasses
 import threading
 import time
 from collections.abc import Callable
@@ -12,17 +13,19 @@ from crazyflie_driver.jobs import Delivery, Job, Jobs
 from crazyflie_driver.landings import Landings, Reason
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.parameter_mirror import ParameterMirror
+from crazyflie_driver.positioning import MOCAP, SOURCES
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_gate import Event, SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import StatusPublisher
-from crazyflie_driver.vehicle_parameters import VehicleParameters
+from crazyflie_driver.vehicle_parameters import POSITIONING_PARAMETER, VehicleParameters
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import CrazyflieError, NoAnswerError
 from crazyflie_link.transmission import REPLY_LIMIT
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils import NodeHandle, ParameterError, ServiceError
+from crazyflie_utils.parameters.types import Text
 
 PAUSE = 0.2  #: Between two attempts to connect, s.
 
@@ -145,6 +148,7 @@ class DriverVehicle:
         try:
             connect_within(limit, self.crazyflie.connect, self.connection.is_closing)
             self.connection.handle(ConnectionEvent.LINK_OPENED)
+            self._choose_positioning()
             self._services.wait_for_names()
             with self._announcing:
                 if self.connection.is_closing():
@@ -158,6 +162,15 @@ class DriverVehicle:
             raise
         self._context.delivery.submit(self.status.publish)
         self._handle.info(f"{self.parameters.name}: connected to {self.parameters.uri}")
+
+    def _choose_positioning(self):
+        name = f"{self.parameters.prefix}/{POSITIONING_PARAMETER}"
+        try:
+            source = self._context.handle.get_param(name, Text(SOURCES), MOCAP)
+        except ParameterError as error:
+            raise ServiceError(str(error)) from None
+        chosen = dataclasses.replace(self.parameters, positioning=source)
+        self.parameters = self._context.parameters = chosen
 
     def _announce(self):
         self.log.start()

@@ -7,16 +7,30 @@ import rosgraph.names
 from typing_extensions import override
 
 from crazyflie_driver.msg import LogBlock
+from crazyflie_driver.positioning import MOCAP, SOURCES
 from crazyflie_driver.srv import AddCrazyflieRequest
 from crazyflie_link.log import LONGEST_PERIOD_MS, SHORTEST_PERIOD_MS
 from crazyflie_utils import ParameterError, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, read_parameter
-from crazyflie_utils.parameters.types import BOOLEAN, TEXT, Integer, ListOf, Number, ParameterType
+from crazyflie_utils.parameters.types import (
+    BOOLEAN,
+    TEXT,
+    Integer,
+    ListOf,
+    Number,
+    ParameterType,
+    Text,
+)
 
 STATUS_TOPIC = "status"  #: Topic with the state of a vehicle in words.
 #: The same with more details, as crazyflie_msgs/VehicleStatus.
 VEHICLE_STATUS_TOPIC = "vehicle_status"
+POSITIONING_TOPIC = "positioning"  #: Topic with why its own estimate cannot be flown by.
 CONNECTED_TOPIC = "connected"  #: Topic with whether the driver is connected to a vehicle.
+
+
+#: Parameter below a vehicle's namespace that the driver reads when the vehicle is added.
+POSITIONING_PARAMETER = "positioning"
 
 
 class EachLogBlock(ListOf):
@@ -117,6 +131,13 @@ class VehicleParameters(Parameters):
         name=_VARIABLES_NAME,
     )
 
+    positioning: str = parameter(
+        Text(SOURCES),
+        "source of the pose: motion capture, or the vehicle's own estimate by its Lighthouse, "
+        "Flow or Loco deck, which the driver then publishes on /tf as `PREFIX/estimate`",
+        MOCAP,
+    )
+
     @override
     def complaints(self) -> list[str]:
         found = [
@@ -153,7 +174,17 @@ class VehicleParameters(Parameters):
             name
             for name in STANDARD_TOPICS
             if (self.enable_logging or name == "packets") and getattr(self, _SWITCH + name)
-        )
+        ) | ({"pose"} if self.is_own_estimate else set())
+
+    @property
+    def is_own_estimate(self) -> bool:
+        """Whether the vehicle is flown by its own estimate."""
+        return self.positioning != MOCAP
+
+    @property
+    def estimate_frame(self) -> str:
+        """Frame of the vehicle's own estimate on /tf."""
+        return f"{self.tf_prefix}/estimate".lstrip("/")
 
     @property
     def log_blocks(self) -> list[LogBlock]:
@@ -167,12 +198,17 @@ class VehicleParameters(Parameters):
 
     @classmethod
     def from_request(cls, request: AddCrazyflieRequest) -> Self:
-        """Return the parameters of a request; `ServiceError` names all that makes no sense."""
+        """Return the parameters of a request; `ServiceError` names all that makes no sense.
+
+        The request has no ``positioning``: its type is that of other drivers, too.
+        """
 
         def get(name: str) -> Any:
             if name in _LOG_BLOCK_FIELDS:
                 field = _LOG_BLOCK_FIELDS[name]
                 return [getattr(block, field) for block in request.log_blocks]
+            if name == POSITIONING_PARAMETER:
+                return MOCAP
             value = getattr(request, name)
             return value.strip() if isinstance(value, str) else value
 
@@ -195,7 +231,14 @@ STANDARD_TOPICS = tuple(
 )
 
 
-_OWN_TOPICS = (*STANDARD_TOPICS, "rssi", STATUS_TOPIC, VEHICLE_STATUS_TOPIC, CONNECTED_TOPIC)
+_OWN_TOPICS = (
+    *STANDARD_TOPICS,
+    "rssi",
+    STATUS_TOPIC,
+    VEHICLE_STATUS_TOPIC,
+    CONNECTED_TOPIC,
+    POSITIONING_TOPIC,
+)
 
 
 class CrazyflieAddParameters(VehicleParameters):

@@ -21,7 +21,7 @@ import math
 
 from crazyflie_model.angles import Quaternion, Triple, rotate, zyx_from_quaternion
 from crazyflie_model.units import GRAVITY
-from crazyflie_virtual.body import Physics, Sensors
+from crazyflie_virtual.body import Sensors
 from crazyflie_virtual.firmware.states import Estimate
 from crazyflie_virtual.quaternions import normalized, turned
 
@@ -41,7 +41,8 @@ class Estimator:
     """Estimate of position, velocity and attitude, updated in place."""
 
     def __init__(self, estimate: Estimate):
-        self._estimate = estimate
+        #: The estimate; others read it.
+        self.estimate = self._estimate = estimate
         #: Pose after `reset`, m and rad.
         self.initial_x = self.initial_y = self.initial_z = self.initial_yaw = 0.0
         self._sums = [0.0] * 6
@@ -165,19 +166,14 @@ class Estimator:
         e.roll, e.pitch, e.yaw = math.degrees(roll), -math.degrees(pitch), math.degrees(yaw)
 
 
-DECK, NONE = "deck", "none"  #: Positioning systems.
 EXTERNAL_AGE = 0.5  #: The deck measures only when there was no external measurement for so long, s.
-_DECK_POSITION_DEVIATION = 0.003  #: m.
-_DECK_ATTITUDE_DEVIATION = 0.003  #: rad.
 
 
 class Localization:
-    """Corrects the estimator by external measurements, and by those of a positioning deck."""
+    """Corrects the estimator by external measurements."""
 
-    def __init__(self, estimator: Estimator, physics: Physics, has_deck: bool):
+    def __init__(self, estimator: Estimator):
         self._estimator = estimator
-        self._physics = physics
-        self.has_deck = has_deck
         #: x, y, z, qx, qy, qz, qw: Last external measurement, m; for the log.
         self.x = self.y = self.z = 0.0
         self.qx = self.qy = self.qz = 0.0
@@ -205,9 +201,6 @@ class Localization:
         self.qx, self.qy, self.qz, self.qw = quaternion
         self._estimator.correct_attitude(*quaternion, self.attitude_deviation)
 
-    def update(self, time: float) -> None:
-        """Measure with the deck, if there is one and no external measurement."""
-        is_external = self.time is not None and time - self.time < EXTERNAL_AGE
-        if self.has_deck and not is_external:
-            self._estimator.correct_position(*self._physics.position, _DECK_POSITION_DEVIATION)
-            self._estimator.correct_attitude(*self._physics.quaternion, _DECK_ATTITUDE_DEVIATION)
+    def is_fed(self, time: float) -> bool:
+        """Return whether there has been an external measurement lately; ``time`` in s."""
+        return self.time is not None and time - self.time < EXTERNAL_AGE

@@ -4,12 +4,13 @@ from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.body import OFF, STEP, MotorCommands, Physics, RangingSensors, Sensors
 from crazyflie_virtual.crtp import LinkStatistics
 from crazyflie_virtual.firmware.console import Console
-from crazyflie_virtual.firmware.estimator import DECK, Estimator, Localization
+from crazyflie_virtual.firmware.decks import PositioningDeck
+from crazyflie_virtual.firmware.estimator import Estimator, Localization
 from crazyflie_virtual.firmware.planner import ACTIVE, Planner, TrajectoryState
 from crazyflie_virtual.firmware.setpoints import AttitudeDecoder, Commander
 from crazyflie_virtual.firmware.stabilizer import IDLE_THRUST, Stabilizer
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
-from crazyflie_virtual.firmware.supervisor import PowerMonitor, State, Supervisor
+from crazyflie_virtual.firmware.supervisor import Health, PowerMonitor, State, Supervisor
 from crazyflie_virtual.memory import MemoryTester
 from crazyflie_virtual.settings import FaultSwitches, VehicleSettings
 
@@ -45,16 +46,17 @@ class Firmware:
         self.warn = self.console.warn
         self.estimate = Estimate()
         self.sensors = Sensors(settings.sensor_noise, settings.seed)
-        has_deck = settings.positioning == DECK
-        self.ranging = RangingSensors(physics, settings.multiranger, has_deck)
         self.estimator = Estimator(self.estimate)
-        self.localization = Localization(self.estimator, physics, has_deck)
+        self.deck = PositioningDeck(settings, faults, self.estimator, physics)
+        self.ranging = RangingSensors(physics, settings.multiranger, self.deck.has_flow)
+        self.localization = Localization(self.estimator)
         self.planner = Planner()
         self.commander = Commander(self.planner)
         self.attitude_decoder = AttitudeDecoder()
         self.supervisor = Supervisor(self.console.write_line, settings.auto_arm)
         self.stabilizer = Stabilizer(0 if settings.auto_arm else IDLE_THRUST)
         self.power = PowerMonitor()
+        self.health = Health(faults)
         self.link_statistics = LinkStatistics()
         self.memory_tester = MemoryTester()
         self.setpoint = Setpoint()  #: Input of the controllers.
@@ -76,6 +78,11 @@ class Firmware:
         self.console.write_line("STAB: Ready to fly.")
 
     @property
+    def variance_velocity(self) -> float:
+        """Variance of the velocity along each horizontal axis, m^2/s^2."""
+        return self.estimator.variance_velocity + self.deck.unmeasured
+
+    @property
     def milliseconds(self) -> int:
         """Time since the start, ms."""
         return round(1000.0 * self.time)
@@ -88,6 +95,7 @@ class Firmware:
         if self._steps % _POWER_STEPS == 0:
             self.link_statistics.update(self.time)
             self._watch_power(voltage)
+            self.health.update()
         if not self.is_started:
             return OFF
         with_position = self._steps % POSITION_STEPS == 0
@@ -124,7 +132,8 @@ class Firmware:
             self.reset_estimation = 0
             self.estimator.reset()
         self.estimator.grow_variances(_POSITION_PERIOD)
-        self.localization.update(self.time)
+        if self.deck.is_there and not self.localization.is_fed(self.time):
+            self.deck.measure(_POSITION_PERIOD)
         if not any(self.stabilizer.commands) and not self.supervisor.is_flying:
             self.estimator.correct_on_ground(_POSITION_PERIOD)
 

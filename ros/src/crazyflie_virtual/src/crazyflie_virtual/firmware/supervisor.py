@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_virtual.body import OPEN_CIRCUIT_VOLTAGES, Sensors
+from crazyflie_virtual.body import OPEN_CIRCUIT_VOLTAGES, Sensors, sag
 from crazyflie_virtual.firmware.states import Setpoint
+from crazyflie_virtual.settings import FaultSwitches
 
 
 class State(Enum):
@@ -279,6 +280,35 @@ ON_BATTERY, LOW = 0, 3  #: States; 1 and 2, charging and charged, do not occur.
 _LOW_AFTER = 5.0  #: Time of low voltage until the state `LOW`, s.
 #: Voltage, V, at 0, 10, ... 90 % of charge [firmware: measured on the stock battery at 25 C].
 _LEVELS = OPEN_CIRCUIT_VOLTAGES[:-1]
+
+
+_MOST_SAG = 0.95  #: Of a good battery in its self test, V: as in health.c of the firmware.
+_LOAD = 1.0  #: Load of that test, over that of hover.
+
+
+class Health:
+    """Self tests of motors and battery; here they take no time, and the motors stand still."""
+
+    def __init__(self, faults: FaultSwitches):
+        self._faults = faults
+        self.motors_asked = self.battery_asked = 0  #: Not 0: the test is to begin.
+        self.motors_passed = 0  #: Bit mask of the motors that have passed.
+        self.battery_passed = 0
+        self.battery_sag = 0.0  #: V.
+        self.tests = 0  #: Number of tests that were done.
+
+    def update(self) -> None:
+        """Do the tests that were asked for."""
+        if self.motors_asked:
+            self.motors_asked = 0
+            failed = self._faults.motor_failure
+            self.motors_passed = 0b1111 & ~(1 << failed - 1 if failed else 0)
+            self.tests += 1
+        if self.battery_asked:
+            self.battery_asked = 0
+            self.battery_sag = sag(_LOAD)
+            self.battery_passed = int(self.battery_sag < _MOST_SAG and not self._faults.low_battery)
+            self.tests += 1
 
 
 class PowerMonitor:

@@ -1,0 +1,230 @@
+"""Checks of one vehicle on the ground: battery, link, decks, firmware, estimate, self tests.
+
+Normal ranges are those of a Crazyflie 2.1 with the stock battery; figures of a vehicle at rest.
+"""
+
+import math
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from crazyflie_doctor.finding import Check, Finding, error, warn
+from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.errors import CrazyflieError
+from crazyflie_link.log import LogBlock
+
+MIN_VOLTAGE, FULL_VOLTAGE = 3.7, 4.25  #: For a flight of some minutes, and the most of one cell, V.
+MIN_QUALITY = 0.95  #: Share of answered pings.
+MAX_LATENCY = 0.02  #: 95th percentile of the round-trip time, s.
+#: Deviation of the estimated velocity, m/s, and its change while the vehicle is watched.
+MAX_DEVIATION, MAX_CHANGE = 0.1, 0.03
+#: Releases of the firmware that this workspace was flown against.
+KNOWN_FIRMWARE = ("2026.08",)
+ALL_MOTORS = 0b1111  #: Bit mask in health.motorPass.
+
+_PERIOD_MS = 100
+_SELF_TEST_LIMIT = 10.0  #: s.
+_VERSION_PORT, _VERSION_CHANNEL, _FIRMWARE = 13, 1, 1
+_VARIANCES = ("kalman.varPX", "kalman.varPY", "kalman.varPZ")
+_HEALTH = ("health.motorPass", "health.batteryPass", "health.motorTestCount")
+
+
+@dataclass
+class VehicleFacts:
+    """Facts about a vehicle that stands on the ground; None or NaN for what is not known."""
+
+    voltage: float = math.nan  # V.
+    quality: float = math.nan  # Share of answered pings.
+    latency: float = math.nan  # s.
+    decks: tuple[str, ...] = ()  # Such as bcFlow2.
+    firmware: str = ""  # Release.
+    deviations: tuple[float, ...] = ()  # Of the estimated velocity along each axis, m/s.
+    changes: tuple[float, ...] = ()  # Of these while it was watched, m/s.
+    motors: int | None = None  # Bit mask of those that have passed their test; None: not tested.
+    battery_passed: bool | None = None  # None: not tested.
+    failure: str = ""  # Why nothing is known.
+
+
+def checks(facts: VehicleFacts) -> Iterator[Check]:
+    """Yield the checks of a vehicle."""
+    if facts.failure:
+        yield Check("vehicle", "", [error(facts.failure, "mend this first")])
+        return
+    yield Check("battery", f"{facts.voltage:.2f} V", _battery(facts))
+    yield Check(
+        "link",
+        f"{100.0 * facts.quality:.0f} % of pings answered, latency {1000.0 * facts.latency:.1f} ms",
+        _link(facts),
+    )
+    yield Check("decks", ", ".join(facts.decks) or "none", [])
+    yield Check("firmware", facts.firmware, _firmware(facts))
+    deviations = ", ".join(f"{each:.3f}" for each in facts.deviations)
+    yield Check("estimate", f"velocity within {deviations} m/s, at rest", _estimate(facts))
+    yield Check("motors", _tested(facts.motors, "all four pass"), _motors(facts))
+    yield Check("battery test", _tested(facts.battery_passed, "passes"), _battery_test(facts))
+
+
+def _tested(result, text):
+    return "not tested; --motors true does, and turns the propellers" if result is None else text
+
+
+def _battery(facts) -> Iterator[Finding]:
+    if not MIN_VOLTAGE <= facts.voltage <= FULL_VOLTAGE:
+        yield error(
+            f"{facts.voltage:.2f} V without load; normal is {MIN_VOLTAGE} to {FULL_VOLTAGE} V",
+            "charge the battery; if it is full, change it",
+        )
+
+
+def _link(facts) -> Iterator[Finding]:
+    remedy = "come nearer, turn the antenna, take another channel: wireless networks disturb"
+    if not facts.quality >= MIN_QUALITY:
+        yield error(
+            f"{100.0 * facts.quality:.0f} % of pings answered; normal is {100 * MIN_QUALITY:.0f} % "
+            "or more",
+            remedy,
+        )
+    if not facts.latency <= MAX_LATENCY:
+        yield warn(
+            f"latency {1000.0 * facts.latency:.1f} ms; normal is {1000 * MAX_LATENCY:.0f} ms or "
+            "less",
+            remedy,
+        )
+
+
+def _firmware(facts) -> Iterator[Finding]:
+    if not facts.firmware.startswith(KNOWN_FIRMWARE):
+        yield warn(
+            f"release {facts.firmware or 'unknown'}; flown against {', '.join(KNOWN_FIRMWARE)}",
+            "update it with cfclient, or watch the first flights",
+        )
+
+
+def _estimate(facts) -> Iterator[Finding]:
+    if not facts.deviations:
+        yield warn("its variance is not logged", "set stabilizer.estimator to 2, or update")
+        return
+    # NaN is not within any limit.
+    if not all(each <= MAX_DEVIATION for each in facts.deviations):
+        yield error(
+            f"velocity with a deviation of {max(facts.deviations):.2f} m/s at rest; normal is "
+            f"{MAX_DEVIATION:g} m/s or less",
+            "let it see its positioning system, or send it poses; leave it at rest and try again",
+        )
+    elif not all(each <= MAX_CHANGE for each in facts.changes):
+        yield error(
+            f"the deviation of the velocity has changed by {max(facts.changes):.2f} m/s; normal is "
+            f"{MAX_CHANGE:g} m/s or less at rest",
+            "leave it at rest until it has converged",
+        )
+
+
+def _motors(facts) -> Iterator[Finding]:
+    if facts.motors is not None and facts.motors != ALL_MOTORS:
+        failed = [str(i + 1) for i in range(4) if not facts.motors >> i & 1]
+        yield error(
+            f"motor {', '.join(failed)} fails its self test; normal is that all four pass",
+            "look for hair and bent propellers, push the motor home, change propeller or motor",
+        )
+
+
+def _battery_test(facts) -> Iterator[Finding]:
+    if facts.battery_passed is False:
+        yield error("its voltage sags too far under load", "change the battery, clean its contacts")
+
+
+@dataclass(eq=False)
+class _Watch:
+    """What the vehicle logs and answers, from its link's thread."""
+
+    voltages: list[float] = field(default_factory=list)
+    variances: list[tuple[float, ...]] = field(default_factory=list)
+    health: tuple[float, ...] = ()
+    firmware: str = ""
+    came: threading.Event = field(default_factory=threading.Event)
+
+    def on_packet(self, port: int, channel: int, data: bytes) -> None:
+        is_version = (port, channel, data[:1]) == (
+            _VERSION_PORT,
+            _VERSION_CHANNEL,
+            bytes([_FIRMWARE]),
+        )
+        if is_version:
+            self.firmware = data[1:].split(b"\0")[0].decode(errors="replace")
+
+    def on_health(self, _: int, values: tuple[float, ...]) -> None:
+        self.health = values
+        self.came.set()
+
+
+def examine(uri: str, duration: float = 10.0, motors: bool = False) -> VehicleFacts:
+    """Connect to a vehicle and watch it for a duration (s); blocks.
+
+    With ``motors`` it does the self tests, in which the propellers turn.
+    """
+    watch = _Watch()
+    try:
+        with Crazyflie(uri, on_packet=watch.on_packet) as vehicle:
+            return _watch(vehicle, watch, duration, motors)
+    except CrazyflieError as failure:
+        return VehicleFacts(failure=str(failure))
+
+
+def _watch(vehicle: Crazyflie, watch: _Watch, duration: float, motors: bool) -> VehicleFacts:
+    known = vehicle.log.variables()
+    vehicle.add_log_block(
+        LogBlock(
+            "battery", _PERIOD_MS, ("pm.vbat",), lambda _, values: watch.voltages.append(values[0])
+        )
+    )
+    if all(name in known for name in _VARIANCES):
+        vehicle.add_log_block(
+            LogBlock(
+                "variances", _PERIOD_MS, _VARIANCES, lambda _, v: watch.variances.append(tuple(v))
+            )
+        )
+    if all(name in known for name in _HEALTH):
+        vehicle.add_log_block(LogBlock("health", _PERIOD_MS, _HEALTH, watch.on_health))
+    vehicle.send_packet(_VERSION_PORT, _VERSION_CHANNEL, bytes([_FIRMWARE]))
+    end = time.monotonic() + duration
+    while time.monotonic() < end:
+        # Raises the reason when the link is lost.
+        vehicle.link()
+        time.sleep(_PERIOD_MS / 1000.0)
+    values = vehicle.parameters.values()
+    deviations = [tuple(map(_root, sample)) for sample in watch.variances]
+    facts = VehicleFacts(
+        voltage=sum(watch.voltages) / len(watch.voltages) if watch.voltages else math.nan,
+        quality=vehicle.quality(),
+        latency=vehicle.latency(),
+        decks=tuple(
+            sorted(
+                name.removeprefix("deck.")
+                for name, value in values.items()
+                if name.startswith("deck.") and value
+            )
+        ),
+        firmware=watch.firmware,
+        deviations=deviations[-1] if deviations else (),
+        changes=tuple(max(axis) - min(axis) for axis in zip(*deviations, strict=True)),
+    )
+    if motors and watch.health:
+        facts.motors = int(_self_test(vehicle, watch, "health.startPropTest")[0])
+        facts.battery_passed = bool(_self_test(vehicle, watch, "health.startBatTest")[1])
+    return facts
+
+
+def _self_test(vehicle, watch, parameter):
+    """Start a self test and return the health that follows it."""
+    before = watch.health[2]
+    vehicle.parameters.write(parameter, 1)
+    end = time.monotonic() + _SELF_TEST_LIMIT
+    while watch.health[2] == before and time.monotonic() < end:
+        watch.came.clear()
+        watch.came.wait(_PERIOD_MS / 1000.0)
+    return watch.health
+
+
+def _root(variance):
+    return math.sqrt(variance) if variance >= 0.0 else math.nan

@@ -1,0 +1,144 @@
+"""A vehicle that is flown by its own estimate: what its decks say decides."""
+
+import math
+import time
+
+import pytest
+import rospy
+from geometry_msgs.msg import PoseStamped
+
+from crazyflie_driver.positioning import OUT_OF_REACH, SYSTEMS, Positioning
+from crazyflie_driver.srv import TakeoffRequest
+from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.transport import ServiceError
+from crazyflie_virtual.testing import virtual_vehicle
+
+TAKEOFF = TakeoffRequest(height=0.5, duration=rospy.Duration(2))
+GOOD = {
+    "flow": (300.0, 1e-3, 1e-3),
+    "lighthouse": (3.0, 3.0, 3.0, 1e-6, 1e-6, 1e-6),
+    "loco": (1e-4, 1e-4, 1e-4),
+}
+
+
+def changed(source, variable, value):
+    values = dict(zip(SYSTEMS[source].variables, GOOD[source], strict=True))
+    assert variable in values
+    return tuple({**values, variable: value}.values())
+
+
+@pytest.mark.parametrize("source", GOOD)
+def test_nothing_is_wrong_with_a_good_state(source):
+    positioning = Positioning(source)
+    assert "has not come" in positioning.problem(0.0)
+    positioning.update(10.0, GOOD[source])
+    assert positioning.problem(10.1) == ""
+    assert not positioning.is_lost(10.4)
+    assert "has not come for 1.0 s" in positioning.problem(11.0)
+    assert positioning.is_lost(11.0)
+
+
+@pytest.mark.parametrize(
+    ("source", "variable", "value", "words"),
+    [
+        ("flow", "range.zrange", float(OUT_OF_REACH), "no ground within its reach"),
+        ("flow", "kalman.varPY", 0.04, "velocity with a deviation of 0.20 m/s, expected at most"),
+        ("flow", "kalman.varPX", math.nan, "velocity with a deviation of nan"),
+        ("lighthouse", "lighthouse.bsReceive", 0.0, "receives no base station"),
+        ("lighthouse", "lighthouse.bsGeoVal", 0.0, "no geometry of the base stations"),
+        ("lighthouse", "lighthouse.bsCalVal", 4.0, "no calibration of the base stations"),
+        ("lighthouse", "kalman.varX", 0.01, "position with a deviation of 0.10 m"),
+        ("loco", "kalman.varZ", 1.0, "position with a deviation of 1.00 m"),
+    ],
+)
+def test_problems_are_named_at_once_and_end_a_flight_once_they_last(source, variable, value, words):
+    positioning = Positioning(source)
+    positioning.update(10.0, GOOD[source])
+    for now in (10.1, 10.2, 10.3, 10.4):
+        positioning.update(now, changed(source, variable, value))
+        assert words in positioning.problem(now)
+        assert not positioning.is_lost(now)
+    positioning.update(10.6, changed(source, variable, value))
+    assert positioning.is_lost(10.6)
+    positioning.update(10.7, GOOD[source])
+    assert positioning.problem(10.7) == ""
+    assert not positioning.is_lost(10.7)
+
+
+def test_estimates_keep_the_time_at_which_they_were_made():
+    """A vehicle's clock that began 50 s before, and a link that delays some by up to 80 ms."""
+    positioning = Positioning("flow")
+    times = []
+    for k in range(600):
+        sent = 3.0 + 0.01 * k
+        delay = 0.08 if k % 7 == 0 else 0.002
+        arrival = 50.0 + sent + delay
+        times.append((sent, positioning.local_time(sent, arrival)))
+    assert times[0][1] is None
+    late = [(sent, local) for sent, local in times if local is not None]
+    assert len(late) > 400
+    for sent, local in late:
+        assert local - sent == pytest.approx(50.002, abs=1e-3)
+    # One that has come already is not published twice.
+    assert positioning.local_time(sent, arrival + 0.01) is None
+
+
+def add(server, uri, positioning):
+    server.process.transport.parameters["/cf1/positioning"] = positioning
+    server.add(uri)
+
+
+@pytest.mark.parametrize(
+    ("positioning", "deck", "words"),
+    [
+        ("lighthouse", "flow", "no Lighthouse deck .*bcLighthouse4.*it has .*bcFlow2"),
+        ("loco", "none", "no Loco Positioning deck"),
+        ("gps", "flow", "positioning is 'gps'; expected one of mocap, lighthouse, flow, loco"),
+    ],
+)
+def test_a_deck_that_is_not_there_is_named(server, positioning, deck, words):
+    with (
+        virtual_vehicle(positioning=deck) as (_, uri),
+        pytest.raises(ServiceError, match=words),
+    ):
+        add(server, uri, positioning)
+
+
+def transforms(server):
+    messages = server.process.transport.publishers["/tf"].messages
+    return [each for message in messages for each in message.transforms]
+
+
+def test_the_estimate_is_on_tf_and_ends_when_no_base_station_is_seen(server):
+    with virtual_vehicle(positioning="lighthouse") as (virtual, uri):
+        add(server, uri, "lighthouse")
+        pass_time(server, lambda: len(transforms(server)) > 20)
+        first = transforms(server)[0]
+        assert (first.header.frame_id, first.child_frame_id) == ("world", "cf1/estimate")
+        poses = server.process.published("/cf1/pose")
+        assert poses[0].header.stamp == first.header.stamp
+        assert server.process.published("/cf1/positioning")[-1].data == ""
+        # What comes as an external pose may be this very estimate.
+        server.process.publish("/cf1/external_pose", PoseStamped())
+        assert "ignoring external_pose" in server.process.logged("warn")[-1]
+        virtual.switches.occluded = 3
+        texts = server.process.published("/cf1/positioning")
+        pass_time(server, lambda: "receives no base station" in texts[-1].data)
+        with pytest.raises(ServiceError, match="no takeoff.*receives no base station"):
+            server.call("/cf1/takeoff", TAKEOFF)
+        positioning = server.node._vehicles[uri].log.positioning
+        pass_time(server, lambda: positioning.is_lost(server.process.clock.time()))
+        before, count = len(transforms(server)), len(poses)
+        pass_time(server, lambda: len(poses) > count + 20)
+        assert len(transforms(server)) == before
+
+
+def pass_time(server, condition):
+    """Let the driver's clock follow the machine's until a condition holds."""
+    ahead = server.process.clock.time() - time.monotonic()
+
+    def is_met():
+        server.process.advance(time.monotonic() + ahead - server.process.clock.time())
+        return condition()
+
+    wait_until(is_met)

@@ -1,0 +1,65 @@
+"""Positioning decks of a virtual vehicle: drift, lost texture, occluded base stations."""
+
+import math
+import struct
+
+import pytest
+from virtual_bench import Bench
+
+from crazyflie_virtual.crtp import Port
+
+
+def go(bench, x, y, duration=3.0):
+    data = struct.pack("<BB??5f", 12, 0, False, False, x, y, 1.0, 0.0, duration)
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, data)[3] == 0
+    bench.run(duration + 1.0)
+
+
+def error(bench):
+    """Return the horizontal distance of the estimate from the true position, m."""
+    estimate, (x, y, _) = bench.firmware.estimate, bench.physics.position
+    return math.hypot(estimate.x - x, estimate.y - y)
+
+
+def test_optical_flow_drifts_with_the_way_and_not_with_time():
+    """Over seeds the drift has the standard deviation 15 mm a square root of metre, an axis."""
+    drifts = []
+    for seed in range(12):
+        bench = Bench(positioning="flow", seed=seed)
+        bench.take_off()
+        before = error(bench)
+        bench.run(10.0)
+        assert error(bench) == pytest.approx(before, abs=0.01)
+        go(bench, 2.0, 0.0)
+        go(bench, 0.0, 0.0)
+        drifts.append(error(bench))
+    root_mean_square = math.sqrt(sum(each**2 for each in drifts) / len(drifts))
+    # 4 m of way, two axes; the interval holds 99 % of samples of 12.
+    assert 0.5 < root_mean_square / (0.015 * math.sqrt(2 * 4.0)) < 1.5
+
+
+def test_without_texture_the_velocity_is_not_measured():
+    bench = Bench(positioning="flow", smooth_x=2.0, smooth=0.5)
+    bench.take_off()
+    assert bench.firmware.variance_velocity < 0.01
+    go(bench, 2.0, 0.0)
+    assert bench.firmware.variance_velocity > 0.1
+    assert error(bench) > 0.0
+
+
+@pytest.mark.parametrize(("occluded", "active"), [(0, 3), (1, 2), (3, 0)])
+def test_base_stations_are_occluded(occluded, active):
+    bench = Bench(positioning="lighthouse", occluded=occluded)
+    bench.run(1.0)
+    deck = bench.firmware.deck
+    assert (deck.received, deck.active_stations, deck.known_stations) == (active, active, 3)
+    assert (bench.firmware.estimator.variance_position < 1e-4) is (active > 0)
+
+
+def test_one_base_station_measures_less_precisely_and_without_geometry_none():
+    def variance(**options):
+        bench = Bench(positioning="lighthouse", **options)
+        bench.run(2.0)
+        return bench.firmware.estimator.variance_position
+
+    assert variance() < variance(base_stations=1) < 1e-4 < variance(knows_stations=False)

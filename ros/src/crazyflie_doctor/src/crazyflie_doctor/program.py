@@ -40,8 +40,8 @@ def doctor(arguments: list[str] | None = None) -> int:
         [each for each in given if ":=" not in each],
         "doctor",
         "Check this computer and the graph that runs, print a line for each finding and what to do "
-        "about it. It publishes nothing, and connects to no vehicle but one that is given. Exit status: 0 without errors, "
-        "1 with errors, 2 wrong usage.",
+        "about it. It publishes nothing, and connects to no vehicle but one that is given. Exit "
+        "status: 0 without errors, 1 with errors, 2 wrong usage.",
     )
     watchdog = threading.Timer(options.timeout, _give_up, [options.timeout])
     watchdog.daemon = True

@@ -69,7 +69,7 @@ def _tested(result, text):
     return "not tested; --motors true does, and turns the propellers" if result is None else text
 
 
-def _battery(facts) -> Iterator[Finding]:
+def _battery(facts: VehicleFacts) -> Iterator[Finding]:
     if not MIN_VOLTAGE <= facts.voltage <= FULL_VOLTAGE:
         yield error(
             f"{facts.voltage:.2f} V without load; normal is {MIN_VOLTAGE} to {FULL_VOLTAGE} V",
@@ -77,7 +77,7 @@ def _battery(facts) -> Iterator[Finding]:
         )
 
 
-def _link(facts) -> Iterator[Finding]:
+def _link(facts: VehicleFacts) -> Iterator[Finding]:
     remedy = "come nearer, turn the antenna, take another channel: wireless networks disturb"
     if not facts.quality >= MIN_QUALITY:
         yield error(
@@ -93,7 +93,7 @@ def _link(facts) -> Iterator[Finding]:
         )
 
 
-def _firmware(facts) -> Iterator[Finding]:
+def _firmware(facts: VehicleFacts) -> Iterator[Finding]:
     if not facts.firmware.startswith(KNOWN_FIRMWARE):
         yield warn(
             f"release {facts.firmware or 'unknown'}; flown against {', '.join(KNOWN_FIRMWARE)}",
@@ -101,7 +101,7 @@ def _firmware(facts) -> Iterator[Finding]:
         )
 
 
-def _estimate(facts) -> Iterator[Finding]:
+def _estimate(facts: VehicleFacts) -> Iterator[Finding]:
     if not facts.deviations:
         yield warn("its variance is not logged", "set stabilizer.estimator to 2, or update")
         return
@@ -120,7 +120,7 @@ def _estimate(facts) -> Iterator[Finding]:
         )
 
 
-def _motors(facts) -> Iterator[Finding]:
+def _motors(facts: VehicleFacts) -> Iterator[Finding]:
     if facts.motors is not None and facts.motors != ALL_MOTORS:
         failed = [str(i + 1) for i in range(4) if not facts.motors >> i & 1]
         yield error(
@@ -129,7 +129,7 @@ def _motors(facts) -> Iterator[Finding]:
         )
 
 
-def _battery_test(facts) -> Iterator[Finding]:
+def _battery_test(facts: VehicleFacts) -> Iterator[Finding]:
     if facts.battery_passed is False:
         yield error("its voltage sags too far under load", "change the battery, clean its contacts")
 

@@ -12,11 +12,11 @@ page=$(compgen -G "$page")
 launch=$(awk '/^<!-- run: until \//{awaited=1} awaited && /^roslaunch/{print; exit} /^```$/{awaited=0}' "$page")
 [ -z "${DISPLAY:-}" ] || launch=$(sed -E 's/ (rviz:=false|sim_time:=true|real_time_factor:=[0-9]+)//g' <<<"$launch")
 if [ -z "$launch" ]; then
-  echo "This lesson launches nothing."
+  echo "This lesson has no flight to launch."
 elif rostopic list >/dev/null 2>&1; then
-  echo "A master runs already; this terminal joins it."
+  echo "A master is already running. This terminal uses it."
 elif ! eval "${launch/roslaunch/roslaunch --nodes}" >/dev/null 2>&1; then
-  echo "Not launched yet, because the lesson makes it first: $launch"
+  echo "Not launched yet, because you make it in the lesson: $launch"
 else
   set -m  # a process group of its own: Ctrl-C in this terminal does not end the flight
   eval "$launch" >~/course.log 2>&1 &
@@ -27,8 +27,8 @@ else
     sleep 0.5
   done
   echo "Launched: $launch"
-  echo "Its output is in ~/course.log; exit ends it."
-  [ -z "${DISPLAY:-}" ] || echo "RViz begins near the vehicle: the mouse wheel zooms out, the left button turns the view."
+  echo "Its output is in ~/course.log. Type exit to stop it."
+  [ -z "${DISPLAY:-}" ] || echo "RViz starts near the vehicle: zoom out with the mouse wheel, turn the view with the left button."
 fi
 echo "The lesson: docs/course/${page##*/}"
 [ ! -d "$COURSE/skeletons/$LESSON" ] ||

@@ -16,6 +16,6 @@ FAULTS = {"heavy", "light", "headwind", "crosswind", "noise", "gaps"}
 )
 def test_the_fault_is_found(recording, digest):
     answer = yaml.safe_load(ANSWERS.read_text())[recording]
-    assert answer in FAULTS, f"{answer!r} is none of {', '.join(sorted(FAULTS))}"
+    assert answer in FAULTS, f"{answer!r}; expected one of {', '.join(sorted(FAULTS))}"
     found = sha256(f"{recording}: {answer}".encode()).hexdigest()
     assert found.startswith(digest), f"recording {recording} has another fault than {answer}"

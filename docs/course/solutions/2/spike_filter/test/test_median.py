@@ -31,7 +31,7 @@ def test_publishes_medians(process):
     assert median_of(process, 2.0, 50.0, 3.0) == 3.0
 
 
-def test_begins_anew_after_a_reset(process):
+def test_forgets_all_numbers_after_a_reset(process):
     median_of(process, 2.0, 2.0, 2.0)
     process.call("/median/reset", EmptyRequest())
     assert median_of(process, 7.0) == 7.0

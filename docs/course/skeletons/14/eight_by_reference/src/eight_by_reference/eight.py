@@ -1,5 +1,6 @@
 """The algorithm: where a figure of eight is at a time; a position has no need of a heading."""
 
+import math
 from dataclasses import dataclass
 
 

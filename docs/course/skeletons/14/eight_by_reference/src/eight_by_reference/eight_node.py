@@ -2,7 +2,12 @@
 
 from typing_extensions import override
 
-from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    FlightStatus,
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_utils import Node, NodeHandle
 from eight_by_reference.eight import Eight
 

@@ -1,5 +1,6 @@
 """The algorithm: which way to turn, and when."""
 
+import math
 from dataclasses import dataclass
 
 

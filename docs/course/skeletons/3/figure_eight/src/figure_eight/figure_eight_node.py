@@ -4,6 +4,7 @@ from geometry_msgs.msg import Twist
 from std_msgs.msg import UInt32
 from typing_extensions import override
 
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, Number
 from figure_eight.figure_eight import FigureEight

@@ -1,10 +1,14 @@
 """Removes one vehicle from a simulation, and lets another one appear."""
 
+import sys
+
 import rospy
+
+from crazyflie_tutorial_msgs.srv import RemoveVehicle, SpawnVehicle
 
 
 def replace(remove, spawn, old: str, new: str, x: float, y: float) -> str:
-    """Remove the vehicle ``old``, spawn ``new`` at (x, y), m; return the name that it has got.
+    """Remove the vehicle ``old``, spawn ``new`` at (x, y), m; return the name of the new one.
 
     ``remove(name)`` and ``spawn(name, x, y)`` are the services. If there is no ``old``, which
     ``remove`` says with a rospy.ServiceException, the new one is spawned all the same.

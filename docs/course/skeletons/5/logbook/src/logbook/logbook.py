@@ -1,6 +1,9 @@
 """The algorithm: a book into which flights are written."""
 
+import math
 from dataclasses import dataclass
+
+from crazyflie_utils.refusal import RefusalError
 
 
 @dataclass
@@ -14,7 +17,7 @@ class FlightEntry:
     duration : float
         s.
     distance : float
-        Length of the way, m.
+        Length of the path, m.
     max_height : float
         m.
     """
@@ -56,6 +59,6 @@ class Logbook:
         Raises
         ------
         RefusalError
-            There is none with this number.
+            No flight has this number. The text is "there is no flight 7; 1 have ended".
         """
         raise NotImplementedError("step 6")

@@ -6,7 +6,7 @@ from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
 from crazyflie_utils import Node, NodeHandle
 from logbook.logbook import FlightEntry, Logbook
 from logbook.msg import Flight
-from logbook.srv import GetFlight
+from logbook.srv import GetFlight, GetFlightResponse
 
 
 class LogbookNode(Node):

@@ -1,5 +1,9 @@
 """Step 1: the velocity of a harmonic oscillator, and its scale."""
 
+import math
+
+from crazyflie_utils.refusal import RefusalError
+
 BEGIN, END = 2.0, 9.0
 
 
@@ -19,7 +23,7 @@ def velocity(x: float) -> float:
     Raises
     ------
     RefusalError
-        ``x`` is outside.
+        ``x`` is outside, or no number. The text is "x is 1.5; expected 2 to 9".
     """
     raise NotImplementedError("step 1a")
 

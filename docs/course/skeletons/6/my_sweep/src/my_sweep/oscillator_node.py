@@ -2,7 +2,9 @@
 
 from typing_extensions import override
 
+from crazyflie_tutorial_msgs.srv import VelocityAt, VelocityAtResponse
 from crazyflie_utils import Node, NodeHandle
+from my_sweep.oscillator import velocity
 
 
 class OscillatorNode(Node):
@@ -10,8 +12,8 @@ class OscillatorNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        """There are none."""
+        """There are no parameters."""
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        """Step 2: advertise my_oscillator (VelocityAt), which returns a VelocityAtResponse."""
+        """Step 2: advertise my_oscillator (VelocityAt); answer with a VelocityAtResponse."""

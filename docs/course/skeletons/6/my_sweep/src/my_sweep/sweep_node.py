@@ -2,16 +2,20 @@
 
 import math
 
+from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
 from crazyflie_msgs.msg import (
     FlightStatus,
+    PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
 from crazyflie_sweep.sweep_parameters import Area
+from crazyflie_tutorial_msgs.srv import VelocityAt, VelocityAtRequest
 from crazyflie_utils import Node, NodeHandle
 from my_sweep.lanes import LanePath, Line, Point, sweep
+from my_sweep.oscillator import service_position
 
 AREA = Area.from_mapping({"x_min": -1.5, "x_max": 1.5, "y_min": -1.5, "y_max": 1.5})
 WIDTH = 1.0

@@ -1,5 +1,6 @@
 """The algorithm: how near a vehicle is to a pole."""
 
+import math
 from dataclasses import dataclass
 
 

@@ -1,5 +1,6 @@
 """Step 5: does a range sensor work? The algorithm of the check."""
 
+import math
 from dataclasses import dataclass
 
 
@@ -20,7 +21,7 @@ class Reading:
 
 
 def faults(readings: list[Reading], min_range: float, max_range: float, rate: float) -> list[str]:
-    """Return what is wrong with the readings of 2 s; an empty list if nothing is.
+    """Return the faults in the readings of 2 s; an empty list if the sensor works.
 
     Of these texts, those that apply, in this order:
 

@@ -22,5 +22,5 @@ class Median:
         return statistics.median(self._numbers)
 
     def reset(self) -> None:
-        """Begin anew: the next number is taken as it is."""
+        """Forget all numbers."""
         self._numbers.clear()

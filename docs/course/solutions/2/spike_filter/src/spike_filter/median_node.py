@@ -20,7 +20,7 @@ class MedianParameters(Parameters):
 
 
 class MedianNode(Node):
-    """Publish the median for every number; the service ~reset begins anew."""
+    """Publish the median for every number; the service ~reset forgets them."""
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:

@@ -17,7 +17,7 @@ class FlightEntry:
     duration : float
         s.
     distance : float
-        Length of the way, m.
+        Length of the path, m.
     max_height : float
         m.
     """
@@ -72,7 +72,7 @@ class Logbook:
         Raises
         ------
         RefusalError
-            There is none with this number.
+            No flight has this number. The text is "there is no flight 7; 1 have ended".
         """
         if not 1 <= number <= len(self.flights):
             raise RefusalError(f"there is no flight {number}; {len(self.flights)} have ended")

@@ -23,7 +23,7 @@ def velocity(x: float) -> float:
     Raises
     ------
     RefusalError
-        ``x`` is outside.
+        ``x`` is outside, or no number. The text is "x is 1.5; expected 2 to 9".
     """
     if not BEGIN <= x <= END:
         raise RefusalError(f"x is {x:g}; expected {BEGIN:g} to {END:g}")

@@ -12,7 +12,7 @@ class OscillatorNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        """There are none."""
+        """There are no parameters."""
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

@@ -21,7 +21,7 @@ class Reading:
 
 
 def faults(readings: list[Reading], min_range: float, max_range: float, rate: float) -> list[str]:
-    """Return what is wrong with the readings of 2 s; an empty list if nothing is.
+    """Return the faults in the readings of 2 s; an empty list if the sensor works.
 
     Of these texts, those that apply, in this order:
 

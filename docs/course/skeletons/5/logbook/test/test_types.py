@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from genmsg import MsgContext
 from genmsg.msg_loader import load_msg_from_file, load_srv_from_file
 
@@ -39,7 +38,6 @@ def test_step_1_the_service_has_a_number_in_and_a_flight_out():
     assert fields(spec.response) == [("logbook/Flight", "flight")]
 
 
-@pytest.mark.long  # The quick part: the files, above.
 def test_step_2_the_package_builds_and_its_types_can_be_imported(tmp_path):
     shutil.copytree(PACKAGE, tmp_path / "src" / "logbook")
     built = subprocess.run(

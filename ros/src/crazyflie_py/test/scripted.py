@@ -15,10 +15,10 @@ LIMIT = 90.0
 
 TRACE = """
 import json, runpy, sys
-from crazyflie_py.ros_connection import Connection
+from crazyflie_py.ros_connection import ScriptConnection
 
 track = []
-sleep = Connection.sleep
+sleep = ScriptConnection.sleep
 
 
 def traced(self, duration):
@@ -26,7 +26,7 @@ def traced(self, duration):
     track.append([self.fleet.position(name) for name in self.fleet.names])
 
 
-Connection.sleep = traced
+ScriptConnection.sleep = traced
 sys.argv = sys.argv[1:]
 try:
     runpy.run_path(sys.argv[0], run_name="__main__")

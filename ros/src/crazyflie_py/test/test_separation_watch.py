@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from crazyflie_mission_api.ros_vehicle import Pose
+from crazyflie_mission_api.ros_vehicle import TimedPose
 from crazyflie_py.separation_watch import SeparationWatch
 from crazyflie_py.setpoints import Attitude, FullState, Hover, Position, VelocityWorld, led_to
 
@@ -24,7 +24,7 @@ class Vehicle:
         self.is_known = True
 
     def pose(self):
-        return Pose(tuple(self.position), LEVEL, self.time) if self.is_known else None
+        return TimedPose(tuple(self.position), LEVEL, self.time) if self.is_known else None
 
     def streamed_goal(self, place):
         return self.goal

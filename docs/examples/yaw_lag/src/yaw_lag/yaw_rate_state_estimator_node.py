@@ -4,7 +4,7 @@ import numpy as np
 from typing_extensions import override
 
 from crazyflie_state_estimator.estimator_node import StateEstimatorNode, StateEstimatorParameters
-from crazyflie_state_estimator.motion import Motion
+from crazyflie_state_estimator.motion import EstimatedMotion
 from crazyflie_utils import parameter
 from crazyflie_utils.parameters.types import Integer
 from yaw_lag.msg import YawRateStateStamped
@@ -23,7 +23,7 @@ class YawRateStateEstimatorNode(StateEstimatorNode):
     parameters_type = YawRateStateEstimatorParameters
 
     @override
-    def state(self, motion: Motion) -> np.ndarray:
+    def state(self, motion: EstimatedMotion) -> np.ndarray:
         return np.concatenate(
             [motion.position, motion.velocity, motion.attitude[2:], motion.attitude_rate[2:]]
         )

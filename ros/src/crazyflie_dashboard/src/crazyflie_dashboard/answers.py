@@ -1,8 +1,6 @@
 """Answers of services, and what they say in words."""
 
-import ast
 import contextlib
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
@@ -27,13 +25,8 @@ def settle(done: "Future[Any]", outcome: "Future[Any]") -> None:
 
 
 def words(error: BaseException) -> str:
-    """Return what a service has answered, without what rospy says around it."""
-    text = str(error) or repr(error)
-    text = re.sub(r"^service \[[^]]*\] responded with an error: ", "", text)
-    if text.startswith(("b'", 'b"')):
-        with contextlib.suppress(ValueError, SyntaxError):
-            text = ast.literal_eval(text).decode(errors="replace")
-    return text.removeprefix("service cannot process request: ")
+    """Return what a service has answered; `NodeHandle.call_service` leaves out rospy's words."""
+    return str(error) or repr(error)
 
 
 def failed(text: str) -> "Future[Any]":

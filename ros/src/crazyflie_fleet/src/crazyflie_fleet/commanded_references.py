@@ -9,7 +9,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_fleet.conversions import reference_message
-from crazyflie_fleet.follower import Follower, Velocity
+from crazyflie_fleet.follower import CommandFollower, Velocity
 from crazyflie_fleet.high_level_services import FleetVehicle, HighLevelParameters
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal, at_rest
@@ -77,7 +77,7 @@ class CommandedReferences:
     ):
         self._handle = handle
         self._parameters = parameters
-        self.follower = Follower()
+        self.follower = CommandFollower()
         self._is_moving = False
         self._is_move = False  # Not a trajectory, which other vehicles may fly at the same time.
         # When the last setpoint came; None without a stream.
@@ -113,11 +113,11 @@ class CommandedReferences:
         return goal.position if goal is not None and self._is_moving else None
 
     def begin(self, command: Callable[..., None], *arguments: Any) -> None:
-        """Begin a command of `Follower`; raises `ServiceError` if it is refused."""
+        """Begin a command of `CommandFollower`; raises `ServiceError` if it is refused."""
         self._command(self.follower, command, arguments)
         self._setpoint_time = None
         self._is_moving = True
-        self._is_move = command is Follower.go_to
+        self._is_move = command is CommandFollower.go_to
         if self.follower.trajectory is not None:
             self._plan.show(self.follower.trajectory)
         self._set_timer()
@@ -157,7 +157,7 @@ class CommandedReferences:
             return
         self.forget()
         try:
-            self.begin(Follower.go_to, last.position, last.yaw, _HOLD_DURATION)
+            self.begin(CommandFollower.go_to, last.position, last.yaw, _HOLD_DURATION)
         except ServiceError as reason:
             # The last reference has a velocity, and the controller goes on with it.
             self._handle.warn(f"setpoints have stopped, and {reason}: stays at the last one")

@@ -30,7 +30,7 @@ class Velocity(NamedTuple):
     height: float | None = None  # Height above the ground (m).
 
 
-class Follower:
+class CommandFollower:
     """The goal of one vehicle, by time.
 
     Commands are those of the firmware's high-level commander, and so are trajectories from rest.

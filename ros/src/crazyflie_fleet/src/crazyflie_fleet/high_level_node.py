@@ -12,7 +12,7 @@ from typing_extensions import override
 from crazyflie_driver import srv
 from crazyflie_fleet.commanded_references import CommandedReferences
 from crazyflie_fleet.conversions import from_message
-from crazyflie_fleet.follower import Follower
+from crazyflie_fleet.follower import CommandFollower
 from crazyflie_fleet.high_level_services import (
     FleetVehicle,
     Groups,
@@ -169,7 +169,7 @@ class HighLevelNode(Node):
             way = height - references.present().position[2]
             left = takeoff.end - self._handle.time()
             duration = max(left, abs(way) / CLIMB_SPEED, self._parameters.time_step)
-            references.begin(Follower.go_to, (x, y, height), yaw, duration)
+            references.begin(CommandFollower.go_to, (x, y, height), yaw, duration)
             references.publish()
         except ServiceError as reason:
             self._handle.warn(f"takeoff: {reason}")
@@ -209,7 +209,7 @@ class HighLevelNode(Node):
             )
         hover = at_rest((x, y, request.height), start.yaw)
         if self._is_followed() or self._takeoff is not None:
-            self._execute(Follower.go_to, hover.position, hover.yaw, duration)
+            self._execute(CommandFollower.go_to, hover.position, hover.yaw, duration)
             return srv.TakeoffResponse()
         takeoff = self._takeoff = _Takeoff(hover, self._handle.time() + duration)
 
@@ -244,19 +244,19 @@ class HighLevelNode(Node):
         return srv.StopResponse()
 
     def _on_go_to(self, request):
-        self._execute(Follower.go_to, *self._move(request))
+        self._execute(CommandFollower.go_to, *self._move(request))
         return srv.GoToResponse()
 
     def _on_limited_go_to(self, request):
         move = self._move(request)
         try:
-            self._go(Follower.go_to, *move, True)
+            self._go(CommandFollower.go_to, *move, True)
         except ServiceError as reason:
             raise ServiceError(f"{self._handle.resolve('go_to')} refused: {reason}") from None
         return srv.GoToResponse()
 
     def _move(self, request):
-        """Return the arguments of `Follower.go_to`."""
+        """Return the arguments of `CommandFollower.go_to`."""
         if request.yaw and not self._parameters.has_yaw and not math.isnan(request.yaw):
             raise ServiceError(
                 f"yaw is {request.yaw:g} rad, and the controller keeps the heading 0; expected 0"
@@ -282,14 +282,14 @@ class HighLevelNode(Node):
 
     def _on_start(self, request):
         flown = (request.trajectoryId, request.timescale, request.reversed, request.relative)
-        self._execute(Follower.start, *flown)
+        self._execute(CommandFollower.start, *flown)
         return srv.StartTrajectoryResponse()
 
     def _on_start_all(self, message):
         if self._handle.name not in message.data.split():
             return
         if self._status.state == FlightStatus.FLYING:
-            self._begin_or_log(Follower.start, 0)
+            self._begin_or_log(CommandFollower.start, 0)
         else:
             self._handle.error(f"not started: the vehicle is {WORDS[self._status.state]}")
 

@@ -46,7 +46,7 @@ _HOLD_TIMEOUT = 3.0  #: Timeout of its answer (s of the machine's clock); the dr
 _LANDING_RETRY_TIME = 10.0
 
 
-class Pose(NamedTuple):
+class TimedPose(NamedTuple):
     """Position (m), rotation (quaternion x, y, z, w) and their time (s)."""
 
     position: Triple
@@ -54,7 +54,7 @@ class Pose(NamedTuple):
     time: float
 
 
-def velocity_between(first: Pose, last: Pose) -> Triple:
+def velocity_between(first: TimedPose, last: TimedPose) -> Triple:
     """Return the mean velocity, m/s, from one pose to a later one."""
     span = last.time - first.time
     x, y, z = ((b - a) / span for a, b in zip(first.position, last.position, strict=True))
@@ -62,7 +62,7 @@ def velocity_between(first: Pose, last: Pose) -> Triple:
 
 
 class RosVehicleState:
-    """Pose of a vehicle, whether it can fly on, and whether it has landed.
+    """TimedPose of a vehicle, whether it can fly on, and whether it has landed.
 
     The driver publishes its pose and status; otherwise the takeoff server its status, and an
     estimator its state. ``frames`` are the fixed and its own frame, if its position comes by tf;
@@ -85,7 +85,7 @@ class RosVehicleState:
         #: flight_status, driver_status: The last messages.
         self.flight_status = FlightStatus()
         self.driver_status = VehicleStatus(link=VehicleStatus.CONNECTING)
-        self._pose: Pose | None = None
+        self._pose: TimedPose | None = None
         self._seen_at = -math.inf
         # Height of the ground at the last takeoff (m), and planned end of the last landing (s).
         self._ground = 0.0
@@ -112,7 +112,7 @@ class RosVehicleState:
         pose = self.pose() if self.has_yaw else None
         return 0.0 if pose is None else heading(*pose.rotation)
 
-    def pose(self) -> Pose | None:
+    def pose(self) -> TimedPose | None:
         """Return the pose of the vehicle; None if it is not known."""
         if self._handle.time() - self._seen_at < MAX_POSITION_AGE:
             return self._pose
@@ -127,7 +127,7 @@ class RosVehicleState:
         # A pose far ahead of now is from before the clock was set back.
         if not -MAX_FUTURE_STAMP_SIMULATED <= age < MAX_POSITION_AGE:
             return None
-        return Pose(pose.position, pose.rotation, pose.stamp * 1e-9)
+        return TimedPose(pose.position, pose.rotation, pose.stamp * 1e-9)
 
     def fault(self) -> str:
         """Return why the vehicle cannot fly on; empty if it can."""
@@ -164,13 +164,13 @@ class RosVehicleState:
     def _on_pose(self, message):
         p, q = message.pose.position, message.pose.orientation
         self._seen_at = self._handle.time()
-        self._pose = Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w), self._seen_at)
+        self._pose = TimedPose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w), self._seen_at)
 
     def _on_state(self, message):
         s = message.state
         self._seen_at = self._handle.time()
         rotation = quaternion_from_rpy(0.0, 0.0, s.yaw)
-        self._pose = Pose((s.x, s.y, s.z), rotation, self._seen_at)
+        self._pose = TimedPose((s.x, s.y, s.z), rotation, self._seen_at)
 
     def _on_flight_status(self, message):
         self.flight_status = message

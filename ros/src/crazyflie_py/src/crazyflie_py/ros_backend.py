@@ -22,7 +22,7 @@ from crazyflie_mission_api.ros_vehicle import ALL_OF_FLEET, common_services, sec
 from crazyflie_model.angles import Triple
 from crazyflie_py import fleet as fleet_files
 from crazyflie_py.backend import EachVehicle, SwarmBackend, Visualizer
-from crazyflie_py.ros_connection import Connection, running_vehicles
+from crazyflie_py.ros_connection import ScriptConnection, running_vehicles
 from crazyflie_py.ros_vehicle import RosVehicleBackend
 from crazyflie_py.separation_watch import SeparationWatch
 from crazyflie_py.visualizer import NullVisualizer
@@ -67,7 +67,7 @@ class RosBackend(EachVehicle, SwarmBackend):
         except (MissionError, ValueError) as error:
             self._end()
             sys.exit(str(error))
-        self._connection = Connection(handle, fleet, options.unchecked)
+        self._connection = ScriptConnection(handle, fleet, options.unchecked)
         ids = [v.id for v in vehicles] if vehicles else ids_of(names)
         places: list[Any] = [v.position for v in vehicles] if vehicles else [None] * len(names)
         services = handle.service_nodes()

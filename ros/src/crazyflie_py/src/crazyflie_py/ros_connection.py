@@ -23,7 +23,7 @@ class CommandRefusedError(RuntimeError):
     """A vehicle refuses a command, or has not answered; the text names it and the reason."""
 
 
-class Connection:
+class ScriptConnection:
     """Handle, fleet and calls that all vehicles of a script share."""
 
     def __init__(self, handle: NodeHandle, fleet: Fleet, is_unchecked: bool):

@@ -19,13 +19,13 @@ from crazyflie_driver.msg import VelocityWorld as VelocityWorldMessage
 from crazyflie_fleet.conversions import full_state_message, to_message
 from crazyflie_fleet.settings import FirmwareNumber
 from crazyflie_mission_api.mission_vehicle import Clock
-from crazyflie_mission_api.ros_vehicle import Pose, RosVehicle, velocity_between
+from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, velocity_between
 from crazyflie_model.angles import Triple, rpy_from_quaternion
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import Goal, PolynomialPiece
 from crazyflie_msgs.msg import FlightStatus, VehicleStatus
 from crazyflie_py.backend import VehicleBackend, VehicleState
-from crazyflie_py.ros_connection import Connection
+from crazyflie_py.ros_connection import ScriptConnection
 from crazyflie_py.separation_watch import HeldVehicle
 from crazyflie_py.setpoints import (
     Attitude,
@@ -131,7 +131,7 @@ class RosStates:
     def __init__(self, vehicle: RosVehicle, clock: Clock):
         self._vehicle = vehicle
         self._clock = clock
-        self._last: Pose | None = None
+        self._last: TimedPose | None = None
         self._velocity = _UNKNOWN
 
     def state(self) -> VehicleState:
@@ -151,7 +151,7 @@ class RosStates:
         rpy = rpy_from_quaternion(*pose.rotation)
         return VehicleState(pose.position, self._velocity, _UNKNOWN, rpy)
 
-    def _wait(self, condition: Callable[[Pose], bool]) -> Pose:
+    def _wait(self, condition: Callable[[TimedPose], bool]) -> TimedPose:
         def is_there():
             pose = self._vehicle.pose()
             return pose is not None and condition(pose)
@@ -195,7 +195,7 @@ class RosVehicleBackend(VehicleBackend):
         vehicle: RosVehicle,
         vehicle_id: int,
         position: Triple | None,
-        connection: Connection,
+        connection: ScriptConnection,
         has_firmware: bool,
     ):
         self.name = vehicle.name

@@ -8,10 +8,10 @@ from geometry_msgs.msg import Point
 
 from crazyflie_driver import srv
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_mission_api.ros_vehicle import Pose, RosVehicle, seconds, velocity_between
+from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, seconds, velocity_between
 from crazyflie_model.angles import Triple
 from crazyflie_msgs.msg import VehicleStatus
-from crazyflie_py.ros_connection import Connection
+from crazyflie_py.ros_connection import ScriptConnection
 from crazyflie_py.setpoints import SETPOINT_TIMEOUT, Attitude, MotorsOff, Position, Setpoint, led_to
 
 _HOLD_DURATION = 0.8  #: In which a vehicle that is held stops, s.
@@ -25,7 +25,7 @@ _REPEAT = 2.0  #: Between two warnings of a vehicle, s.
 class HeldVehicle:
     """One vehicle."""
 
-    def __init__(self, vehicle: RosVehicle, connection: Connection):
+    def __init__(self, vehicle: RosVehicle, connection: ScriptConnection):
         self.name = vehicle.name
         #: is_landing, avoids: Whether it lands, and whether its firmware avoids collisions; it is
         #: not held then.
@@ -60,7 +60,7 @@ class HeldVehicle:
         is_free = self._connection.fleet.time() < self._free_until
         return is_flying and not is_free and not self.is_landing and not self.avoids
 
-    def pose(self) -> Pose | None:
+    def pose(self) -> TimedPose | None:
         """Return where it is; None if that is not known."""
         return self._vehicle.pose()
 
@@ -108,12 +108,12 @@ class SeparationWatch:
         self,
         vehicles: Sequence[HeldVehicle],
         buffers: Sequence[float],
-        connection: Connection,
+        connection: ScriptConnection,
     ):
         self._vehicles = vehicles
         self._separation = Separation(buffers)
         self._connection = connection
-        self._poses: list[Pose | None] = [None] * len(vehicles)
+        self._poses: list[TimedPose | None] = [None] * len(vehicles)
         self._velocities = np.zeros((len(vehicles), 3))
         self._held: set[int] = set()
 

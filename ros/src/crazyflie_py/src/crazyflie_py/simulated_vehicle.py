@@ -41,7 +41,7 @@ _log = logging.getLogger(__name__)
 _FALL_HEIGHT = 0.1
 
 
-class Motion(NamedTuple):
+class SimulatedMotion(NamedTuple):
     """Position (m), velocity (m/s), acceleration (m/s^2), each (3,), and yaw (rad)."""
 
     position: Array
@@ -51,7 +51,7 @@ class Motion(NamedTuple):
 
 
 class IdealMotion:
-    """Motion of one vehicle, in steps.
+    """SimulatedMotion of one vehicle, in steps.
 
     Parameters
     ----------
@@ -68,30 +68,30 @@ class IdealMotion:
         self._disturbance = disturbance
         self._avoidance: CollisionAvoidance | None = None
         self._others: Sequence[IdealMotion] = ()
-        self.now = Motion(np.array(position), np.zeros(3), np.zeros(3), 0.0)
+        self.now = SimulatedMotion(np.array(position), np.zeros(3), np.zeros(3), 0.0)
 
     def avoid(self, others: Sequence[Self], settings: AvoidanceSettings | None) -> None:
         """Avoid others from now on; with None for settings, no more."""
         self._others = others
         self._avoidance = None if settings is None else CollisionAvoidance(settings)
 
-    def held(self) -> Motion:
+    def held(self) -> SimulatedMotion:
         """Return the motion of staying in place."""
-        return Motion(self.now.position, np.zeros(3), np.zeros(3), self.now.yaw)
+        return SimulatedMotion(self.now.position, np.zeros(3), np.zeros(3), self.now.yaw)
 
-    def tracked(self, goal: Goal[float] | FullState, dt: float) -> Motion:
+    def tracked(self, goal: Goal[float] | FullState, dt: float) -> SimulatedMotion:
         """Return the motion ``dt`` (s) from now, as far as avoidance and speed permit the goal."""
         vectors = (goal.position, goal.velocity, goal.acceleration)
         position, velocity, acceleration = map(np.array, vectors)
-        return self._limited(Motion(position, velocity, acceleration, goal.yaw), dt)
+        return self._limited(SimulatedMotion(position, velocity, acceleration, goal.yaw), dt)
 
-    def at_setpoint(self, setpoint: Setpoint, dt: float) -> Motion:
+    def at_setpoint(self, setpoint: Setpoint, dt: float) -> SimulatedMotion:
         """Return the motion ``dt`` (s) from now; an attitude keeps the vehicle in place."""
         if isinstance(setpoint, FullState):
             return self.tracked(setpoint, dt)
         if isinstance(setpoint, Position):
             zero = np.zeros(3)
-            goal = Motion(np.array(setpoint.position), zero, zero, setpoint.yaw)
+            goal = SimulatedMotion(np.array(setpoint.position), zero, zero, setpoint.yaw)
             return self._approached(self._limited(goal, dt), dt)
         if isinstance(setpoint, VelocityWorld):
             return self._at_velocity(np.array(setpoint.velocity), setpoint.yaw_rate, dt)
@@ -132,7 +132,7 @@ class IdealMotion:
         if self._disturbance:
             velocity = velocity + self._disturbance * np.random.normal(size=3)
         yaw = self.now.yaw + math.radians(yaw_rate) * dt
-        return Motion(position + dt * velocity, velocity, np.zeros(3), yaw)
+        return SimulatedMotion(position + dt * velocity, velocity, np.zeros(3), yaw)
 
     def _other_positions(self):
         return np.array([other.now.position for other in self._others]).reshape(-1, 3)
@@ -376,12 +376,12 @@ class SimulatedVehicle(IdealVehicle):
     # State.
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> SimulatedMotion:
         """Where the vehicle is, and how it moves."""
         return self._motion.now
 
     @motion.setter
-    def motion(self, motion: Motion) -> None:
+    def motion(self, motion: SimulatedMotion) -> None:
         self._motion.now = motion
 
     @property
@@ -417,7 +417,7 @@ class SimulatedVehicle(IdealVehicle):
             **dict.fromkeys(counts, 0),
         }
 
-    def next_motion(self, dt: float) -> Motion:
+    def next_motion(self, dt: float) -> SimulatedMotion:
         """Return where the vehicle is at the present time, ``dt`` (s) after `motion`."""
         now = self._time()
         if now > self._expiry:

@@ -22,7 +22,7 @@ class Velocity:
 
 
 @dataclass(frozen=True)
-class Pose:
+class ReferencePose:
     """A place in the fixed frame, m, and a heading, rad."""
 
     x: float
@@ -62,14 +62,14 @@ class VelocityReference:
         self.limits = limits
         #: A velocity that is older than this, s, counts no more: the reference comes to rest.
         self.silence = silence
-        self.pose: Pose | None = None  #: None before the first `place`.
+        self.pose: ReferencePose | None = None  #: None before the first `place`.
         self._velocity = Velocity()
         self._command = Velocity()
         self._command_time = -math.inf
 
     def place(self, x: float, y: float, z: float) -> None:
         """Begin anew at rest at a place; the heading stays, or is 0."""
-        self.pose = Pose(x, y, z, 0.0 if self.pose is None else self.pose.yaw)
+        self.pose = ReferencePose(x, y, z, 0.0 if self.pose is None else self.pose.yaw)
         self.stop()
 
     def stop(self) -> None:
@@ -101,7 +101,9 @@ class VelocityReference:
         if not lowest <= z <= highest:
             z = min(max(z, lowest), highest)
             self._velocity = replace(v, z=0.0)
-        self.pose = Pose(pose.x + dx, pose.y + dy, z, wrap_to_pi(pose.yaw + v.yaw_dot * dt))
+        self.pose = ReferencePose(
+            pose.x + dx, pose.y + dy, z, wrap_to_pi(pose.yaw + v.yaw_dot * dt)
+        )
 
     @property
     def velocity(self) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ import numpy as np
 import yaml
 
 from crazyflie_controller.flight import GoToFlight
-from crazyflie_controller.go_to import GoToController, PidParameters, Pose
+from crazyflie_controller.go_to import GoToController, HeadingPose, PidParameters
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import thrust_from_pwm
@@ -83,7 +83,7 @@ class Loop:
 
     def pose(self):
         (x, y, z), quaternion = self._vehicle.pose
-        return Pose(
+        return HeadingPose(
             float(x), float(y), float(z) + self._ground, rpy_from_quaternion(*quaternion)[2]
         )
 

@@ -6,7 +6,7 @@ from closed_loop import PERIOD, Loop, control_from_cmd_vel
 
 from crazyflie_control_merger.cmd_vel_converter_node import cmd_vel_from_control
 from crazyflie_controller.flight import HOLD_LIMIT, OFF_AGE, State
-from crazyflie_controller.go_to import Pose, Setpoint
+from crazyflie_controller.go_to import HeadingPose, Setpoint
 from crazyflie_utils.refusal import RefusalError
 
 OFF = Setpoint()
@@ -23,7 +23,7 @@ def standing(**options):
     return loop
 
 
-ABOVE = Pose(0.0, 0.0, 1.0, 0.0)
+ABOVE = HeadingPose(0.0, 0.0, 1.0, 0.0)
 
 
 def flying(goal=ABOVE, **options):
@@ -65,7 +65,7 @@ def test_a_takeoff_is_a_ramp():
 @pytest.mark.parametrize("errors", VEHICLES)
 @pytest.mark.parametrize("pose_period", [0.02, 1.0 / 30.0], ids=["50 Hz", "30 Hz"])
 def test_flies_to_the_goal_and_lands_softly(errors, pose_period):
-    goal = Pose(0.6, -0.4, 1.0, 0.8)
+    goal = HeadingPose(0.6, -0.4, 1.0, 0.8)
     loop = flying(goal, pose_period=pose_period, **errors)
     assert 0.05 < loop.pose().z < 0.07
     track = loop.run(15.0)
@@ -84,9 +84,9 @@ def test_flies_to_the_goal_and_lands_softly(errors, pose_period):
 
 
 def test_a_steep_descent_stays_near_the_straight_line():
-    loop = flying(Pose(0.0, 0.0, 3.0, 0.0))
+    loop = flying(HeadingPose(0.0, 0.0, 3.0, 0.0))
     loop.run(20.0)
-    loop.flight.set_goal(Pose(0.3, 0.2, 0.6, 0.0))
+    loop.flight.set_goal(HeadingPose(0.3, 0.2, 0.6, 0.0))
     track = loop.run(5.0)
     assert track[:, 0].max() < 0.4
     assert track[:, 1].max() < 0.3
@@ -95,7 +95,7 @@ def test_a_steep_descent_stays_near_the_straight_line():
 def test_turns_round_and_goes_on_the_spot():
     loop = flying()
     loop.run(8.0)
-    loop.flight.set_goal(Pose(1.0, 0.0, 1.0, -2.5))
+    loop.flight.set_goal(HeadingPose(1.0, 0.0, 1.0, -2.5))
     track = loop.run(6.0)
     # Its way turns into a curve, but not into a spiral.
     assert np.abs(track[:, 1]).max() < 0.3
@@ -124,7 +124,7 @@ def test_a_hover_without_a_goal_is_no_goal_for_the_next_takeoff():
 
 
 def test_the_ground_is_where_it_starts():
-    loop = flying(Pose(0.0, 0.0, 1.5, 0.0), ground=0.7)
+    loop = flying(HeadingPose(0.0, 0.0, 1.5, 0.0), ground=0.7)
     loop.run(10.0)
     loop.flight.land()
     track = loop.run_until(lambda: loop.flight.state is State.IDLE, 8.0)
@@ -237,7 +237,7 @@ def test_lands_on_a_floor_that_is_higher_than_the_start():
     loop.run(10.0)
     loop.flight.land()
     # It stands on something 0.3 m high: seen there for ever.
-    stuck = Pose(0.0, 0.0, 0.3, 0.0)
+    stuck = HeadingPose(0.0, 0.0, 0.3, 0.0)
     loop.pose = lambda: stuck
     loop.run_until(lambda: loop.flight.state is State.IDLE, 8.0)
     assert loop.setpoints[-1] == OFF
@@ -245,7 +245,7 @@ def test_lands_on_a_floor_that_is_higher_than_the_start():
 
 @pytest.mark.parametrize("moment", [0.0, 1.0, 6.0])
 def test_a_landing_under_way_is_made_faster(moment):
-    loop = flying(Pose(0.0, 0.0, 5.0, 0.0))
+    loop = flying(HeadingPose(0.0, 0.0, 5.0, 0.0))
     loop.run(20.0)
     assert loop.pose().z > 4.5
     loop.flight.land()
@@ -270,7 +270,7 @@ def test_a_goal_during_a_landing_waits_for_the_next_takeoff():
     loop.run(5.0)
     loop.flight.land()
     loop.run(0.5)
-    loop.flight.set_goal(Pose(2.0, 0.0, 2.0, 0.0))
+    loop.flight.set_goal(HeadingPose(2.0, 0.0, 2.0, 0.0))
     track = loop.run_until(lambda: loop.flight.state is State.IDLE, 8.0)
     assert np.abs(track[:, 0]).max() < 0.05
     loop.flight.take_off()

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from crazyflie_controller.go_to import (
     INTEGRATED_ERROR,
     GoToController,
+    HeadingPose,
     PidParameters,
-    Pose,
     SaturatedPid,
 )
 from crazyflie_model.angles import rotate_by_yaw
@@ -123,7 +123,7 @@ def test_an_integral_gain_that_returns_begins_with_an_empty_integral():
 
 
 HOVER = 42000.0
-HERE = Pose(0.0, 0.0, 1.0, 0.0)
+HERE = HeadingPose(0.0, 0.0, 1.0, 0.0)
 
 
 def steer(goal, pose=HERE):
@@ -154,8 +154,8 @@ def test_counter_clockwise_is_a_negative_yaw_rate():
 
 
 def test_everything_has_its_limit():
-    assert steer(Pose(5.0, 5.0, 50.0, 2.0)) == (10.0, -10.0, 60000.0, -200.0)
-    assert steer(Pose(-5.0, -5.0, -50.0, -2.0)) == (-10.0, 10.0, 10000.0, 200.0)
+    assert steer(HeadingPose(5.0, 5.0, 50.0, 2.0)) == (10.0, -10.0, 60000.0, -200.0)
+    assert steer(HeadingPose(-5.0, -5.0, -50.0, -2.0)) == (-10.0, 10.0, 10000.0, 200.0)
 
 
 def test_turns_the_short_way():
@@ -203,14 +203,14 @@ def test_a_forgotten_error_has_no_slope():
 
 
 poses = st.builds(
-    Pose, st.floats(-2, 2), st.floats(-2, 2), st.floats(0, 2), st.floats(-math.pi, math.pi)
+    HeadingPose, st.floats(-2, 2), st.floats(-2, 2), st.floats(0, 2), st.floats(-math.pi, math.pi)
 )
 
 
 @given(st.lists(poses, min_size=2, max_size=5), poses, st.floats(-math.pi, math.pi))
 def test_the_setpoint_does_not_depend_on_where_north_is(path, goal, turn):
     def turned(pose):
-        return Pose(*rotate_by_yaw(pose.x, pose.y, turn), pose.z, pose.yaw + turn)
+        return HeadingPose(*rotate_by_yaw(pose.x, pose.y, turn), pose.z, pose.yaw + turn)
 
     controllers = [GoToController(pids()) for _ in range(2)]
 

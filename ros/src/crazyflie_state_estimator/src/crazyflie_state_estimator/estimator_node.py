@@ -16,8 +16,8 @@ from crazyflie_state_estimator.control_input import ControlInput
 from crazyflie_state_estimator.frozen_poses import FrozenPoseMonitor
 from crazyflie_state_estimator.motion import (
     ClockStepMonitor,
+    EstimatedMotion,
     FiniteDifference,
-    Motion,
     MotionEstimator,
 )
 from crazyflie_state_estimator.parameters import (
@@ -55,7 +55,7 @@ class StateEstimatorNode(Node):
         self._tf_error = ""
         self._inner_type = type(self.state_type().state)
 
-    def state(self, motion: Motion) -> list[float]:
+    def state(self, motion: EstimatedMotion) -> list[float]:
         """Return the state, in the order of the message's fields."""
         raise NotImplementedError
 
@@ -169,7 +169,7 @@ class StateEstimatorNode(Node):
         departure = self._frozen.departure
         if departure is None:
             return None
-        return Motion(departure.position, departure.velocity, attitude, (0.0, 0.0, 0.0))
+        return EstimatedMotion(departure.position, departure.velocity, attitude, (0.0, 0.0, 0.0))
 
     def _reject_frozen(self):
         self._frozen_poses += 1
@@ -249,7 +249,7 @@ class PositionVelocityStateEstimatorNode(StateEstimatorNode):
     parameters_type = PositionVelocityStateEstimatorParameters
 
     @override
-    def state(self, motion: Motion) -> list[float]:
+    def state(self, motion: EstimatedMotion) -> list[float]:
         return [*motion.position, *motion.velocity]
 
 
@@ -259,7 +259,7 @@ class PositionVelocityYawStateEstimatorNode(StateEstimatorNode):
     state_type = PositionVelocityYawStateStamped
 
     @override
-    def state(self, motion: Motion) -> list[float]:
+    def state(self, motion: EstimatedMotion) -> list[float]:
         return [*motion.position, *motion.velocity, motion.attitude[2]]
 
 
@@ -276,5 +276,5 @@ class FullStateEstimatorNode(StateEstimatorNode):
     parameters_type = FullStateEstimatorParameters
 
     @override
-    def state(self, motion: Motion) -> list[float]:
+    def state(self, motion: EstimatedMotion) -> list[float]:
         return [number for part in motion for number in part]

@@ -63,7 +63,7 @@ class FiniteDifference(RateFilter):
         return value, self._rate
 
 
-class Motion(NamedTuple):
+class EstimatedMotion(NamedTuple):
     """Position, velocity, attitude and attitude rate of a vehicle, in the fixed frame."""
 
     position: Components  #: x, y, z in m.
@@ -106,7 +106,7 @@ class ClockStepMonitor:
 
 
 class MotionEstimator:
-    """Motion from a sequence of poses, by the poses' own stamps.
+    """EstimatedMotion from a sequence of poses, by the poses' own stamps.
 
     A pose whose stamp repeats, or that is not finite, is ignored. A pose whose stamp goes
     back is the first of a new sequence: tf returns the latest pose, so its stamp goes back only
@@ -132,7 +132,7 @@ class MotionEstimator:
         position: Components,
         attitude: Components,
         acceleration: Components | None = None,
-    ) -> Motion | None:
+    ) -> EstimatedMotion | None:
         """Process the next pose; return the motion, or None if the pose is the first or ignored.
 
         The stamp is in ns, since floats resolve the time of day to 0.2 us only; the position in m;
@@ -160,7 +160,9 @@ class MotionEstimator:
         ]
         position, velocity = self._position_filter.step(dt, position, acceleration)
         _, attitude_rate = self._angle_filter.step(dt, self._angles)
-        return Motion(position, velocity, [wrap_to_pi(each) for each in attitude], attitude_rate)
+        return EstimatedMotion(
+            position, velocity, [wrap_to_pi(each) for each in attitude], attitude_rate
+        )
 
     def _start(self, stamp, position, attitude):
         self._stamp = stamp

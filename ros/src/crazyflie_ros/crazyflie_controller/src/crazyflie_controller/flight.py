@@ -6,7 +6,7 @@ Times are s of any monotonic clock; after a reset of the clock, a manoeuvre cont
 import math
 from enum import Enum
 
-from crazyflie_controller.go_to import GoToController, Pose, Setpoint
+from crazyflie_controller.go_to import GoToController, HeadingPose, Setpoint
 from crazyflie_model.limits import OFF_AGE
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 from crazyflie_utils.last_valid import HOLD_LIMIT
@@ -58,9 +58,9 @@ class GoToFlight:
         self._controller = controller
         self._state = State.IDLE
         self._warning: str | None = None
-        self._goal: Pose | None = None
+        self._goal: HeadingPose | None = None
         # Never used before the first pose.
-        self._pose = self._hover = self._descent_start = Pose(0.0, 0.0, 0.0, 0.0)
+        self._pose = self._hover = self._descent_start = HeadingPose(0.0, 0.0, 0.0, 0.0)
         self._stamp: float | None = None
         self._pose_time = -math.inf
         self._time = -math.inf
@@ -81,7 +81,7 @@ class GoToFlight:
         warning, self._warning = self._warning, None
         return warning
 
-    def set_goal(self, goal: Pose) -> None:
+    def set_goal(self, goal: HeadingPose) -> None:
         """Set the goal of this flight, or of the next one."""
         self._goal = goal
 
@@ -111,7 +111,7 @@ class GoToFlight:
             self._descent_speed = max(DESCENT_SPEED, (self._pose.z - self._ground) / limit)
             self._enter(State.LANDING)
 
-    def tick(self, time: float, stamp: float | None, pose: Pose | None) -> Setpoint | None:
+    def tick(self, time: float, stamp: float | None, pose: HeadingPose | None) -> Setpoint | None:
         """Return the setpoint for a time (s); None leaves the vehicle to its own watchdog.
 
         The pose is the latest one, or None. Its stamp is in s of any clock; the same

@@ -92,7 +92,7 @@ class SaturatedPid:
 AXES = ("X", "Y", "Z", "Yaw")  #: Names of the four controllers.
 
 
-class Pose(NamedTuple):
+class HeadingPose(NamedTuple):
     """Position, m, and heading, rad, in the world frame."""
 
     x: float
@@ -149,7 +149,7 @@ class GoToController:
         """Compute no rate of change with the next error, which does not continue the last one."""
         self._error = None
 
-    def update(self, pose: Pose, goal: Pose, interval: float) -> Setpoint:
+    def update(self, pose: HeadingPose, goal: HeadingPose, interval: float) -> Setpoint:
         """Return the setpoint.
 
         The interval is the time between the last pose and this one, s; > 0 except after

@@ -2,7 +2,7 @@
 
 from geometry_msgs.msg import Point, Quaternion, Vector3
 
-from crazyflie_controller.go_to import Pose
+from crazyflie_controller.go_to import HeadingPose
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils import NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.parameters.types import FRAME
@@ -28,7 +28,7 @@ class PoseSource:
         self._parameters = parameters
         self._lookup = handle.listen_to_transforms()
 
-    def latest(self) -> tuple[float, Pose] | tuple[None, None]:
+    def latest(self) -> tuple[float, HeadingPose] | tuple[None, None]:
         """Return stamp (s of ROS time) and latest pose in the world frame, or None twice."""
         parameters = self._parameters
         try:
@@ -44,8 +44,8 @@ class PoseSource:
         return found.header.stamp.to_sec(), pose(transform.translation, transform.rotation)
 
 
-def pose(position: Point | Vector3, orientation: Quaternion) -> Pose:
+def pose(position: Point | Vector3, orientation: Quaternion) -> HeadingPose:
     """Return the pose of a position and an orientation."""
     q = orientation
     yaw = rpy_from_quaternion(q.x, q.y, q.z, q.w)[2]
-    return Pose(position.x, position.y, position.z, yaw)
+    return HeadingPose(position.x, position.y, position.z, yaw)

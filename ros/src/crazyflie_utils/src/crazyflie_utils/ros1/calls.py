@@ -188,7 +188,7 @@ def _reason(error):
     if not found:
         return text
     try:
-        words = ast.literal_eval(said).decode()
+        words = ast.literal_eval(said).decode(errors="replace")
     except (SyntaxError, ValueError, AttributeError):
         return text
     return words.removeprefix("service cannot process request: ")

@@ -49,7 +49,7 @@ def test_a_recording_becomes_a_report(recording, tmp_path):
     subprocess.run(["sh", "-c", f"until [ -d {made} ]; do :; done"], timeout=LIMIT, check=True)
     report = recording.stop().result(LIMIT)
     assert report == str(made / "report" / "report.html") == str(recording.report)
-    with pytest.raises(RefusalError, match="there is none"):
+    with pytest.raises(RefusalError, match="no recording runs"):
         recording.stop()
 
 

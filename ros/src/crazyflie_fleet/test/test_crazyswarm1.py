@@ -70,7 +70,7 @@ def test_without_that_file_types_have_no_effect(load, from_text):
     fleet = fleet_file.parse(VEHICLES) if from_text else load(types="")
     assert fleet.names == ("cf1", "cf26")
     (remark,) = fleet.warnings
-    assert remark.endswith("there is no crazyflieTypes.yaml beside it; types have no effect")
+    assert remark.endswith("there is no crazyflieTypes.yaml next to it; types have no effect")
 
 
 @pytest.mark.parametrize(

@@ -259,7 +259,7 @@ def test_takeoff_of_a_vehicle_that_cannot_fly_is_refused_at_once(status, reason)
         ({"takeoff_refusal": "two nodes publish"}, "/takeoff refused: two nodes publish"),
         (
             {"state": FilterStatus.EMERGENCY, "reason": "it was called"},
-            "/takeoff refused: emergency, it was called; it has to be reset first",
+            "/takeoff refused: emergency, it was called; reset it first",
         ),
     ],
 )

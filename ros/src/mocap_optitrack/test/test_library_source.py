@@ -172,6 +172,6 @@ def test_unlabelled_markers_are_told_when_they_are_new():
 
 @pytest.mark.usefixtures("_fake_package")
 def test_a_package_without_unlabelled_markers_is_refused_where_they_are_needed():
-    with pytest.raises(SourceError, match="tells no unlabelled markers of vicon"):
+    with pytest.raises(SourceError, match="sends no unlabelled markers of vicon"):
         with connection("127.0.0.1", needs_points=True):
             pass

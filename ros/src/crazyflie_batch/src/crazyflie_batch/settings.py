@@ -87,7 +87,7 @@ class RunParameters(Parameters):
         kalman.ACCELERATION_WALK,
     )
     K_file: str = parameter(
-        TEXT, "gain file, 4 rows of 7 numbers: beside this file, or in crazyflie_lqr/config"
+        TEXT, "gain file, 4 rows of 7 numbers: next to this file, or in crazyflie_lqr/config"
     )
     integrator_k_x: float = parameter(ANY, "see crazyflie_lqr", 0.0, "integrator/k/x")
     integrator_k_y: float = parameter(ANY, "see crazyflie_lqr", 0.0, "integrator/k/y")

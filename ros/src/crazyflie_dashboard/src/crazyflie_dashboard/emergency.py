@@ -222,7 +222,7 @@ class EmergencyLane:
             began = time.monotonic()
             try:
                 self._update({n: node for n, node in self._services().items() if is_emergency(n)})
-                self._trouble = "there is none on the graph"
+                self._trouble = "no node on the graph offers it"
             except Exception as error:
                 # Whatever it is: the next look may succeed, and what is known stays.
                 self._trouble = str(error)

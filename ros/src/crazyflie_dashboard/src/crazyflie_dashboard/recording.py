@@ -62,7 +62,9 @@ class Recording:
         """
         recorder, self._recorder = self._recorder, None
         if recorder is None:
-            raise RefusalError("stop recording: there is none; expected one that was begun here")
+            raise RefusalError(
+                "stop recording: no recording runs; expected one that was begun here"
+            )
         self.text = "the report is made"
         outcome: Future[str] = Future()
 

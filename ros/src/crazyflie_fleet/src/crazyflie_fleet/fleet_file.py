@@ -163,7 +163,7 @@ def _fleet(top, types):
     parts = None if types is None else yaml_file.load(types)
     parser = FleetParser(converted(top, parts))
     if types is None and any("type" in each for each in top[VEHICLES].elements()):
-        parser.remarks.add(f"{top.file}: there is no {TYPES_FILE} beside it; types have no effect")
+        parser.remarks.add(f"{top.file}: there is no {TYPES_FILE} next to it; types have no effect")
     return parser.fleet()
 
 

@@ -147,7 +147,7 @@ class TakeoffChecks:
         if report.event is Event.FILTER_REFUSES:
             return report.reason
         if report.event is Event.FILTER_EMERGENCY:
-            return f"emergency, {report.reason}; it has to be reset first"
+            return f"emergency, {report.reason}; reset it first"
         return (
             hover_complaint(self.parameters.hover, self.box)
             or self._driver_refusal(now)

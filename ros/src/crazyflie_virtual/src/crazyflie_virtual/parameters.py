@@ -356,7 +356,7 @@ class ParameterPort:
     def _write(self, data):
         parameter = self._find(data)
         if parameter is None:
-            self._warn("parameter", f"PARAM: there is none with the number {data[:2].hex()}")
+            self._warn("parameter", f"PARAM: no parameter has the number {data[:2].hex()}")
             return data[:2] + _NO_ENTRY
         if parameter.spec.read_only:
             self._warn(parameter.full_name, f"PARAM: {parameter.full_name} is read-only")

@@ -187,7 +187,7 @@ def _with_picture(shape: Shape, entry: Entry) -> Shape:
     # Unlike pathlib's, this takes a name that is too long for one.
     if not os.path.isfile(picture):
         raise entry["picture"].error(
-            f"is {shown(shape.picture)}; expected a file, and {shortened(str(picture))} is none"
+            f"is {shown(shape.picture)}; expected a file; {shortened(str(picture))} is not one"
         )
     return replace(shape, picture=str(picture))
 

@@ -68,7 +68,7 @@ class LibrarySource(Source):
             raise SourceError(self._no_answer())
         if not self._parse(line) and self._needs_points:
             raise SourceError(
-                "the motioncapture package that is installed tells no unlabelled markers of "
+                "the installed motioncapture package sends no unlabelled markers of "
                 f"{self._system}, which single_markers need; use a version with pointCloud"
             )
         return f"{self._system} at {self._host}, over the motioncapture package"

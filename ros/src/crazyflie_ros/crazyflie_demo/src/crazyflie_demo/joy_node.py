@@ -17,7 +17,7 @@ _EVENTS = 512  #: Events that are read at most at one time.
 
 _HINTS = {
     errno.ENOENT: "is it plugged in, and does the parameter dev name it?",
-    errno.EACCES: "may this user read it? Users usually have to be in the group input",
+    errno.EACCES: "may this user read it? Usually the user must be in the group input",
 }
 
 

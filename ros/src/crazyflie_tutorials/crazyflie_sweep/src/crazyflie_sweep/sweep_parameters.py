@@ -26,8 +26,8 @@ class Area(Parameters):
 
     x_min: float = parameter(METRES, "the area begins here, in the fixed frame", -1.5)
     x_max: float = parameter(METRES, "and ends here", 1.5)
-    y_min: float = parameter(METRES, "the first lane is beside it", -1.5)
-    y_max: float = parameter(METRES, "the last lane is beside it", 1.5)
+    y_min: float = parameter(METRES, "the first lane is next to it", -1.5)
+    y_max: float = parameter(METRES, "the last lane is next to it", 1.5)
 
 
 class SpeedLimits(Parameters):
@@ -45,7 +45,7 @@ class CoverageGoal(Parameters):
     swath: float = parameter(_WIDTH, "diameter of what the vehicle covers at a time", 0.7)
     cell: float = parameter(_WIDTH, "width of the cells that are counted", 0.1)
     goal: float = parameter(
-        Number(above=0.0, maximum=1.0), "share of the area that has to be covered", 0.99
+        Number(above=0.0, maximum=1.0), "share of the area that must be covered", 0.99
     )
     max_passes: int = parameter(
         Integer(1, 100), "how often the lanes are flown, there and back, to get there", 2

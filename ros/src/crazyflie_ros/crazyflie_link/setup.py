@@ -3,6 +3,4 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-PACKAGES = ["crazyflie_link", "crazyflie_link.testing"]
-
-setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))
+setup(**generate_distutils_setup(packages=["crazyflie_link"], package_dir={"": "src"}))

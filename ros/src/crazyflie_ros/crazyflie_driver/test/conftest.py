@@ -6,9 +6,9 @@ from safety_helpers import FLYING, is_, stream_position, wait_for_words
 from crazyflie_driver.msg import LogBlock
 from crazyflie_driver.server_node import CrazyflieServerNode
 from crazyflie_driver.srv import AddCrazyflieRequest, RemoveCrazyflieRequest
-from crazyflie_link.testing.fake_vehicle import READ_ONLY, FakeVehicle
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.testing.fixtures import own_cache  # noqa: F401
+from crazyflie_virtual.fake_vehicle import READ_ONLY, FakeVehicle
 
 LIMIT = 60.0
 """The longest that a test waits for the driver, s; how soon it gives up by itself is in Limits of

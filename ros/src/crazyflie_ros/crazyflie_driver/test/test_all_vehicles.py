@@ -25,7 +25,7 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_link.address import Address
 from crazyflie_link.broadcast import REPEATS
-from crazyflie_link.testing.fake_dongle import Dongle
+from crazyflie_link.testing import Dongle
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.waiting import wait_until
 

@@ -18,9 +18,9 @@ from safety_helpers import (
 
 from crazyflie_driver.srv import UpdateParamsRequest
 from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.testing.fake_vehicle import READ_ONLY
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_virtual.fake_vehicle import READ_ONLY
 from crazyflie_virtual.testing import virtual_vehicle
 
 LIMIT = 60.0

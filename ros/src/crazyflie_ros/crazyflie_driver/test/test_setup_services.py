@@ -20,7 +20,7 @@ from crazyflie_driver.srv import (
     UploadCompressedTrajectoryRequest,
     WriteLighthouseRequest,
 )
-from crazyflie_link.testing.lighthouse_file import write_lighthouse_file
+from crazyflie_link.testing import write_lighthouse_file
 from crazyflie_utils import ServiceError
 from crazyflie_virtual.testing import virtual_vehicle
 

@@ -14,9 +14,9 @@ from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.localization import PackedPoses, pack
 from crazyflie_link.safe_crazyflie import packet
 from crazyflie_link.supervisor import BROADCAST_STOP
-from crazyflie_link.testing.fake_dongle import PLACES
-from crazyflie_link.testing.fake_vehicle import FakeVehicle
+from crazyflie_link.testing import PLACES
 from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_virtual.fake_vehicle import FakeVehicle
 
 # The thread of cflib that ends with the dongle.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")

@@ -9,7 +9,7 @@ from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.errors import RefusedError, ValueRangeError
 from crazyflie_link.lighthouse import Lighthouse
-from crazyflie_link.testing.lighthouse_file import write_lighthouse_file
+from crazyflie_link.testing import write_lighthouse_file
 
 CALIBRATIONS = 16  #: The page of the first calibration; those of the geometries begin at 0.
 SYSTEM_TYPE = 2  #: That of the files.

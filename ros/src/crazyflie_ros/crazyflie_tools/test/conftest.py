@@ -2,8 +2,8 @@
 
 import pytest
 
-from crazyflie_link.testing.fake_vehicle import READ_ONLY, FakeVehicle
 from crazyflie_utils.testing.fixtures import own_cache, time_limit  # noqa: F401
+from crazyflie_virtual.fake_vehicle import READ_ONLY, FakeVehicle
 
 LOG = {"stateEstimate.x": ("f", 1.5), "pm.vbat": ("f", 3.75), "radio.rssi": ("B", 47)}
 

@@ -124,6 +124,16 @@ class Firmware:
         if not setpoint.is_finite:
             self.warn("setpoint", "CMD: flies by a setpoint that is not a number")
 
+    def client_state(self) -> SupervisorState:
+        """Return the present state of supervisor and high-level commander as clients see it."""
+        if self.protocol < SUPERVISOR_PROTOCOL:
+            return self.supervisor.flags
+        return self.supervisor.flags | SupervisorState.of(
+            high_level_active=self.planner.state in ACTIVE,
+            trajectory_finished=self.planner.is_finished(self.time),
+            high_level_disabled=self.planner.state is TrajectoryState.DISABLED,
+        )
+
     def _correct_estimate(self):
         if not self.estimate.is_finite:
             self.warn("estimate", "ESTKALMAN: the state is no number, resetting")
@@ -144,15 +154,8 @@ class Firmware:
         self.supervisor.update(self.time, self.sensors, age, motors_run)
         if self.supervisor.can_fly:
             self._warned_state = None
-        planner_state = self.planner.state
-        self.info = self.supervisor.flags
-        if self.protocol >= SUPERVISOR_PROTOCOL:
-            self.info |= SupervisorState.of(
-                high_level_active=planner_state in ACTIVE,
-                trajectory_finished=self.planner.is_finished(self.time),
-                high_level_disabled=planner_state is TrajectoryState.DISABLED,
-            )
-        if planner_state is TrajectoryState.DISABLED:
+        self.info = self.client_state()
+        if self.planner.state is TrajectoryState.DISABLED:
             self.warn("planner", "HLC: gives no setpoints: what was asked for is not a number")
         self.planner.block(not self.supervisor.can_fly)
 

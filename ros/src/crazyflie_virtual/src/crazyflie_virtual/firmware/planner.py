@@ -104,7 +104,12 @@ class Planner:
 
     def is_finished(self, time: float) -> bool:
         """Return whether the last plan has ended."""
-        return self._trajectory is None or time >= self._begin + self._trajectory.duration
+        return time >= self.end
+
+    @property
+    def end(self) -> float:
+        """Time at which the last plan ends, s; minus infinity without."""
+        return -math.inf if self._trajectory is None else self._begin + self._trajectory.duration
 
     def goal(self, time: float) -> Goal[float] | None:
         """Return where the last plan is at ``time`` (s), at rest from its end on; None without."""

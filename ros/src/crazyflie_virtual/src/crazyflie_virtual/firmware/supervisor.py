@@ -123,7 +123,7 @@ def next_state(state: State, conditions: Condition) -> State:
 
 
 EMERGENCY_WATCHDOG = 1.0  #: Longest time between watchdog messages, after the first one, s.
-_LANDED_AFTER = 2.0  #: Time with the motors off after which the vehicle counts as landed (s).
+LANDED_AFTER = 2.0  #: Time with the motors off after which the vehicle counts as landed (s).
 #: Accelerometer along up, g, below which the vehicle has tumbled, and after how long, s.
 _TILTED, _UPSIDE_DOWN = (0.5, 1.0), (-0.2, 0.1)
 #: Accelerometer, g, below which in all axes the vehicle is falling and not tumbled.
@@ -215,7 +215,7 @@ class Supervisor:
         """
         if motors_run:
             self._thrust_time = time
-        runs = self._thrust_time is not None and time - self._thrust_time < _LANDED_AFTER
+        runs = self._thrust_time is not None and time - self._thrust_time < LANDED_AFTER
         self.is_tumbled = bool(self.tumble_check) and self._has_tumbled(time, sensors)
         state = next_state(self.state, self._conditions(time, setpoint_age, runs))
         if state is self.state:

@@ -1,14 +1,17 @@
-"""A Crazyradio for tests: a USB device below cflib's radio driver, and its bus."""
+"""Support for tests: a Crazyradio below cflib's radio driver, and files of base stations."""
 
 import socket
 import time
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
 
 import usb
+from cflib.crazyflie.mem import LighthouseBsCalibration, LighthouseBsGeometry
 from cflib.drivers import crazyradio
+from cflib.localization import LighthouseConfigFileManager
 
 from crazyflie_link.cflib_internals import BROADCAST_ADDRESS
-from crazyflie_link.testing.fake_vehicle import FakeVehicle
 
 Place = tuple[int, int]  #: Channel, and last byte of the address, of a vehicle.
 
@@ -17,6 +20,12 @@ LINK_BITS = 3 << 2
 
 #: Of the vehicles of `crazyflie_link`'s own tests.
 PLACES: tuple[Place, ...] = ((10, 0xE7), (20, 0xE7), (30, 0x01), (30, 0x02))
+
+
+class Vehicle(Protocol):
+    """A vehicle on a UDP port of this machine."""
+
+    port: int
 
 
 class Dongle:
@@ -28,7 +37,7 @@ class Dongle:
 
     bcdDevice = 0x0053  # noqa: N815
 
-    def __init__(self, vehicles: Mapping[Place, FakeVehicle]):
+    def __init__(self, vehicles: Mapping[Place, Vehicle]):
         self._peers = {place: vehicle.port for place, vehicle in vehicles.items()}
         self._sockets: dict[Place, socket.socket] = {}
         self._channel, self._acknowledges = 2, True
@@ -109,7 +118,7 @@ class Dongle:
 class Bus:
     """A USB bus with one socket for a dongle."""
 
-    def __init__(self, vehicles: Mapping[Place, FakeVehicle]):
+    def __init__(self, vehicles: Mapping[Place, Vehicle]):
         self._vehicles = vehicles
         self.dongle: Dongle | None = None
         self.failed_attempts = 0
@@ -119,7 +128,7 @@ class Bus:
         self.dongle = Dongle(self._vehicles)
 
     def break_it(self) -> None:
-        """Have the dongle answer no request any more; it stays plugged in."""
+        """Break the dongle, which answers no request any more and stays plugged in."""
         assert self.dongle is not None
         self.dongle.is_broken = True
 
@@ -127,3 +136,18 @@ class Bus:
         """Return the dongle, as cflib looks for devices."""
         self.failed_attempts += self.dongle is None
         return [self.dongle] if self.dongle is not None else []
+
+
+def write_lighthouse_file(path: Path, *numbers: int, system_type: int = 2) -> str:
+    """Write the base stations of these numbers as cflib does, and return the path.
+
+    Station k is at (1, 2, 2 + k), m; its calibration has the identifier 1000 + k.
+    """
+    geometries, calibrations = {}, {}
+    for number in numbers:
+        geometry, calibration = LighthouseBsGeometry(), LighthouseBsCalibration()
+        geometry.origin, geometry.valid = [1.0, 2.0, 2.0 + number], True
+        calibration.uid, calibration.valid = 1000 + number, True
+        geometries[number], calibrations[number] = geometry, calibration
+    LighthouseConfigFileManager.write(str(path), geometries, calibrations, system_type)
+    return str(path)

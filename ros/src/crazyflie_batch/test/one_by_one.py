@@ -11,7 +11,7 @@ from crazyflie_batch.batch import Batch
 from crazyflie_lqr import control_law
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_model.angles import rpy_from_quaternion
-from crazyflie_simulator.motion_capture import MotionCapture
+from crazyflie_simulator.disturbances import MotionCapture
 from crazyflie_simulator.vehicle import SimulatedVehicle
 from crazyflie_state_estimator.kalman import ConstantAccelerationFilter
 from crazyflie_state_estimator.motion import FiniteDifference, MotionEstimator

@@ -27,7 +27,7 @@ from crazyflie_mission_api.ros_vehicle import RosVehicle
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.testing.programs import free_port, running
 from crazyflie_utils.testing.waiting import wait_until
-from crazyflie_virtual.fake_vehicle import FakeVehicle
+from crazyflie_virtual.testing import FakeVehicle
 
 COMMANDS = (8, 0, b"\x0c")  #: Port, channel and first byte of a go_to.
 

@@ -7,7 +7,7 @@ import pytest
 import rospy
 
 from crazyflie_utils.testing.peer import LIMIT, wait_until
-from crazyflie_virtual.observer import decode
+from crazyflie_virtual.server import Observation
 
 FIRST_PORT, OBSERVER_PORT = 17850, 17800
 
@@ -36,7 +36,7 @@ def test_they_stand_side_by_side():
         observer.settimeout(LIMIT)
         end = time.monotonic() + LIMIT
         while len(positions) < 3 and time.monotonic() < end:
-            observation = decode(observer.recv(1024))
+            observation = Observation.decode(observer.recv(1024))
             positions[observation.body_id] = observation.position
     assert sorted(positions.values()) == [(0.0, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 1.0, 0.0)]
 

@@ -8,7 +8,7 @@ import pytest
 from recording import recorded
 
 from crazyflie_virtual import ports
-from crazyflie_virtual.fake_vehicle import FakeFlight, FakeVehicle
+from crazyflie_virtual.testing import FakeFlight, FakeVehicle
 
 LAG = 0.1
 """After a recorded moment, s: the firmware's supervisor runs at 25 Hz."""

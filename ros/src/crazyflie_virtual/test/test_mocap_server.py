@@ -9,8 +9,7 @@ import pytest
 from natnet import NatNetClient
 
 from crazyflie_virtual.mocap import MocapServer, MocapSettings
-from crazyflie_virtual.observer import Observation, decode
-from crazyflie_virtual.server import VehicleServer
+from crazyflie_virtual.server import Observation, VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
 
 LIMIT = 60.0
@@ -170,12 +169,12 @@ def test_observations_come_back():
     observation = Observation(
         7, "ünder", 12.5, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (0.0, 0.0, 0.6, 0.8), (7.0, 8.0, 9.0)
     )
-    assert decode(observation.encode()) == observation
+    assert Observation.decode(observation.encode()) == observation
 
 
 def test_rubbish_is_no_observation():
-    assert decode(b"") is None
-    assert decode(bytes(200)) is None
+    assert Observation.decode(b"") is None
+    assert Observation.decode(bytes(200)) is None
 
 
 @pytest.mark.parametrize(("port", "name"), [(19850, "cf1"), (19859, "cf10"), (17850, "cf17850")])
@@ -198,7 +197,7 @@ def test_a_vehicle_tells_its_observer():
         server = VehicleServer(VehicleSettings(port=0, observer_port=port, body_id=5, init_y=2.0))
         server.start()
         try:
-            first, second = (decode(observer.recv(1024)) for _ in range(2))
+            first, second = (Observation.decode(observer.recv(1024)) for _ in range(2))
         finally:
             server.stop()
     assert (first.body_id, first.position) == (5, (0.0, 2.0, 0.0))
@@ -218,6 +217,6 @@ def test_after_a_stall_no_two_observations_have_the_same_time(moments):
                 server._process(begin + moment, [])
         finally:
             server.stop()
-        assert decode(observer.recv(1024)).time == pytest.approx(begin + moments[0])
+        assert Observation.decode(observer.recv(1024)).time == pytest.approx(begin + moments[0])
         with pytest.raises(BlockingIOError):
             observer.recv(1024)

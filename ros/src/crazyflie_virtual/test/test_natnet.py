@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from crazyflie_virtual import natnet
 from crazyflie_virtual.mocap import MocapSwitches, Scene
 from crazyflie_virtual.natnet import BodyPose, Encoder
-from crazyflie_virtual.observer import Observation
+from crazyflie_virtual.server import Observation
 
 BODIES = [
     BodyPose(1, "cf1", (1.0, 2.0, 3.0), (0.0, 0.0, 0.6, 0.8), True),

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from crazyflie_virtual.mocap import MocapServer, MocapSettings
-from crazyflie_virtual.observer import Observation
+from crazyflie_virtual.server import Observation
 from mocap_optitrack.natnet_source import NatNetSource
 from mocap_optitrack.parameters import NatNetParameters
 

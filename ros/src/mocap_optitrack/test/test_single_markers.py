@@ -10,7 +10,7 @@ from test_mocap_node import launch, refusal
 
 from crazyflie_virtual.mocap import MocapSwitches, Scene
 from crazyflie_virtual.natnet import Encoder
-from crazyflie_virtual.observer import Observation
+from crazyflie_virtual.server import Observation
 from mocap_optitrack import natnet_messages
 from mocap_optitrack.frames import Frame
 from mocap_optitrack.marker_tracker import MarkerTracker

@@ -7,7 +7,7 @@ import time
 import yaml
 
 from crazyflie_utils.testing.programs import running
-from crazyflie_virtual.observer import Observation
+from crazyflie_virtual.server import Observation
 
 LIMIT = 60.0
 

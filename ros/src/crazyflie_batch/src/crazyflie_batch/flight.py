@@ -40,7 +40,7 @@ def yaw_from_quaternion(quaternion: Sequence[Number]) -> Number:
 def turn(quaternion: Sequence[Number], rotation: Sequence[Number]) -> Vector[Number]:
     """Return the quaternion after a rotation vector (rad) in the body frame.
 
-    The error of an attitude in `crazyflie_simulator.motion_capture`.
+    The error of an attitude in `crazyflie_simulator.disturbances`.
     """
     x, y, z, w = quaternion
     p, q, r = rotation
@@ -154,7 +154,7 @@ def measure(
 ) -> Vector[Any]:
     """Return the pose that motion capture sends off, `POSE_DIM` components.
 
-    See `crazyflie_simulator.motion_capture.MotionCapture`.
+    See `crazyflie_simulator.disturbances.MotionCapture`.
     """
     position, attitude = plan.model(parameters).pose(memory["x"], effective_control(memory))
     position_noise, attitude_noise = parameters["noise"]

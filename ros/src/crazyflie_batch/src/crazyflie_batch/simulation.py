@@ -92,7 +92,7 @@ class Controller:
 
 @dataclass(frozen=True)
 class Measurement:
-    """`crazyflie_simulator.motion_capture.MotionCapture` for every vehicle.
+    """`crazyflie_simulator.disturbances.MotionCapture` for every vehicle.
 
     ValueError: an argument is out of its range.
     """

@@ -9,7 +9,7 @@ import rospy
 
 from crazyflie_demo.joystick import AXIS, BUTTON, EVENT
 from crazyflie_utils.testing.programs import free_port, running
-from crazyflie_virtual.observer import decode
+from crazyflie_virtual.server import Observation
 
 LIMIT = 60.0
 """How long anything may take to come about, s."""
@@ -44,7 +44,7 @@ class Observer:
         end = time.monotonic() + limit
         track = []
         while True:
-            seen = decode(self._socket.recv(1024))
+            seen = Observation.decode(self._socket.recv(1024))
             if seen is not None:
                 track.append(seen)
                 if is_it(track[-1]):

@@ -8,7 +8,7 @@ from crazyflie_driver.server_node import CrazyflieServerNode
 from crazyflie_driver.srv import AddCrazyflieRequest, RemoveCrazyflieRequest
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.testing.fixtures import own_cache  # noqa: F401
-from crazyflie_virtual.fake_vehicle import READ_ONLY, FakeVehicle
+from crazyflie_virtual.testing import READ_ONLY, FakeVehicle
 
 LIMIT = 60.0
 """The longest that a test waits for the driver, s; how soon it gives up by itself is in Limits of

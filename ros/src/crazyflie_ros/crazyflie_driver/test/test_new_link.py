@@ -20,8 +20,7 @@ from crazyflie_driver.srv import UpdateParamsRequest
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils.testing.waiting import wait_until
-from crazyflie_virtual.fake_vehicle import READ_ONLY
-from crazyflie_virtual.testing import virtual_vehicle
+from crazyflie_virtual.testing import READ_ONLY, virtual_vehicle
 
 LIMIT = 60.0
 

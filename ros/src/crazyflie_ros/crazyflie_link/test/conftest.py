@@ -10,7 +10,7 @@ from cflib.drivers import crazyradio
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.testing import PLACES, Bus
 from crazyflie_utils.testing.fixtures import own_cache  # noqa: F401
-from crazyflie_virtual.fake_vehicle import EXTENDED, READ_ONLY, FakeVehicle
+from crazyflie_virtual.testing import EXTENDED, READ_ONLY, FakeVehicle
 
 LIMIT = 60.0
 

@@ -16,7 +16,7 @@ from crazyflie_link.safe_crazyflie import packet
 from crazyflie_link.supervisor import BROADCAST_STOP
 from crazyflie_link.testing import PLACES
 from crazyflie_utils.testing.waiting import wait_until
-from crazyflie_virtual.fake_vehicle import FakeVehicle
+from crazyflie_virtual.testing import FakeVehicle
 
 # The thread of cflib that ends with the dongle.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")

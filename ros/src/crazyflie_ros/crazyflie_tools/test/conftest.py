@@ -3,7 +3,7 @@
 import pytest
 
 from crazyflie_utils.testing.fixtures import own_cache, time_limit  # noqa: F401
-from crazyflie_virtual.fake_vehicle import READ_ONLY, FakeVehicle
+from crazyflie_virtual.testing import READ_ONLY, FakeVehicle
 
 LOG = {"stateEstimate.x": ("f", 1.5), "pm.vbat": ("f", 3.75), "radio.rssi": ("B", 47)}
 

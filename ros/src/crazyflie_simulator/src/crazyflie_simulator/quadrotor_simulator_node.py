@@ -7,8 +7,8 @@ from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
 from crazyflie_model.limits import CRASH_TILT
 from crazyflie_model.quadrotor import Airframe
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
+from crazyflie_simulator.disturbances import Wind
 from crazyflie_simulator.simulator_node import SimulatorNode, SimulatorParameters
-from crazyflie_simulator.wind import Wind
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.declaration import group

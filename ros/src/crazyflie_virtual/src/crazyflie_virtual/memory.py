@@ -9,7 +9,7 @@ from typing import NamedTuple
 from typing_extensions import override
 
 from crazyflie_virtual import settings
-from crazyflie_virtual.firmware.console import FirmwareAssertionError, Warn
+from crazyflie_virtual.crtp import FirmwareAssertionError, Warn
 
 _SIZE = 112  #: Size of a one-wire memory (bytes).
 _BITCRAZE = 0xBC  #: Vendor.

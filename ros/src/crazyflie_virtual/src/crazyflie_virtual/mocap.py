@@ -11,14 +11,22 @@ from dataclasses import dataclass
 from typing_extensions import override
 
 from crazyflie_model.angles import Quaternion, Triple
-from crazyflie_simulator.motion_capture import MotionCapture
+from crazyflie_simulator.disturbances import MotionCapture
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, TEXT, Integer, Number, Text
 from crazyflie_virtual import natnet
 from crazyflie_virtual.natnet import VERSIONS, BodyPose, Encoder
-from crazyflie_virtual.observer import DEFAULT_PORT, Observation, decode
 from crazyflie_virtual.quaternions import turned
-from crazyflie_virtual.server import Address, Server, open_socket, received, run_server, send
+from crazyflie_virtual.server import (
+    Address,
+    Observation,
+    Server,
+    open_socket,
+    received,
+    run_server,
+    send,
+)
+from crazyflie_virtual.settings import OBSERVER_PORT
 
 OCCLUSION = 0.3  #: Longest time for which a vehicle is hidden, s.
 _GHOST_MARGIN = 0.3  #: Largest distance of reflections from the vehicles, along each axis (m).
@@ -176,7 +184,7 @@ class MocapSettings(Parameters):
     observer_port: int = parameter(
         Integer(0, 65535),
         "UDP port at which the vehicles' true poses arrive; 0 takes a free one",
-        DEFAULT_PORT,
+        OBSERVER_PORT,
         "observer/port",
     )
     position_noise: float = parameter(
@@ -294,7 +302,7 @@ class MocapServer(Server):
 
     def _receive_observations(self):
         for datagram, _ in received(self._observations):
-            observation = decode(datagram)
+            observation = Observation.decode(datagram)
             if observation is not None:
                 self._scene.observe(observation)
 

@@ -9,6 +9,7 @@ import random
 import select
 import signal
 import socket
+import struct
 import sys
 import threading
 import time
@@ -16,14 +17,14 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator
 from random import Random
-from typing import Any
+from typing import Any, NamedTuple
 
 from typing_extensions import override
 
 import crazyflie_utils
+from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parse_arguments
 from crazyflie_virtual.crtp import is_broadcast
-from crazyflie_virtual.observer import Observation
 from crazyflie_virtual.settings import FIRST_PORT, FaultSwitches, VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
 
@@ -161,6 +162,56 @@ def run_server(
     except KeyboardInterrupt:
         # Ctrl-C is how it ends.
         pass
+
+
+_MAGIC = b"vcf1"
+_FORM = struct.Struct("<4sH32s14d")
+
+
+class Observation(NamedTuple):
+    """The truth about a vehicle at some moment, which local observers are sent.
+
+    Motion capture sees the vehicle this way, and tests do.
+    """
+
+    #: body_id, name: those of the vehicle; the name has at most 31 bytes.
+    body_id: int
+    name: str
+    time: float  #: Of the machine's monotonic clock, which all its processes share (s).
+    #: position, velocity: m and m/s, fixed frame.
+    position: Triple
+    velocity: Triple
+    quaternion: Quaternion  #: (x, y, z, w), body to fixed frame.
+    rates: Triple  #: Body rates, rad/s.
+
+    def encode(self) -> bytes:
+        """Return the observation as a datagram."""
+        return _FORM.pack(
+            _MAGIC,
+            self.body_id,
+            self.name.encode()[:31],
+            self.time,
+            *self.position,
+            *self.velocity,
+            *self.quaternion,
+            *self.rates,
+        )
+
+    @classmethod
+    def decode(cls, datagram: bytes) -> "Observation | None":
+        """Return the observation in a datagram; None when it holds none."""
+        if len(datagram) != _FORM.size or not datagram.startswith(_MAGIC):
+            return None
+        _, body_id, name, time, *numbers = _FORM.unpack(datagram)
+        return cls(
+            body_id,
+            name.rstrip(b"\0").decode("utf-8", "replace"),
+            time,
+            tuple(numbers[0:3]),
+            tuple(numbers[3:6]),
+            tuple(numbers[6:10]),
+            tuple(numbers[10:13]),
+        )
 
 
 _TICK = 0.005  #: Longest time between two steps of the vehicle when no packet comes (s).

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, METRES, TEXT, Integer, Number, Text
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
-from crazyflie_virtual.observer import DEFAULT_PORT
 
 
 @dataclass
@@ -31,6 +30,7 @@ class FaultSwitches:
 #: Positioning systems of a vehicle: decks that know the true pose, real decks, and none.
 DECK, FLOW, LIGHTHOUSE, LOCO, NONE = "deck", "flow", "lighthouse", "loco", "none"
 
+OBSERVER_PORT = 19800  #: UDP port to which the true pose is sent.
 FIRST_PORT = 19850  #: UDP port of the first vehicle: clients scan from here to 19859.
 
 _FRACTION = Number(minimum=-0.5, maximum=1.0)
@@ -98,7 +98,7 @@ class VehicleSettings(Parameters):
         TEXT, "where the true pose is sent", "127.0.0.1", "observer/host"
     )
     observer_port: int = parameter(
-        _UDP_PORT, "UDP port there; 0 sends nothing", DEFAULT_PORT, "observer/port"
+        _UDP_PORT, "UDP port there; 0 sends nothing", OBSERVER_PORT, "observer/port"
     )
     observer_rate: float = parameter(
         Number("Hz", minimum=1.0, maximum=500.0), "how often", 200.0, "observer/rate"

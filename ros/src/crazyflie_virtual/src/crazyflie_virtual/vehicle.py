@@ -8,8 +8,7 @@ from functools import partial
 from crazyflie_utils.parameters import vehicle_model
 from crazyflie_virtual import crtp, ports
 from crazyflie_virtual.body import LOW_CHARGE, OFF, STEP, Battery, Physics
-from crazyflie_virtual.crtp import Packet, Port
-from crazyflie_virtual.firmware.console import FirmwareAssertionError
+from crazyflie_virtual.crtp import FirmwareAssertionError, Packet, Port
 from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
 from crazyflie_virtual.log import LogPort
 from crazyflie_virtual.memory import LighthouseMemory, MemoryPort, decks, eeprom, memories

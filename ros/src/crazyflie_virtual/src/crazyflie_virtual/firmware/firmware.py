@@ -2,8 +2,7 @@
 
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.body import OFF, STEP, MotorCommands, Physics, RangingSensors, Sensors
-from crazyflie_virtual.crtp import LinkStatistics
-from crazyflie_virtual.firmware.console import Console
+from crazyflie_virtual.crtp import Console, LinkStatistics
 from crazyflie_virtual.firmware.decks import PositioningDeck
 from crazyflie_virtual.firmware.estimator import Estimator, Localization
 from crazyflie_virtual.firmware.planner import ACTIVE, Planner, TrajectoryState

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from crazyflie_model.limits import MAX_SETPOINT_PWM
-from crazyflie_virtual.firmware.console import FirmwareAssertionError
+from crazyflie_virtual.crtp import FirmwareAssertionError
 from crazyflie_virtual.firmware.planner import Planner
 from crazyflie_virtual.firmware.states import ABSOLUTE, MOTION, VELOCITY, Estimate, Modes, Setpoint
 from crazyflie_virtual.quaternions import decompress_quaternion

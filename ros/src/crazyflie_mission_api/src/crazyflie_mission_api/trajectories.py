@@ -31,9 +31,9 @@ _STEP = 0.05  #: Time between two checks of distances (s).
 START_SKEW = 0.15
 """Largest difference between the starts of vehicles behind the driver, s.
 
-Each is called by itself, unless all of a driver are started. bench/start_skew.py measured at most
-0.04 s for ten vehicles and 0.11 s for twenty, by UDP on a busy machine with two cores. A
-Crazyradio, which serves its vehicles one after the other, has not been measured.
+Each is called by itself, unless all of a driver are started. At most 0.04 s was measured for ten
+vehicles and 0.11 s for twenty, by UDP on a busy machine with two cores. A Crazyradio, which serves
+its vehicles one after the other, has not been measured.
 """
 
 

@@ -11,12 +11,14 @@ from crazyflie_virtual.crtp import Packet, Port
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.firmware.states import MOTION
 from crazyflie_virtual.toc import (
+    ATTITUDE_PIDS,
     FLOAT,
     I8,
     I16,
     I32,
     LOG_CODES,
     LOG_TYPES,
+    RATE_PIDS,
     U8,
     U16,
     U32,
@@ -183,16 +185,8 @@ _GROUPS: dict[str, list[tuple[str, NumberType, Read]]] = {
         ),
         *_rows(I16, -1.0, ctr_yaw="stabilizer.command_yaw"),
     ],
-    "pid_attitude": _pids(
-        "stabilizer.attitude", _ATTITUDE_OUTPUTS, roll="roll", pitch="pitch", yaw="yaw"
-    ),
-    "pid_rate": _pids(
-        "stabilizer.attitude",
-        _ATTITUDE_OUTPUTS,
-        roll="roll_rate",
-        pitch="pitch_rate",
-        yaw="yaw_rate",
-    ),
+    "pid_attitude": _pids("stabilizer.attitude", _ATTITUDE_OUTPUTS, **ATTITUDE_PIDS),
+    "pid_rate": _pids("stabilizer.attitude", _ATTITUDE_OUTPUTS, **RATE_PIDS),
     "posCtl": [
         *_rows(
             FLOAT,

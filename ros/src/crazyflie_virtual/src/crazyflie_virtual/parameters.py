@@ -15,10 +15,12 @@ from crazyflie_virtual.crtp import MAX_DATA
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.firmware.stabilizer import DEFAULT, MELLINGER
 from crazyflie_virtual.toc import (
+    ATTITUDE_PIDS,
     FLOAT,
     I8,
     PARAMETER_CODES,
     PARAMETER_TYPES,
+    RATE_PIDS,
     U8,
     U16,
     U32,
@@ -115,19 +117,13 @@ _GROUPS = {
         ),
     ],
     "pid_attitude": [
-        *_gains("stabilizer.attitude", _ATTITUDE_GAINS, roll="roll", pitch="pitch", yaw="yaw"),
+        *_gains("stabilizer.attitude", _ATTITUDE_GAINS, **ATTITUDE_PIDS),
         *_persistent(FLOAT, yawMaxDelta="stabilizer.attitude.yaw_max_delta"),
         *_persistent(I8, attFiltEn=0),
         *_persistent(FLOAT, attFiltCut=15.0),
     ],
     "pid_rate": [
-        *_gains(
-            "stabilizer.attitude",
-            _ATTITUDE_GAINS,
-            roll="roll_rate",
-            pitch="pitch_rate",
-            yaw="yaw_rate",
-        ),
+        *_gains("stabilizer.attitude", _ATTITUDE_GAINS, **RATE_PIDS),
         *_persistent(I8, rateFiltEn=0),
         *_persistent(FLOAT, omxFiltCut=30.0, omyFiltCut=30.0, omzFiltCut=30.0),
     ],

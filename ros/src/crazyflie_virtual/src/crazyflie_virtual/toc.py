@@ -113,6 +113,11 @@ class Table:
         return None
 
 
+#: Names of the controllers of attitude and of rates -> their attributes.
+ATTITUDE_PIDS = {axis: axis for axis in ("roll", "pitch", "yaw")}
+RATE_PIDS = {axis: f"{axis}_rate" for axis in ATTITUDE_PIDS}
+
+
 def pid_paths(
     owner: str, pids: Mapping[str, str], attributes: Mapping[str, str]
 ) -> Iterable[tuple[str, str]]:

@@ -53,7 +53,9 @@ class Vehicle:
     stamps: Rows  #: Of the states, s; 0 for a state without.
     reference: Rows
     control: Rows  #: CONTROL_FIELDS.
+    command: Rows  #: CONTROL_FIELDS as the driver was given them; none without a driver.
     attitude: Rows  #: POSE_FIELDS.
+    pose_stamps: Rows  #: Of the poses with an attitude, s; 0 for a pose without.
     battery: Rows  #: V.
     link: Rows  #: Share of answered pings, and setpoints that were not sent so far.
     toggles: Rows  #: Without fields.
@@ -140,7 +142,9 @@ def _vehicle(namespace, sources, frame, frames, link):
         stamps=state[:, [_TIME, _STAMP]],
         reference=_without_header(rows("reference", len(STATE_FIELDS))),
         control=_without_header(control),
+        command=_without_header(cmd_vel),
         attitude=_without_header(pose),
+        pose_stamps=pose[:, [_TIME, _STAMP]],
         battery=_without_header(rows("battery", 1)),
         link=link,
         toggles=_without_header(rows("toggle", 0)),

@@ -34,11 +34,18 @@ CHANGE_LIMIT, HARDWARE_CHANGE_LIMIT = 0.01, 0.03
 SATURATED_LIMIT = 0.01  #: Share of controls that are at a limit.
 _ROUNDING = 1e-6  #: Of a control that was in degrees on its way (rad).
 _NO_TILT = np.empty((0, 2))  #: Roll and pitch of no control.
+#: Thrust in hover over g: a battery that sags takes a part, a wrong mass or thrust curve more.
+HOVER_LIMITS = (0.85, 1.15)
+LATENESS_LIMIT = (
+    0.25  #: Of roll and pitch behind their commands, s: the firmware's loops take 0.19.
+)
+_MAX_LATENESS, _LATENESS_STEP, _LEAST_POSES, _LEAST_CORRELATION = 0.5, 0.01, 200, 0.5
 LEAST_VOLTAGE = 3.2  #: Of one lithium polymer cell under load, V.
 
 _HOVER = "a takeoff, and a hover of 1 s at its reference"
 _TRACKING = "states and references while the controller flies"
 _CONTROL, _STATE, _BATTERY = "controls in flight", "states in flight", "battery voltages"
+_TILTS = "controls and poses with an attitude, and motion"
 _STATUS = "vehicle_status, which a driver publishes"
 
 
@@ -63,6 +70,8 @@ class Figure:
     @property
     def normal(self) -> str:
         """What is normal, in words; empty if nothing is said about it."""
+        if math.isfinite(self.minimum) and math.isfinite(self.maximum):
+            return f"{self.minimum:.3g} to {self.maximum:.3g} {self.unit}"
         if math.isfinite(self.minimum):
             return f"≥ {self.minimum:g} {self.unit}"
         return f"≤ {self.maximum:g} {self.unit}".strip() if math.isfinite(self.maximum) else ""
@@ -85,6 +94,7 @@ def figures(flight: Flight) -> list[Figure]:
         *_tracking(flight),
         *_motion(flight),
         *_controls(flight),
+        *_model(flight),
         *_loop(flight),
         *_link(flight),
     ]
@@ -173,6 +183,48 @@ def _controls(flight: Flight) -> Iterator[Figure]:
     limit = HARDWARE_CHANGE_LIMIT if flight.is_driven else CHANGE_LIMIT
     yield Figure("roll and pitch, mean change per control", "rad", change, _CONTROL, maximum=limit)
     yield Figure("controls saturated", "%", share, _CONTROL, maximum=100.0 * SATURATED_LIMIT)
+
+
+def _model(flight: Flight) -> Iterator[Figure]:
+    """Return what a flight says about the model of the vehicle: its hover, and how late it is."""
+    phases = [each for each in flight.phases if each.name == "flying"]
+    parts = [flight.record.final_control.between(each.start, each.end) for each in phases]
+    thrust = np.concatenate([each[:, 3] for each in parts] or [_NO_TILT[:, 0]])
+    hover = float(np.median(thrust)) if len(thrust) else math.nan
+    late = [_lateness(flight, each.start, each.end) for each in phases]
+    known = [each for each in late if not math.isnan(each)]
+    hint = "otherwise the vehicle is not its model: ./run identify BAG finds it"
+    low, high = (factor * GRAVITY for factor in HOVER_LIMITS)
+    yield Figure("thrust in hover", "m/s²", hover, _CONTROL, low, high, note=hint)
+    lateness = 1e3 * float(np.median(known)) if known else math.nan
+    limit = 1e3 * LATENESS_LIMIT
+    yield Figure(
+        "roll and pitch behind their commands", "ms", lateness, _TILTS, maximum=limit, note=hint
+    )
+
+
+def _lateness(flight, start, end):
+    """Return by how much roll and pitch follow their commands, s, by their correlation.
+
+    NaN if they do not: without motion, noise is more than the commands.
+    """
+    poses = flight.attitude[(flight.attitude[:, 0] >= start) & (flight.attitude[:, 0] <= end)]
+    control = flight.record.final_control
+    if len(poses) < _LEAST_POSES or len(control) < 2:
+        return math.nan
+    times = np.arange(poses[0, 0], poses[-1, 0] - _MAX_LATENESS, _LATENESS_STEP)
+    shifts = np.arange(0.0, _MAX_LATENESS, _LATENESS_STEP)
+    found = np.zeros(len(shifts))
+    for column in (0, 1):
+        command = np.interp(times, control.times, control.values[:, column])
+        command = command - command.mean()
+        for k, shift in enumerate(shifts):
+            tilt = np.interp(times + shift, poses[:, 0], poses[:, 4 + column])
+            spread = command.std() * tilt.std()
+            if spread > 0.0:
+                found[k] += 0.5 * float((command * tilt).mean()) / spread
+    best = int(found.argmax())
+    return float(shifts[best]) if found[best] > _LEAST_CORRELATION else math.nan
 
 
 def _loop(flight: Flight) -> Iterator[Figure]:

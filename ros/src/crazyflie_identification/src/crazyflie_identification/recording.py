@@ -1,0 +1,66 @@
+"""Commands and poses of a flight in a bag, for the fit."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from crazyflie_identification.fit import LEAST_TIME, IdentificationError, Recording
+from crazyflie_model.quadrotor import QuadrotorParameters
+from crazyflie_model.units import pwm_from_thrust
+from crazyflie_reports import bag_log
+from crazyflie_reports.bag_flights import OTHER_CLOCK, Vehicle, flights, vehicles
+
+_BEGINNING = 1.0  #: Time after the takeoff in which the vehicle settles, s.
+
+
+def of_bag(path: Path, kind: QuadrotorParameters, name: str = "") -> Recording:
+    """Return the longest flight of a bag, without takeoff and landing.
+
+    Commands are those of the driver (cmd_vel); in simulation the final controls, of which 9.81
+    m/s^2 carries a vehicle of the type ``kind``. ``name`` is the vehicle, if there are several.
+    `BagError`: the bag cannot be read. `IdentificationError`: it has no such flight.
+    """
+    found: list[tuple[float, float, Vehicle]] = []
+    names = []
+    with tempfile.TemporaryDirectory() as folder:
+        for log in bag_log.read(path, Path(folder)):
+            for vehicle in vehicles(log):
+                names.append(vehicle.name)
+                if name not in ("", vehicle.name):
+                    continue
+                states = log.events.flight_states.get(vehicle.namespace, [])
+                for flight in flights(vehicle, states, [], log.end):
+                    found += [(p.end - p.start, p.start, vehicle) for p in flight.phases
+                              if p.name == "flying"]  # fmt: skip
+    if name and name not in names:
+        raise IdentificationError(
+            f"{path} has no vehicle {name}; expected one of {', '.join(names) or 'none'}"
+        )
+    if not found:
+        raise IdentificationError(
+            f"{path} has no flight; expected one of {LEAST_TIME:g} s and more"
+        )
+    _, start, vehicle = max(found, key=lambda each: each[0])
+    duration = max(found, key=lambda each: each[0])[0]
+    return _recording(path, vehicle, kind).between(start + _BEGINNING, start + duration)
+
+
+def _recording(path, vehicle, kind):
+    poses = vehicle.attitude
+    rows = vehicle.command if len(vehicle.command) else vehicle.control
+    for what, there in (("poses with an attitude (/tf or pose)", poses), ("commands", rows)):
+        if len(there) < 2:
+            raise IdentificationError(
+                f"{path} has no {what} of {vehicle.name}; expected {LEAST_TIME:g} s of them"
+            )
+    commands = rows[:, 1:].copy()
+    is_driven = len(vehicle.command) > 0
+    commands[:, 3] = pwm_from_thrust(rows[:, 4]) if is_driven else kind.pwm(rows[:, 4])
+    # A pose is of its stamp, if that is of the same clock.
+    stamps = vehicle.pose_stamps
+    offsets = stamps[:, 0] - stamps[:, 1]
+    has_clock = len(stamps) == len(poses) and abs(float(np.median(offsets))) < OTHER_CLOCK
+    times = stamps[:, 1] if has_clock else poses[:, 0]
+    finite = np.isfinite(poses).all(axis=1) & np.r_[True, np.diff(times) > 1e-4]
+    return Recording(rows[:, 0], commands, times[finite], poses[finite, 1:])

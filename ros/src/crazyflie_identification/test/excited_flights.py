@@ -1,0 +1,90 @@
+"""Excited flights of simulated vehicles, for tests: as a virtual vehicle is flown and recorded."""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from crazyflie_identification import excitation
+from crazyflie_identification.fit import Recording
+from crazyflie_lqr.control_law import limited
+from crazyflie_lqr.linear_feedback import IntegralStateFeedback
+from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
+from crazyflie_model.quadrotor import TYPES
+from crazyflie_simulator.motion_capture import MotionCapture
+from crazyflie_simulator.vehicle import SimulatedVehicle
+
+KIND = TYPES["cf21_markers"]
+PERIOD = 0.01  #: Of poses and controls, s.
+HEIGHT = 4.0  #: A vehicle that is heavier than it is taken for sinks at first, m.
+SETTLING = 8.0  #: Time until the integrator has found its weight, s.
+
+
+def drawn(seed):
+    """Return a vehicle at random: mass, delay, lags, drag, trims."""
+    random = np.random.default_rng(seed)
+    scale = random.uniform(0.5, 2.0)
+    lags = random.uniform(0.03, 0.12, 3)
+    trims = np.radians(random.uniform(-2.0, 2.0, 2))
+    return dataclasses.replace(
+        KIND,
+        mass=random.uniform(0.027, 0.045),
+        delay=round(random.uniform(0.0, 0.06), 3),
+        roll_lag=lags[0],
+        pitch_lag=lags[1],
+        yaw_lag=lags[2],
+        drag_horizontal=scale * KIND.drag_horizontal,
+        drag_vertical=scale * KIND.drag_vertical,
+        roll_trim=trims[0],
+        pitch_trim=trims[1],
+    )
+
+
+def fly(true, feedback, flown=KIND, duration=40.0, path=None, seed=0):
+    """Fly a vehicle; return the recording and the errors of position, m.
+
+    ``feedback`` are gains, shape (4, 7), for the vehicle that it is taken for, ``flown``.
+
+    ``path(t)`` returns displacement and velocity of the reference; without one it is excited.
+    """
+    vehicle = SimulatedVehicle(FirstOrderQuadrotor(true), (0.0, 0.0, HEIGHT), 0.0, delay=true.delay)
+    mocap = MotionCapture(0.0002, 0.001, seed=seed)
+    k = (-0.05, 0.05, -0.5)
+    controller = IntegralStateFeedback(
+        feedback, np.array([0.0, 0.0, 0.0, 9.81]), 6, k, (1.0, 1.0, 6.0)
+    )
+    controller.enable_integrator()
+    times, commands, poses, errors = [], [], [], []
+    last = None
+    velocity = np.zeros(3)
+    for step in range(round((SETTLING + duration) / PERIOD)):
+        t = step * PERIOD
+        vehicle.advance_to(t)
+        mocap.measure(t, *vehicle.pose)
+        ((_, position, quaternion),) = mocap.arrivals(t)
+        rpy = rpy_from_quaternion(*quaternion)
+        if last is not None:
+            # A low pass of 20 ms, as the Kalman filter of the estimator has it.
+            velocity += (1.0 - math.exp(-0.5)) * ((np.array(position) - last) / PERIOD - velocity)
+        last = np.array(position)
+        since = t - SETTLING
+        offset, speed = (path or excitation.reference)(max(since, 0.0))
+        target = np.array([offset[0], offset[1], HEIGHT + offset[2], *speed, 0.0])
+        state = np.array([*position, *velocity, rpy[2]])
+        u = np.array(controller.control(state, target, t))
+        if path is None:
+            u = np.array(limited(list(u + np.array(excitation.controls(since)))))
+        pwm = min(flown.pwm(float(u[3])), 60000.0)
+        sent = (u[0] + flown.roll_trim, u[1] + flown.pitch_trim, u[2], pwm)
+        vehicle.command(
+            [sent[0] - true.roll_trim, sent[1] - true.pitch_trim, sent[2], true.thrust(pwm)]
+        )
+        if since < 0.0:
+            continue
+        times.append(t)
+        commands.append(sent)
+        poses.append([*position, *rpy])
+        errors.append(np.linalg.norm(np.array(vehicle.pose[0]) - target[:3]))
+    time = np.array(times)
+    return Recording(time, np.array(commands), time, np.array(poses)), np.array(errors)

@@ -1,0 +1,87 @@
+"""The command identify, on bags."""
+
+import numpy as np
+import pytest
+import rosbag
+import rospy
+from excited_flights import KIND, drawn, fly
+from geometry_msgs.msg import TransformStamped, Twist, Vector3
+from tf2_msgs.msg import TFMessage
+
+from crazyflie_identification.command import main
+from crazyflie_lqr.linear_feedback_node import Gains
+from crazyflie_model.angles import quaternion_from_rpy
+from crazyflie_utils.parameters import vehicle_model
+
+from test_fit import DEFAULT  # isort: skip
+
+BEGIN = 1_700_000_000.0  #: Time of the first message, s.
+
+
+def write(path, recording, late=0.004):
+    """Write a bag as a flight with hw_hover.launch leaves it; poses arrive ``late``, s."""
+    with rosbag.Bag(str(path), "w") as bag:
+        for time, (roll, pitch, yaw_dot, pwm) in zip(
+            recording.command_times, recording.commands, strict=True
+        ):
+            degrees = np.degrees([roll, pitch, yaw_dot])
+            twist = Twist(linear=Vector3(degrees[1], degrees[0], pwm))
+            twist.angular.z = -degrees[2]
+            bag.write("/crazyflie/cmd_vel", twist, rospy.Time.from_sec(BEGIN + time))
+        for time, (x, y, z, *rpy) in zip(recording.pose_times, recording.poses, strict=True):
+            pose = TransformStamped(child_frame_id="crazyflie")
+            pose.header.frame_id, pose.header.stamp = "world", rospy.Time.from_sec(BEGIN + time)
+            pose.transform.translation = Vector3(x, y, z)
+            q = pose.transform.rotation
+            q.x, q.y, q.z, q.w = quaternion_from_rpy(*rpy)
+            bag.write("/tf", TFMessage([pose]), rospy.Time.from_sec(BEGIN + time + late))
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    """Return a vehicle that is late and heavy."""
+    return drawn(7)
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory, vehicle):
+    """Return the bag of an excited flight of it."""
+    path = tmp_path_factory.mktemp("bags") / "flight.bag"
+    write(path, fly(vehicle, DEFAULT, duration=22.0)[0])
+    return path
+
+
+def test_a_bag_becomes_a_model_that_can_be_flown(bag, vehicle, tmp_path, capsys):
+    out = tmp_path / "mine.yaml"
+    assert main([str(bag), "--type", "cf21_markers", "--out", str(out)]) == 0
+    model = vehicle_model.load(str(out))
+    assert model.mass == pytest.approx(vehicle.mass, rel=0.02)
+    assert model.delay == pytest.approx(vehicle.delay, abs=0.005)
+    assert model.pitch_trim == pytest.approx(vehicle.pitch_trim, abs=0.002)
+    printed = capsys.readouterr().out
+    assert "roll lag" in printed and "+-" in printed and f"model:={out}" in printed
+    page = (tmp_path / "mine.html").read_text()
+    assert page.count("<polyline") == 12
+    assert "standard errors" in page
+    assert "standard_errors" in out.read_text()
+    # The controller takes it for its gains.
+    assert Gains(4, 7)(str(out)).shape == (4, 7)
+
+
+def test_what_is_no_flight_is_refused_and_nothing_is_written(bag, tmp_path, capsys):
+    out = tmp_path / "mine.yaml"
+    short = tmp_path / "short.bag"
+    recording, _ = fly(KIND, DEFAULT, duration=6.0)
+    write(short, recording)
+    for arguments, reason in (
+        ([str(short)], "flight has 5.0 s of poses and commands; expected at least 15 s"),
+        ([str(tmp_path / "none.bag")], "none.bag"),
+        ([str(bag), "--vehicle", "cf9"], "has no vehicle cf9; expected one of crazyflie"),
+    ):
+        assert main([*arguments, "--out", str(out)]) == 1
+        error = capsys.readouterr().err
+        assert error.startswith("identify: ")
+        assert reason in error
+    assert not out.exists()
+    with pytest.raises(SystemExit):
+        main([str(bag), "--type", "bolt"])

@@ -36,7 +36,7 @@ class World:
         self.machine.silence = random.choice([0.0, 0.2])
         self.machine.is_needed = random.random() < 0.7
         self.machine.takeoff_thrust = random.choice([0.0, 9.0, 10.0])
-        self.measured.advance(step)
+        self.measured.age += step
         if random.random() < 0.5:
             position = (0.0, 0.0, random.choice([0.0, 0.07, 1.0]))
             self.measured.update(Motion(position, (0.0, 0.0, random.choice([-0.4, 0.0]))), 0.0)

@@ -1,18 +1,22 @@
 """Server and filter look after a flight less often while all is well, and are quick when not."""
 
+import sys
 from unittest import mock
 
 import lone_server
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from flight_words import thrusts
 from std_msgs.msg import Bool
 from takeoff_helpers import FILTER, GRAVITY, control
 
 from crazyflie_msgs.msg import FlightStatus
+from crazyflie_takeoff import flight_topics
 from crazyflie_takeoff.filter_machine import FilterMachine
 from crazyflie_takeoff.server_table import FlightStateMachine
 from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.topics import Publisher
 
 
 @pytest.fixture(params=range(5))
@@ -36,6 +40,41 @@ def test_in_flight_there_is_little_to_do(network):
     network.call("/land")
     network.advance(0.1)
     assert count(network, FlightStateMachine, 1.0) == pytest.approx(100, abs=1)
+
+
+def test_a_nominal_control_costs_a_few_calls(network):
+    """Counts what Python calls for a control and a tick, where nothing can change."""
+    network.advance(1.0)
+    node, calls = network.process("filter").node, []
+
+    def note(frame, event, _):
+        if event == "call" and frame.f_globals["__name__"].startswith("crazyflie_takeoff."):
+            calls.append(frame.f_code.co_name)
+
+    def counted(run):
+        calls.clear()
+        sys.setprofile(note)
+        try:
+            run()
+        finally:
+            sys.setprofile(None)
+        return len(calls)
+
+    message = network.on("/control/lqr")[-1][1]
+    message._connection_header = node._connection
+    assert counted(lambda: node._on_commanded_control(message)) <= 4
+    network.advance(0.04)
+    assert counted(node._on_timer) <= 24
+
+
+def test_diagnostics_that_nobody_receives_are_not_made(network):
+    with mock.patch.object(flight_topics, "report", autospec=True) as report:
+        with mock.patch.object(Publisher, "has_subscribers", return_value=False):
+            network.advance(2.5)
+        assert report.call_count == 0
+        report.side_effect = lambda *_: DiagnosticArray()
+        network.advance(1.5)
+        assert report.call_count >= 2
 
 
 def test_a_landing_begins_at_once(moment):

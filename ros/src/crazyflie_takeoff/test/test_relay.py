@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState
+from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.relay import Relay
 from crazyflie_takeoff.safe_control import Setpoint
@@ -203,6 +204,7 @@ def test_a_control_that_is_out_of_range_takes_the_long_way(control):
         lambda machine: machine.set_tilted(True),
         lambda machine: machine.miss_server(),
         lambda machine: machine.measure(at(9.0)),
+        lambda machine: machine.measure(Motion((0.0, 0.0, 1.0), (0.0, 0.0, 2.2))),
         lambda machine: machine.takeoff(1.01, "zero", level(0.0), "server"),
         lambda machine: machine.commanded(1.01, "other", level(G), "other"),
         lambda machine: setattr(machine, "flight_state", DESCENDING),
@@ -259,3 +261,44 @@ def test_the_short_way_leads_where_the_long_one_does(seed):
         assert short.state is long.state
         assert short.silence == pytest.approx(long.silence)
     assert taken > 20 or short.state is not FilterState.PASSING
+
+
+def facts(value):
+    """Return all that a machine or a part of it knows, numbers to the last bit."""
+    if hasattr(value, "__dict__") and not isinstance(value, FlightState | FilterState):
+        return {name: facts(each) for name, each in vars(value).items()}
+    return repr(value)
+
+
+@given(st.integers(0))
+def test_a_nominal_tick_leaves_what_a_whole_one_does(seed):
+    """Random flights of two filters, one of which looks at everything in each tick."""
+    random, short, whole = Random(seed), flying(), flying()
+    time, motion = 1.0, at(1.0)
+    for _ in range(300):
+        time += random.choice([0.01, 0.01, 0.01, 0.04, 0.002, 0.0, -0.01, 0.3, 2.0][: 5 + seed % 5])
+        thrust = random.gauss(G + 0.5, 1.0 if random.random() < 0.95 else 5.0)
+        control = Setpoint(random.gauss(0.0, 0.05), random.gauss(0.0, 0.1), 0.1, thrust)
+        caller = "a" if random.random() < 0.98 else "b"
+        if random.random() < 0.1:
+            height, speed = random.uniform(0.2, 2.2), random.uniform(-1.0, 2.5)
+            motion = Motion((0.0, 0.0, height), (0.0, 0.0, speed))
+        events = [
+            event
+            for event, share in [("measure", 0.7), ("control", 0.9), ("takeoff", 0.01)]
+            if random.random() < share
+        ]
+        outputs = []
+        for machine in (short, whole):
+            if "measure" in events:
+                machine.measure(motion)
+            if "control" in events and not machine.pass_unchanged(time, control, 0.0):
+                outputs.append(machine.commanded(time, control, control, caller))
+            if "takeoff" in events:
+                outputs.append(machine.takeoff(time, control, control, "server"))
+            if machine is whole:
+                machine.passes_unchanged = False
+            outputs.append(machine.tick(time))
+        half = len(outputs) // 2
+        assert outputs[:half] == outputs[half:]
+        assert facts(short) == facts(whole)

@@ -60,6 +60,27 @@ def test_work_submitted_by_work_runs_after_it(executor):
     assert order == ["outer", "first", "second", "after first", "after second"]
 
 
+def test_each_of_several_begins_after_all_that_the_one_before_has_submitted(executor):
+    order = []
+
+    def work(name):
+        executor.submit(order.append, f"after {name}")
+        order.append(name)
+
+    executor.submit_all([lambda: work("first"), lambda: work("second")])
+    assert order == ["first", "after first", "second", "after second"]
+    executor.submit(lambda: executor.submit_all([lambda: work("third"), lambda: work("fourth")]))
+    assert order[4:] == ["third", "fourth", "after third", "after fourth"]
+
+
+def test_several_wait_for_the_start():
+    executor, order = Executor(), []
+    executor.submit_all([lambda: order.append("first"), lambda: order.append("second")])
+    assert order == []
+    executor.start()
+    assert order == ["first", "second"]
+
+
 def test_first_come_first_served_from_outside(executor):
     running, go_on = threading.Event(), threading.Event()
     order = []

@@ -286,8 +286,7 @@ class VectorizedSimulatorNode(Node):
         self._all_states.publish(array_message(estimates))
         rows = estimates.tolist()
         for publisher, row in zip(self._states, rows, strict=True):
-            if publisher.has_subscribers():
-                publisher.publish(state_message(header, row))
+            publisher.publish(state_message(header, row))
         now = self._handle.time()
         found = [
             (number, x_ref)

@@ -34,8 +34,8 @@ class VectorizedVehicles:
         ]
         self._u = np.zeros((4, self._n))
         self._since = np.full(self._n, _NEVER)
-        self._next_u = np.zeros((4, self._n))
-        self._next_since = np.full(self._n, _NEVER)
+        # Number of a vehicle to the step from which its next control holds, and this control.
+        self._next: dict[int, tuple[int, Sequence[float]]] = {}
         self._start = time
         self._steps = 0
 
@@ -59,8 +59,7 @@ class VectorizedVehicles:
 
         If several come between two calls of `advance_to`, the last one is used.
         """
-        self._next_u[:, vehicle] = u
-        self._next_since[vehicle] = max(math.floor((time - self._start) / STEP + 1e-6), 0)
+        self._next[vehicle] = (max(math.floor((time - self._start) / STEP + 1e-6), 0), u)
 
     def skip(self, duration: float) -> None:
         """Advance the time by ``duration`` (s) without motion."""
@@ -75,18 +74,20 @@ class VectorizedVehicles:
         if steps < -1:
             self._start, self._steps = time, 0
             self._since[self._since != _NEVER] = 0
-            self._next_since[self._next_since != _NEVER] = 0
+            self._next = {vehicle: (0, u) for vehicle, (_, u) in self._next.items()}
         for _ in range(steps):
             self._take_commands()
             self._step()
         self._take_commands()
 
     def _take_commands(self):
-        due = self._next_since <= self._steps
-        if due.any():
-            self._u[:, due] = self._next_u[:, due]
-            self._since[due] = self._steps
-            self._next_since[due] = _NEVER
+        due = {vehicle: u for vehicle, (step, u) in self._next.items() if step <= self._steps}
+        if not due:
+            return
+        numbers = [*due]
+        self._u[:, numbers] = np.array([*due.values()]).T
+        self._since[numbers] = self._steps
+        self._next = {key: each for key, each in self._next.items() if key not in due}
 
     def _step(self):
         moved = self._dynamics.step(self._steps, self._x, self._effective_control())

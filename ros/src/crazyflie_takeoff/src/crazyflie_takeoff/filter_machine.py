@@ -237,9 +237,10 @@ class FilterMachine(Generic[Control]):
 
     def measure(self, motion: Motion, age: float = 0.0) -> None:
         """Process a state that was measured ``age`` s ago."""
-        self.passes_unchanged = False
-        self.relay.flush()
-        self.relay.measure(motion, age, self.server_reports_ground, self.in_flight)
+        relay = self.relay
+        relay.flush()
+        relay.measure(motion, age, self.server_reports_ground, self.in_flight)
+        self.passes_unchanged = self.passes_unchanged and relay.is_free
 
     def set_tilted(self, is_tilted: bool) -> None:
         """Record whether the vehicle has tilted over."""
@@ -373,8 +374,13 @@ class FilterMachine(Generic[Control]):
         self.elapsed += step
         self.silence += step
         self._return_age += step
+        relay.advance(time, elapsed)
+        if self.passes_unchanged and step > 0.0 and self.is_needed and relay.is_free:
+            # Only the silence can change anything now.
+            if self.silence < 0.5 * self._timeouts.hold:
+                return None
         lands = self._lands and self.state is FilterState.PASSING
-        crash, objection = relay.advance(time, step, elapsed, lands)
+        crash, objection = relay.complaints(step, lands)
         if crash:
             self.handle(Event.CRASH, crash)
         if objection:

@@ -1,6 +1,7 @@
 """States of a flight, as server and filter publish them."""
 
 import enum
+from functools import cached_property
 
 
 class FlightState(enum.IntEnum):
@@ -21,14 +22,10 @@ class FlightState(enum.IntEnum):
         """The name of the state on text topics."""
         return self.name.lower()
 
-    @property
+    @cached_property
     def in_flight(self) -> bool:
         """Whether the controller flies the vehicle: the value that the topic in_flight toggles."""
-        return self in _IN_FLIGHT
-
-
-# Looked up once: access to a member of an enumeration is slow.
-_IN_FLIGHT = (FlightState.FLYING, FlightState.DESCENDING)
+        return self in (FlightState.FLYING, FlightState.DESCENDING)
 
 
 def flight_state(code: int) -> FlightState | None:

@@ -194,8 +194,8 @@ class RunGaps:
     """
 
     def __init__(self) -> None:
+        self.longest = 0.0  #: Longest gap of the last seconds (s).
         self._time = math.nan
-        self._longest = 0.0
         self._lost = 0.0
 
     @property
@@ -205,23 +205,18 @@ class RunGaps:
         return "this computer is too busy for a flight" if is_starved else ""
 
     @property
-    def longest(self) -> float:
-        """Longest gap of the last seconds, s."""
-        return self._longest
-
-    @property
     def is_free(self) -> bool:
         """Whether `apply` changes no control that is in its ranges."""
-        return self._longest * _MAX_EXCESS < MAX_SPEED_CHANGE
+        return self.longest * _MAX_EXCESS < MAX_SPEED_CHANGE
 
     def run(self, time: float) -> None:
         """Record that the filter runs at ``time`` (s)."""
         gap = time - self._time
         self._time = time
         if gap > 0.0:
-            remembered = self._longest * math.exp(-gap / GAP_MEMORY)
+            remembered = self.longest * math.exp(-gap / GAP_MEMORY)
             gap = min(gap, LONGEST_GAP)
-            self._longest = max(remembered, gap)
+            self.longest = max(remembered, gap)
             share = 1.0 - math.exp(-gap / STARVATION_MEMORY)
             self._lost += share * (float(gap > BUSY_GAP) - self._lost)
 
@@ -235,14 +230,14 @@ class RunGaps:
         control (``is_ramp``), which may belong to the ramp of a landing, only thrust above hover is
         limited.
         """
-        if self._longest <= 0.0:
+        if self.longest <= 0.0:
             return control
-        tilt = math.atan(MAX_SPEED_CHANGE / self._longest / GRAVITY)
-        is_busy = self._longest > BUSY_GAP
+        tilt = math.atan(MAX_SPEED_CHANGE / self.longest / GRAVITY)
+        is_busy = self.longest > BUSY_GAP
         rising, sinking = (climb, -climb) if is_busy else (min(climb, 0.0), min(-climb, 0.0))
-        most = hover + max((MAX_SPEED_CHANGE - rising) / self._longest, -MAX_BRAKING)
+        most = hover + max((MAX_SPEED_CHANGE - rising) / self.longest, -MAX_BRAKING)
         most = max(most, MIN_THRUST)
-        least = min(hover - (MAX_SPEED_CHANGE - sinking) / self._longest, MAX_SUBSTITUTE)
+        least = min(hover - (MAX_SPEED_CHANGE - sinking) / self.longest, MAX_SUBSTITUTE)
         return Setpoint(
             limited(control.roll, tilt),
             limited(control.pitch, tilt),
@@ -280,6 +275,7 @@ class Callers:
     """
 
     def __init__(self, what: str, tolerance: int):
+        self.complaint = ""  #: Message that two nodes publish; empty if they do not.
         self._what = what
         self._tolerance = tolerance
         self._now = -math.inf
@@ -298,6 +294,7 @@ class Callers:
             if time - sent < overlap:
                 self._changes.append(time)
         self._last = (caller, time)
+        self._update_complaint()
 
     def renew(self, time: float) -> None:
         """Record another message of the last node at ``time`` (s)."""
@@ -311,13 +308,14 @@ class Callers:
             self._changes.clear()
             self._last = None if self._last is None else (self._last[0], time)
         self._now = time
-        while self._changes and time - self._changes[0] > MEMORY:
-            self._changes.popleft()
+        if self._changes or self.complaint:
+            while self._changes and time - self._changes[0] > MEMORY:
+                self._changes.popleft()
+            self._update_complaint()
 
-    @property
-    def complaint(self) -> str:
-        """Message that two nodes publish; empty if they do not."""
+    def _update_complaint(self):
         if self._last is None or len(self._changes) <= self._tolerance:
-            return ""
+            self.complaint = ""
+            return
         names = sorted(each or "one of this process" for each in (self._former, self._last[0]))
-        return f"two nodes publish {self._what}, {' and '.join(names)}; expected one"
+        self.complaint = f"two nodes publish {self._what}, {' and '.join(names)}; expected one"

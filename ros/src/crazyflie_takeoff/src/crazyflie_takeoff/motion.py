@@ -40,10 +40,6 @@ class Measurement:
         """Process a state that was measured ``age`` s ago."""
         self._motion, self.age = motion, age
 
-    def advance(self, step: float) -> None:
-        """Advance by ``step`` (s)."""
-        self.age += step
-
     def within(self, age: float) -> Motion | None:
         """Return the state if it is younger than ``age`` (s)."""
         return self._motion if self.age < age else None
@@ -51,7 +47,7 @@ class Measurement:
     @property
     def fresh(self) -> Motion | None:
         """The state, unless it is older than `MAX_FEEDBACK_AGE`."""
-        return self.within(MAX_FEEDBACK_AGE)
+        return self._motion if self.age < MAX_FEEDBACK_AGE else None
 
 
 class MeasuredPosition:

@@ -91,18 +91,20 @@ class Relay:
         self.ground.measure(motion, is_on_ground, in_flight)
         self._position_complaint = self.walls.complaint(motion.position)
 
-    def advance(self, time: float, step: float, elapsed: float, lands: bool) -> tuple[str, str]:
-        """Advance to ``time`` (s); return a crash and an objection.
-
-        ``elapsed`` is the time since the last call, s, and ``step`` the part of it that is added to
-        durations. ``lands`` is whether the controller is to bring the vehicle down. A crash is the
-        reason for which the motors are stopped in the air, an objection that for which the vehicle
-        is landed; both may be empty.
-        """
-        self.measured.advance(elapsed)
+    def advance(self, time: float, elapsed: float) -> None:
+        """Advance to ``time``, by ``elapsed`` (s)."""
+        self.measured.age += elapsed
         self.gaps.run(time)
         self.takeoff_callers.advance(time)
         self.commanded_callers.advance(time)
+
+    def complaints(self, step: float, lands: bool) -> tuple[str, str]:
+        """Return a crash and an objection, ``step`` s after the last call; both may be empty.
+
+        ``lands`` is whether the controller is to bring the vehicle down. A crash is the reason for
+        which the motors are stopped in the air, an objection that for which the vehicle is landed.
+        They are empty while `is_free` holds, as at the last call, and the vehicle is not to land.
+        """
         motion = self.measured.fresh
         crash = self._position_debounce.advance(
             step, "" if motion is None else self._position_complaint

@@ -7,6 +7,7 @@ backwards; if it is reset, a takeoff or a landing continues from there.
 import enum
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from crazyflie_model.units import GRAVITY
@@ -63,7 +64,7 @@ class ServerState(enum.Enum):
     TOUCHING_DOWN = enum.auto()  # Repeats zero thrust until the vehicle is on the ground.
     YIELDED = enum.auto()  # The filter brings the vehicle down.
 
-    @property
+    @cached_property
     def flight_state(self) -> FlightState | None:
         """The flight state that is published meanwhile; None if no state is published."""
         return _FLIGHT_STATES.get(self)

@@ -144,7 +144,9 @@ class FilterStatusPublisher:
         self._logged_explanation = explanation
 
     def publish_diagnostics(self, machine: FilterMachine[Any]) -> None:
-        """Publish diagnostics."""
+        """Publish diagnostics, if they are received."""
+        if not self._diagnostics.has_subscribers():
+            return
         is_down = machine.state is FilterState.DOWN
         is_acknowledged = machine.remembered is FlightState.ON_GROUND
         if machine.state is FilterState.PASSING or (is_down and is_acknowledged):

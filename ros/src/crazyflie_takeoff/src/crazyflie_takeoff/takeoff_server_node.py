@@ -180,7 +180,9 @@ class StatusPublisher:
             self._text.publish(String(text))
 
     def publish_diagnostics(self) -> None:
-        """Publish diagnostics."""
+        """Publish diagnostics, if they are received."""
+        if not self._diagnostics.has_subscribers():
+            return
         checks, event = self._checks, self._flight.filter.event
         text = _text(*self._content())
         level = flight_topics.WARN if ": " in text else flight_topics.OK

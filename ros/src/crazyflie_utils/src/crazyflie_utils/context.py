@@ -142,7 +142,7 @@ class ProcessContext:
     def _on_clock(self, clock, message):
         # As work among the other work: time does not move within a callback, and
         # a reset does not overtake messages of the simulation before it.
-        self.executor.submit(partial(clock.set, message.clock.to_sec()))
+        self.executor.submit(clock.set, message.clock.to_sec())
 
     def _run_simulated(self, now, is_reset):
         if is_reset:

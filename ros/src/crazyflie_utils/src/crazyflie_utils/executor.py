@@ -7,7 +7,8 @@ runs it, and what is submitted meanwhile.
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 
 class _FairLock:
@@ -47,7 +48,7 @@ class Executor:
     """
 
     def __init__(self) -> None:
-        self._queue: deque[Callable[[], None]] = deque()
+        self._queue: deque[tuple[Callable[..., None], tuple[Any, ...]]] = deque()
         self._running = _FairLock()
         self._runner: int | None = None
         self._started = False
@@ -63,23 +64,41 @@ class Executor:
         """Whether this thread runs work at present."""
         return self._runner == threading.get_ident()
 
-    def submit(self, work: Callable[[], None]) -> None:
-        """Run ``work`` after all that was submitted before it.
+    def submit(self, work: Callable[..., None], *arguments: Any) -> None:
+        """Run ``work(*arguments)`` after all that was submitted before it.
 
         From outside, returns when the work is done. From inside running work,
         and before `start`, returns at once.
         """
-        self._queue.append(work)
+        self._queue.append((work, arguments))
         if self._runner != threading.get_ident():
             self._drain()
 
-    def _drain(self) -> None:
+    def submit_all(self, works: Iterable[Callable[[], None]]) -> None:
+        """Submit several pieces of work; see `submit`.
+
+        From outside, each begins after all that the one before has submitted.
+        """
+        items = [(work, ()) for work in works]
+        if self._started and self._runner != threading.get_ident():
+            self._drain(items)
+        else:
+            self._queue.extend(items)
+
+    def _drain(self, items=()):
         if not self._started:
             return
         with self._running:
             self._runner = threading.get_ident()
+            queue = self._queue
             try:
-                while self._queue:
-                    self._queue.popleft()()
+                while queue:
+                    work, arguments = queue.popleft()
+                    work(*arguments)
+                for item in items:
+                    queue.append(item)
+                    while queue:
+                        work, arguments = queue.popleft()
+                        work(*arguments)
             finally:
                 self._runner = None

@@ -28,8 +28,9 @@ from crazyflie_utils.parameters.types import ParameterType
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.tf.poses import StampedPose
 from crazyflie_utils.timers import Timer, VaryingTimer
-from crazyflie_utils.topics import LatestMessage, Publisher, Subscriber, finite_only
+from crazyflie_utils.topics import LatestMessage, Publisher, Subscriber
 from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.vectors import is_finite, number_getter
 
 P = TypeVar("P", bound=Parameters)
 M = TypeVar("M", bound=genpy.Message)
@@ -140,14 +141,32 @@ class NodeHandle:
         service call.
         """
         name = self.resolve(topic)
-        if finite:
-            callback = finite_only(callback, finite, on_invalid, name, self.warn)
-        guarded = self.guard(callback)
+        numbers = number_getter(message_type, finite) if finite else None
+
+        def work(message):
+            if self.is_closed:
+                return
+            try:
+                # If the sum is finite, so are the numbers; it may also overflow.
+                if (
+                    not finite
+                    or (numbers and math.isfinite(sum(numbers(message))))
+                    or is_finite(getattr(message, finite))
+                ):
+                    callback(message)
+                    return
+                self.warn(f"ignoring a message on {name}: its {finite} is not finite", throttle=1.0)
+                if on_invalid is not None:
+                    on_invalid()
+            except Exception as error:
+                self.report_fault(callback, error)
+
+        receive: Callable[[Any], None]
         if latest_only:
-            self._latest.append(LatestMessage(guarded))
+            self._latest.append(LatestMessage(work))
             receive = self._latest[-1].take
         else:
-            receive = lambda message: self._submit(partial(guarded, message))  # noqa: E731
+            receive = partial(self._submit, work)
         subscriber = self._process.topics.subscribe(name, message_type, receive)
         self._undo.append(subscriber.close)
         return subscriber
@@ -223,7 +242,7 @@ class NodeHandle:
         reply = transport.call_service(
             self.resolve(name), service_type, request, limit, start_limit
         )
-        reply.add_done_callback(lambda reply: self._submit(partial(forward, reply, outcome, self)))
+        reply.add_done_callback(lambda reply: self._submit(forward, reply, outcome, self))
         return outcome
 
     @property
@@ -259,18 +278,22 @@ class NodeHandle:
         return timer
 
     def _tick(self, callback):
-        guarded = self.guard(callback)
-
         def tick():
             for latest in self._latest:
-                latest.deliver()
-            guarded()
+                if latest.waiting:
+                    latest.deliver()
+            if self.is_closed:
+                return
+            try:
+                callback()
+            except Exception as error:
+                self.report_fault(callback, error)
 
         return tick
 
     def submit(self, callback: Callable[..., None], *arguments: Any) -> None:
         """Queue a call ``callback(*arguments)``; from any thread of the node."""
-        self._submit(partial(self.guard(callback), *arguments))
+        self._submit(self.guard(callback), *arguments)
 
     def broadcast_poses(
         self, refresh: Callable[[], None] | None = None

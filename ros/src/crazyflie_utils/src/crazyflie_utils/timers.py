@@ -157,13 +157,11 @@ class TimerQueue:
         """
         self._is_running = True
         due = self._take_due(now)
-        are_several = len(due) > 1
-        if are_several and self._before is not None:
-            self._executor.submit(self._before)
-        for timer in due:
-            self._executor.submit(timer.fire)
-        if are_several and self._after is not None:
-            self._executor.submit(self._after)
+        works = [timer.fire for timer in due]
+        if len(due) > 1:
+            works = [*filter(None, (self._before, *works, self._after))]
+        if works:
+            self._executor.submit_all(works)
 
     def rebase(self, now: float) -> None:
         """Set every deadline one period after ``now`` (s): time has been reset."""

@@ -3,13 +3,13 @@
 They must therefore not change it. Messages are sent to other processes only if these subscribe.
 """
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import genpy
 
 from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, Transport
-from crazyflie_utils.vectors import is_finite
 
 Receiver = Callable[[Any], None]
 
@@ -22,11 +22,6 @@ class Topic:
         self.message_type = message_type
         self.publishers: list[Publisher] = []
         self.receivers: list[Receiver] = []
-
-    def deliver(self, message: genpy.Message) -> None:
-        """Hand a message to every subscriber in this process."""
-        for receiver in self.receivers:
-            receiver(message)
 
 
 class Publisher:
@@ -73,7 +68,8 @@ class Publisher:
             self.latched = message
         if self._latch or self._external.has_subscribers():
             self._external.publish(*before, message)
-        self._topic.deliver(message)
+        for receiver in self._topic.receivers:
+            receiver(message)
 
     def close(self) -> None:
         """End the publication; later messages, and the latched one, are lost."""
@@ -115,37 +111,13 @@ class LatestMessage:
 
     def __init__(self, callback: Callable[[Any], None]):
         self._callback = callback
-        self._message: Any = None
-
-    def take(self, message: Any) -> None:
-        """Store a message; it replaces the previous one."""
-        self._message = message
+        self.waiting: deque[Any] = deque(maxlen=1)  #: The message, if it is new.
+        self.take = self.waiting.append  #: Stores a message; it replaces the previous one.
 
     def deliver(self) -> None:
         """Call the callback with the latest message, if it is new."""
-        message, self._message = self._message, None
-        if message is not None:
-            self._callback(message)
-
-
-def finite_only(
-    callback: Callable[[Any], None],
-    field: str,
-    on_invalid: Callable[[], None] | None,
-    topic: str,
-    warn: Callable[..., None],
-) -> Callable[[Any], None]:
-    """Return a callback that drops messages with a NaN or infinity; see `NodeHandle.subscribe`."""
-
-    def check(message):
-        if is_finite(getattr(message, field)):
-            callback(message)
-            return
-        warn(f"ignoring a message on {topic}: its {field} is not finite", throttle=1.0)
-        if on_invalid is not None:
-            on_invalid()
-
-    return check
+        if self.waiting:
+            self._callback(self.waiting.pop())
 
 
 class Topics:

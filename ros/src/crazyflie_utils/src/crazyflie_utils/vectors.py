@@ -76,6 +76,16 @@ def is_finite(message: genpy.Message) -> bool:
     return all(_is_finite(getattr(message, field)) for field in message.__slots__)
 
 
+def number_getter(
+    message_type: Any, field: str
+) -> Callable[[genpy.Message], tuple[float, ...]] | None:
+    """Return a function for the numbers of a field of a message; None if it is not a flat one."""
+    inner_type: Any = type(getattr(message_type(), field))
+    if not (hasattr(inner_type, "_slot_types") and _is_flat(inner_type)):
+        return None
+    return attrgetter(*(f"{field}.{each}" for each in inner_type.__slots__))
+
+
 @functools.cache
 def _is_flat(message_type):
     types = message_type._slot_types

@@ -45,11 +45,22 @@ def test_a_position_is_known_for_half_a_second():
     assert position.value(10.125) == (1.0, 2.0, 3.0)
     assert position.explanation(10.125, "/state") == ""
     assert position.value(10.25) is None
-    assert "states on /state are 0.2 s old" in position.explanation(10.25, "/state")
+    assert "states on /state get 0.5 s old before the next" in position.explanation(10.25, "/state")
     assert "no state has come" in position.explanation(10.5, "/state")
     # After a reset of the clock the age counts from there.
     assert position.value(2.0) == (1.0, 2.0, 3.0)
     assert position.value(2.25) is None
+
+
+def test_the_reason_is_the_longest_gap_of_the_last_seconds_or_the_age():
+    position = MeasuredPosition()
+    position.measure(10.0, (1.0, 2.0, 3.0), 0.25)
+    position.measure(10.875, (1.0, 2.0, 3.0), 0.125)
+    position.measure(11.0, (1.0, 2.0, 3.0), 0.375)
+    explanation = position.explanation(11.125, "/state")
+    assert "states on /state get 1.2 s old before the next one comes; expected less" in explanation
+    position.measure(17.0, (1.0, 2.0, 3.0), 0.5)
+    assert "states on /state are 0.5 s old when they come" in position.explanation(17.0, "/state")
 
 
 def test_the_usual_age_grows_by_a_tenth():

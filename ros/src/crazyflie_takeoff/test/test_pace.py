@@ -8,7 +8,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from flight_words import thrusts
 from std_msgs.msg import Bool
-from takeoff_helpers import FILTER, GRAVITY, control
+from takeoff_helpers import FILTER, GRAVITY, SERVER, HoverNetwork, control
 
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_takeoff import flight_topics
@@ -141,8 +141,17 @@ def test_the_filter_looks_more_often_than_a_control_is_lost(hold, rate):
     assert tick.call_count == pytest.approx(rate, abs=1)
 
 
-def test_the_server_has_little_to_do_in_flight_only():
+def test_the_server_has_little_to_do_in_flight_and_on_the_ground():
     process = lone_server.flying()
     process.advance(0.1)
     assert count(process, FlightStateMachine) == pytest.approx(10, abs=1)
-    assert count(lone_server.on_ground(), FlightStateMachine) == pytest.approx(100, abs=1)
+    assert count(lone_server.on_ground(), FlightStateMachine) == pytest.approx(20, abs=1)
+
+
+def test_so_has_the_filter_on_the_ground_and_in_a_takeoff():
+    network = HoverNetwork(SERVER)
+    network.advance(1.0)
+    assert count(network, FilterMachine, 1.0) == pytest.approx(25, abs=1)
+    network.call("/takeoff")
+    network.advance(0.1)
+    assert count(network, FilterMachine, 0.5) == pytest.approx(25, abs=2)

@@ -158,20 +158,23 @@ def test_only_a_landing_that_is_seen_above_the_ground_has_to_come_down(state, z,
 TOLERANCE = 0.002
 
 
-def flying(z=1.0):
-    """Return a machine whose nominal flight has lasted for a second."""
+def flying(z=1.0, state=FLYING):
+    """Return a machine whose nominal flight, or climb, has lasted for a second."""
     machine = FilterMachine(TIMEOUTS, LIMITS)
     machine.stop_listening(0.0)
-    machine.flight_state = FLYING
-    for k in range(101):
+    machine.flight_state = state
+    for k in range(-100 if state is TAKING_OFF else 0, 101):
+        if k < -60:
+            machine.takeoff(0.01 * k, "thrust", level(G + 0.2), "server")
         machine.measure(at(z))
         machine.commanded(0.01 * k, "control", level(G))
         machine.tick(0.01 * k)
     return machine
 
 
-def test_a_nominal_control_passes_unchanged():
-    machine = flying()
+@pytest.mark.parametrize("state", [FLYING, TAKING_OFF])
+def test_a_nominal_control_passes_unchanged(state):
+    machine = flying(state=state)
     assert machine.pass_unchanged(1.01, level(G), 0.0)
     assert machine.pass_unchanged(1.02, Setpoint(MAX_TILT, -MAX_TILT, MAX_YAW_RATE, MAX_THRUST), 0)
     assert machine.pass_unchanged(1.03, level(MIN_THRUST), 0.04)
@@ -229,10 +232,10 @@ def test_a_fast_or_high_climb_takes_the_long_way(z, z_dot, passes):
     assert machine.pass_unchanged(1.02, level(G), 0.0) == passes
 
 
-@given(st.integers(0))
-def test_the_short_way_leads_where_the_long_one_does(seed):
+@given(st.integers(0), st.sampled_from([FLYING, TAKING_OFF]))
+def test_the_short_way_leads_where_the_long_one_does(seed, state):
     """Random flights of two filters, one of which never takes it."""
-    random, short, long = Random(seed), flying(), flying()
+    random, short, long = Random(seed), flying(state=state), flying(state=state)
     time, taken = 1.0, 0
     motion = at(1.0)
     for k in range(400):
@@ -270,10 +273,10 @@ def facts(value):
     return repr(value)
 
 
-@given(st.integers(0))
-def test_a_nominal_tick_leaves_what_a_whole_one_does(seed):
+@given(st.integers(0), st.sampled_from([FLYING, TAKING_OFF]))
+def test_a_nominal_tick_leaves_what_a_whole_one_does(seed, state):
     """Random flights of two filters, one of which looks at everything in each tick."""
-    random, short, whole = Random(seed), flying(), flying()
+    random, short, whole = Random(seed), flying(state=state), flying(state=state)
     time, motion = 1.0, at(1.0)
     for _ in range(300):
         time += random.choice([0.01, 0.01, 0.01, 0.04, 0.002, 0.0, -0.01, 0.3, 2.0][: 5 + seed % 5])

@@ -11,6 +11,7 @@ import pytest
 import rosgraph
 import rospy
 from processes import composed, small_node
+from rosgraph_msgs.msg import Log
 from std_msgs.msg import Float64, Int64, String
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
@@ -71,6 +72,21 @@ def test_messages_go_out_and_come_in(outlet):
     for number in range(2, 102):
         publisher.publish(Int64(number))
         assert heard.get(timeout=LIMIT).data == number + 1000
+
+
+def test_a_line_of_the_log_has_no_list_of_topics(handle):
+    lines = []
+    subscriber = handle.subscribe("/rosout", Log, lines.append)
+    handle.publisher("/one_of_many", String)
+    wait_until(subscriber.has_publishers, "the log to connect")
+
+    def is_logged():
+        handle.info("a line")
+        return any("a line" in each.msg for each in lines)
+
+    wait_until(is_logged, "the line to come")
+    subscriber.close()
+    assert {topic for each in lines for topic in each.topics} == set()
 
 
 def test_a_new_topic_has_no_subscribers(handle):

@@ -4,7 +4,7 @@ The models take a state or a control as the list of its *components*: floats
 for one vehicle, on which Python is several times quicker than numpy; arrays of
 shape (n,), or of any shape that broadcasts, for many. The differences between the
 two are in this module. Any other type that supports numpy's ``sin``, ``where``
-and ``minimum`` (NEP 13, NEP 18) is accepted as well.
+and ``clip`` (NEP 13, NEP 18) is accepted as well.
 """
 
 from __future__ import annotations
@@ -89,5 +89,7 @@ def clip(value: Many, low: Many, high: Many) -> Many:
     """Return ``value`` limited to [low, high]."""
     if isinstance(value, float):
         return low if value < low else high if value > high else value
-    # The same as np.clip, in a fraction of its time; a NaN stays.
-    return np.minimum(np.maximum(value, low), high)
+    if type(value) is np.ndarray:
+        # The same as np.clip, in a fraction of its time; a NaN stays.
+        return np.minimum(np.maximum(value, low), high)
+    return np.clip(value, low, high)

@@ -124,6 +124,8 @@ class FilterMachine(Generic[Control]):
         self.passes_unchanged = False
         self._flight_state: FlightState | None = None
         self._toggled = False
+        # Whether the vehicle is in flight, by the flight state or else by the toggles.
+        self.in_flight = False
         self._is_listening = True
         self._waiting: Control | None = None  # A commanded control, while the filter listens.
         # The last takeoff control that was passed on, its thrust (m/s^2), and when it came (s).
@@ -151,18 +153,18 @@ class FilterMachine(Generic[Control]):
     @flight_state.setter
     def flight_state(self, state: FlightState | None) -> None:
         self._flight_state = state
-        self.passes_unchanged = False
+        self._update_in_flight()
 
     def toggle(self) -> None:
         """Process a toggle of in_flight; no toggle restores a flight that has ended."""
         if not self.state.passes_nothing:
             self._toggled = not self._toggled
-            self.passes_unchanged = False
+            self._update_in_flight()
 
-    @property
-    def in_flight(self) -> bool:
-        """Whether the vehicle is in flight, by the flight state or else by the toggles."""
-        return self._toggled if self._flight_state is None else self._flight_state.in_flight
+    def _update_in_flight(self):
+        state = self._flight_state
+        self.in_flight = self._toggled if state is None else state.in_flight
+        self.passes_unchanged = False
 
     @property
     def remembered(self) -> FlightState | None:
@@ -196,7 +198,7 @@ class FilterMachine(Generic[Control]):
 
     @property
     def _lands(self):
-        return self.remembered is FlightState.DESCENDING
+        return self._flight_state is FlightState.DESCENDING
 
     def takeoff_age(self, time: float) -> float:
         """Return the age of the last takeoff control at ``time``, s; infinite without one."""
@@ -218,7 +220,9 @@ class FilterMachine(Generic[Control]):
     @property
     def is_nominal(self) -> bool:
         """Whether no transition is possible within half of the timeout ``hold``."""
-        is_heard = self.silence < 0.5 * self._timeouts.hold or self.is_on_ground
+        latest = 0.5 * self._timeouts.hold
+        lifts_off = not self.is_needed and self.takeoff_age(self._ticked) < latest
+        is_heard = self.silence < latest or lifts_off or self.is_on_ground
         is_settled = self.state is FilterState.PASSING and self._return_age >= RETURN_TIME
         return is_settled and is_heard and self.relay.is_nominal and not self._ground_check_pending
 
@@ -230,8 +234,9 @@ class FilterMachine(Generic[Control]):
 
     @property
     def _refusal(self):
-        stays = self.is_on_ground and self.state is not FilterState.EMERGENCY
-        return self.relay.contention if stays else ""
+        contention = self.relay.contention
+        stays = contention and self.is_on_ground and self.state is not FilterState.EMERGENCY
+        return contention if stays else ""
 
     # Inputs.
 
@@ -390,8 +395,11 @@ class FilterMachine(Generic[Control]):
         self.is_needed = self.selects_controller(time)
         self.handle(Event.TICK)
         is_missed = self.lacks_controller or self.may_lack_reference or not self.is_commanded
-        is_flying = self._flight_state is FlightState.FLYING and not is_missed
-        self.passes_unchanged = is_flying and relay.is_free and self.is_nominal
+        # In the climb of a takeoff, the controller is selected when the server has become silent.
+        climbs = self._flight_state is FlightState.TAKING_OFF and self.is_needed
+        is_flying = self._flight_state is FlightState.FLYING or climbs
+        is_selected = is_flying and not is_missed
+        self.passes_unchanged = is_selected and relay.is_free and self.is_nominal
         return self._substitute(time, elapsed)
 
     def _substitute(self, time, elapsed):
@@ -513,6 +521,7 @@ class FilterMachine(Generic[Control]):
     def _end_flight(self):
         self._toggled = False
         self._kept_thrust = 0.0
+        self._update_in_flight()
 
     def _hold_place(self):
         self.takeovers += 1

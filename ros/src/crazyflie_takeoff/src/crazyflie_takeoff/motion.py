@@ -7,6 +7,7 @@ from crazyflie_utils.clock import CLOCK_STEP
 
 MAX_FEEDBACK_AGE = 0.2  #: Oldest state that controls the vehicle and its limits (s).
 MAX_POSITION_AGE = 0.5  #: Age up to which a position is that of the vehicle (s).
+GAP_MEMORY = 5.0  #: Time for which the longest gap between two states is remembered (s).
 DRIFT = 0.1  #: Rate at which the usual age of messages may grow (s/s).
 MIN_AGE = -0.05  #: Least age of a message that is on time, by its stamp (s).
 TOUCHDOWN_HEIGHT = 0.05  #: Largest height of a vehicle that is down where it took off (m).
@@ -60,6 +61,7 @@ class MeasuredPosition:
         self._position: Position | None = None
         self._age = 0.0
         self._received = 0.0
+        self._gap, self._gap_end = 0.0, -math.inf
         self.missing_reason = ""  #: Why the estimator has no state; empty if it has one.
 
     @property
@@ -69,6 +71,11 @@ class MeasuredPosition:
 
     def measure(self, time: float, position: Position, age: float) -> None:
         """Record a position (m) that was received at ``time`` with an age (s)."""
+        gap = time - self._received
+        if self._position is not None and (
+            gap > self._gap or not 0.0 <= time - self._gap_end < GAP_MEMORY
+        ):
+            self._gap, self._gap_end = gap, time
         self._position, self._received, self._age = position, time, age
 
     def value(self, time: float) -> Position | None:
@@ -80,7 +87,14 @@ class MeasuredPosition:
         """Return why the position, from states on ``topic``, is not known; empty if it is."""
         if self.value(time) is not None:
             return ""
-        if self._position is not None and self._silence(time) < MAX_POSITION_AGE:
+        silence = self._silence(time)
+        if self._position is not None and silence < MAX_POSITION_AGE:
+            if self._age < MAX_POSITION_AGE:
+                oldest = max(silence, self._gap) + self._age
+                return (
+                    f"states on {topic} get {oldest:.1f} s old before the next one comes; expected "
+                    f"less than {MAX_POSITION_AGE:g} s: is this computer too busy?"
+                )
             return (
                 f"states on {topic} are {self._age:.1f} s old when they come; do the clocks of all "
                 "computers agree, and are they quick enough?"

@@ -397,9 +397,10 @@ class TakeoffControlFilterNode(Node):
 
     def _publish_state(self):
         status = self._filter.status
-        # Commanded controls right after a launch do not prove a flight.
-        is_commanded = status.is_commanded and not self._is_fresh
-        self._status.publish(status._replace(is_commanded=is_commanded))
+        if self._is_fresh and status.is_commanded:
+            # Commanded controls right after a launch do not prove a flight.
+            status = status._replace(is_commanded=False)
+        self._status.publish(status)
 
     def _publish_diagnostics(self):
         self._status.publish_diagnostics(self._filter)

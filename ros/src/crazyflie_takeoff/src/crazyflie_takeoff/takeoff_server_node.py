@@ -39,6 +39,7 @@ from crazyflie_utils.vectors import from_vector, stamped
 
 TIME_STEP = 0.01  #: Period of the server (s).
 CRUISE_TIME_STEP = 0.1  #: Period in flight, where it only watches the battery (s).
+GROUND_TIME_STEP = 0.05  #: Period on the ground, where it repeats zero thrust (s).
 STATUS_PERIOD = 0.1  #: Period at which the status is compared with the published one (s).
 RECOVERY_LIMIT = 1.0  #: Time that a server waits for evidence of the flight when it starts (s).
 
@@ -423,9 +424,12 @@ class TakeoffServerNode(Node):
 
     def _watch_battery(self):
         now = self._handle.time()
-        if complaint := self._checks.battery_complaint(now):
-            self._handle.warn(complaint, throttle=30.0, key="battery")
-        if self._checks.battery.charge(now) is Charge.CRITICAL:
+        charge = self._checks.battery.charge(now)
+        if charge not in (Charge.LOW, Charge.CRITICAL):
+            return
+        complaint = self._checks.battery_complaint(now)
+        self._handle.warn(complaint, throttle=30.0, key="battery")
+        if charge is Charge.CRITICAL:
             self._land(complaint, f"takeoff aborted: {complaint}")
 
     def _watch_positioning(self):
@@ -457,16 +461,21 @@ class TakeoffServerNode(Node):
             if state is FlightState.DESCENDING:
                 self._descent.publish(message)
         if output.thrust is not None:
-            control = Control(thrust=output.thrust)
+            control = from_vector(Control, (0.0, 0.0, 0.0, output.thrust))
             self._control.publish(stamped(ControlStamped, self._handle.stamp(), control=control))
         if state in (FlightState.ON_GROUND, FlightState.FLYING):
             self._calls.finish()
 
     def _set_pace(self):
         # Not before the state has been published.
-        is_flying = self._status.state is self._flight.flight_state is FlightState.FLYING
-        cruises = is_flying and not self._calls.waiting
-        self._timer.set_period(CRUISE_TIME_STEP if cruises else TIME_STEP)
+        state = self._flight.flight_state
+        period = TIME_STEP
+        if state is self._status.state and not self._calls.waiting:
+            if state is FlightState.FLYING:
+                period = CRUISE_TIME_STEP
+            elif state is FlightState.ON_GROUND:
+                period = GROUND_TIME_STEP
+        self._timer.set_period(period)
 
 
 def report_of(message: FilterStatus) -> FilterReport:

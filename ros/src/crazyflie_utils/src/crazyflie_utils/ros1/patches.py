@@ -64,15 +64,16 @@ def shield_screen_log() -> None:
 
 
 def log_without_master() -> None:
-    """Read the parameter with which rospy leaves topics out of /rosout, once.
+    """Read the parameter with which rospy leaves topics out of /rosout, once; by default it does.
 
     rospy caches no parameter that is not set: it asked the master at each line, and waited for one
-    that was frozen, in the middle of an emergency.
+    that was frozen, in the middle of an emergency. In a process of 100 vehicles the names of all
+    topics made a line take 2 ms, and lines of all vehicles at once a gap in their control.
     """
-    value = False
+    value = True
     # A master that has just gone does not block the process.
     with contextlib.suppress(OSError):
-        value = rospy.get_param(_NO_TOPICS, False)
+        value = rospy.get_param(_NO_TOPICS, True)
     paramserver.get_param_server_cache().set(_NO_TOPICS, value)
 
 

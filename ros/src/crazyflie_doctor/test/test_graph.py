@@ -1,6 +1,8 @@
 """The doctor's checks of a graph and its motion, on data."""
 
 import dataclasses
+import subprocess
+import sys
 
 import pytest
 from doctor_findings import found, the_only
@@ -140,6 +142,21 @@ def test_two_drivers_of_one_vehicle():
         ("error", f"{uri} is flown by /a, /b"),
         ("error", f"{uri} is added by /cf1/add, /cf2/add"),
     ]
+
+
+def test_two_drivers_of_one_vehicle_whose_address_is_spelled_in_two_ways():
+    first, second = "radio://0/80/2M/E7E7E7E7E7", "radio://1/080/2M/e7e7e7e7e7?safelink=0"
+    twice = but(parameters={"/cf1/add/uri": first, "/cf2/add/uri": second, "/cf3/add/uri": "x://?"})
+    reported = {"udp://localhost:1": {"/a"}, "udp://127.0.0.1:1": {"/b"}, second: {"/a"}}
+    assert found(graph.check_drivers(twice, reported)) == [
+        ("error", "udp://127.0.0.1:1 is flown by /a, /b"),
+        ("error", f"{first} is added by /cf1/add, /cf2/add"),
+    ]
+
+
+def test_addresses_are_read_without_cflib():
+    program = "import sys; sys.modules['cflib'] = None; import crazyflie_doctor.graph"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
 
 
 # Time, tf, delay.

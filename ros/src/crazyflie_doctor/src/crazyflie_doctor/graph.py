@@ -1,11 +1,13 @@
 """Checks of a graph: nodes, message types, connections, publishers."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from crazyflie_doctor.finding import Finding, error, listed, warn
+from crazyflie_link.address import Address
+from crazyflie_link.errors import AddressError
 
 Type = tuple[str, str]  #: Name and MD5 sum of a message or service type.
 
@@ -55,12 +57,25 @@ class Graph:
 
     @property
     def uris(self) -> dict[str, list[str]]:
-        """Address of a vehicle -> parameters that name it."""
-        named = defaultdict(list)
-        for name, value in sorted(self.parameters.items()):
-            if name.endswith("/uri") and isinstance(value, str) and "://" in value:
-                named[value].append(name)
-        return dict(named)
+        """Address of a vehicle, in one of its spellings -> parameters that name it."""
+        return _by_vehicle(
+            (value, name)
+            for name, value in sorted(self.parameters.items())
+            if name.endswith("/uri") and isinstance(value, str) and "://" in value
+        )
+
+
+def _by_vehicle(named: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    """Return the names of pairs of an address and a name, by the first spelling of the address."""
+    spellings: dict[str, str] = {}
+    names: dict[str, list[str]] = {}
+    for uri, name in named:
+        try:
+            key = Address.parse(uri).key
+        except AddressError:
+            key = uri
+        names.setdefault(spellings.setdefault(key, uri), []).append(name)
+    return names
 
 
 def check_nodes(graph: Graph) -> Iterator[Finding]:
@@ -178,8 +193,9 @@ def check_drivers(graph: Graph, reported: Mapping[str, set[str]]) -> Iterator[Fi
 
     ``reported`` is address of a vehicle -> nodes whose diagnostics have it.
     """
-    for uri, nodes in sorted(reported.items()):
-        if len(nodes) > 1:
+    pairs = ((uri, node) for uri in sorted(reported) for node in reported[uri])
+    for uri, nodes in _by_vehicle(pairs).items():
+        if len({*nodes}) > 1:
             yield error(f"{uri} is flown by {listed(nodes)}", "end all but one driver")
     for uri, parameters in graph.uris.items():
         if len(parameters) > 1:

@@ -1,14 +1,15 @@
 """Link to a Crazyflie: connections with limits, log blocks, parameters, commands.
 
 The names below are imported at their first use: `crazyflie_link.errors`, `crazyflie_link.address`
-and the like do not need the rest.
+and the like do not need the rest, nor cflib.
 """
 
+import contextlib
 import importlib
 import warnings
 
 # cflib switches deprecation warnings on for the whole process, and rospy has some.
-with warnings.catch_warnings():
+with warnings.catch_warnings(), contextlib.suppress(ImportError):
     import cflib  # noqa: F401
 
 _HOME = {

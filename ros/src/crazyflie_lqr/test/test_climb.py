@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_lqr.climb import ACCELERATION, LEAD, SPEED, Climb
+from crazyflie_lqr.linear_feedback import ACCELERATION, LEAD, SPEED, Climb
 
 
 def test_it_waits_for_a_vehicle_that_does_not_lift_off():

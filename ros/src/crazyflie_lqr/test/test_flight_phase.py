@@ -1,6 +1,6 @@
 """The guess whether a vehicle stands on the ground."""
 
-from crazyflie_lqr.climb import GroundGuess
+from crazyflie_lqr.linear_feedback import GroundGuess
 
 
 def test_who_hangs_in_the_air_flies():

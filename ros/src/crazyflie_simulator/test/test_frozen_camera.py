@@ -14,8 +14,7 @@ from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import GRAVITY
 from crazyflie_simulator.disturbances import MotionCapture, Wind
 from crazyflie_simulator.vehicle import SimulatedVehicle
-from crazyflie_state_estimator.control_input import ControlInput
-from crazyflie_state_estimator.frozen_poses import FrozenPoseMonitor
+from crazyflie_state_estimator.control_response import ControlInput, FrozenPoseMonitor
 from crazyflie_state_estimator.kalman import ConstantAccelerationFilter
 from crazyflie_state_estimator.motion import FiniteDifference, MotionEstimator
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from crazyflie_model.units import GRAVITY
-from crazyflie_state_estimator.control_input import ControlInput
+from crazyflie_state_estimator.control_response import ControlInput
 from crazyflie_utils.last_valid import HOLD_LIMIT
 
 HOVER = np.array([0.0, 0.0, 0.0, GRAVITY])

@@ -7,7 +7,7 @@ import pytest
 from estimator_helpers import fly, launch
 
 from crazyflie_msgs.msg import Control, ControlStamped
-from crazyflie_state_estimator.frozen_poses import FrozenPoseMonitor
+from crazyflie_state_estimator.control_response import FrozenPoseMonitor
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 STILL = (0.0, 0.0, 0.0)

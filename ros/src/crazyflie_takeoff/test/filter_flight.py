@@ -3,10 +3,10 @@
 from takeoff_helpers import PointMass
 
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, LossTimeouts
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.limits import Box, Limits
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.transition_table import FlightState
 
 G = 9.81
 ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState

@@ -1,7 +1,7 @@
 """A flight with a clock that is moved by hand."""
 
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.server_table import Event, FlightStateMachine, Plan, ServerState
+from crazyflie_takeoff.transition_table import FlightState
 
 G = 9.81
 PLAN = Plan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.3)

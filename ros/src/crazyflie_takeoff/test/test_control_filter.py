@@ -13,7 +13,7 @@ from filter_flight import (
 )
 
 from crazyflie_takeoff.filter_machine import FilterMachine, LossTimeouts
-from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.transition_table import FlightState
 
 
 class ControlFilter(FilterMachine):

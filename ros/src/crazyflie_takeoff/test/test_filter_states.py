@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from crazyflie_msgs.msg import FilterStatus
 from crazyflie_takeoff.filter_machine import Event, FilterMachine, FilterState, LossTimeouts
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.transition_table import FlightState
 
 TABLE = FilterMachine.TABLE
 LEGAL = {

@@ -16,8 +16,8 @@ from flight_clock import (
     in_state,
 )
 
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.server_table import Event, Plan
+from crazyflie_takeoff.transition_table import FlightState
 from crazyflie_utils.refusal import RefusalError
 
 

@@ -6,13 +6,13 @@ import pytest
 
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_takeoff.filter_machine import FilterMachine, LossTimeouts
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.limits import Box, Callers, Debounce, DescentWatch, Limits, Walls
 from crazyflie_takeoff.motion import Delay, Ground, MeasuredPosition, Measurement, Motion
 from crazyflie_takeoff.relay import Relay
 from crazyflie_takeoff.safe_control import Setpoint
 from crazyflie_takeoff.server_table import DESCENT_MARGIN, Descent
 from crazyflie_takeoff.takeoff_checks import Battery, Charge, DriverConnection
+from crazyflie_takeoff.transition_table import FlightState
 
 
 def at(z, z_dot=0.0):

@@ -3,7 +3,6 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.server_table import (
     TABLE,
     TAKEOVERS,
@@ -13,6 +12,7 @@ from crazyflie_takeoff.server_table import (
     Plan,
     ServerState,
 )
+from crazyflie_takeoff.transition_table import FlightState
 
 G = 9.81
 PLAN = Plan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.3)

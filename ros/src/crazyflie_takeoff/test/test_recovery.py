@@ -2,7 +2,6 @@
 
 import pytest
 
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.server_table import (
     TAKEOVERS,
     Event,
@@ -11,6 +10,7 @@ from crazyflie_takeoff.server_table import (
     Plan,
     ServerState,
 )
+from crazyflie_takeoff.transition_table import FlightState
 
 ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState
 

@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.relay import Relay
 from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.transition_table import FlightState
 
 TILTED = Setpoint(0.2, -0.1, 1.0, G + 0.5)
 HALF = pytest.approx((0.1, -0.05, 0.5, G + 0.25))

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from crazyflie_model.limits import MIN_THRUST
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.limits import Debounce
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import (
@@ -15,6 +14,7 @@ from crazyflie_takeoff.safe_control import (
     MOTORS_OFF,
     Setpoint,
 )
+from crazyflie_takeoff.transition_table import FlightState
 from crazyflie_utils.refusal import RefusalError
 
 # Limits.

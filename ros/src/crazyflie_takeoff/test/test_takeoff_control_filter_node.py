@@ -15,12 +15,12 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_takeoff import flight_topics
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.takeoff_control_filter_node import (
     LISTENING_TIME,
     SERVER_LIMIT,
     TakeoffControlFilterNode,
 )
+from crazyflie_takeoff.transition_table import FlightState
 from crazyflie_utils.testing import FakeProcess
 
 

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from crazyflie_utils.executor import Executor, _FairLock
+from crazyflie_utils.timers import Executor, _FairLock
 
 LIMIT = 60.0
 

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_utils.clock import SteadyClock
-from crazyflie_utils.executor import Executor
-from crazyflie_utils.timers import SteadyTimers, TimerQueue
+from crazyflie_utils.timers import Executor, SteadyTimers, TimerQueue
 
 LIMIT = 60.0
 

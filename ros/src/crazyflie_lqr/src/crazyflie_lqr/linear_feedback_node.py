@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
-from crazyflie_lqr.climb import GroundGuess
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
-from crazyflie_lqr.linear_feedback import LinearFeedback, at_rest
-from crazyflie_lqr.reference import GuardedReference
-from crazyflie_lqr.state_age import StateAge
+from crazyflie_lqr.linear_feedback import GroundGuess, LinearFeedback, at_rest
+from crazyflie_lqr.reference import GuardedReference, StateAge
 from crazyflie_model.limits import MAX_SPEED
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, flight_status, parameter

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.limits import OVERLAP, Box, Limits
 from crazyflie_takeoff.motion import Motion, is_sinking
 from crazyflie_takeoff.relay import Relay
@@ -19,7 +18,7 @@ from crazyflie_takeoff.safe_control import (
     Setpoint,
     descent_time,
 )
-from crazyflie_takeoff.transition_table import Table, Transition, step
+from crazyflie_takeoff.transition_table import FlightState, Table, Transition, step
 from crazyflie_utils.refusal import RefusalError
 
 TAKEOFF_CONTROL_LIMIT = 0.5  #: Age of a takeoff control up to which it excludes commanded ones (s).

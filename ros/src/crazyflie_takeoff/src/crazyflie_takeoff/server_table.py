@@ -11,9 +11,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Position
-from crazyflie_takeoff.transition_table import Table, Transition, find, step
+from crazyflie_takeoff.transition_table import FlightState, Table, Transition, find, step
 from crazyflie_utils.refusal import RefusalError
 
 LIFT_OFF_THRUST = GRAVITY + 0.2  #: Thrust of the open-loop part of a takeoff (m/s^2).

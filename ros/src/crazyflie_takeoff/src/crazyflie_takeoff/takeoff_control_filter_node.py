@@ -17,11 +17,11 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_takeoff import flight_topics
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, LossTimeouts, Status
-from crazyflie_takeoff.flight_state import FlightState, flight_state
 from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic
 from crazyflie_takeoff.limits import Limits
 from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.transition_table import FlightState, flight_state
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
 from crazyflie_utils.refusal import RefusalError

@@ -20,7 +20,6 @@ from crazyflie_msgs.msg import (
     VehicleStatus,
 )
 from crazyflie_takeoff import flight_topics
-from crazyflie_takeoff.flight_state import FlightState, flight_state
 from crazyflie_takeoff.server_table import (
     NO_FILTER,
     REFUSALS,
@@ -31,8 +30,13 @@ from crazyflie_takeoff.server_table import (
     FlightStateMachine,
     ServerState,
 )
-from crazyflie_takeoff.takeoff_checks import Charge, TakeoffChecks
-from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters, hover_complaint
+from crazyflie_takeoff.takeoff_checks import (
+    Charge,
+    TakeoffChecks,
+    TakeoffServerParameters,
+    hover_complaint,
+)
+from crazyflie_takeoff.transition_table import FlightState, flight_state
 from crazyflie_utils import Node, NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import from_vector, stamped

@@ -1,4 +1,4 @@
-"""State machines as data: the program runs the table that the documentation draws.
+"""The states of a flight, and state machines as data: the program runs the table that is drawn.
 
 A table is a sequence of `Transition`; guards and actions are functions of one context, and their
 names are the words of the diagram.
@@ -7,7 +7,38 @@ names are the words of the diagram.
 import enum
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Generic, TypeVar
+
+
+class FlightState(enum.IntEnum):
+    """State of a flight; the values are those of crazyflie_msgs/FlightStatus.
+
+    A landing has two states, because the vehicle is still in flight in the first: the controller
+    brings it down (`DESCENDING`) before the server ramps the thrust down (`LANDING`).
+    """
+
+    ON_GROUND = 1
+    TAKING_OFF = 2
+    FLYING = 3
+    DESCENDING = 4
+    LANDING = 5
+
+    @property
+    def word(self) -> str:
+        """The name of the state on text topics."""
+        return self.name.lower()
+
+    @cached_property
+    def in_flight(self) -> bool:
+        """Whether the controller flies the vehicle: the value that the topic in_flight toggles."""
+        return self in (FlightState.FLYING, FlightState.DESCENDING)
+
+
+def flight_state(code: int) -> FlightState | None:
+    """Return the state of a constant of FlightStatus; None for UNKNOWN, else ValueError."""
+    return FlightState(code) if code else None
+
 
 State = TypeVar("State", bound=enum.Enum)
 Context = TypeVar("Context")

@@ -7,11 +7,10 @@ from functools import partial
 from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.clock import SimulatedClock, SteadyClock
-from crazyflie_utils.executor import Executor
 from crazyflie_utils.flights import ShutdownInhibitor
 from crazyflie_utils.log import NodeLog
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED, Transforms
-from crazyflie_utils.timers import SteadyTimers, Timer, TimerQueue
+from crazyflie_utils.timers import Executor, SteadyTimers, Timer, TimerQueue
 from crazyflie_utils.topics import Publisher, Topics
 from crazyflie_utils.transport import Transport
 

@@ -1,5 +1,7 @@
 """The 7-dimensional models against closed forms and scipy's integrator."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -202,3 +204,18 @@ def test_rates_that_depend_on_the_time_are_integrated_as_by_simpson_s_rule():
     # It is exact for a cubic.
     (x,) = rk4_step(lambda t, x, u: [u[0] * t**3], 1.0, [7.0], [2.0], 0.5)
     assert x == pytest.approx(7.0 + 2.0 * (1.5**4 - 1.0) / 4.0)
+
+
+class Drag(Coupled7D):
+    """A model that is derived from `Coupled7D`."""
+
+    def rates(self, t, x, u):
+        rates = super().rates(t, x, u)
+        return [*rates[:3], rates[3] - 0.5 * x[3], *rates[4:]]
+
+
+def test_a_derived_model_flies_by_its_own_rates():
+    x = [0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0]
+    for count in range(1000):
+        x = Drag().step(count, x, [0.0, 0.0, 0.0, GRAVITY])
+    assert x[3] == pytest.approx(2.0 * math.exp(-0.5), rel=1e-6)

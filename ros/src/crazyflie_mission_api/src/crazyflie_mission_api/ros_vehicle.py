@@ -62,7 +62,7 @@ def velocity_between(first: TimedPose, last: TimedPose) -> Triple:
 
 
 class RosVehicleState:
-    """TimedPose of a vehicle, whether it can fly on, and whether it has landed.
+    """Pose of a vehicle, whether it can fly on, and whether it has landed.
 
     The driver publishes its pose and status; otherwise the takeoff server its status, and an
     estimator its state. ``frames`` are the fixed and its own frame, if its position comes by tf;

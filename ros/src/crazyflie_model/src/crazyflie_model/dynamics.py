@@ -186,6 +186,9 @@ class Coupled7D(SevenDimensional):
         The acceleration turns with the heading; what its integrals have of the third order in the
         yaw rate is left out: at 3.5 rad/s it is 1e-9 of them.
         """
+        if type(self).rates is not Coupled7D.rates:
+            # A model that is derived from this one.
+            return super().step(count, x, u)
         px, py, pz, vx, vy, vz, yaw = x
         yaw_dot, half = u[2], STEP / 2.0
         ax, ay, az = coupled_acceleration(u, yaw + half * yaw_dot)

@@ -51,7 +51,7 @@ class SimulatedMotion(NamedTuple):
 
 
 class IdealMotion:
-    """SimulatedMotion of one vehicle, in steps.
+    """Motion of one vehicle, in steps.
 
     Parameters
     ----------

@@ -106,7 +106,7 @@ class ClockStepMonitor:
 
 
 class MotionEstimator:
-    """EstimatedMotion from a sequence of poses, by the poses' own stamps.
+    """Motion from a sequence of poses, by the poses' own stamps.
 
     A pose whose stamp repeats, or that is not finite, is ignored. A pose whose stamp goes
     back is the first of a new sequence: tf returns the latest pose, so its stamp goes back only

@@ -1,4 +1,4 @@
-"""Flights as arrays, and the processor's threads that fly them."""
+"""Flights as arrays, flown in parallel by threads."""
 
 import math
 from collections.abc import Mapping
@@ -112,7 +112,7 @@ def _flights(batch, memory, records):
 
     largest, squares, upright, speed = vehicles(memory, "metrics").T
     x = vehicles(memory, "x")
-    # What has overflowed is neither larger nor smaller than anything.
+    # NaN of an overflow compares as false.
     has_crashed = (vehicles(memory, "has_crashed")[:, 0] > 0.0) | ~np.isfinite(x).all(axis=1)
     counted = np.maximum(batch.ticks - batch.parameters["settled"][0], 1.0)
     return Flights(

@@ -1,4 +1,4 @@
-"""The version of the code that flies, so that results of two versions are not mixed."""
+"""The version of the simulated code, so that results of two versions are not mixed."""
 
 import ast
 import hashlib
@@ -49,7 +49,7 @@ def sources(module: str) -> dict[str, bytes]:
 
 
 def _path(name: str) -> Path | None:
-    """Return the file of a module; None for other packages, and for what is no module."""
+    """Return the file of a module; None for other packages and other objects."""
     if name.partition(".")[0] not in FLOWN_PACKAGES:
         return None
     try:
@@ -68,5 +68,5 @@ def _imported(source: bytes) -> Iterator[str]:
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module is not None:
             yield node.module
-            # What is imported from a package may be a module.
+            # An imported name may be a module.
             yield from (f"{node.module}.{alias.name}" for alias in node.names)

@@ -65,7 +65,7 @@ NOISE_DIM = 7
 SAMPLE_STEPS = round(inner_loops.PERIOD / STEP)
 POSE_DIM = 5  #: Components of a delayed pose: position (3), yaw, and 1 for one that is not lost.
 
-#: What is remembered of a flight: largest distance from the goal, m, and sum of the squared
+#: Metrics of a flight: largest distance from the goal, m, and sum of the squared
 #: distances at the ticks after it has settled; of all ticks, the least cosine of the tilt and the
 #: largest speed, m/s.
 METRICS = ("largest_error", "squared_errors", "least_upright", "largest_speed")
@@ -99,13 +99,13 @@ class Plan:
         return self.steps * STEP
 
     def memory_dims(self) -> dict[str, int]:
-        """Return what a flight remembers, and how many numbers that are."""
+        """Return the memory of a flight: name to number of rows."""
         x_dim = self.make_model(**dict.fromkeys(self.model_parameters, 0.0)).x_dim
         start = self.initial_memory([0.0] * x_dim)
         return {name: len(part) for name, part in start.items()}
 
     def parameter_dims(self) -> dict[str, int]:
-        """Return what differs between vehicles, and how many numbers that are."""
+        """Return the numbers that differ between vehicles: name to number of rows."""
         return {
             "model": len(self.model_parameters),
             "estimator": len(fields(self.estimator)),
@@ -125,7 +125,7 @@ class Plan:
         return self.make_model(**dict(zip(self.model_parameters, parameters["model"], strict=True)))
 
     def initial_memory(self, x: Vector[Any]) -> Components:
-        """Return what is remembered of a flight that begins at a state of the model."""
+        """Return the memory of a flight that begins at a state of the model."""
         return {
             "x": x,
             "u": [0.0] * control_law.U_DIM,
@@ -141,7 +141,7 @@ class Plan:
 
 
 def effective_control(memory: Components) -> Vector[Any]:
-    """Return what the vehicle flies: the last control while it is new, then what the watchdog does.
+    """Return the control in effect: the last one while it is new, then that of the watchdog.
 
     See `crazyflie_simulator.vehicle.SimulatedVehicle`.
     """

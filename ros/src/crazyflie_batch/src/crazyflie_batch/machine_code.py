@@ -116,7 +116,7 @@ class _Writer:
         self._store(place, {"pose": flight.POSE_DIM}, {"pose": pose})
 
     def _receive(self, transit, delay, tick, slots):
-        """Return the pose that was sent ``delay`` ticks ago: another one for each lane."""
+        """Return the pose that was sent ``delay`` ticks ago; delays of lanes differ."""
         builder = self._builder
         numbers = builder.bitcast(transit, ir.PointerType(DOUBLE))
         delays = builder.fptosi(delay.value, ir.VectorType(_INTEGER, self._lanes))
@@ -170,7 +170,7 @@ class _Writer:
 
     @contextmanager
     def _loop(self, count: ir.Value) -> Iterator[ir.Value]:
-        """Write a loop around what is written meanwhile; the value counts from 0."""
+        """Write a loop around the instructions of the with block; the value counts from 0."""
         builder = self._builder
         before = builder.block
         body = builder.append_basic_block()

@@ -30,7 +30,7 @@ class SchedulerError(Exception):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; return its exit status: 0, 1 for what cannot be flown, 2 for usage."""
+    """Run the command; return its exit status: 0, 1 if it cannot fly, 2 for usage."""
     options = _parser().parse_args(arguments)
     try:
         settings = read_settings(options.settings)

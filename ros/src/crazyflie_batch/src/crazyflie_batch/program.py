@@ -19,7 +19,7 @@ _CALCULATES = ("crazyflie_batch.symbols", "crazyflie_model.elementwise", "numpy"
 
 @contextmanager
 def naming_the_formula() -> Iterator[None]:
-    """Put the name, file and line of the formula before what is wrong with it: a TypeError."""
+    """Add the name, file and line of the formula to a TypeError."""
     try:
         yield
     except (AttributeError, TypeError, ValueError) as error:

@@ -190,15 +190,15 @@ def read_settings(path: str | Path) -> Settings:
 
 
 def _gain_file(settings: Path, name: str) -> Path:
-    beside = settings.parent / name
+    local = settings.parent / name
     # Unlike pathlib's, this takes a name that is too long for one.
-    if os.path.exists(beside):
-        return beside
+    if os.path.exists(local):
+        return local
     try:
         shipped = Path(RosPack().get_path("crazyflie_lqr"), "config", name)
     except ResourceNotFound:
-        return beside
-    return shipped if os.path.exists(shipped) else beside
+        return local
+    return shipped if os.path.exists(shipped) else local
 
 
 def _sweep(entry: Entry, name: str) -> Sweep:

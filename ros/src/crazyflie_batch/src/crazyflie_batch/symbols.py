@@ -3,7 +3,7 @@
 The formulas of `crazyflie_model` take floats, arrays or whatever else calculates like these
 (see `crazyflie_model.elementwise`). Given a `Symbol`, a formula leaves the instructions that
 would calculate its result, in an LLVM function that is being built; nothing is calculated yet.
-A symbol stands for one number of each of several vehicles, its lanes.
+A symbol represents one number of each of several vehicles, its lanes.
 
 A formula must not branch on a value; it chooses with ``where`` and ``clip``.
 """
@@ -53,7 +53,7 @@ class Emitter:
         self._vector_functions = vector_functions
 
     def value(self, number: Any) -> ir.Value:
-        """Return the vector that a symbol or a float stands for."""
+        """Return the vector of a symbol or a float."""
         if isinstance(number, Symbol):
             return number.value
         return ir.Constant(self.type, [float(number)] * self.lanes)
@@ -102,7 +102,7 @@ class Emitter:
 
 
 class Condition:
-    """Something that holds for some of the lanes."""
+    """A condition that is true for some of the lanes."""
 
     def __init__(self, emitter: Emitter, value: ir.Value):
         self.value = value
@@ -120,7 +120,7 @@ class Condition:
         return Condition(self._emitter, self._emitter.builder.not_(self.value))
 
     def _of(self, other):
-        # What does not depend on a symbol is a bool.
+        # A condition without symbols is a bool.
         if isinstance(other, Condition):
             return other.value
         return ir.Constant(self.value.type, [bool(other)] * self.value.type.count)
@@ -129,7 +129,7 @@ class Condition:
         raise TypeError(_MUST_NOT_BRANCH)
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
-        """Take part in ``numpy.where``."""
+        """Support ``numpy.where``."""
         if function is not np.where:
             return NotImplemented
         _, value, other = args
@@ -150,7 +150,7 @@ def _arithmetic(instruction: str) -> tuple[Callable[..., "Symbol"], Callable[...
 
 
 class Symbol:
-    """A number that the program will know; see the module."""
+    """A number that is known when the program runs; see the module."""
 
     def __init__(self, emitter: Emitter, value: ir.Value):
         self.value = value
@@ -192,13 +192,13 @@ class Symbol:
     __hash__ = None  # type: ignore[assignment]
 
     def __array_ufunc__(self, function: Any, method: str, *args: Any, **kwargs: Any) -> Any:
-        """Take part in ``numpy.sin`` and its like."""
+        """Support ``numpy.sin`` and other functions."""
         if method != "__call__" or kwargs:
             return NotImplemented
         return self._emitter.call(function, args)
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
-        """Take part in ``numpy.clip``."""
+        """Support ``numpy.clip``."""
         if function is not np.clip:
             return NotImplemented
         value, low, high = args

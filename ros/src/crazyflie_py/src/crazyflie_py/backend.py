@@ -58,7 +58,7 @@ class VehicleBackend(Commands, Protocol):
 
     name: str  #: "cf1".
     id: int  #: Last byte of the radio address.
-    initial_position: Triple  #: As the fleet file has it, m.
+    initial_position: Triple  #: Start point in the fleet file (m).
 
     def set_group_mask(self, group_mask: int) -> None:
         """Make the vehicle a member of groups, a bit each."""
@@ -77,7 +77,7 @@ class VehicleBackend(Commands, Protocol):
         """Avoid collisions; with hardware the firmware determines the others."""
 
     def disable_avoidance(self) -> None:
-        """Do not avoid collisions any more."""
+        """End collision avoidance."""
 
     def state(self) -> VehicleState:
         """Return the state; TimeoutError if none is received for 10 s."""
@@ -134,7 +134,7 @@ class SwarmBackend(Commands, Protocol):
         """Begin the next file of a record, if there is one."""
 
     def close(self) -> None:
-        """End what is left to do, once, at the end of the script, also after an exception."""
+        """Land and release the vehicles; called once at the end, also after an exception."""
 
 
 def _to_each(name: str) -> Any:

@@ -198,7 +198,7 @@ class ScriptCommands:
         self._commands.notify_setpoints_stop(remain, self._mask(where, groupMask))
 
     def emergency(self) -> None:
-        """Stop the motors at once; until a restart, nothing has an effect any more."""
+        """Stop the motors at once; commands have no effect until a restart."""
         self._commands.emergency()
 
     def arm(self, arm: bool = True) -> None:
@@ -230,7 +230,7 @@ class Crazyflie(ScriptCommands):
         #: name, prefix: "cf1", "/cf1".
         self.name = vehicle.name
         self.prefix = f"/{vehicle.name}"
-        #: As the fleet file has it, m.
+        #: Start point in the fleet file (m).
         self.initialPosition: Array = np.array(vehicle.initial_position)
         #: Colour that `setLEDColor` has set; before, Crazyswarm's colour in pictures.
         self.ledRGB = DEFAULT_COLOR
@@ -416,7 +416,7 @@ class Crazyflie(ScriptCommands):
         self._vehicle.enable_avoidance(vehicles, settings)
 
     def disableCollisionAvoidance(self) -> None:
-        """Do not avoid collisions any more."""
+        """End collision avoidance."""
         self._vehicle.disable_avoidance()
 
 

@@ -15,10 +15,10 @@ from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_model.angles import Triple
 from crazyflie_utils import ParameterError
 
-#: Variables of the environment, by which whoever starts a script decides, and not the script: it
-#: flies ideal vehicles, as with --sim, if this is set;
+#: Environment variables of the program that starts a script; they override the script's options.
+#: If this one is set, the script flies ideal vehicles, as with --sim.
 DRY_RUN = "CRAZYFLIE_PY_DRY_RUN"
-#: it has these vehicles only, names with colons between them.
+#: Names of the script's vehicles, separated by colons.
 VEHICLES = "CRAZYFLIE_PY_VEHICLES"
 
 _LOG = logging.getLogger(__name__)
@@ -84,7 +84,7 @@ def chosen(names: Sequence[str]) -> list[str]:
 
 
 def _id(vehicle: VehicleConfig) -> int:
-    # As in crazyswarm2 the end of the address; the number in the name of one without.
+    # The end of the address, as in crazyswarm2; without an address, the number in the name.
     address = "" if vehicle.uri is None else vehicle.uri.split("?")[0]
     if found := re.search("[0-9A-Fa-f]{2}$", address):
         return int(found[0], 16)

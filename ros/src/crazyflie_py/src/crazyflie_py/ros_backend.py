@@ -29,9 +29,9 @@ from crazyflie_py.visualizer import NullVisualizer
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.process import Process
 
-_FIND_LIMIT = 10.0  #: For the vehicles of a file, s of the machine's clock.
-_WATCH_PERIOD = 0.05  #: Between two looks at the distances of vehicles, s; as a fleet's.
-_LANDING_LIMIT = 15.0  #: For landings of the script at its end, s.
+_FIND_LIMIT = 10.0  #: Timeout of the search for the vehicles of a file (s, machine's clock).
+_WATCH_PERIOD = 0.05  #: Period of the checks of distances, as in a fleet (s).
+_LANDING_LIMIT = 15.0  #: Timeout of landings that the script has begun, at its end (s).
 
 
 class RosBackend(EachVehicle, SwarmBackend):
@@ -173,7 +173,7 @@ class RosBackend(EachVehicle, SwarmBackend):
         if self._top is None:
             calls = {vehicle.name: vehicle.begin_emergency() for vehicle in self._vehicles}
         else:
-            # That of a fleet is not one of its high-level services.
+            # A fleet's emergency service is not one of its high-level services.
             service = f"{self._top.removesuffix(f'/{HIGH_LEVEL}')}/emergency"
             calls = {"allcfs": self._connection.call(service, Empty)}
         self._connection.finish("emergency", calls)
@@ -237,9 +237,9 @@ class RosBackend(EachVehicle, SwarmBackend):
             if vehicle.has_landed():
                 fleet.release(name)
             else:
-                # From where it is by now.
+                # Its landing begins where it is now.
                 fleet.adopt(name)
-        # As after an error: whatever their distances, they land.
+        # They land as after an error, whatever their distances.
         fleet.__exit__(RuntimeError, None, None)
 
 

@@ -15,8 +15,8 @@ from crazyflie_mission_api.ros_vehicle import CALL_TIMEOUT
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.parameters.types import Integer
 
-_SEARCH_LIMIT = 5.0  #: For vehicles, s of the machine's clock.
-_ANSWER_LIMIT = 15.0  #: For the answer to a command, s of the machine's clock.
+_SEARCH_LIMIT = 5.0  #: Timeout of the search for vehicles (s of the machine's clock).
+_ANSWER_LIMIT = 15.0  #: Timeout of the answer to a command (s of the machine's clock).
 
 
 class CommandRefusedError(RuntimeError):

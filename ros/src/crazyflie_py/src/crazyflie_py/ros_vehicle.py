@@ -40,7 +40,7 @@ from crazyflie_py.simulated_parameters import SimulatedParameters
 from crazyflie_utils import NodeHandle, ParameterError
 from crazyflie_utils.topics import Publisher
 
-#: For the first setpoint, until the vehicle is connected, s of the machine's clock.
+#: Timeout of the connection before the first setpoint (s of the machine's clock).
 _CONNECTION_LIMIT = 2.0
 
 _TOPICS: dict[type, tuple[str, Any]] = {
@@ -52,12 +52,12 @@ _TOPICS: dict[type, tuple[str, Any]] = {
     MotorsOff: ("cmd_stop", Empty),
 }
 
-_STATE_TIMEOUT = 10.0  #: For a pose, s of the vehicles' time.
-_VELOCITY_SPAN = 0.2  #: Longest time between two poses from which a velocity follows, s.
+_STATE_TIMEOUT = 10.0  #: Timeout of a pose (s of the vehicles' time).
+_VELOCITY_SPAN = 0.2  #: Longest time between the two poses of a velocity (s).
 
 _UNKNOWN: Triple = (math.nan, math.nan, math.nan)
 
-#: In place of an infinite corner, m: the parameter server has no infinity.
+#: Replaces infinite corners (m): the parameter server has no infinity.
 _FIRMWARE_INFINITY = 1e9
 
 _NOT_FLYING = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)

@@ -1,4 +1,4 @@
-"""Keeps vehicles of a script apart that the driver alone flies, as a fleet's process does."""
+"""Keeps the vehicles of a script that the driver alone flies apart, as a fleet does."""
 
 import math
 from collections.abc import Sequence

@@ -19,13 +19,13 @@ _COLOR = ("ring.solidRed", "ring.solidGreen", "ring.solidBlue")
 
 
 class HasGroups(Protocol):
-    """Has a mask of groups."""
+    """A vehicle that is a member of groups."""
 
     groups: int
 
 
 class SimulatedParameters:
-    """Parameters, "group.name" -> value.
+    """Firmware parameters, "group.name" -> value.
 
     Only the groups and the LED's colour have an effect.
 

@@ -71,7 +71,7 @@ class IdealMotion:
         self.now = SimulatedMotion(np.array(position), np.zeros(3), np.zeros(3), 0.0)
 
     def avoid(self, others: Sequence[Self], settings: AvoidanceSettings | None) -> None:
-        """Avoid others from now on; with None for settings, no more."""
+        """Avoid others; None for settings ends collision avoidance."""
         self._others = others
         self._avoidance = None if settings is None else CollisionAvoidance(settings)
 

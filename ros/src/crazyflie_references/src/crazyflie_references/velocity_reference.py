@@ -1,4 +1,4 @@
-"""A reference that goes where a velocity in its own heading frame leads it."""
+"""A reference that moves with a velocity in its own heading frame."""
 
 import math
 from collections.abc import Iterator
@@ -35,7 +35,7 @@ _SPEED = Number("m/s", above=0.0)
 
 
 class LimitParameters(Parameters):
-    """What a reference keeps to."""
+    """Limits of a reference."""
 
     horizontal: float = parameter(_SPEED, "largest speed, x and y together", 0.7, live=True)
     vertical: float = parameter(_SPEED, "largest speed, z", 0.4, live=True)
@@ -60,7 +60,7 @@ class VelocityReference:
 
     def __init__(self, limits: LimitParameters, silence: float):
         self.limits = limits
-        #: A velocity that is older than this, s, counts no more: the reference comes to rest.
+        #: Age of the last velocity at which the reference stops (s).
         self.silence = silence
         self.pose: ReferencePose | None = None  #: None before the first `place`.
         self._velocity = Velocity()
@@ -68,17 +68,17 @@ class VelocityReference:
         self._command_time = -math.inf
 
     def place(self, x: float, y: float, z: float) -> None:
-        """Begin anew at rest at a place; the heading stays, or is 0."""
+        """Start at rest at a position (m); the heading stays, or is 0."""
         self.pose = ReferencePose(x, y, z, 0.0 if self.pose is None else self.pose.yaw)
         self.stop()
 
     def stop(self) -> None:
-        """Stop at once, and forget what was commanded."""
+        """Stop at once, and forget the commanded velocity."""
         self._velocity = Velocity()
         self._command = Velocity()
 
     def command(self, velocity: Velocity, time: float) -> None:
-        """Take a velocity that was commanded at ``time`` (s)."""
+        """Set the velocity that was commanded at ``time`` (s)."""
         self._command = velocity
         self._command_time = time
 
@@ -87,7 +87,7 @@ class VelocityReference:
         return 0.0 <= time - self._command_time <= self.silence
 
     def advance(self, dt: float, time: float) -> None:
-        """Go on for ``dt`` seconds, until ``time`` (s)."""
+        """Advance the reference by ``dt`` (s) to ``time`` (s)."""
         if self.pose is None:
             return
         self._velocity = self._approach(self._target(time), dt)

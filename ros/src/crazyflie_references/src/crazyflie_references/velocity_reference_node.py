@@ -86,7 +86,7 @@ class VelocityReferenceNode(Node):
 
     @override
     def enter_safe_state(self) -> None:
-        """Let the vehicle hover where the reference is."""
+        """Publish the present reference at rest."""
         if self._is_moving:
             self._reference.stop()
             self._publish()

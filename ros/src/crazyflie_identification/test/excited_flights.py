@@ -12,7 +12,7 @@ from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
 from crazyflie_model.quadrotor import TYPES
-from crazyflie_simulator.motion_capture import MotionCapture
+from crazyflie_simulator.disturbances import MotionCapture
 from crazyflie_simulator.vehicle import SimulatedVehicle
 
 KIND = TYPES["cf21_markers"]

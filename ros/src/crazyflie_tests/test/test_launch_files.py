@@ -215,7 +215,7 @@ def test_xacro_finds_packages(tmp_path):
 def test_stand_ins_give_way(tmp_path, place, is_there):
     # What the top-level CMakeLists.txt does, in a workspace with one stand-in.
     text = (TOP / "ros" / "src" / "CMakeLists.txt").read_text()
-    loop = re.search(r"foreach\(name joy xacro\).*?endforeach\(\)", text, re.DOTALL).group()
+    loop = re.search(r"foreach\(name joy .*?endforeach\(\)", text, re.DOTALL).group()
     stand_in = tmp_path / "own" / "src" / "stand_ins" / "joy"
     real = tmp_path / place
     for folder in (stand_in, real):
@@ -225,8 +225,187 @@ def test_stand_ins_give_way(tmp_path, place, is_there):
             "<maintainer email='x@x.example'>x</maintainer><license>x</license></package>"
         )
     script = tmp_path / "loop.cmake"
-    script.write_text(f'set(WORKSPACE "{tmp_path}/own")\n' + loop.replace("joy xacro", "joy"))
+    script.write_text(
+        f'set(WORKSPACE "{tmp_path}/own")\n' + re.sub(r"name joy .*?\)", "name joy)", loop, count=1)
+    )
     path = f"{tmp_path}/own/src:{real.parent}"
     environment = {**os.environ, "ROS_PACKAGE_PATH": path, "ROS_HOME": str(tmp_path)}
     subprocess.run(["cmake", "-P", script], env=environment, timeout=120, check=True)
     assert (stand_in / "CATKIN_IGNORE").exists() == is_there
+
+
+# What crazyflie_ros's own launch files say, by their names, without what no stand-in reads.
+RVIZ = "-d $(find crazyflie_demo)/launch/{}.rviz"
+LINK = "0 0 0 0 0 0 1 /vicon/cf/cf /crazyflie/base_link 100"
+
+
+def element(tag, /, *inner, **attributes):
+    text = "".join(f' {key}="{value}"' for key, value in attributes.items())
+    return f"<{tag}{text}>{''.join(inner)}</{tag}>"
+
+
+def included(package, file, **arguments):
+    inner = [element("arg", name=name, value=value) for name, value in arguments.items()]
+    return element("include", *inner, file=f"$(find {package})/launch/{file}.launch")
+
+
+def started(package, program, args="", /, **parameters):
+    inner = [element("param", name=name, value=value) for name, value in parameters.items()]
+    return element(
+        "node", *inner, pkg=package, type=program, name=program.replace(".", "_"), args=args
+    )
+
+
+def vehicle(*others, name="crazyflie", logs=False):
+    if logs:
+        add = started("crazyflie_driver", "crazyflie_add", uri="radio://0/80/2M", tf_prefix=name)
+    else:
+        given = {"uri": "radio://0/80/2M", "tf_prefix": name, "enable_logging": "False"}
+        add = included("crazyflie_driver", "crazyflie_add", **given)
+    return element("group", add, *others, ns=name)
+
+
+def demo(program, /, **parameters):
+    return started("crazyflie_demo", program, **parameters)
+
+
+def rviz(config):
+    urdf = "$(find crazyflie_description)/urdf/crazyflie.urdf.xacro"
+    xacro = f"$(find xacro)/xacro.py {urdf}"
+    model = element("param", name="robot_description", command=xacro)
+    return model + started("rviz", "rviz", RVIZ.format(config))
+
+
+def model(name):
+    urdf = f"$(find crazyflie_description)/urdf/{name}.urdf.xacro"
+    return (
+        element("param", name="robot_description", command=f"$(find xacro)/xacro.py {urdf}"),
+        started("joint_state_publisher", "joint_state_publisher"),
+        started("robot_state_publisher", "state_publisher"),
+        started("rviz", "rviz", "-d $(find crazyflie_description)/launch/crazyflie.rviz"),
+    )
+
+
+SERVER = included("crazyflie_driver", "crazyflie_server")
+JOY = started("joy", "joy_node", dev="/dev/input/js0")
+TELEOP = demo("controller.py", use_crazyflie_controller="True")
+CONTROLLER = included("crazyflie_controller", "crazyflie2", frame="/vicon/cf/cf")
+GOAL = demo("publish_pose.py", name="goal", rate=30, x=0, y=0, z=0.5)
+BASE = started("tf", "static_transform_publisher", LINK)
+VICON = included("vicon_bridge", "vicon")
+TRACKER = started(
+    "ros_vrpn_client",
+    "ros_vrpn_client",
+    ip="vicon",
+    port=3883,
+    frame_id="/world",
+    child_frame_id="cf",
+)
+VRPN = started(
+    "vrpn_client_ros",
+    "vrpn_client_node",
+    server="10.0.0.1",
+    port=3883,
+    frame_id="/world",
+    broadcast_tf="false",
+)
+PLOT = started("rqt_plot", "rqt_plot", "/crazyflie/log1/values[0] /crazyflie/log1/values[1]")
+PADS = [included("crazyflie_demo", name) for name in ("ps3", "xbox360")]
+HOVER = vehicle(JOY, TELEOP, CONTROLLER, GOAL, BASE)
+TWO = [vehicle(TELEOP, CONTROLLER, GOAL, BASE, name=name) for name in ("cf1", "cf2")]
+EXTERNAL = "publish_external_{}.py".format
+
+CRAZYFLIE_ROS = {
+    "crazyflie_controller/crazyflie2": (
+        included("crazyflie_controller", "crazyflie2", frame="cf"),
+    ),
+    "crazyflie_demo/customLogBlocks": (SERVER, vehicle(logs=True)),
+    "crazyflie_demo/external_pose_vicon": (
+        SERVER,
+        vehicle(demo(EXTERNAL("pose_vicon"), topic="/vicon/cf/cf"), BASE, logs=True),
+        VICON,
+        rviz("crazyflie_pos"),
+        PLOT,
+    ),
+    "crazyflie_demo/external_position_vicon": (
+        SERVER,
+        vehicle(demo(EXTERNAL("position_vicon"), topic="/vicon/cf/cf"), BASE, logs=True),
+        VICON,
+        rviz("crazyflie_pos"),
+        PLOT,
+    ),
+    "crazyflie_demo/external_position_vrpn": (
+        SERVER,
+        vehicle(demo(EXTERNAL("position_vrpn"), topic="/cf/vrpn_client_node/cf/pose"), VRPN),
+    ),
+    "crazyflie_demo/hover_vicon": (SERVER, HOVER, VICON, rviz("crazyflie_pos")),
+    "crazyflie_demo/hover_vrpn": (SERVER, vehicle(JOY, TELEOP, CONTROLLER, GOAL, BASE, TRACKER)),
+    "crazyflie_demo/multi_hover_vicon": (SERVER, JOY, *TWO, VICON, rviz("crazyflie_pos_multi")),
+    "crazyflie_demo/multi_hover_vrpn": (
+        SERVER,
+        JOY,
+        *(vehicle(TELEOP, CONTROLLER, TRACKER, name=n) for n in ("cf1", "cf2")),
+    ),
+    "crazyflie_demo/multi_teleop_ps3": (
+        SERVER,
+        *(vehicle(JOY, PADS[0], demo("controller.py"), BASE, name=n) for n in ("cf1", "cf2")),
+        rviz("crazyflie_multi"),
+        PLOT,
+    ),
+    "crazyflie_demo/multi_teleop_xbox360": (
+        SERVER,
+        *(vehicle(JOY, PADS[1], demo("controller.py"), BASE, name=n) for n in ("cf1", "cf2")),
+        rviz("crazyflie_multi"),
+        PLOT,
+    ),
+    "crazyflie_demo/multi_waypoint_vicon": (
+        SERVER,
+        JOY,
+        *(
+            vehicle(TELEOP, CONTROLLER, demo(f"demo{k}.py", frame="cf"), name=f"cf{k}")
+            for k in (1, 2)
+        ),
+        VICON,
+    ),
+    "crazyflie_demo/position": (SERVER, vehicle(demo("Position.py"))),
+    "crazyflie_demo/ps3": (demo("quadrotor_teleop", x_axis=4, y_axis=3, z_axis=2, yaw_axis=1),),
+    "crazyflie_demo/swarm_external_position_vrpn": (
+        SERVER,
+        *(
+            vehicle(demo(EXTERNAL("position_vrpn"), topic="pose"), VRPN, name=f"cf{k}", logs=True)
+            for k in (1, 2, 3)
+        ),
+    ),
+    "crazyflie_demo/teleop_ps3": (SERVER, vehicle(JOY, PADS[0], demo("controller.py"))),
+    "crazyflie_demo/teleop_vicon": (
+        SERVER,
+        vehicle(JOY, TELEOP, CONTROLLER, demo("publish_pose_teleop.py", name="goal"), BASE),
+        VICON,
+        rviz("crazyflie_pos"),
+    ),
+    "crazyflie_demo/teleop_xbox360": (SERVER, vehicle(JOY, PADS[1], demo("controller.py"))),
+    "crazyflie_demo/test_high_level": (SERVER, vehicle(demo("test_high_level.py"))),
+    "crazyflie_demo/xbox360": (demo("quadrotor_teleop", x_axis=4, y_axis=3, z_axis=2, yaw_axis=1),),
+    "crazyflie_description/crazyflie2_rviz": model("crazyflie2"),
+    "crazyflie_description/crazyflie_rviz": model("crazyflie"),
+    "crazyflie_driver/crazyflie_add": (vehicle(),),
+    "crazyflie_driver/crazyflie_server": (SERVER,),
+}
+
+
+@pytest.mark.parametrize("name", CRAZYFLIE_ROS)
+def test_launch_files_of_crazyflie_ros_start_as_they_are(tmp_path, name):
+    assert len(CRAZYFLIE_ROS) == 24
+    file = tmp_path / "theirs.launch"
+    file.write_text(element("launch", *CRAZYFLIE_ROS[name]))
+    nodes, _ = launch_files.expand(file)
+    assert nodes
+    for full_name, node in nodes.items():
+        assert find_node(node.package, node.type), f"{full_name}: {node.package}/{node.type}"
+        assert all(Path(word).is_file() for word in node.args.split() if word.endswith(".rviz"))
+
+
+def test_rqt_plot_says_where_plots_are():
+    command = ["rosrun", "rqt_plot", "rqt_plot", "/cf1/log1/values[0]", "__name:=rqt_plot1"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    assert "dashboard.launch, then Plots, and add /cf1/log1/values[0]\n" in done.stdout

@@ -12,6 +12,7 @@ from geometry_msgs.msg import Point, Pose2D, Quaternion
 
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
+from mocap_optitrack.client_nodes import ViconBridgeNode, VrpnClientNode
 from mocap_optitrack.frames import Body, Frame
 from mocap_optitrack.library_source import LibrarySource
 from mocap_optitrack.mocap_node import MocapNode
@@ -288,3 +289,47 @@ def test_bad_parameters_are_named(changes, name, reason):
 
 def test_the_bodies_are_required():
     assert "parameter rigid_bodies is not set; expected it, or single_markers" in refusal({})
+
+
+class SilentVicon(SilentNode, ViconBridgeNode):
+    """vicon_bridge, not connected to anything."""
+
+
+class SilentVrpn(SilentNode, VrpnClientNode):
+    """vrpn_client_node, likewise."""
+
+
+def test_subjects_of_vicon_are_transforms_of_their_names():
+    process, node = FakeProcess(), SilentVicon()
+    assert process.launch(node, "/vicon", {"datastream_hostport": "10.0.0.2:801"})
+    assert isinstance(node.source, LibrarySource)
+    for _ in range(2):
+        show(process, node, Body(None, "cf1", (1.0, 2.0, 3.0), TURNED, True), body(4, "big drone"))
+    message = process.published("/vicon/cf1/cf1")[-1]
+    assert (message.header.frame_id, message.child_frame_id) == ("world", "vicon/cf1/cf1")
+    assert message.transform.translation.y == 2.0
+    assert process.published("/vicon/big_drone/big_drone")
+    frames = {each.child_frame_id for each in process.published("/tf")[-1].transforms}
+    assert frames == {"vicon/cf1/cf1", "vicon/big drone/big drone"}
+    process.advance(1.0)
+    (report,) = process.published("/diagnostics")
+    assert "vicon: rigid body cf1" in {status.name for status in report.status}
+
+
+def test_trackers_that_are_not_listed_are_not_published():
+    process, node = FakeProcess(), SilentVrpn()
+    given = {"server": "10.0.0.1", "trackers": ["cf1"], "broadcast_tf": False}
+    assert process.launch(node, "/vrpn_client_node", given)
+    show(process, node, Body(None, "cf1", (1.0, 2.0, 3.0), TURNED, True), body(4, "cf2"))
+    assert process.published("/vrpn_client_node/cf1/pose")
+    assert not process.transport.publishers.keys() & {"/tf", "/vrpn_client_node/cf2/pose"}
+
+
+def test_a_server_without_a_name_ends_the_client():
+    process = FakeProcess()
+    assert not process.launch(SilentVrpn(), "/vrpn_client_node", {"server": "", "port": 0})
+    (text,) = process.logged("error")
+    assert (
+        "/vrpn_client_node/server" in text
+        and "port is 0; expected an integer from 1 to 65535" in text
+    )

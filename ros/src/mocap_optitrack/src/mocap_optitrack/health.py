@@ -66,6 +66,12 @@ class Health:
         self._others: dict[tuple[int | None, str | None], Body] = {}
         self._begin_period(now)
 
+    def add(self, body: ConfiguredBody) -> None:
+        """Report on a body, too."""
+        self._bodies[body.key] = _BodyCount()
+        self._labels[body.key] = body.component
+        self._others.pop((None, body.key), None)
+
     def count(self, event: Event) -> None:
         """Count an event."""
         self._events[event] += 1

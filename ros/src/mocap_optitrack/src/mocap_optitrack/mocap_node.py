@@ -1,6 +1,7 @@
 """ROS interface of a motion capture system."""
 
 import math
+from collections.abc import Callable
 from functools import partial
 
 import genpy
@@ -21,13 +22,14 @@ from std_srvs.srv import Trigger, TriggerResponse
 from typing_extensions import override
 
 from crazyflie_utils import Node, NodeHandle
+from mocap_optitrack.bodies import RigidBody
 from mocap_optitrack.frames import Frame, heading
 from mocap_optitrack.health import ERROR, Health
 from mocap_optitrack.library_source import LibrarySource
 from mocap_optitrack.natnet_source import NatNetSource
 from mocap_optitrack.parameters import NATNET, MocapParameters
 from mocap_optitrack.source import Receiver
-from mocap_optitrack.tracker import Tracker
+from mocap_optitrack.tracker import BodyPose, Tracker
 
 _REPORT_PERIOD = 1.0  #: Period of the diagnostics (s): REP 107 wants one report a second.
 _REPEAT = 5.0  #: The same warning comes at most this often, s.
@@ -41,6 +43,7 @@ class MocapNode(Node):
     """Publish where the rigid bodies of a motion capture system are, as topics and on tf."""
 
     needed_in_flight = True
+    pose_type: type = PoseStamped  #: Of the topics with poses.
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -59,7 +62,7 @@ class MocapNode(Node):
             bodies, parameters.up_axis, stale_after, self._health, parameters.hold_time, handle.warn
         )
         markers = parameters.markers
-        self._poses = _publishers(handle, bodies, "pose", PoseStamped)
+        self._poses = _publishers(handle, bodies, "pose", self.pose_type)
         self._poses2d = _publishers(handle, bodies, "pose2d", Pose2D)
         self._positions = _publishers(handle, markers, "position", PointStamped)
         self._headings: dict[str, tuple[float, float]] = {}
@@ -69,6 +72,7 @@ class MocapNode(Node):
                 handle.subscribe(_private(marker.parameters.heading), Float32, on_heading)
         if markers:
             handle.advertise_service("~reset_lost", Trigger, self._reset_lost)
+        self._broadcast: Callable[[list[TransformStamped]], None] | None = None
         if any(body.parameters.child_frame_id for body in bodies):
             self._broadcast = handle.broadcast_transforms()
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
@@ -78,6 +82,14 @@ class MocapNode(Node):
         )
         self._receiver = self.make_receiver(handle)
         self._receiver.start()
+
+    def add_body(self, body: RigidBody) -> None:
+        """Publish a body from now on that is not in the parameters."""
+        self._tracker.add(body)
+        self._health.add(body)
+        self._poses |= _publishers(self._handle, [body], "pose", self.pose_type)
+        if self._broadcast is None and body.parameters.child_frame_id:
+            self._broadcast = self._handle.broadcast_transforms()
 
     def _reconfigure(self, parameters):
         self._health.stale_after = parameters.stale_after
@@ -138,14 +150,20 @@ class MocapNode(Node):
                 continue
             oriented = pose._replace(quaternion=quaternion)
             if body.key in self._poses:
-                self._poses[body.key].publish(_pose(header, oriented))
+                self._poses[body.key].publish(self.pose_message(header, oriented))
             if body.key in self._poses2d:
                 x, y, _ = pose.position
                 self._poses2d[body.key].publish(Pose2D(x, y, heading(quaternion)))
             if body.parameters.child_frame_id is not None:
-                transforms.append(_transform(header, oriented))
-        if transforms:
+                transforms.append(transform_of(header, oriented))
+        if transforms and self._broadcast is not None:
             self._broadcast(transforms)
+
+    @staticmethod
+    def pose_message(header: Header, pose: BodyPose) -> genpy.Message:
+        """Return a message of `pose_type`."""
+        assert pose.quaternion is not None
+        return PoseStamped(header, Pose(Point(*pose.position), Quaternion(*pose.quaternion)))
 
     def _on_heading(self, key, message):
         if math.isfinite(message.data):
@@ -223,10 +241,8 @@ def _private(topic):
     return topic if topic.startswith(("/", "~")) else "~" + topic
 
 
-def _pose(header, pose):
-    return PoseStamped(header, Pose(Point(*pose.position), Quaternion(*pose.quaternion)))
-
-
-def _transform(header, pose):
+def transform_of(header: Header, pose: BodyPose) -> TransformStamped:
+    """Return the frame of a body, whose attitude is known."""
+    assert pose.quaternion is not None
     transform = Transform(Vector3(*pose.position), Quaternion(*pose.quaternion))
     return TransformStamped(header, pose.body.parameters.child_frame_id, transform)

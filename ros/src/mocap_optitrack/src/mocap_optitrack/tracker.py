@@ -65,6 +65,10 @@ class Tracker:
         self._newest = self._arrival = -math.inf
         self._clock = ClockOffset()
 
+    def add(self, body: Body) -> None:
+        """Find a body by its name, too."""
+        self._by_name[body.key] = body
+
     def restart(self) -> None:
         """Learn the clock of another server."""
         self._clock = ClockOffset()

@@ -462,13 +462,60 @@ def test_more_than_twenty_vehicles_are_a_table_that_sorts(browser, server):
     assert browser.find(f"{browser.card('cf7')}.chosen")
 
 
+def test_batteries_have_a_bar_and_what_is_low_has_a_sign(browser, server, driver):
+    def shown(part, what):
+        return driver.execute_script(
+            f"return {what}", browser.find(f"{browser.card('cf1')} {part}")
+        )
+
+    server.dashboard.change("cf1", battery=3.6)
+    browser.has("3.60 V", browser.card("cf1"))
+    assert shown(".charge", "arguments[0].ariaValueNow") == "50"
+    assert shown(".charge i", "arguments[0].style.width") == "50%"
+    assert browser.count(f"{browser.card('cf1')} .warn") == 0
+    server.dashboard.change("cf1", battery=3.06, is_battery_low=True)
+    browser.has("3.06 V", f"{browser.card('cf1')} .warn")
+    # Not by color alone.
+    sign = "getComputedStyle(arguments[0], '::before').content"
+    assert "⚠" in shown(".warn dd", sign)
+    fleet = [vehicle(f"cf{k}", 0.1 * k, is_battery_low=k == 7) for k in range(1, 26)]
+    server.dashboard.set_vehicles(*fleet)
+    cell = wait_for(lambda: browser.find("tr[data-vehicle=cf7] td.warn"), "a cell with a warning")
+    assert "⚠" in driver.execute_script(f"return {sign}", cell)
+
+
+def test_states_differ_by_words_and_not_by_color_alone(browser, server):
+    browser.has("on the ground", browser.card("cf1"))
+    server.dashboard.change("cf2", is_emergency=True, state="emergency")
+    server.dashboard.change("cf1", is_in_flight=True, state="hovering")
+    browser.has("hovering", browser.card("cf1"))
+    browser.has("cf2 · emergency", ".scene")
+    browser.has("cf3 · 7 s old", ".scene")
+
+
+def test_a_hundred_failures_are_one_message(browser, server):
+    names = [f"cf{k}" for k in range(1, 101)]
+    server.dashboard.set_vehicles(*(vehicle(name, 0.1 * k) for k, name in enumerate(names)))
+    server.dashboard.refusals = dict.fromkeys(names[1:], "the battery is low")
+    server.dashboard.refusals["cf1"] = "it has no pose"
+    browser.take_control()
+    browser.press("All")
+    browser.has("100 of 100 chosen")
+    browser.press("Take off")
+    browser.has("cf1: it has no pose")
+    browser.has("99 vehicles: the battery is low")
+    assert browser.count(".q-notification") == 2
+
+
 def test_the_emergency_is_in_a_window_of_any_size(browser, driver):
-    size = driver.get_window_size()
     try:
-        for width, height in ((500, 800), (700, 500), (900, 700)):
-            driver.set_window_size(width, height)
+        # As a phone has it: a window of Chromium is wider.
+        for width, height in ((360, 640), (500, 800), (700, 500), (900, 700)):
+            metrics = {"width": width, "height": height, "deviceScaleFactor": 0.5, "mobile": False}
+            driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
             rect = browser.find(".emergency-all").rect
             inner = driver.execute_script("return [innerWidth, innerHeight]")
+            assert inner == [width, height]
             assert rect["x"] >= 0.0 and rect["x"] + rect["width"] <= inner[0]
             assert rect["y"] >= 0.0 and rect["y"] + rect["height"] <= inner[1]
             # Nothing is above it.
@@ -476,8 +523,11 @@ def test_the_emergency_is_in_a_window_of_any_size(browser, driver):
             top = f"document.elementFromPoint({x}, {y}).closest('.emergency-all')"
             assert driver.execute_script(f"return {top} !== null")
             assert browser.find(".scene").rect["height"] > 100
+            # Nothing is beside the window.
+            wide = "return document.documentElement.scrollWidth <= innerWidth"
+            assert driver.execute_script(wide)
     finally:
-        driver.set_window_size(size["width"], size["height"])
+        driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 NAMELESS = """

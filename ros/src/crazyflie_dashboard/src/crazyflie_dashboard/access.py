@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 MIN_TOKEN_LENGTH = 16
 
-_LISTENING = "0A"  #: Of a socket in /proc/net/tcp.
+_LISTENING = "0A"  #: State of a listening socket in /proc/net/tcp.
 
 
 class AccessError(Exception):

@@ -26,19 +26,19 @@ from crazyflie_takeoff.limits import Box
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.refusal import RefusalError
 
-_FLIGHT_TIMEOUT = 60.0  #: Of services that answer when the vehicle flies or has landed, s.
-_TIMEOUT = 10.0  #: Of the others, s.
-_CLIMB_SPEED = 0.5  #: Mean speed of a takeoff, m/s.
-_UNKNOWN_HEIGHT = 1.0  #: From which a vehicle lands whose position is not known, m.
-_MIN_DURATION = 1.0  #: Of a move, s.
-_MAX_SPEED = 2.0  #: m/s.
-HEIGHTS = 0.1, 5.0  #: Lowest and highest of a takeoff, m.
+_FLIGHT_TIMEOUT = 60.0  #: Limit for services that answer when the vehicle flies or has landed (s).
+_TIMEOUT = 10.0  #: Limit for the others (s).
+_CLIMB_SPEED = 0.5  #: Mean speed of a takeoff (m/s).
+_UNKNOWN_HEIGHT = 1.0  #: Assumed height of a landing vehicle without a position (m).
+_MIN_DURATION = 1.0  #: Shortest duration of a move (s).
+_MAX_SPEED = 2.0  #: Highest speed of a go to (m/s).
+HEIGHTS = 0.1, 5.0  #: Lowest and highest takeoff (m).
 
-_HOLD_DURATION = 1.0  #: Of a move to where a vehicle is, s.
-#: The firmware's parameter for lights, the value of all, and for how long they are on, s.
+_HOLD_DURATION = 1.0  #: Duration of a move to where a vehicle is (s).
+#: The firmware's parameter for lights, its value for all lights, and how long they are on (s).
 _LIGHTS, _ALL_LIGHTS, _LIGHT_TIME = "led/bitmask", 255, 5.0
 
-#: Of a vehicle in flight the motors would stop.
+#: Refused in flight: the motors would stop.
 _GROUND_ONLY = (Action.DISARM, Action.REBOOT)
 
 _STAYS = "not all of them can go"
@@ -183,7 +183,7 @@ class Actions:
         return outcome
 
     def _light(self, driver, command):
-        """Have all lights of a vehicle on for a while, as its firmware can."""
+        """Switch all lights of a vehicle on for `_LIGHT_TIME`, by its firmware."""
         service = Service(f"{driver}/update_params", Request.UPDATE_PARAMS)
         request = srv.UpdateParamsRequest([_LIGHTS])
         outcome: Future[Any] = Future()
@@ -211,7 +211,7 @@ class Actions:
     # Several vehicles that go somewhere.
 
     def _go_to(self, command, targets, graph, fixed):
-        """Have the middle of vehicles go somewhere: all of them, or none."""
+        """Send vehicles to where their middle is at the goal: all of them, or none."""
         refusals = {}
         for name in command.vehicles:
             if text := self._why_it_stays(name, targets.get(name), graph):
@@ -315,7 +315,7 @@ class Actions:
         return in_frame(goal, yaw, place)
 
     def _hold(self, targets):
-        """Have vehicles stay where they are."""
+        """Hold vehicles where they are."""
         for target in targets:
             self._moves.pop(target.vehicle.name, None)
             (service,) = _services(target, Action.GO_TO)

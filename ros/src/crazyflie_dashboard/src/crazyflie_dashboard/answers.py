@@ -10,7 +10,7 @@ from crazyflie_dashboard.page_data import Outcome
 from crazyflie_utils import ServiceError
 from crazyflie_utils.refusal import RefusalError
 
-_MAX_NAMES = 8  #: Of vehicles in one text.
+_MAX_NAMES = 8  #: Names of vehicles in one text.
 
 
 def settle(done: "Future[Any]", outcome: "Future[Any]") -> None:

@@ -24,7 +24,7 @@ class PageControl:
         self.on_first: Callable[[], None] = lambda: None
         self.on_close: Callable[[int], None] = lambda page: None
         self.on_empty: Callable[[], None] = lambda: None
-        #: Is told which page has control, when that changes.
+        #: Called with a text when another page has control.
         self.log: Callable[[str], None] = lambda text: None
         self._lock = threading.RLock()
         self._numbers = itertools.count(1)
@@ -32,7 +32,7 @@ class PageControl:
         self._controller: int | None = None
 
     def open(self, tell: Callable[[str], None]) -> int:
-        """Take note of a new page; return its number.
+        """Add a page; return its number.
 
         ``tell(text)`` is called, from any thread, when another page takes or gives up control.
         """
@@ -45,7 +45,7 @@ class PageControl:
         return page
 
     def close(self, page: int) -> None:
-        """Take note that a page is gone; its control with it."""
+        """Remove a page, and its control with it."""
         with self._lock:
             self.release(page)
             if self._tell.pop(page, None) is None:
@@ -84,7 +84,7 @@ class PageControl:
         if before is not None:
             self._say(before, f"page {page} has taken over control: this page only looks now")
             self._say(page, f"this page has taken over control from page {before}")
-        self._tell_others(page, f"page {page} has control", besides=before)
+        self._tell_others(page, f"page {page} has control", excluding=before)
 
     def release(self, page: int) -> None:
         """Give up control, if the page has it."""
@@ -117,10 +117,10 @@ class PageControl:
         if page not in self._tell:
             raise ControlError(f"page {page} is closed; load it again")
 
-    def _tell_others(self, page, text, besides=None):
+    def _tell_others(self, page, text, excluding=None):
         self.log(text)
         for other in self.pages:
-            if other not in (page, besides):
+            if other not in (page, excluding):
                 self._say(other, text)
 
     def _say(self, page, text):

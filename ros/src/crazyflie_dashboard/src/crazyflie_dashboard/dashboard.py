@@ -232,7 +232,7 @@ class Dashboard:
         return self._recording.report
 
     def examine(self) -> "Future[None]":
-        """Have the doctor look the graph over: its sentences are in the scene, 10 s later."""
+        """Run the doctor on the graph: its sentences are in the scene 10 s later."""
 
         def show(sentences):
             self._model.sentences = sentences
@@ -259,7 +259,7 @@ class Dashboard:
     # In the node's turn.
 
     def _do(self, work: Callable[..., Any], *arguments: Any, what: str = "") -> "Future[Any]":
-        """Have work done in its turn; the future has its result, or that of its future.
+        """Do work in the node's turn; the future has its result, or that of its future.
 
         With ``what`` is logged that it was asked for, and what has become of it.
         """

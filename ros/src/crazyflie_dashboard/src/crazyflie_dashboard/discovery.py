@@ -9,7 +9,7 @@ from enum import Enum
 from crazyflie_dashboard.snapshot import Action
 from crazyflie_reports.bag_topics import ROLES
 
-#: Beside the roles of recordings: names below the vehicle's namespace, and types.
+#: Topics in addition to the roles of recordings: names below the vehicle's namespace, and types.
 _STATUS = {
     "flight_status": (r"in_flight_flight_status|flight_status", "crazyflie_msgs/FlightStatus"),
     "filter_status": (r"in_flight_filter_status|filter_status", "crazyflie_msgs/FilterStatus"),
@@ -17,7 +17,7 @@ _STATUS = {
     "vehicle_status": (r"vehicle_status", "crazyflie_msgs/VehicleStatus"),
 }
 
-#: Last names of namespaces that have services of vehicles, and are none.
+#: Last names of namespaces with services of vehicles that are no vehicles.
 _NO_VEHICLES = {"all", "high_level"}
 
 
@@ -46,7 +46,7 @@ class Service:
 
 @dataclass(frozen=True)
 class Graph:
-    """What the master says.
+    """Topics and services of the graph, by the master.
 
     ``topics`` and ``types`` are topic -> type, of those that are published and of all; ``services``
     service -> its node.

@@ -23,14 +23,14 @@ from std_srvs.srv import Empty
 
 from crazyflie_dashboard.page_data import Outcome
 
-#: Longest time from a click to the emergency, s; older ones are refused. Longest for an answer.
+#: Age after which a click is refused, and longest time for an answer (s).
 MAX_EMERGENCY_AGE = 5.0
 #: These are called first.
 ALL = ("/all/emergency", "/crazyflie_server/all/emergency")
 
-_CONNECT_LIMIT = 2.0  #: To connect to a service in advance, s.
-_PERIOD = 1.0  #: From one look at the master to the next, s; longer where it takes long:
-_SHARE = 0.02  #: of the time at most.
+_CONNECT_LIMIT = 2.0  #: Longest time for a connection in advance (s).
+_PERIOD = 1.0  #: Shortest period of requests to the master (s).
+_SHARE = 0.02  #: Largest share of time that they take.
 _EMPTY = struct.pack("<I", 0)  #: A request of std_srvs/Empty: the length of nothing.
 
 

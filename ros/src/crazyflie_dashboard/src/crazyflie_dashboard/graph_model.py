@@ -36,15 +36,15 @@ from crazyflie_utils import NodeHandle
 from crazyflie_utils.tf.poses import RawTransforms, StampedPose
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED
 
-SCENE_PERIOD = 0.05  #: From one scene to the next, s.
-_POLL_PERIOD = 2.0  #: From one look at the master to the next, s; longer where it takes long:
-_POLL_SHARE = 0.02  #: of the time at most.
-_FORGET_AFTER = 30.0  #: A vehicle whose topics are gone is shown for so long, s.
-_FEW = 10  #: With more vehicles references and controls of watched ones are received only.
-#: What is received is kept for so long, s, after the last page has gone: a page that is loaded
-#: again is shown it also without a master.
+SCENE_PERIOD = 0.05  #: Period of scenes (s).
+_POLL_PERIOD = 2.0  #: Shortest period of requests to the master (s).
+_POLL_SHARE = 0.02  #: Largest share of time that they take.
+_FORGET_AFTER = 30.0  #: Time for which a vehicle is shown after its topics have gone (s).
+_FEW = 10  #: With more vehicles, references and controls are received of watched ones only.
+#: Time for which subscriptions are kept after the last page has gone (s): a page that is loaded
+#: again shows vehicles also without a master.
 _LINGER_TIME = 10.0
-_MAX_LINES = 500  #: Of the log.
+_MAX_LINES = 500  #: Lines of the log.
 
 _OLDER = "an older pose is shown"
 _CLOCKS = "set the clocks of both computers, or look for what is slow"
@@ -52,7 +52,7 @@ _REMEDIES = {"is stamped in the future": f"{_OLDER}; {_CLOCKS}"}
 
 
 class GraphModel:
-    """What is known of the graph. Not for several threads at once, except ``scene`` and ``graph``.
+    """The running graph. Not for several threads at once, except ``scene`` and ``graph``.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class GraphModel:
         self.scene = Scene()  #: The newest one.
         self.graph = Graph()  #: The newest one.
         self.models: dict[str, VehicleModel] = {}  #: By name of the vehicle.
-        self.plots: dict[str, VehiclePlots] = {}  #: Of watched vehicles.
+        self.plots: dict[str, VehiclePlots] = {}  #: Plots of watched vehicles, by name.
         #: paths, sentences, missions, recording: Parts of the scene that are set from outside.
         self.paths: Mapping[str, tuple[Triple, ...]] = {}
         self.sentences: tuple[Sentence, ...] = ()

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 _MAX_WIDTH = 640  #: Larger pictures are made smaller, pixels.
-_QUALITY = 80  #: Of JPEG, percent.
+_QUALITY = 80  #: Quality of JPEG (%).
 
 #: Encoding of sensor_msgs/Image -> type of a number, and where blue, green and red are; one channel
 #: of more than a byte is shown from its least to its largest number.

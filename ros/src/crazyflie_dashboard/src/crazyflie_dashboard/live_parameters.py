@@ -19,8 +19,8 @@ from crazyflie_utils.parameters.reconfigure import config_message
 from crazyflie_utils.parameters.types import ParameterType
 from crazyflie_utils.refusal import RefusalError
 
-_TIMEOUT = 3.0  #: Of what a node has latched, s of the machine's clock.
-_CALL_TIMEOUT = 5.0  #: Of a change, s.
+_TIMEOUT = 3.0  #: Longest time for a latched message of a node, by the machine's clock (s).
+_CALL_TIMEOUT = 5.0  #: Longest time for a change (s).
 
 _SERVICE = "/set_parameters"
 

@@ -9,7 +9,7 @@ import rosgraph
 
 from crazyflie_dashboard.discovery import Graph
 
-_LIMIT = 2.0  #: Of an answer of the master, s.
+_LIMIT = 2.0  #: Longest time for an answer of the master (s).
 
 
 class MasterError(OSError):

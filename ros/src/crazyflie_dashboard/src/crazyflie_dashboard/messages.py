@@ -1,4 +1,4 @@
-"""What nodes and the doctor say: sentences of diagnostics, lines of the log, findings."""
+"""Messages of nodes and of the doctor: diagnostics, lines of the log, findings."""
 
 import subprocess
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from rosgraph_msgs.msg import Log
 from crazyflie_dashboard.discovery import Vehicle
 from crazyflie_dashboard.snapshot import Kind, LogLine, Sentence
 
-_MAX_AGE = 10.0  #: A diagnostic that is older, s, is not true any more.
+_MAX_AGE = 10.0  #: Age after which a diagnostic is dropped (s).
 _DOCTOR_TIMEOUT = 60.0  #: s; the doctor gives up after 40.
 
 _LEVELS = {
@@ -22,7 +22,7 @@ _LEVELS = {
     Log.FATAL: "fatal",
 }
 
-_MAX_TEXT = 2000  #: Of a line of the log, characters.
+_MAX_TEXT = 2000  #: Length of a line of the log (characters).
 
 
 def log_line(number: int, message: Log) -> LogLine:
@@ -32,7 +32,7 @@ def log_line(number: int, message: Log) -> LogLine:
 
 
 class Diagnostics:
-    """What nodes say on /diagnostics.
+    """Diagnostics of nodes, from /diagnostics.
 
     Parameters
     ----------

@@ -27,12 +27,12 @@ _RUNNER = ("-m", "crazyflie_mission_api.mission_runner")
 _RESULT = '{"dry_run": '
 _COMMAND = re.compile(r" *[0-9.]+ s  (\w+: .+)")
 _DRY_RUN_TIMEOUT = 60.0  #: s.
-_LAND_TIMEOUT = 60.0  #: From the end of a mission that is stopped until its process is killed, s.
-_MAX_OUTPUT = 2000  #: Of the text of a failure, characters.
+_LAND_TIMEOUT = 60.0  #: Time from the stop of a mission until its process is killed (s).
+_MAX_OUTPUT = 2000  #: Length of the text of a failure (characters).
 
-_POLL = 0.2  #: From one look at the output of a mission to the next, s.
-_MAX_DISTANCE = 0.2  #: From where vehicles were at a dry run to where they are, m.
-_SOURCES = (".py", ".csv", ".yaml", ".yml")  #: Of files beside a script that it may read.
+_POLL = 0.2  #: Period in which the output of a mission is read (s).
+_MAX_DISTANCE = 0.2  #: Distance that vehicles may have moved since the dry run (m).
+_SOURCES = (".py", ".csv", ".yaml", ".yml")  #: Suffixes of files that a script may read.
 
 _CRAZYSWARM = ("pycrazyswarm", "crazyflie_py")
 
@@ -55,7 +55,7 @@ def listed(folders: Iterable[str | Path]) -> tuple[MissionFile, ...]:
 class Flight:
     """A mission in a process of its own, which goes on without this one.
 
-    Its output is a file. What is beside it, ``record``, says which process it is: a process number
+    Its output is a file. The file ``record`` says which process it is: a process number
     alone may be another's by now.
 
     Raises
@@ -110,7 +110,7 @@ class Flight:
         return status
 
     def stop(self) -> None:
-        """Have it land its vehicles; it is killed if it does not end. Only the first time counts.
+        """Land its vehicles; kill it if it does not end. Only the first call counts.
 
         Raises
         ------
@@ -238,7 +238,7 @@ class Missions:
         return end
 
     def stop(self) -> None:
-        """Have the missions that fly end and land their vehicles.
+        """End the missions that fly; they land their vehicles.
 
         Raises
         ------
@@ -333,7 +333,7 @@ def _is_crazyswarm(path):
 
 
 def _key(mission: MissionFile, vehicles: tuple[str, ...]) -> tuple[Any, ...]:
-    """Return what changes with a mission, its vehicles, and what is beside its file to be read."""
+    """Return a value that changes with a mission, its vehicles, and the files in its folder."""
     try:
         files = {Path(mission.path), *Path(mission.path).parent.iterdir()}
         times = [(str(f), f.stat().st_mtime_ns) for f in files if f.suffix in _SOURCES]

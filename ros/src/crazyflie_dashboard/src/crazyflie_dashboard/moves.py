@@ -13,12 +13,12 @@ from crazyflie_model.angles import rotate_back, rpy_from_quaternion
 from crazyflie_model.trajectory import minimum_jerk
 from crazyflie_utils.refusal import RefusalError
 
-SEPARATION = 0.3  #: Of any two vehicles, m; as that of missions by default.
-FAR = 0.5  #: A vehicle that is further from its move than this, m, has been told something else.
+SEPARATION = 0.3  #: Distance between two vehicles, as that of missions by default (m).
+FAR = 0.5  #: A vehicle further from its move has been commanded otherwise (m).
 
-_STEP = 0.05  #: Between two places of the fastest vehicle that are checked, m.
+_STEP = 0.05  #: Distance between two checked places of the fastest vehicle (m).
 _MAX_STEPS = 400
-_APPROACH = 0.02  #: Two that are too near already may fly apart, and come nearer by this, m.
+_APPROACH = 0.02  #: Two vehicles that are too near already may come nearer by this (m).
 
 
 @dataclass(frozen=True)

@@ -1,28 +1,28 @@
-"""What pages ask for, and what they are answered, as plain data."""
+"""Requests of pages and their answers, as plain data."""
 
 from dataclasses import dataclass
 
 from crazyflie_dashboard.snapshot import Action, Triple
 
-#: An older command, s, is not carried out: it has waited in a browser or a network.
+#: An older command has waited in a browser or a network, and is not carried out (s).
 MAX_COMMAND_AGE = 1.0
 
 
 @dataclass(frozen=True)
 class Command:
-    """What an operator has asked vehicles for."""
+    """A command of an operator for vehicles."""
 
     action: Action
     vehicles: tuple[str, ...]  #: Names.
-    clicked: float  #: When the operator did, by time.monotonic() of this computer.
-    goal: Triple | None = None  #: Of go to: x, y, z in m.
-    yaw: float | None = None  #: Of go to, rad; None keeps the heading.
-    height: float = 1.0  #: Of a takeoff, m.
-    speed: float = 0.5  #: Of go to, m/s.
+    clicked: float  #: Time of the click, by time.monotonic() of this computer (s).
+    goal: Triple | None = None  #: Goal of a go to: x, y, z (m).
+    yaw: float | None = None  #: Heading of a go to; None keeps it (rad).
+    height: float = 1.0  #: Height of a takeoff (m).
+    speed: float = 0.5  #: Speed of a go to (m/s).
 
     @property
     def words(self) -> str:
-        """What is asked for, as a line of the log has it."""
+        """The command as a text for the log."""
         text = f"{self.action.value} {', '.join(self.vehicles)}"
         if self.action == Action.TAKEOFF:
             text += f" to {self.height:g} m"
@@ -33,7 +33,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What has become of a command: ``text`` is "" when the vehicle does it, else the refusal."""
+    """The outcome of a command: ``text`` is the refusal, "" if there is none."""
 
     vehicle: str
     text: str = ""
@@ -51,7 +51,7 @@ class ParameterInfo:
     help: str = ""
     minimum: float | None = None
     maximum: float | None = None
-    choices: tuple[str, ...] = ()  #: Of a text; any if there are none.
+    choices: tuple[str, ...] = ()  #: Values of a text; any if empty.
     is_firmware: bool = False
 
 
@@ -66,7 +66,7 @@ class MissionFile:
 
 @dataclass(frozen=True)
 class DryRunResult:
-    """What a dry run has shown: ``text`` is the reason if it has not passed, or a summary.
+    """The result of a dry run: ``text`` is the reason if it has not passed, or a summary.
 
     ``paths`` are the commanded positions by vehicle, for the scene.
     """

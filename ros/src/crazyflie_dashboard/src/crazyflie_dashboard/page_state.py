@@ -1,4 +1,4 @@
-"""What one page has chosen to see: a vehicle, fields of topics, a camera."""
+"""The choices of one page: a vehicle, fields of topics, a camera."""
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
@@ -13,13 +13,13 @@ from crazyflie_utils import NodeHandle
 from crazyflie_utils.refusal import RefusalError
 
 IMAGES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")  #: Types of the topics of cameras.
-_IMAGE_PERIOD = 0.2  #: Between two pictures of a camera, s.
+_IMAGE_PERIOD = 0.2  #: Shortest period of pictures of a camera (s).
 
 _MAX_FIELDS = 20
 
 
 class PageState:
-    """What a page sees beside the scene."""
+    """The vehicle, the fields and the camera that a page shows in addition to the scene."""
 
     def __init__(self, handle: NodeHandle, workers: Executor, clock: Callable[[], float]) -> None:
         self.vehicle: str | None = None  #: The one whose plots it shows.

@@ -13,17 +13,17 @@ from crazyflie_dashboard.snapshot import VehicleSnapshot
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils.refusal import RefusalError
 
-DURATION = 60.0  #: s.
-_PERIOD = 0.05  #: From one number that is kept to the next, s.
+DURATION = 60.0  #: Time that is kept (s).
+_PERIOD = 0.05  #: Period of the numbers that are kept (s).
 
 #: Types of fields that can be plotted.
 _NUMBERS = {"bool", "byte", "char", "time", "duration", "float32", "float64"} | {
     f"{sign}int{size}" for sign in ("", "u") for size in (8, 16, 32, 64)
 }
 
-_UNITS = ["m", "m/s", "deg", "m/s^2", "V"]  #: In the order of their plots; others come last.
+_UNITS = ["m", "m/s", "deg", "m/s^2", "V"]  #: Order of the plots by unit; others come last.
 
-_MAX_SERIES = 100  #: Of one vehicle: a log topic may have any number of values.
+_MAX_SERIES = 100  #: Series of one vehicle: a log topic may have any number of values.
 
 
 class Ring:

@@ -12,9 +12,9 @@ import rospkg
 
 from crazyflie_utils.refusal import RefusalError
 
-_END_LIMIT = 30.0  #: Until a recorder that is to end has ended, s.
-_REPORT_LIMIT = 600.0  #: Of making a report, s.
-_NICE = ("nice", "-n", "10")  #: What flies comes first.
+_END_LIMIT = 30.0  #: Longest time for the end of the recorder (s).
+_REPORT_LIMIT = 600.0  #: Longest time for the report (s).
+_NICE = ("nice", "-n", "10")  #: Flights have priority.
 
 
 class Recording:
@@ -29,7 +29,7 @@ class Recording:
     """
 
     def __init__(self, folder: Path | None = None, programs: Any = None):
-        self.text = ""  #: What goes on, for the page.
+        self.text = ""  #: State in words, for the page.
         self.report: Path | None = None  #: The last one, HTML.
         self._folder = folder or Path(rospkg.get_ros_home(), "flights")
         self._programs = programs or _program

@@ -1,4 +1,4 @@
-"""What the page shows at one moment, as plain data. Texts are those of the graph: never HTML.
+"""The vehicles and their surroundings at one moment, as plain data. Texts are never HTML.
 
 Lengths are in m, angles in rad, times in s, in the fixed frame; None is "not known".
 """
@@ -19,7 +19,7 @@ STALE_AGE = 0.5  #: A vehicle whose pose is older, s, is stale.
 
 
 class Kind(Enum):
-    """What a vehicle is."""
+    """Kind of a vehicle."""
 
     SIMULATED = "simulated"
     VIRTUAL = "virtual"
@@ -27,7 +27,7 @@ class Kind(Enum):
 
 
 class Action(Enum):
-    """What a vehicle can be told; the value is a word for a button."""
+    """Commands of a vehicle; the value is the text of a button."""
 
     TAKEOFF = "take off"
     LAND = "land"
@@ -57,14 +57,14 @@ class VehicleSnapshot:
 
     name: str  #: Its namespace without a slash in front, such as cf1; "/" without a namespace.
     kind: Kind = Kind.SIMULATED
-    frame: str | None = None  #: Of /tf.
+    frame: str | None = None  #: Its frame on /tf.
     #: position, rotation: m, and a quaternion (x, y, z, w).
     position: Triple | None = None
     rotation: Rotation = (0.0, 0.0, 0.0, 1.0)
     velocity: Triple | None = None  #: m/s.
     pose_age: float | None = None  #: s.
     is_stale: bool = True  #: The pose is older than `STALE_AGE`, or there is none.
-    #: Of all vehicles if there are few, otherwise of watched ones.
+    #: Known of all vehicles if there are few, otherwise of watched ones.
     reference: Reference | None = None
     control_age: float | None = None  #: s; as references.
     #: state, reason: State of the flight in words, and why it is what it is; "" for an ordinary
@@ -80,7 +80,7 @@ class VehicleSnapshot:
     link_quality: float | None = None  #: 0 to 1.
     #: Hz, of pose, state, reference, control.
     rates: Mapping[str, float] = field(default_factory=dict)
-    actions: frozenset[Action] = frozenset()  #: What it offers.
+    actions: frozenset[Action] = frozenset()  #: Commands that it offers.
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ class Solids:
 
 
 class Placed(NamedTuple):
-    """What is drawn in a frame, and where that frame is: m, and a quaternion (x, y, z, w)."""
+    """Solids of a frame, with the frame's position (m) and quaternion (x, y, z, w)."""
 
     what: Solids
     position: Triple = (0.0, 0.0, 0.0)
@@ -159,7 +159,7 @@ class LogLine:
 class Scene:
     """All that there is at one moment."""
 
-    #: When it was made, s of time.monotonic(); inf before the first one.
+    #: Time at which it was made, by time.monotonic(); inf before the first one (s).
     made: float = math.inf
     fixed_frame: str = "world"
     #: By name, in the order in which they are shown.
@@ -169,8 +169,10 @@ class Scene:
     frames: tuple[Frame, ...] = ()
     #: Planned trajectories, by the vehicle's name or by topic. Changes rarely.
     paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)
-    sentences: tuple[Sentence, ...] = ()  #: Of the doctor and of /diagnostics, errors first.
+    sentences: tuple[
+        Sentence, ...
+    ] = ()  #: Sentences of the doctor and of /diagnostics, errors first.
     log: tuple[LogLine, ...] = ()  #: The newest ones, oldest first.
     images: tuple[str, ...] = ()  #: Topics of cameras.
-    missions: tuple[str, ...] = ()  #: What runs, as `missions.Run.text` says.
-    recording: str = ""  #: What a recording does that was begun here.
+    missions: tuple[str, ...] = ()  #: Missions that run, as `missions.Run.text`.
+    recording: str = ""  #: State of a recording that was begun here.

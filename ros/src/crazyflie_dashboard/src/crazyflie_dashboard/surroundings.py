@@ -1,4 +1,4 @@
-"""What is drawn around the vehicles: solids, planned paths and geofences of the graph."""
+"""Solids, planned paths and geofences of the graph, drawn around the vehicles."""
 
 import math
 from collections import defaultdict
@@ -18,14 +18,14 @@ from crazyflie_takeoff.flight_topics import follow_box
 from crazyflie_takeoff.limits import Box
 from crazyflie_utils import NodeHandle
 
-_MARKERS = ("world/markers", "sweep/markers", "plan/markers")  #: How the topics of markers end.
-_FENCES = "geofence/parameter_updates"  #: How a topic with the live parameters of a geofence ends.
+_MARKERS = ("world/markers", "sweep/markers", "plan/markers")  #: Last names of topics with markers.
+_FENCES = "geofence/parameter_updates"  #: Last name of a geofence's live parameters.
 _PATH = "nav_msgs/Path"
-_HELD = "fleet/waiting"  #: How the topic with the names of vehicles that a fleet holds apart ends.
+_HELD = "fleet/waiting"  #: Last name of the topic with vehicles that a fleet holds apart.
 
-_FAR = 14.0  #: Where a wall is drawn that a fence does not have, m: the end of the floor.
-_MAX_POINTS = 1000  #: Of a path.
-#: Of one topic that are drawn, points of lists counted one by one.
+_FAR = 14.0  #: Distance of walls that a fence does not have: the end of the floor (m).
+_MAX_POINTS = 1000  #: Points of a path.
+#: Markers of one topic that are drawn, and points of lists.
 MAX_PARTS = 100_000
 
 _SHAPES = {Marker.CUBE: "box", Marker.CYLINDER: "cylinder", Marker.SPHERE: "ball"}
@@ -81,7 +81,7 @@ class Surroundings:
 
     @property
     def too_many(self) -> tuple[str, ...]:
-        """What is not drawn, in words."""
+        """Texts about markers that are not drawn."""
         return tuple(
             f"{count} markers and points on {topic}; {MAX_PARTS} are drawn"
             for topic, (_, count) in self._markers.items()

@@ -1,4 +1,4 @@
-"""What is known of one vehicle: its topics become a `VehicleSnapshot`."""
+"""A vehicle and its topics, which become a `VehicleSnapshot`."""
 
 import math
 from collections import Counter, defaultdict
@@ -35,7 +35,7 @@ _FILTER_WORDS = {
 }
 _ON_GROUND = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
 
-#: For so long, s, a vehicle without a frame may get one: its topics cost more.
+#: Time after which poses of a vehicle without a frame come from its topics, which cost more (s).
 _FRAME_TIMEOUT = 3.0
 
 #: Types of the driver's log topics, and their numbers.
@@ -44,7 +44,7 @@ _LOGS: dict[str, tuple[Any, Callable[[Any], list[float]]]] = {
     "std_msgs/Float32": (Float32, lambda message: [message.data]),
 }
 
-_LOW_BATTERY = 3.2  #: V, where no driver says what is low; as the fleet's warning.
+_LOW_BATTERY = 3.2  #: Low voltage without a driver that reports it; as the fleet's warning (V).
 
 
 class VehicleModel:
@@ -70,7 +70,7 @@ class VehicleModel:
     ):
         self.vehicle = vehicle
         self.kind = Kind.REAL if vehicle.has_driver else Kind.SIMULATED
-        #: Of /tf, where its poses come from; without one they come from its own topics.
+        #: Frame of /tf with its poses; without one they come from its own topics.
         self.frame: str | None = None
         self._handle, self._time, self._on_row = handle, time, on_row
         self._received: dict[str, NodeHandle] = {}

@@ -12,15 +12,15 @@ from typing import Any
 
 from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
 
-MERGE_TIME = 1.0  #: The same event within this time of the last counts as one, s.
-MAX_EVENTS = 20_000  #: Of a bag; more are only counted.
+MERGE_TIME = 1.0  #: An event that repeats within this time counts as one (s).
+MAX_EVENTS = 20_000  #: Events of a bag; more are only counted.
 
 _WARN, _ERROR = 4, 8  # Levels of rosgraph_msgs/Log.
 _ROS2_LEVELS = {30: _WARN, 40: _ERROR, 50: _ERROR}  # Of rcl_interfaces/Log.
 
 
 class Kind(Enum):
-    """What an event is about."""
+    """Kind of an event."""
 
     REFUSAL = "refusal"
     REJECTED = "pose rejected"
@@ -38,10 +38,10 @@ class Event:
     """Something that happened."""
 
     time: float  #: s, when it was recorded.
-    namespace: str  #: Of the node or topic that it comes from.
+    namespace: str  #: Namespace of the node or topic that it comes from.
     kind: Kind
     text: str
-    count: int = 1  #: How many times in succession.
+    count: int = 1  #: Repetitions.
 
 
 class EventLog:

@@ -20,9 +20,9 @@ MAGIC = b"#ROSBAG V2.0\n"
 
 _MESSAGE, _BAG_HEADER, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
 
-LARGEST_CHUNK = 1 << 28  #: Of a chunk when it is decompressed, bytes; rosbag's have 768 kB.
-#: Of all chunks together: this many bytes, and this many times the size of the file. Flights are
-#: compressed to a third.
+LARGEST_CHUNK = 1 << 28  #: Size of a decompressed chunk; rosbag's have 768 kB (bytes).
+#: Size of all decompressed chunks: this many bytes plus this many times the size of the file.
+#: Flights are compressed to a third.
 LEAST_TOTAL, LARGEST_RATIO = 1 << 30, 100
 
 _LARGEST_HEADER = 1 << 20  #: Longer headers of records, bytes, are no headers: the file is damaged.
@@ -89,7 +89,7 @@ class Connection:
     datatype: str
     md5sum: str
 
-    encoding: ClassVar[str] = "ros1"  #: Of its messages.
+    encoding: ClassVar[str] = "ros1"  #: Encoding of its messages.
 
     def deserializer(self) -> Callable[[bytes], Any]:
         """Return what makes a message of its data.

@@ -22,11 +22,11 @@ Rows = NDArray[np.float64]
 
 _TIME, _STAMP, _NUMBER, _FIRST = 0, 1, 2, 3  # Columns of a spool.
 
-OTHER_CLOCK = 10.0  #: Stamps that are further from the time of recording, s, are another clock's.
+OTHER_CLOCK = 10.0  #: Stamps that are further from the time of recording are of another clock (s).
 
-PAUSE = 1.0  #: Without thrust for longer than this, s, a flight is over.
+PAUSE = 1.0  #: A flight is over after this time without thrust (s).
 LIFT = 0.1  #: A vehicle of which only poses are known flies this high above the lowest, m.
-MARGIN = 1.0  #: What is shown of the time before and after a flight, s.
+MARGIN = 1.0  #: Time that is shown before and after a flight (s).
 
 PHASES = {
     FlightStatus.UNKNOWN: "unknown",
@@ -39,7 +39,7 @@ PHASES = {
 
 @dataclass
 class Vehicle:
-    """What was recorded of a vehicle.
+    """A vehicle in a recording.
 
     Each array has a time of recording (s) in its first column and the fields that are named here
     in the others; there may be no rows.
@@ -50,7 +50,7 @@ class Vehicle:
     is_driven: bool  #: A driver has sent its controls: it is no simulated one.
     #: state, reference: STATE_FIELDS; velocities and yaw may be NaN.
     state: Rows
-    stamps: Rows  #: Of the states, s; 0 for a state without.
+    stamps: Rows  #: Stamps of the states; 0 for a state without (s).
     reference: Rows
     control: Rows  #: CONTROL_FIELDS.
     command: Rows  #: CONTROL_FIELDS as the driver was given them; none without a driver.
@@ -59,7 +59,7 @@ class Vehicle:
     battery: Rows  #: V.
     link: Rows  #: Share of answered pings, and setpoints that were not sent so far.
     toggles: Rows  #: Without fields.
-    delays: Rows  #: From the stamp of the newest pose to each control, s.
+    delays: Rows  #: Time from the stamp of the newest pose to each control (s).
     #: States that were published and not recorded; None without numbers in sequence.
     lost: int | None
 
@@ -179,7 +179,7 @@ def _lost(rows: Rows) -> int | None:
     if not numbers.any():
         return None
     steps = np.diff(numbers)
-    # A publisher that is started anew begins anew.
+    # The numbers of a publisher that was started again begin again.
     return int((steps[steps > 1.0] - 1.0).sum())
 
 

@@ -24,12 +24,12 @@ from crazyflie_reports.bag_topics import (
 )
 from crazyflie_reports.usd_log import UsdConnection, UsdLogFile, is_usd_log
 
-POSE_PERIOD = 0.009  #: Of transforms, which may come at 1 kHz, one in this time is kept, s.
+POSE_PERIOD = 0.009  #: Period of the transforms that are kept; they may come at 1 kHz (s).
 
-#: Times of ROS before this one, of 1973, count from the start of a simulation, s.
+#: Times of ROS before this one, of 1973, are simulated time (s).
 SIMULATED = 1e8
 
-RESTART = 0.5  #: Simulated time that steps back by more than this, s, has started again.
+RESTART = 0.5  #: Simulated time that steps back by more than this has started again (s).
 
 _BUFFER = 8192  # Numbers.
 
@@ -44,8 +44,8 @@ class Spool:
     def __init__(self, path: Path, fields: tuple[str, ...]):
         self._path, self.fields = path, fields
         self._buffer = array("d")
-        self.count = 0  #: Of rows.
-        self.offset = 0.0  #: Of the times of recording that are returned, s.
+        self.count = 0  #: Number of rows.
+        self.offset = 0.0  #: Added to the times of recording (s).
         self.last_time = float("-inf")
 
     def append(self, time: float, stamp: float, number: int, row: Sequence[float]) -> None:
@@ -83,9 +83,9 @@ class Source:
 
 @dataclass
 class BagLog:
-    """What a recording has for a report."""
+    """The contents of a recording that a report needs."""
 
-    name: str  #: Of the recording.
+    name: str  #: Name of the recording.
     sources: dict[str, Source] = field(default_factory=dict)  #: By topic.
     frames: dict[str, Spool] = field(default_factory=dict)  #: `POSE_FIELDS` by child frame of /tf.
     events: EventLog = field(default_factory=EventLog)

@@ -20,8 +20,8 @@ from crazyflie_reports.bag_ros2 import known, message, ros2_name, types
 
 FIXED = "world"  #: The frame of positions.
 
-ARM, ROTOR = 0.046, 0.023  #: Of a Crazyflie, m: half of its diagonal, radius of a propeller.
-PATH_POINTS = 2000  #: Of a path's marker.
+ARM, ROTOR = 0.046, 0.023  #: Half of the diagonal of a Crazyflie, radius of a propeller (m).
+PATH_POINTS = 2000  #: Points of a path's marker.
 
 _STATE, _CONTROL = "crazyflie_msgs/PositionVelocityYawStateStamped", "crazyflie_msgs/ControlStamped"
 _LINE_STRIP, _LINE_LIST, _SPHERE, _CYLINDER, _TEXT = 4, 5, 2, 3, 9  # Types of a Marker.

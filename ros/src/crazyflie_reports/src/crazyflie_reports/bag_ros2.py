@@ -32,7 +32,7 @@ from crazyflie_reports.bag_file import (
     TopicError,
 )
 
-#: Of Python from 3.14 on.
+#: Part of Python from 3.14 on.
 zstd = import_module("compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd")
 
 SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
@@ -116,7 +116,7 @@ def _zero(kind):
 class Ros2Connection(Connection):
     """A topic of a ROS 2 bag."""
 
-    definition: str = ""  #: As the bag has it; "" if it has none.
+    definition: str = ""  #: Definition in the bag; "" if it has none.
 
     encoding: ClassVar[str] = "cdr"
 

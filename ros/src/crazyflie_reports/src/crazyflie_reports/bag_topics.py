@@ -1,4 +1,4 @@
-"""What topics of a bag are: series of numbers of a vehicle, and messages that are events.
+"""Topics of a bag: series of numbers of a vehicle, and events.
 
 The topics are those of the examples, of the C++ workspace and of crazyflie_ros.
 """
@@ -26,7 +26,7 @@ class Role:
 
     name: str
     topics: str  #: Regular expression of the name below the vehicle's namespace.
-    fields: tuple[str, ...]  #: Of a row.
+    fields: tuple[str, ...]  #: Fields of a row.
     rows: dict[str, Callable[[Any], Row]]  #: By type, what makes a row of a message.
 
 
@@ -123,7 +123,7 @@ FLOATS = {
     "crazyflie_msgs/FullStateStamped": 12,
 }
 
-#: Of ROS 2 alone: those of crazyswarm2.
+#: Roles of ROS 2 alone: those of crazyswarm2.
 _ROS2_ROLES = (
     Role(
         "reference",
@@ -154,7 +154,7 @@ _HEADER = struct.Struct("<III")
 class Topic:
     """How messages of a connection are read."""
 
-    namespace: str  #: Of the vehicle, without slashes at its ends.
+    namespace: str  #: Namespace of the vehicle, without slashes at its ends.
     role: Role | None  #: None for messages that are events.
     #: ``decode(data)`` returns stamp (s, 0 without one), number in sequence, and a row or, without
     #: a role, the message.

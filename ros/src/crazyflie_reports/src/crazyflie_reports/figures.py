@@ -24,15 +24,17 @@ from crazyflie_reports.flight_record import (
 HARDWARE_TOLERANCE = 0.05
 
 SHORTEST_HOVER = 1.0  #: A vehicle that leaves the hover point within this time, s, does not hover.
-HOVER_TIME_LIMIT = 8.0  #: The takeoff server's 1 s of open loop and 5 s of hover, and 2 s more, s.
+HOVER_TIME_LIMIT = (
+    8.0  #: 1 s of open loop and 5 s of hover of the takeoff server, and 2 s more (s).
+)
 TRACKING_LIMIT = 0.2  #: Largest distance from a moving reference, m.
-DELAY_LIMIT = 0.02  #: 95 % of the controls follow the pose within this time, s.
-LEAST_RATE = 50.0  #: Of states and controls, Hz; at lower ones velocities are poor.
+DELAY_LIMIT = 0.02  #: 95 % of the controls follow the pose within this time (s).
+LEAST_RATE = 50.0  #: Lowest rate of states and controls; velocities are poor below it (Hz).
 #: Mean change of roll and pitch from one control to the next (rad). Of gains with enough margin;
 #: those at the limit of stability reach ten times as much.
 CHANGE_LIMIT, HARDWARE_CHANGE_LIMIT = 0.01, 0.03
 SATURATED_LIMIT = 0.01  #: Share of controls that are at a limit.
-_ROUNDING = 1e-6  #: Of a control that was in degrees on its way (rad).
+_ROUNDING = 1e-6  #: Rounding error of a control that was sent in degrees (rad).
 _NO_TILT = np.empty((0, 2))  #: Roll and pitch of no control.
 #: Thrust in hover over g: a battery that sags takes a part, a wrong mass or thrust curve more.
 HOVER_LIMITS = (0.85, 1.15)
@@ -56,11 +58,11 @@ class Figure:
     name: str
     unit: str
     value: float  #: NaN if it is not known.
-    needs: str  #: What has to be recorded, or flown, for it to be known.
+    needs: str  #: Topic or flight that is needed to know it.
     #: minimum, maximum: What is normal, if that is limited.
     minimum: float = -math.inf
     maximum: float = math.inf
-    note: str = ""  #: What a reader may wonder about.
+    note: str = ""  #: Explanation for readers.
 
     @property
     def is_normal(self) -> bool:

@@ -41,7 +41,7 @@ class FlightOperator:
     ):
         self._handle = handle = process.handle(f"{namespace.rstrip('/')}/flight_recorder")
         self._limit = limit
-        self.record = record = FlightRecord()  #: What has come so far.
+        self.record = record = FlightRecord()  #: Record of the flight so far.
         self._received = threading.Condition()  # Notified after every message.
         self._is_finished = False
         for topic, message_type, series in (
@@ -82,7 +82,7 @@ class FlightOperator:
         self._call("takeoff", "flying")
 
     def hover(self, duration: float) -> None:
-        """Let ``duration`` seconds of flight pass."""
+        """Wait for ``duration`` seconds of flight."""
         state = self.record.state
         end = state.last_time + duration
         self._wait_for(lambda: state.last_time >= end, "states stopped coming")

@@ -12,13 +12,13 @@ STATE_FIELDS = ("x", "y", "z", "x_dot", "y_dot", "z_dot", "yaw")
 CONTROL_FIELDS = ("roll", "pitch", "yaw_dot", "thrust")
 
 GROUND_TOLERANCE = 0.01  #: A vehicle below this height stands on the ground, m.
-GAP_LIMIT = 0.1  #: Without a new state for longer than this the vehicle is not controlled, s.
+GAP_LIMIT = 0.1  #: A vehicle without a new state for longer than this is not controlled (s).
 _LONG = 3.0  # A series with fewer samples has a gap where it pauses for this many periods.
 AT_POINT = 0.001  #: References closer to a point than this lead to it, m.
 
 HOVER_TOLERANCE = 0.01  #: Largest distance from the hover point of a good flight, m.
-HOVER_WINDOW = 5.0  #: Time before the end of the hover from which its error is taken, s.
-OVERSHOOT_LIMIT = 0.1  #: How far a good flight may rise above the hover point, m.
+HOVER_WINDOW = 5.0  #: Time before the end of the hover in which its error is measured (s).
+OVERSHOOT_LIMIT = 0.1  #: Largest overshoot of a good flight (m).
 TOUCHDOWN_LIMIT = 0.5  #: Fastest touchdown of a good flight, m/s.
 
 
@@ -202,7 +202,7 @@ class FlightRecord:
 class FlightReport:
     """Figures of one flight from /takeoff to /land; NaN if it has no hover or no touchdown."""
 
-    time_to_hover: float  #: From the call of /takeoff until it stayed within `HOVER_TOLERANCE`, s.
+    time_to_hover: float  #: Time from /takeoff until it stayed within `HOVER_TOLERANCE` (s).
     overshoot: float  #: Above the hover height, m.
     #: hover_error_mean, hover_error_max: Distance from the hover point at the end of the hover, m.
     hover_error_mean: float

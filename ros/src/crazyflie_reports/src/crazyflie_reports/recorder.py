@@ -25,7 +25,7 @@ TOPICS = (
     r"|parameter_updates)"
 )
 
-MAX_SIZE = 1024  #: Of a bag, MB; then the next one begins.
+MAX_SIZE = 1024  #: Size of a bag, after which the next one begins (MB).
 
 PARAMETERS = "parameters.yaml"
 

@@ -15,9 +15,9 @@ from crazyflie_reports.flight_record import gaps
 
 Array = NDArray[np.float64]
 
-#: Of a curve at most, at least, and about what all flights share.
+#: Largest and smallest number of points of a curve, and of those of all flights, about.
 MOST_POINTS, LEAST_POINTS, ALL_POINTS = 1000, 100, 40_000
-FRAME_PERIOD = 0.04  #: From one pose of the replay to the next, where points are enough, s.
+FRAME_PERIOD = 0.04  #: Period of the replay's poses, where points are enough (s).
 MAX_EVENTS = 300  #: That a flight's list shows.
 
 

@@ -83,7 +83,7 @@ def _reference(v: Values) -> Row | None:
     return position and (*position, *(_xyz(v, "ctrltarget", "v") or _UNKNOWN), math.nan)
 
 
-#: What is read, in words.
+#: The variables that are read, in words.
 EXPECTED = (
     "stateEstimate.x, y, z; stateEstimate.qx, qy, qz, qw, or roll, pitch, yaw of stateEstimate or "
     "stabilizer; ctrltarget.roll, pitch, yaw with stabilizer.thrust; ctrltarget.x, y, z; or pm.vbat"

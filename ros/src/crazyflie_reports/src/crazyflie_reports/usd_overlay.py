@@ -9,9 +9,9 @@ from crazyflie_model.angles import quaternion_from_rpy, zyx_from_quaternion
 from crazyflie_reports.bag_flights import Vehicle, vehicles
 from crazyflie_reports.bag_log import BagLog, Source
 
-PERIOD = 0.01  #: To which attitudes are brought to be compared, s.
-LEAST_OVERLAP = 3.0  #: Of a log and a recording, s.
-LEAST_CORRELATION = 0.6  #: Of roll and pitch where the log is at its place.
+PERIOD = 0.01  #: Sampling period of the attitudes that are compared (s).
+LEAST_OVERLAP = 3.0  #: Shortest time that a log and a recording have in common (s).
+LEAST_CORRELATION = 0.6  #: Lowest correlation of roll and pitch that counts.
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def _resampled(rows):
 
 
 def lay_over(usd: BagLog, logs: list[BagLog]) -> bool:
-    """Add the series of a log to the recording, beside the vehicle that it fits best.
+    """Add the series of a log to the recording, next to the vehicle that it fits best.
 
     Its times become those of the recording, and it has the phases of the vehicle. A remark says
     where it is; or, when it fits nowhere and False is returned, why.

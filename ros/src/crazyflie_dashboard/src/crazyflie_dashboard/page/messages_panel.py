@@ -1,4 +1,4 @@
-"""What the doctor and the diagnostics say, and the log."""
+"""Sentences of the doctor and of diagnostics, and the log."""
 
 import re
 import time

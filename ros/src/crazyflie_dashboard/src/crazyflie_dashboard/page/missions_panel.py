@@ -13,7 +13,7 @@ class MissionsPanel:
 
     def __init__(self, session: Session):
         self._session = session
-        self.paths: dict[str, tuple[Triple, ...]] = {}  #: Of the last dry run, for the scene.
+        self.paths: dict[str, tuple[Triple, ...]] = {}  #: Paths of the last dry run, for the scene.
         self._files: dict[str, MissionFile] = {}
         self._passed: tuple[str, tuple[str, ...]] | None = None
         self._choice = ui.label().classes("choice")

@@ -13,13 +13,13 @@ from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.snapshot import Scene
 
-SPAN = 60.0  #: Time that is shown, s.
+SPAN = 60.0  #: Time that is shown (s).
 MAX_POINTS = 300  #: Points of one line: more than the plot has pixels to show would only be sent.
-HEIGHT, GAP, TOP = 105, 34, 26  #: Of one plot, and the space between two and above the first, px.
+HEIGHT, GAP, TOP = 105, 34, 26  #: Height of a plot, space between two and above the first (px).
 
 COLORS = ["#4ea1ff", "#35c98a", "#ffb545", "#ff6b6b", "#b58cff", "#5fd3e0"]
 
-DIM = {"color": "#93a0b2"}  #: Of texts.
+DIM = {"color": "#93a0b2"}  #: Style of texts.
 SPLIT_LINE = {"lineStyle": {"color": "#2a323e"}}
 NAME_STYLES = {f"c{i}": {"color": color, "fontSize": 11} for i, color in enumerate(COLORS)}
 

@@ -17,10 +17,11 @@ from nicegui.element import Element
 from crazyflie_dashboard.snapshot import Rotation, Scene, Solids, Triple, VehicleSnapshot
 
 FOLDER = Path(__file__).parent
-MAX_UNANSWERED = 3  #: Scenes that a browser has not taken, before no more is sent,
-ANSWER_LIMIT = 2.0  #: for so long, s.
-PART_TIME = 1e-5  #: From sending walls, obstacles and points to sending others, s for each.
-DIGITS = 4  #: Of positions in m and of quaternions, for the browser.
+#: With this many unanswered scenes a browser is sent no more, for `ANSWER_LIMIT` at most.
+MAX_UNANSWERED = 3
+ANSWER_LIMIT = 2.0  #: Time after which a scene counts as answered (s).
+PART_TIME = 1e-5  #: Time between two transmissions of solids, for each of them (s).
+DIGITS = 4  #: Decimal places of positions (m) and quaternions that the browser is sent.
 
 ui.scene  # noqa: B018  Registers three.js.
 

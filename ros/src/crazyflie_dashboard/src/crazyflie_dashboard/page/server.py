@@ -24,11 +24,11 @@ HEAD = (FOLDER / "head.html").read_text() + (
     f"<style>{(FOLDER / 'dashboard.css').read_text()}</style>"
 )
 
-#: Longest time, s, for which a browser may be too busy to answer. After it the connection is lost,
-#: and the page is loaded anew, without its control and choices. NiceGUI's 2 s are passed by a
-#: browser that draws in software on a busy computer.
+#: Longest time without an answer of a browser (s). After it the connection is lost, and the page is
+#: loaded again, without its control and choices. A browser that draws in software on a busy
+#: computer exceeds NiceGUI's 2 s.
 ANSWER_TIMEOUT = 10.0
-CLOSING_TIME = 3.0  #: Longest time, s, that the server has to end.
+CLOSING_TIME = 3.0  #: Longest time for the end of the server (s).
 
 
 async def _emergency(dashboard: Dashboard, request: Request) -> Response:
@@ -79,7 +79,7 @@ class Page:
         application.get("/camera")(partial(_camera, dashboard))
         application.get("/report")(partial(_report, dashboard))
 
-        # Without a history of messages a page that has lost its connection is loaded anew.
+        # Without a history of messages a page that has lost its connection is loaded again.
         ui.page("/", title="Crazyflie mission control")(lambda: View(dashboard))
         ui.run_with(
             application,

@@ -21,8 +21,8 @@ RATES = {
     "final_control": "control",
     "cmd_vel": "control",
 }
-CHARGE_RANGE = 3.0, 4.2  #: Voltages of an empty and of a full battery, V.
-REACHED = 0.15  #: From a goal, m: it is not shown any more.
+CHARGE_RANGE = 3.0, 4.2  #: Voltages of an empty and of a full battery (V).
+REACHED = 0.15  #: Distance from a goal at which it disappears (m).
 LOOKS = ("ground", "flight", "stale", "emergency")
 
 

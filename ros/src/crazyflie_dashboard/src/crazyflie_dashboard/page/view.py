@@ -1,4 +1,4 @@
-"""What one page consists of, and how it follows the graph."""
+"""The parts of a page, and its timers, which follow the graph."""
 
 import json
 import math
@@ -22,13 +22,13 @@ from crazyflie_dashboard.page.vehicles_panel import VehiclesPanel
 from crazyflie_dashboard.snapshot import Scene, Sentence, VehicleSnapshot
 
 SCENE_PERIOD = 0.05
-PANEL_PERIOD = 0.5  #: Between two updates, s.
-MAX_SCENE_AGE = 1.0  #: Of a dashboard that is not held up, s.
-LOADING_TIME = 2.0  #: Until there is a first scene, s.
+PANEL_PERIOD = 0.5  #: Period of the panels (s).
+MAX_SCENE_AGE = 1.0  #: An older scene is shown as old (s).
+LOADING_TIME = 2.0  #: Longest time until the first scene (s).
 
 
 class View:
-    """A page: bar, scene, and panels beside it. Built when a browser asks for the page."""
+    """A page: bar, scene, and and panels. It is built when a browser asks for the page."""
 
     def __init__(self, dashboard: Dashboard):
         self._dashboard = dashboard
@@ -175,7 +175,7 @@ class View:
 
 
 def alarms_of(vehicle: VehicleSnapshot) -> list[str]:
-    """Return what an operator who does not look at the page has to know of a vehicle."""
+    """Return the alarms of a vehicle, as words."""
     found = ["emergency"] if vehicle.is_emergency else []
     if vehicle.is_in_flight:
         found += ["no pose"] if vehicle.is_stale else []

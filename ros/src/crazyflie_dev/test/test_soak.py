@@ -43,6 +43,13 @@ def test_nothing_makes_the_quadrotor_fly_away():
     assert soak(60.0, seed=8, dynamics="quadrotor", simulator_dt=POSE_PERIOD)["violations"] == []
 
 
+def test_flights_by_the_page_of_a_dashboard_that_lags_and_reloads(monkeypatch):
+    monkeypatch.setattr("crazyflie_dev.soak._PAGE_SHARE", 1.0)
+    result = soak(60.0, seed=9, simulator_dt=POSE_PERIOD)
+    assert result["flights by the page"] > 0
+    assert result["violations"] == []
+
+
 def test_every_live_parameter_is_changed():
     """Also those that are added later: a soak that does not know one fails here."""
     assert set(live_parameters(Soak(seed=1, dynamics="quadrotor").graph)) == set(LIVE_VALUES)

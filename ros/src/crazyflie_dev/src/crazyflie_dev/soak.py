@@ -21,7 +21,10 @@ from typing import Any
 import rospkg
 from std_srvs.srv import EmptyRequest
 
+from crazyflie_dashboard.page_data import MAX_COMMAND_AGE
+from crazyflie_dashboard.snapshot import Action
 from crazyflie_dev.soak_faults import FAULTS, Fault, Flight
+from crazyflie_dev.soak_page import NAME, PageNode
 from crazyflie_dev.soak_watch import Watch
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.main import NodeClasses
@@ -31,6 +34,10 @@ from crazyflie_utils.testing.launch_files import composed_nodes, expand
 HOVER_HEIGHT = 1.0  #: Hover height of the launch file (m).
 _STEP = 0.05  #: Between two looks of the operator at the flight, s.
 _TIMEOUT = 30.0  #: Longest wait for the reply to a call, or for the vehicle to come to rest, s.
+
+_PAGE_SHARE = 0.25  #: Share of the flights that are commanded by the dashboard's page.
+_LOADING_TIME = 2.5  #: Time from loading the page until it shows the vehicle (s).
+_LAGS = (0.0, 0.5, 3.0)  #: Lags of the page from a click to its command (s).
 
 _SIMULATOR = "/simulator"
 
@@ -58,12 +65,15 @@ class Soak:
         self.faults: Counter[str] = Counter()  #: Fault -> how often.
         #: Number of takeoffs that were refused, and of those that were not.
         self.refused = self.answered = 0
+        self.page = PageNode(self.graph)
+        self.clicked = 0  #: Flights that were commanded by the page.
         self._flight = Flight(self.graph, self.random, self.start)
         self._fault_steps: Iterator[None] = iter(())
         self._is_over = True
         self.watch.begin()
         for name in self._classes:
             self.start(name)
+        self.graph.start(NAME, self.page)
         self.graph.advance(2.0)
 
     def start(self, name: str) -> None:
@@ -78,7 +88,8 @@ class Soak:
         self._fault_steps, self._is_over = self._happen(fault), False
         self.watch.may_fly = True
         self.watch.allow(HOVER_HEIGHT)
-        takeoff = self._call("/takeoff")
+        by_page = self.random.random() < _PAGE_SHARE and self._open_page()
+        takeoff = self._click(Action.TAKEOFF) if by_page else self._call("/takeoff")
         if takeoff.done():
             reason = takeoff.exception()
             self.refused += reason is not None
@@ -89,7 +100,12 @@ class Soak:
         for _ in range(self.random.randint(0, 3)):
             self._refer(self.random.uniform(-1, 1), self.random.uniform(-1, 1))
             self._wait(self.random.uniform(0.5, 2.5))
-        self._call("/land")
+        if by_page:
+            self.page.load()
+            self._click(Action.LAND)
+            self.page.close()
+        else:
+            self._call("/land")
         # What has not happened yet happens on the ground.
         while not self._is_over:
             self._wait(_STEP)
@@ -122,8 +138,30 @@ class Soak:
         message.state.x, message.state.y, message.state.z = x, y, height
         self.graph.publish("/ref", message)
 
+    def _open_page(self):
+        """Load the page; return whether it shows the vehicle, as it does not without poses."""
+        self.page.load()
+        self._wait(_LOADING_TIME)
+        if not self.page.sees_vehicle:
+            self.page.close()
+            return False
+        self.clicked += 1
+        return True
+
+    def _click(self, action):
+        """Command the vehicle by the page; a click that has lagged too long moves nothing."""
+        lag = self.random.choice(_LAGS)
+        outcome = self._await(self.page.click(action, lag))
+        if lag > MAX_COMMAND_AGE:
+            text = str(outcome.exception()) if outcome.done() else "no answer"
+            self.watch.check("s old" in text, f"a click {lag:g} s ago: {text}")
+            outcome = self._await(self.page.click(action, 0.0))
+        return outcome
+
     def _call(self, service):
-        outcome: Future[Any] = self.graph.call(service, EmptyRequest())
+        return self._await(self.graph.call(service, EmptyRequest()))
+
+    def _await(self, outcome: Future[Any]) -> Future[Any]:
         end = self.graph.time + _TIMEOUT
         # A server that is killed never answers.
         while (
@@ -186,6 +224,7 @@ def soak(duration: float, seed: int, **arguments: object) -> dict[str, Any]:
         "simulated, s": round(flown, 1),
         "times real time": round(flown / (time.monotonic() - began), 1),
         "takeoffs answered, refused": [run.answered, run.refused],
+        "flights by the page": run.clicked,
         "faults": dict(sorted(run.faults.items())),
         "highest above reference, m": round(run.watch.highest, 3),
         "farthest from start, m": round(run.watch.farthest, 3),

@@ -523,6 +523,7 @@ def test_the_emergency_is_in_a_window_of_any_size(browser, driver):
             top = f"document.elementFromPoint({x}, {y}).closest('.emergency-all')"
             assert driver.execute_script(f"return {top} !== null")
             assert browser.find(".scene").rect["height"] > 100
+            assert browser.find('input[aria-label="height, m"]').rect["width"] > 30
             # Nothing is beside the window.
             wide = "return document.documentElement.scrollWidth <= innerWidth"
             assert driver.execute_script(wide)

@@ -49,7 +49,7 @@ class PageNode(Node):
         """Load the page, or load it again: it loses control and takes it."""
         if self._page:
             self.dashboard.pages.close(self._page)
-        self._page = self.dashboard.pages.open(str)
+        self._page = self.dashboard.pages.open(lambda text: None)
         self.dashboard.pages.take(self._page)
         self.dashboard.watch(self._page, VEHICLE)
 

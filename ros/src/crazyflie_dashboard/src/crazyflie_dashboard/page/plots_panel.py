@@ -133,10 +133,15 @@ def figures(series: Series, start: float, end: float) -> dict[str, str] | None:
 
 
 def points(series: Series) -> list[tuple[float, float | None]]:
-    """Return at most `MAX_POINTS` points of a line; a number that is not finite is a gap."""
+    """Return at most `MAX_POINTS` points of a line; a number that is not finite is a gap.
+
+    Rounded to a millionth: an axis that shows rounding errors would hide that nothing moves.
+    """
     step = max(1, math.ceil(len(series.times) / MAX_POINTS))
     pairs = zip(series.times[::step], series.values[::step], strict=True)
-    return [(round(t, 2), float(f"{v:.5g}") if math.isfinite(v) else None) for t, v in pairs]
+    return [
+        (round(t, 2), round(float(f"{v:.5g}"), 6) if math.isfinite(v) else None) for t, v in pairs
+    ]
 
 
 def chart(series: Iterable[Series], can_be_measured: bool) -> dict[str, Any]:

@@ -17,7 +17,7 @@ def server():
         yield server
 
 
-def client(server, package, program, **parameters):
+def client(server, package, program, /, **parameters):
     given = {"port": server.port, **parameters}
     arguments = [f"_{name}:={value}" for name, value in given.items()]
     return running("rosrun", package, program, *arguments)

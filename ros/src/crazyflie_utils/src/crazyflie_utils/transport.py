@@ -4,13 +4,17 @@
 the same for both.
 """
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import genpy
+if TYPE_CHECKING:
+    # Scripts with ideal vehicles need `ServiceError`, and no ROS.
+    import genpy
 
 
 class ServiceError(Exception):
@@ -67,7 +71,7 @@ class Transport(ABC):
     def set_param(self, name: str, value: Any) -> None:
         """Set a parameter."""
 
-    def set_param_later(self, name: str, value: Any) -> "Future[None]":
+    def set_param_later(self, name: str, value: Any) -> Future[None]:
         """Set a parameter soon, without waiting for the master; by default, at once.
 
         The future is done in any thread.

@@ -63,3 +63,16 @@ def test_one_base_station_measures_less_precisely_and_without_geometry_none():
         return bench.firmware.estimator.variance_position
 
     assert variance() < variance(base_stations=1) < 1e-4 < variance(knows_stations=False)
+
+
+def test_a_hand_carries_the_vehicle_and_lets_it_go():
+    bench = Bench(init_yaw=math.pi / 2.0)
+    hand = bench.physics.hand
+    hand.x, hand.z, hand.yaw = 1.0, 0.5, 45.0
+    bench.run(3.0)
+    # Forward is along y.
+    assert bench.physics.position == pytest.approx((0.0, 1.0, 0.5), abs=1e-6)
+    hand.x = hand.z = hand.yaw = 0.0
+    bench.run(3.0)
+    assert bench.physics.position == pytest.approx((0.0, 0.0, 0.0), abs=0.002)
+    bench.take_off()

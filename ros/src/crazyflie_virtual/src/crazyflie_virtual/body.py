@@ -117,6 +117,47 @@ OFF = MotorCommands(0.0, 0.0, 0.0, 0.0)
 _OVERTURNING = 0.5  #: Cosine of the tilt on the ground beyond which a vehicle lies on its back.
 
 
+_HAND_SPEED, _HAND_TURN = 0.5, math.radians(45.0)  #: m/s, rad/s.
+
+
+class Hand:
+    """A hand that carries the vehicle, from where it took it; at rest there while all are 0."""
+
+    def __init__(self) -> None:
+        #: x, y, z, yaw: Where it carries the vehicle, m and degrees, in the vehicle's directions
+        #: when it was taken.
+        self.x = self.y = self.z = self.yaw = 0.0
+        self._start: tuple[Triple, float] | None = None
+        self._offset = [0.0] * 4
+
+    def carry(self, x: Vector[float]) -> Vector[float] | None:
+        """Return the state of the vehicle after a step, 17 components; None if it is let go."""
+        goal = [self.x, self.y, self.z, math.radians(self.yaw)]
+        if self._start is None:
+            if not any(goal):
+                return None
+            self._start = (x[0], x[1], x[2]), zyx_from_quaternion(x[6:10])[2]
+        elif not (any(goal) or any(self._offset)):
+            self._start = None
+            return None
+        rates = (_HAND_SPEED, _HAND_SPEED, _HAND_SPEED, _HAND_TURN)
+        before = self._offset
+        self._offset = [
+            o + min(max(g - o, -rate * STEP), rate * STEP)
+            for o, g, rate in zip(before, goal, rates, strict=True)
+        ]
+        place, yaw = self._start
+        turn = (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0))
+        way = rotate(turn, self._offset[:3])
+        velocity = rotate(
+            turn, [(b - a) / STEP for a, b in zip(before[:3], self._offset[:3], strict=True)]
+        )
+        attitude = quaternion_from_zyx(0.0, 0.0, yaw + self._offset[3])
+        turning = (self._offset[3] - before[3]) / STEP
+        position = [a + b for a, b in zip(place, way, strict=True)]
+        return [*position, *velocity, *attitude, 0.0, 0.0, turning, *x[13:17]]
+
+
 class Physics:
     """Rigid body, four motors, ground; it begins at a position (m) and heading (rad).
 
@@ -141,6 +182,7 @@ class Physics:
         self.specific_force: Triple = (0.0, 0.0, GRAVITY)
         #: Surroundings; None for the ground alone. The vehicle collides with the ground only.
         self.world: World | None = None
+        self.hand = Hand()
         self.is_overturned = False  #: Came down on its back: lies there until `put_upright`.
 
     @property
@@ -181,6 +223,9 @@ class Physics:
         """Advance by `STEP`; the battery's voltage (V) limits the speed of the motors."""
         top = self._model.max_rotor_speed * voltage / FULL_VOLTAGE
         before = self._x
+        if (carried := self.hand.carry(before)) is not None:
+            self._x, self.specific_force = carried, (0.0, 0.0, GRAVITY)
+            return
         if self.is_overturned:
             commands = OFF
         speeds = [min(top, self._model.rotor_speed(command)) for command in commands]

@@ -255,6 +255,8 @@ _GROUPS = {
         *_limited(U8, 0, 4, motorFailure="faults.motor_failure"),
         *_limited(U8, 0, 3, occluded="faults.occluded"),
         *_limited(FLOAT, 0.0, 100.0, smooth="faults.smooth"),
+        *_limited(FLOAT, -2.0, 2.0, handX="hand.x", handY="hand.y", handZ="hand.z"),
+        *_limited(FLOAT, -180.0, 180.0, handYaw="hand.yaw"),
     ],
 }
 

@@ -38,6 +38,7 @@ class Firmware:
     ):
         self._physics = physics
         self.faults = faults
+        self.hand = physics.hand
         self.protocol = settings.protocol
         self._steps = 0
         self.time = 0.0  #: Since the start, s.

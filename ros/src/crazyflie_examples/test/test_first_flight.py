@@ -7,6 +7,7 @@ import pytest
 from first_flight_rig import FastRig
 
 from crazyflie_examples.first_flight import STEPS, fly, report
+from crazyflie_examples.first_flight_program import main
 
 NAMES = [step.name for step in STEPS]
 
@@ -59,6 +60,14 @@ def test_a_fault_stops_it_at_its_step(faults, step, words):
     assert (last.step, last.passed) == (step, False)
     assert re.search(words, last.text)
     assert len(before) == NAMES.index(step)
+
+
+def test_an_address_that_is_none_is_named(capsys):
+    assert main(["radio:80"]) == 1
+    assert "radio:80" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["udp://127.0.0.1:9", "--positioning", "gps"])
+    assert "expected one of mocap, lighthouse, flow, loco" in capsys.readouterr().err
 
 
 def test_the_pilot_ends_it():

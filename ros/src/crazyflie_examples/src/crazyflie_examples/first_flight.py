@@ -162,6 +162,7 @@ def _motors(rig, ask):
 
 def _hand(rig, _):
     """Compare poses with movements by hand."""
+    rig.carry(0.0, 0.0, 0.0, 0.0)
     place, yaw = _rest(rig)
     ways = []
     for goal in np.eye(3) * CARRY:

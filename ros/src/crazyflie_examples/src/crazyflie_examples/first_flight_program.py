@@ -1,0 +1,343 @@
+"""The command `first_flight`: the protocol with a vehicle, by the driver and then by the LQR."""
+
+import contextlib
+import math
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import genpy
+import rosgraph
+import rospkg
+from geometry_msgs.msg import Point, PoseStamped, TransformStamped
+from std_msgs.msg import Bool
+from std_srvs.srv import Empty, EmptyRequest
+from tf2_msgs.msg import TFMessage
+
+from crazyflie_doctor.vehicle import VehicleFacts, examine
+from crazyflie_driver.msg import GenericLogData
+from crazyflie_driver.positioning import MOCAP, SOURCES
+from crazyflie_driver.srv import (
+    GoTo,
+    GoToRequest,
+    Land,
+    LandRequest,
+    Takeoff,
+    TakeoffRequest,
+    UpdateParams,
+    UpdateParamsRequest,
+)
+from crazyflie_examples.first_flight import HEIGHT, Sample, Stop, fly, report
+from crazyflie_link.address import Address
+from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.errors import CrazyflieError
+from crazyflie_link.log import LogBlock
+from crazyflie_model.angles import zyx_from_quaternion
+from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_utils import Parameters, ServiceError, parameter
+from crazyflie_utils.main import begin_script
+from crazyflie_utils.parameters.declaration import parse_arguments
+from crazyflie_utils.parameters.types import BOOLEAN, FINITE, FRAME, Text
+
+PREFIX = "/crazyflie"
+_RELAYED = "first_flight"  #: Frame by which the LQR flies: the poses, until they are hidden.
+_LIMIT = 60.0  #: Of starts and of services, s.
+_CARRY_TIME = 4.0  #: In which a virtual vehicle is carried, s.
+_DURATION = genpy.Duration(2)  #: Of the driver's commands.
+_HAND = ("handX", "handY", "handZ", "handYaw")
+
+
+class FirstFlightParameters(Parameters):
+    """Options of the command line."""
+
+    positioning: str = parameter(Text(SOURCES), "source of the pose", MOCAP)
+    mocap_frame: str = parameter(
+        FRAME, "frame of the vehicle in motion capture, which has to run", "HY5/base_link"
+    )
+    out: str = parameter(Text(), "folder of report and recording", "out/first_flight")
+    yes: bool = parameter(
+        BOOLEAN, "every question is answered with yes: for virtual vehicles only", False
+    )
+
+
+class LiveRig:
+    """Moves a vehicle by the driver, or by hw_hover.launch, and records it from ROS."""
+
+    def __init__(self, uri: str, options: FirstFlightParameters, folder: Path):
+        self.samples: list[Sample] = []
+        self._uri, self._options, self._folder = uri, options, folder
+        self._launched: subprocess.Popen[bytes] | None = None
+        self._log: tuple[float, ...] = (0.0,) * 6
+        self._hides = self._is_connected = False
+        self._end_node: Callable[[], None] = lambda: None
+        self._landing: Callable[[], None] | None = None
+        is_mocap = options.positioning == MOCAP
+        self._frame = options.mocap_frame if is_mocap else f"{PREFIX[1:]}/estimate"
+
+    def begin(self) -> None:
+        """Connect to the graph, which roscore or a launch of this command has begun."""
+        process, self._end_node = begin_script("first_flight")
+        self._handle = handle = process.handle("/first_flight")
+        self._tf = handle.publisher("/tf", TFMessage)
+        self._external = handle.publisher(f"{PREFIX}/external_pose", PoseStamped)
+        self._reference = handle.publisher("/ref", PositionVelocityStateStamped)
+        handle.subscribe(f"{PREFIX}/first_flight", GenericLogData, self._on_log)
+        handle.subscribe(f"{PREFIX}/connected", Bool, self._on_connected)
+        handle.subscribe("/tf", TFMessage, self._on_tf)
+        process.start()
+
+    def _on_log(self, message):
+        self._log = message.values
+
+    def _on_connected(self, message):
+        self._is_connected = message.data
+
+    def _on_tf(self, message):
+        for each in message.transforms:
+            if each.child_frame_id == self._frame:
+                self._on_pose(each)
+
+    def _on_pose(self, pose):
+        if self._hides:
+            return
+        place, q = pose.transform.translation, pose.transform.rotation
+        yaw = zyx_from_quaternion((q.x, q.y, q.z, q.w))[2]
+        m1, m2, m3, m4, gyro, voltage = self._log
+        stamp = self._handle.time()
+        self.samples.append(
+            Sample(
+                stamp, place.x, place.y, place.z, yaw, math.radians(gyro), voltage, (m1, m2, m3, m4)
+            )
+        )
+        header, transform = pose.header, pose.transform
+        self._tf.publish(TFMessage([TransformStamped(header, _RELAYED, transform)]))
+        if self._options.positioning == MOCAP:
+            external = PoseStamped(header=header)
+            external.pose.position, external.pose.orientation = Point(*_xyz(place)), q
+            self._external.publish(external)
+
+    # The rig.
+
+    def examine(self) -> VehicleFacts:
+        """Return the facts of the doctor, without the self tests, which spin fast."""
+        return examine(self._uri)
+
+    def run(self, duration: float) -> None:
+        """Let time pass (s); any key ends the protocol."""
+        end = time.monotonic() + duration
+        while (left := end - time.monotonic()) > 0.0:
+            if self._launched is not None and self._launched.poll() is not None:
+                raise Stop("the launch has ended; see its log above")
+            if sys.stdin.isatty():
+                if select.select([sys.stdin], [], [], min(left, 0.1))[0]:
+                    sys.stdin.readline()
+                    raise Stop("ended by the pilot")
+            else:
+                time.sleep(min(left, 0.1))
+
+    def spin(self, motor: int, pwm: int) -> None:
+        """Turn one motor for a second, on a link of its own."""
+        names = [f"motor.m{i}" for i in range(1, 5)]
+
+        def note(_: int, values: tuple[float, ...]) -> None:
+            m1, m2, m3, m4 = values
+            self.samples.append(Sample(time.monotonic(), 0, 0, 0, 0, 0, 0, (m1, m2, m3, m4)))
+
+        try:
+            with Crazyflie(self._uri) as vehicle:
+                write = vehicle.parameters.write
+                vehicle.add_log_block(LogBlock("motors", 100, tuple(names), note))
+                try:
+                    write(f"motorPowerSet.m{motor}", pwm)
+                    write("motorPowerSet.enable", 1)
+                    self.run(1.0)
+                finally:
+                    write("motorPowerSet.enable", 0)
+                    write(f"motorPowerSet.m{motor}", 0)
+        except CrazyflieError as error:
+            raise Stop(str(error)) from None
+
+    def carry(self, x: float, y: float, z: float, yaw: float) -> None:
+        """Have a person carry the vehicle; a virtual one is carried by its own parameters."""
+        self._launch("first_flight.launch", f"positioning:={self._options.positioning}")
+        name = f"{PREFIX}/virtual/{_HAND[0]}"
+        if self._handle.get_param(name, FINITE, math.inf) == math.inf:
+            ways = zip((x, y, z), ("forward", "left", "up"), strict=True)
+            goal = [f"{way:g} m {name}" for way, name in ways if way]
+            goal += [f"turned {yaw:g} degrees to the left"] if yaw else []
+            where = f"Carry it from where it stood: {' '.join(goal)}" if goal else "Put it down there"
+            input(f"{where}; Enter while it is still. ")
+            return
+        for name, value in zip(_HAND, (x, y, z, yaw), strict=True):
+            self._handle.set_param(f"{PREFIX}/virtual/{name}", float(value))
+        names = [f"virtual/{name}" for name in _HAND]
+        self._call("update_params", UpdateParams, UpdateParamsRequest(names))
+        self.run(_CARRY_TIME)
+
+    def driver_takeoff(self, height: float) -> None:
+        """Take off by the driver."""
+        self._landing = self.driver_land
+        goal = self.samples[-1].z + height
+        self._call("takeoff", Takeoff, TakeoffRequest(height=goal, duration=_DURATION))
+        self.run(2.0)
+
+    def driver_turn(self, yaw: float) -> None:
+        """Turn by the driver."""
+        request = GoToRequest(relative=True, yaw=math.radians(yaw), duration=_DURATION)
+        self._call("go_to", GoTo, request)
+        self.run(2.0)
+
+    def driver_land(self) -> None:
+        """Land by the driver."""
+        self._landing = None
+        self._call("land", Land, LandRequest(height=0.0, duration=_DURATION))
+        time.sleep(5.0)
+
+    def take_off(self) -> None:
+        """Launch the hover stack and take off."""
+        self.end()
+        self._launch(
+            "hw_hover.launch",
+            f"positioning:={self._options.positioning}",
+            f"pose_frame:={_RELAYED}",
+            f"takeoff_hover_z:={HEIGHT}",
+            "rviz:=false",
+            "record:=true",
+            f"record_folder:={self._folder.resolve()}",
+            "genericLogTopics:=[first_flight]",
+            "genericLogTopicFrequencies:=[10]",
+            f"genericLogTopicVariables_file:={_package() / 'config/first_flight.yaml'}",
+        )
+        self._landing = self.land
+        self._call("/takeoff", Empty, EmptyRequest())
+
+    def refer(self, x: float, y: float, z: float) -> None:
+        """Publish a reference."""
+        message = PositionVelocityStateStamped()
+        message.header.stamp = self._handle.stamp()
+        message.state.x, message.state.y, message.state.z = x, y, z
+        self._reference.publish(message)
+
+    def land(self) -> None:
+        """Land by the takeoff server."""
+        self._landing = None
+        self._call("/land", Empty, EmptyRequest())
+        self.run(1.0)
+
+    def hide_poses(self, duration: float) -> None:
+        """Relay no poses for a duration (s)."""
+        self._hides = True
+        time.sleep(duration)
+        self._hides = False
+        self.run(0.1)
+
+    def emergency(self) -> None:
+        """Stop the motors for good."""
+        self._call("emergency", Empty, EmptyRequest())
+
+    def end(self) -> None:
+        """Land, if it flies, and end what was launched."""
+        if self._landing is not None:
+            with contextlib.suppress(Stop):
+                self._landing()
+        if self._launched is not None:
+            self._launched.send_signal(signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._launched.wait(_LIMIT)
+            self._launched = None
+        self._landing = None
+
+    def close(self) -> None:
+        """End what was launched, and the node."""
+        self.end()
+        self._end_node()
+
+    def _launch(self, name, *arguments):
+        if self._launched is not None:
+            return
+        command = ["roslaunch", str(_package() / "launch" / name), f"uri:={self._uri}", *arguments]
+        self._launched = subprocess.Popen(
+            command, stdout=sys.stderr, stdin=subprocess.DEVNULL, start_new_session=True
+        )
+        self._is_connected = False
+        before, end = len(self.samples), time.monotonic() + _LIMIT
+        while not (self._is_connected and len(self.samples) > before + 10):
+            self.run(0.1)
+            if time.monotonic() > end:
+                raise Stop(
+                    f"no pose in the frame {self._frame} within {_LIMIT:g} s of the launch; is the "
+                    "vehicle seen, and is it connected?"
+                )
+
+    def _call(self, name: str, service: Any, request: Any) -> None:
+        full = name if name.startswith("/") else f"{PREFIX}/{name}"
+        try:
+            self._handle.call_service(full, service, request, _LIMIT).result()
+        except ServiceError as error:
+            raise Stop(f"{full}: {error}") from None
+
+
+def _xyz(vector):
+    return vector.x, vector.y, vector.z
+
+
+def _package() -> Path:
+    return Path(rospkg.RosPack().get_path("crazyflie_examples"))
+
+
+def _ask(text: str) -> bool:
+    return input(f"{text}\n  Enter for yes, anything else ends: ") == ""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Do the protocol; return 0 if every step has passed, otherwise 1."""
+    given = sys.argv[1:] if arguments is None else arguments
+    uri, rest = (given[0], given[1:]) if given and not given[0].startswith("-") else ("", given)
+    options = parse_arguments(
+        FirstFlightParameters,
+        rest,
+        "first_flight URI",
+        "A first flight, one step at a time, each asked for with Enter and ended by any key and "
+        "Enter; it ends with a report. Exit status: 0 all have passed, 1 not, 2 wrong usage.",
+    )
+    try:
+        Address.parse(uri)
+    except CrazyflieError as error:
+        print(f"first_flight: {error}", file=sys.stderr)
+        return 1
+    folder = Path(options.out) / datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
+    folder.mkdir(parents=True)
+    core = None
+    if not rosgraph.is_master_online():
+        port = urlsplit(rosgraph.get_master_uri()).port
+        core = subprocess.Popen(["roscore", "-p", str(port)], stdout=sys.stderr)
+    rig = LiveRig(uri, options, folder)
+    verdicts = []
+    try:
+        end = time.monotonic() + _LIMIT
+        while not rosgraph.is_master_online() and time.monotonic() < end:
+            time.sleep(0.1)
+        rig.begin()
+        for verdict in fly(rig, (lambda _: True) if options.yes else _ask):
+            verdicts.append(verdict)
+            print(f"{'passed' if verdict.passed else 'FAILED'}  {verdict.step}: {verdict.text}")
+            sys.stdout.flush()
+    except KeyboardInterrupt:
+        print("first_flight: interrupted", file=sys.stderr)
+    finally:
+        rig.close()
+        if core is not None:
+            core.terminate()
+            core.wait()
+    path = folder / "report.html"
+    path.write_text(report(verdicts, f"First flight of {uri}", str(folder)))
+    print(f"the report is in {path}")
+    is_done = bool(verdicts) and verdicts[-1].passed and verdicts[-1].step == "emergency"
+    return 0 if is_done else 1

@@ -37,7 +37,7 @@ def lines(bench):
         ((1, 0, b"\1"), "port 1"),
         (write("deck.bcFlow2", b"\0"), "deck.bcFlow2 is read-only"),
         (write("virtual.loss", struct.pack("<f", 2.0)), "virtual.loss is 0 to 1"),
-        ((Port.PARAMETERS, 2, b"\xff\xff\0"), "none with the number ffff"),
+        ((Port.PARAMETERS, 2, b"\xff\xff\0"), "no parameter has the number ffff"),
         ((Port.PARAMETERS, 3, b"\x63\0\0"), "unknown command 63"),
         ((Port.LOG, 1, b"\x63\0"), "unknown command 99"),
         ((Port.MEMORY, 0, b"\x63"), "unknown request 63"),

@@ -90,12 +90,13 @@ cf1, cf2 = swarm.allcfs.crazyflies
 swarm.allcfs.takeoff(1.0, 2.5)
 swarm.timeHelper.sleep(4.0)
 print("begins at", abs(round(cf1.yaw(), 1)))
-cf1.goTo([0.0, 0.5, 1.0], math.pi / 2.0, 2.0)
+side = math.copysign(1.0, cf1.position()[1])  # Away from the other, wherever it stands.
+cf1.goTo([0.0, side * 0.5, 1.0], math.pi / 2.0, 2.0)
 swarm.timeHelper.sleep(3.0)
 print("turned to", abs(round(cf1.yaw(), 1)))
-cf1.goTo([0.4, 0.8, 1.0], math.pi / 2.0, 2.0)
+cf1.goTo([0.4, side * 0.8, 1.0], math.pi / 2.0, 2.0)
 swarm.timeHelper.sleep(3.0)
-print("moved to", abs(round(cf1.yaw(), 1)), [round(each, 1) for each in cf1.position()])
+print("moved to", abs(round(cf1.yaw(), 1)), [abs(round(each, 1)) for each in cf1.position()])
 """
 
 

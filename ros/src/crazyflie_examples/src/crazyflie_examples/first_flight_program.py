@@ -172,7 +172,7 @@ class LiveRig:
             ways = zip((x, y, z), ("forward", "left", "up"), strict=True)
             goal = [f"{way:g} m {name}" for way, name in ways if way]
             goal += [f"turned {yaw:g} degrees to the left"] if yaw else []
-            where = f"Carry it from where it stood: {' '.join(goal)}" if goal else "Put it down there"
+            where = f"Carry it from its place: {' '.join(goal)}" if goal else "Put it in its place"
             input(f"{where}; Enter while it is still. ")
             return
         for name, value in zip(_HAND, (x, y, z, yaw), strict=True):

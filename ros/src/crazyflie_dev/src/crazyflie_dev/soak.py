@@ -20,10 +20,17 @@ from typing import Any
 
 import rospkg
 from std_srvs.srv import EmptyRequest
+from tqdm import tqdm
 
 from crazyflie_dashboard.page_data import MAX_COMMAND_AGE
 from crazyflie_dashboard.snapshot import Action
-from crazyflie_dev.soak_faults import FAULTS, Fault, Flight
+from crazyflie_dev.soak_faults import (
+    FAULTS,
+    MISSION_PARAMETERS,
+    MISSIONS,
+    Fault,
+    Flight,
+)
 from crazyflie_dev.soak_page import NAME, PageNode
 from crazyflie_dev.soak_watch import Watch
 from crazyflie_msgs.msg import PositionVelocityStateStamped
@@ -57,6 +64,9 @@ class Soak:
         given = {"composed": True, "rviz": False, "simulator_dt": 0.005, **arguments}
         _, parameters = expand(package / "launch/sw_hover.launch", **given)
         nodes = composed_nodes(parameters)
+        for mission in MISSIONS:
+            nodes[mission.strip("/")] = "crazyflie_fleet.high_level_node:HighLevelNode"
+            parameters |= {f"{mission}/{key}": name for key, name in MISSION_PARAMETERS.items()}
         self._classes = {f"/{name}": node for name, node in NodeClasses()(nodes).items()}
         # Far from the beginning of time: the wall clock is set back, too.
         self.graph = FakeGraph({**parameters, "/simulator/seed": seed}, start=1e6)
@@ -200,23 +210,25 @@ class Soak:
             self.graph.advance(min(_STEP, end - self.graph.time))
 
 
-def soak(duration: float, seed: int, **arguments: object) -> dict[str, Any]:
+def soak(duration: float, seed: int, progress: bool = False, **arguments: object) -> dict[str, Any]:
     """Fly for ``duration`` (s, simulated) and return what was seen, as JSON knows it.
 
-    See `Soak` for the other arguments.
+    ``progress`` shows a bar on the terminal; see `Soak` for the other arguments.
     """
     began = time.monotonic()
     run = Soak(seed, **arguments)
     start = run.graph.time
     faults: list[Fault] = []
-    while run.graph.time - start < duration:
-        before = len(run.watch.violations)
-        # Each fault once, in a new order, before any comes again.
-        faults = faults or run.random.sample(FAULTS, len(FAULTS))
-        fault = faults.pop()
-        run.fly(fault)
-        new = run.watch.violations[before:]
-        run.watch.violations[before:] = [f"{fault.name}: {each}" for each in new]
+    with tqdm(total=round(duration), unit="s", disable=not progress) as bar:
+        while run.graph.time - start < duration:
+            before = len(run.watch.violations)
+            # Each fault once, in a new order, before any comes again.
+            faults = faults or run.random.sample(FAULTS, len(FAULTS))
+            fault = faults.pop()
+            run.fly(fault)
+            new = run.watch.violations[before:]
+            run.watch.violations[before:] = [f"{fault.name}: {each}" for each in new]
+            bar.update(round(run.graph.time - start) - bar.n)
     flown = run.graph.time - start
     return {
         "seed": seed,
@@ -242,7 +254,7 @@ def main() -> int:
     parser.add_argument("--dynamics", default="near_hover", help="of sw_hover.launch")
     parser.add_argument("--output", type=Path, help="JSON file")
     options = parser.parse_args()
-    result = soak(options.duration, options.seed, dynamics=options.dynamics)
+    result = soak(options.duration, options.seed, progress=True, dynamics=options.dynamics)
     text = json.dumps(result, indent=2)
     print(text)
     if options.output is not None:

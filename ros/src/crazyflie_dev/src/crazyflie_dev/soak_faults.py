@@ -1,4 +1,4 @@
-"""Faults of a soak: poses, nodes, the clock, other programs, calls and live parameters.
+"""Faults of a soak: poses, nodes, the clock, other programs, and commands of people.
 
 A fault is a generator of steps, twenty a second; its end is its ``close()``.
 """
@@ -15,10 +15,12 @@ from random import Random
 from typing import Any
 
 import genpy
+import roslib.message
 import rospkg
 from dynamic_reconfigure.encoding import decode_config, encode_config
 from dynamic_reconfigure.msg import DoubleParameter, StrParameter
 from dynamic_reconfigure.srv import ReconfigureRequest
+from geometry_msgs.msg import Point
 from std_srvs.srv import EmptyRequest
 from tf2_msgs.msg import TFMessage
 
@@ -33,14 +35,32 @@ CONTROLLER, ESTIMATOR, SERVER, FILTER = (
     "/takeoff_control_filter",
 )
 NODES = (CONTROLLER, ESTIMATOR, SERVER, FILTER)
+#: Nodes that make references of a mission's commands, of two missions.
+MISSIONS = ("/mission", "/second_mission")
+#: Their topics and services are the vehicle's own.
+MISSION_PARAMETERS = {
+    "topics/ref": "/ref",
+    "topics/state": "/state",
+    "topics/flight_state": "/in_flight_state",
+    "srv/takeoff": "/takeoff",
+    "srv/land": "/land",
+    "srv/emergency": "/emergency",
+}
+
 _RESPAWN = 1.0  #: Time from the end of a node until roslaunch has started it again (s).
 _FLIGHT_LIMIT = 10.0  #: Longest wait of a node that is to end for the end of a flight (s).
 
 HIGHEST = 1.4  #: Highest place that people ask for, m.
+_SUM_HEIGHT = 5.0  #: Highest place to which random services lead, m: relative goals add up.
 _HEIGHT = 1.0  #: Height of references of other programs (m).
 _UP = (0.0, 0.0, _HEIGHT)
 #: Height of a reference that climbs from `_HEIGHT` at 2 m/s, the limit, for 0.5 s (m).
 _MOVED = _HEIGHT + 1.0
+_STREAM_RADIUS, _STREAM_SPEED = (
+    0.5,
+    0.6,
+)  #: Radius and speed of the circle that a mission streams (m, m/s).
+
 Steps = Generator[None, None, None]
 
 
@@ -140,8 +160,12 @@ def with_each(edit: Callable[[Any, Flight], None]) -> Callable[[Flight], Steps]:
     return on_tf(change)
 
 
-def _setting(part: str, name: str, value: float) -> Callable[[Flight], Steps]:
-    return with_each(lambda each, _: setattr(getattr(each.transform, part), name, value))
+def _nan(transform, _):
+    transform.transform.translation.x = math.nan
+
+
+def _flat_quaternion(transform, _):
+    transform.transform.rotation.w = 0.0
 
 
 def _jump(transform, flight):
@@ -156,6 +180,10 @@ def _shift(offset: float) -> Callable[[Flight], Steps]:
         transform.header.stamp = genpy.Time.from_sec(stamp)
 
     return with_each(edit)
+
+
+def _dropout(message, flight):
+    return [] if flight.random.random() < 0.5 else [message]
 
 
 def _freeze_camera(flight):
@@ -243,7 +271,7 @@ def _command(topic: str, **control: float) -> Callable[[Flight], Steps]:
     return repeated(publish)
 
 
-# People: services and parameters. All of it is legal, but single values of parameters.
+# People: services, parameters, missions. All of it is legal.
 
 
 def _call(service, flight):
@@ -252,14 +280,30 @@ def _call(service, flight):
 
 def _hammer(flight):
     for _ in range(20):
-        _call_server(flight)
+        _call(flight.random.choice(("/takeoff", "/land")), flight)
+
+
+def _call_mission(flight, mission, service, **values):
+    services: dict[str, Any] = flight.graph.services()
+    duration = genpy.Duration.from_sec(flight.random.uniform(1.0, 3.0))
+    request = services[f"{mission}/{service}"]._request_class(duration=duration, **values)
+    flight.graph.call(f"{mission}/{service}", request)
 
 
 def _call_server(flight):
-    _call(flight.random.choice(("/takeoff", "/land")), flight)
+    """Call the server as people and missions do, each twice a second on average."""
+    service, height = flight.random.choice((("takeoff", _HEIGHT), ("land", 0.0)))
+    if flight.random.random() < 0.1:
+        _call(f"/{service}", flight)
+    elif flight.random.random() < 0.1:
+        _call_mission(flight, flight.random.choice(MISSIONS), service, height=height)
 
 
 _emergency = lasting(partial(_call, "/emergency"), partial(_call, "/emergency_reset"))
+
+#: Services that drop a vehicle, or release the motors of one that was dropped; they have a fault of
+#: their own.
+_MOTORS_OFF = ("/emergency", "/emergency_reset")
 
 _SET = "/set_parameters"
 
@@ -320,51 +364,118 @@ def _set(graph, full_name, value):
             graph.call(service, ReconfigureRequest(config))
 
 
-def _change_parameters(flight):
-    """Change a parameter at each fifth step, and restore all of them at the end."""
-    before = {n: v for n, v in live_parameters(flight.graph).items() if LIVE_VALUES[n]}
-    try:
-        while True:
-            if flight.random.random() < 0.2:
-                _change_a_parameter(flight)
-            yield
-    finally:
-        for name, value in before.items():
-            _set(flight.graph, name, value)
+def _changing(act: Callable[[Flight], None]) -> Callable[[Flight], Steps]:
+    """Return a fault that calls ``act(flight)`` at each fifth step, and restores parameters."""
+
+    def run(flight):
+        before = {n: v for n, v in live_parameters(flight.graph).items() if LIVE_VALUES[n]}
+        try:
+            while True:
+                if flight.random.random() < 0.2:
+                    act(flight)
+                yield
+        finally:
+            for name, value in before.items():
+                _set(flight.graph, name, value)
+
+    return run
 
 
-def _change_a_parameter(flight):
+def _change_a_parameter(flight, node=""):
     live = [name for name in live_parameters(flight.graph) if LIVE_VALUES[name]]
-    name = flight.random.choice(live)
+    name = flight.random.choice([each for each in live if each.startswith(f"{node}/")] or live)
     values = LIVE_VALUES[name]
     inside = [flight.random.uniform(*values)] if len(values) == 2 else []
     _set(flight.graph, name, flight.random.choice([*values, *inside]))
 
 
-def _set_nonsense(flight):
+def any_message(message_type: type[genpy.Message], random: Random) -> genpy.Message:
+    """Return a message with random values in all fields, legal and illegal ones."""
+    message = message_type()
+    for name, kind in zip(message.__slots__, message._slot_types, strict=True):
+        setattr(message, name, _any_value(kind, getattr(message, name), random))
+    return message
+
+
+def _any_value(kind, present, random):
+    if kind.endswith("]"):
+        return present
+    if isinstance(present, genpy.Message):
+        return any_message(type(present), random)
+    if isinstance(present, genpy.TVal):
+        return type(present)(random.randint(0, 4), random.randint(0, 999_999_999))
+    if kind.startswith("float"):
+        legal = random.uniform(-HIGHEST, HIGHEST)
+        return random.choice((legal, legal, legal, 0.0, math.nan, math.inf, -math.inf))
+    if kind.startswith("uint"):
+        return random.choice((0, 1, 2 ** int(kind.removeprefix("uint")) - 1))
+    if kind == "bool":
+        return random.random() < 0.5
+    return random.choice(("", "/", "cf1", "\N{SNOWMAN}"))
+
+
+def _call_anything(flight):
     graph, random = flight.graph, flight.random
-    config = encode_config({})
-    number = random.choice(("", "hover/z", "integrator/k/z"))
-    config.doubles = [DoubleParameter(number, math.nan)]
-    config.strs = [StrParameter(random.choice(("K_file", "hover/x")), "no such value")]
-    service = random.choice([each for each in graph.services() if each.endswith(_SET)])
-    graph.call(service, ReconfigureRequest(config))
+    services: dict[str, Any] = graph.services()
+    name = random.choice(sorted(each for each in services if not each.endswith(_MOTORS_OFF)))
+    if not name.endswith(_SET):
+        graph.call(name, any_message(services[name]._request_class, random))
+    elif random.random() < 0.5:
+        _change_a_parameter(flight, name.removesuffix(_SET))
+    else:
+        config = encode_config({})
+        number = random.choice(("", "hover/z", "integrator/k/z"))
+        config.doubles = [DoubleParameter(number, math.nan)]
+        config.strs = [StrParameter(random.choice(("K_file", "hover/x")), "no such value")]
+        graph.call(name, ReconfigureRequest(config))
 
 
+def _go(flight, mission=MISSIONS[0]):
+    x, y = flight.random.uniform(-1.0, 1.0), flight.random.uniform(-1.0, 1.0)
+    goal = Point(x, y, flight.random.uniform(0.6, HIGHEST))
+    _call_mission(flight, mission, "go_to", goal=goal)
+
+
+def _stream(flight, mission=MISSIONS[0], sense=1.0):
+    """Publish a state on a circle, which the missions fly in opposite senses."""
+    angle = sense * flight.graph.time * _STREAM_SPEED / _STREAM_RADIUS
+    # The driver's tests use this package, so that it cannot depend on the driver.
+    message = roslib.message.get_message_class("crazyflie_driver/FullState")()
+    message.header.stamp = flight.graph.stamp()
+    message.pose.orientation.w = 1.0
+    x, y = math.cos(angle), math.sin(angle)
+    message.pose.position.x, message.pose.position.y = _STREAM_RADIUS * x, _STREAM_RADIUS * y
+    message.pose.position.z = 1.0
+    speed = sense * _STREAM_SPEED
+    message.twist.linear.x, message.twist.linear.y = -speed * y, speed * x
+    flight.graph.publish(f"{mission}/cmd_full_state", message)
+
+
+def _stream_both(flight):
+    for mission, sense in zip(MISSIONS, (1.0, -1.0), strict=True):
+        _stream(flight, mission, sense)
+
+
+def _go_both(flight):
+    if flight.random.random() < 0.1:
+        _go(flight, flight.random.choice(MISSIONS))
+
+
+def _end_mission(flight):
+    flight.graph.kill(MISSIONS[0])
+    flight.respawn(MISSIONS[0])
+
+
+_called = repeated(_call_server)
 _blind, _dropping = partial(Fault, blinds=True), partial(Fault, drops=True)
 _lqr, _takeoff = partial(_command, "/control/lqr"), partial(_command, "/control/takeoff")
 
 FAULTS = [
     _blind("poses stop for a moment", on_tf(lambda *_: []), 0.05, 0.45),
     _blind("poses stop", on_tf(lambda *_: []), 0.7, 9.0),
-    Fault(
-        "every second pose is lost",
-        on_tf(lambda m, flight: [m] * flight.random.choice((0, 1))),
-        1.0,
-        5.0,
-    ),
-    _blind("poses are not finite", _setting("translation", "x", math.nan), 0.3, 4.0),
-    _blind("quaternions are no rotations", _setting("rotation", "w", 0.0), 0.3, 4.0),
+    Fault("every second pose is lost", on_tf(_dropout), 1.0, 5.0),
+    _blind("poses are not finite", with_each(_nan), 0.3, 4.0),
+    _blind("quaternions are no rotations", with_each(_flat_quaternion), 0.3, 4.0),
     _blind("poses jump", with_each(_jump), 0.3, 4.0),
     _blind("stamps are 3 s old", _shift(-3.0), 0.3, 4.0),
     _blind("stamps are 8 s ahead", _shift(8.0), 0.3, 4.0),
@@ -378,12 +489,7 @@ FAULTS = [
         Fault(f"the wall clock is set and {n} stopped", together(_set_clock, _freeze(n)), 0.1, 0.4)
         for n in NODES
     ),
-    Fault(
-        "the server is stopped and called",
-        together(_freeze(SERVER), repeated(_call_server)),
-        0.1,
-        4.0,
-    ),
+    Fault("the server is stopped and called", together(_freeze(SERVER), _called), 0.1, 4.0),
     Fault("references are not finite", repeated(_refer_to(math.nan, 0.0, 1.0)), 0.1, 5.0),
     Fault("references are far away", repeated(_refer_to(50.0, -50.0, 1.0)), 0.1, 5.0),
     Fault("references are old", repeated(_refer_to(0.5, 0.5, 0.3, age=30.0)), 0.1, 5.0),
@@ -399,6 +505,10 @@ FAULTS = [
     Fault("a second server lifts", _takeoff(thrust=20.0), 0.5, 5.0),
     Fault("services are hammered", repeated(_hammer), 0.1, 3.0),
     _dropping("emergency", _emergency, 0.2, 3.0, is_emergency=True),
-    Fault("live parameters change", _change_parameters, 3.0, 9.0, height=HIGHEST),
-    Fault("parameters get nonsense", repeated(_set_nonsense), 1.0, 5.0),
+    Fault("live parameters change", _changing(_change_a_parameter), 3.0, 9.0, height=HIGHEST),
+    Fault("services get any arguments", _changing(_call_anything), 3.0, 9.0, height=_SUM_HEIGHT),
+    Fault("a mission dies in a move", lasting(_go, _end_mission), 0.1, 2.5, height=HIGHEST),
+    Fault("a mission dies while it streams", repeated(_stream), 0.5, 5.0, height=1.0),
+    Fault("two missions move one vehicle", repeated(_go_both), 1.0, 6.0, height=HIGHEST),
+    Fault("two missions stream to one vehicle", repeated(_stream_both), 1.0, 6.0, height=1.0),
 ]

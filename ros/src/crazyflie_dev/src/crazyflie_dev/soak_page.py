@@ -14,6 +14,7 @@ from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action
+from crazyflie_dev.soak_faults import MISSIONS
 from crazyflie_msgs.msg import FilterStatus, FlightStatus, PositionVelocityYawStateStamped
 from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.testing import FakeGraph
@@ -84,7 +85,9 @@ class _GraphMaster(Master):
 
     @override
     def graph(self) -> Graph:
-        services = dict.fromkeys(self._fake.services(), "/node")
+        # What missions offer would be taken for two more vehicles, which have no state.
+        own = [name for name in self._fake.services() if not name.startswith(MISSIONS)]
+        services = dict.fromkeys(own, "/node")
         # With it no process is started that would offer it.
         return Graph(_TOPICS, _TOPICS, {**services, "/high_level/go_to": "/high_level"})
 

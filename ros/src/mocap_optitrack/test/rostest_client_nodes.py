@@ -1,5 +1,8 @@
 """Nodes with the names of vrpn_client_ros and ros_vrpn_client, and a VRPN server."""
 
+import platform
+import sys
+
 import pytest
 from geometry_msgs.msg import PoseStamped
 from tf2_msgs.msg import TFMessage
@@ -7,6 +10,11 @@ from vrpn_server import VrpnServer
 
 from crazyflie_utils.testing.peer import listening
 from crazyflie_utils.testing.programs import running
+
+pytestmark = pytest.mark.skipif(
+    platform.machine() != "x86_64" or sys.version_info >= (3, 14),
+    reason="the motioncapture package has no other binaries",
+)
 
 STILL = (4.0, 5.0, 6.0, 0.0, 0.0, 0.6, 0.8)
 

@@ -291,6 +291,7 @@ JOY = started("joy", "joy_node", dev="/dev/input/js0")
 TELEOP = demo("controller.py", use_crazyflie_controller="True")
 CONTROLLER = included("crazyflie_controller", "crazyflie2", frame="/vicon/cf/cf")
 GOAL = demo("publish_pose.py", name="goal", rate=30, x=0, y=0, z=0.5)
+MOVED_GOAL = demo("publish_pose_teleop.py", name="goal", rate=10, x=0, y=0, z=0.5)
 BASE = started("tf", "static_transform_publisher", LINK)
 VICON = included("vicon_bridge", "vicon")
 TRACKER = started(
@@ -379,7 +380,7 @@ CRAZYFLIE_ROS = {
     "crazyflie_demo/teleop_ps3": (SERVER, vehicle(JOY, PADS[0], demo("controller.py"))),
     "crazyflie_demo/teleop_vicon": (
         SERVER,
-        vehicle(JOY, TELEOP, CONTROLLER, demo("publish_pose_teleop.py", name="goal"), BASE),
+        vehicle(JOY, TELEOP, CONTROLLER, MOVED_GOAL, BASE),
         VICON,
         rviz("crazyflie_pos"),
     ),

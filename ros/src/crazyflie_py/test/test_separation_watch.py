@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 
 from crazyflie_mission_api.ros_vehicle import TimedPose
+from crazyflie_mission_api.setpoints import (
+    AttitudeSetpoint,
+    FullStateSetpoint,
+    HoverSetpoint,
+    PositionSetpoint,
+    VelocityWorldSetpoint,
+    led_to,
+)
 from crazyflie_py.separation_watch import SeparationWatch
-from crazyflie_py.setpoints import Attitude, FullState, Hover, Position, VelocityWorld, led_to
 
 STEP = 0.05
 LEVEL = (0.0, 0.0, 0.0, 1.0)
@@ -104,12 +111,12 @@ def test_setpoints_are_followed_again_when_they_lead_away():
 @pytest.mark.parametrize(
     ("setpoint", "expected"),
     [
-        (Position((1.0, 2.0, 3.0), 0.0), (1.0, 2.0, 3.0)),
-        (FullState((1.0, 2.0, 3.0), *[(0.0,) * 3] * 2, 0.0, (0.0,) * 3), (1.0, 2.0, 3.0)),
-        (VelocityWorld((1.0, 0.0, -1.0), 0.0), (0.5, 0.0, 0.5)),
+        (PositionSetpoint((1.0, 2.0, 3.0), 0.0), (1.0, 2.0, 3.0)),
+        (FullStateSetpoint((1.0, 2.0, 3.0), *[(0.0,) * 3] * 2, 0.0, (0.0,) * 3), (1.0, 2.0, 3.0)),
+        (VelocityWorldSetpoint((1.0, 0.0, -1.0), 0.0), (0.5, 0.0, 0.5)),
         # To the left of a vehicle that faces +y.
-        (Hover(0.0, 1.0, 0.0, 0.7), (-0.5, 0.0, 0.7)),
-        (Attitude(0.0, 0.0, 0.0, 40000.0), None),
+        (HoverSetpoint(0.0, 1.0, 0.0, 0.7), (-0.5, 0.0, 0.7)),
+        (AttitudeSetpoint(0.0, 0.0, 0.0, 40000.0), None),
     ],
 )
 def test_where_setpoints_lead(setpoint, expected):

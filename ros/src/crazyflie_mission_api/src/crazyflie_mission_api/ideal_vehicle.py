@@ -7,14 +7,73 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
-from crazyflie_mission_api.mission_vehicle import MissionVehicle, done
+from crazyflie_mission_api.mission_vehicle import MEMORY, MissionVehicle, done
+from crazyflie_mission_api.setpoints import Setpoint
 from crazyflie_mission_api.trajectories import TimedTrajectory
 from crazyflie_model.angles import Triple
 from crazyflie_model.planner import smooth_piece
-from crazyflie_model.polynomials import Goal, at_rest
+from crazyflie_model.polynomials import Goal, PolynomialPiece, at_rest
 from crazyflie_model.trajectory import Pieces, Trajectory
 
+_DEFINITIONS = 31  #: Number of trajectories that can be defined at one time.
 _MIN_DURATION = 0.01  #: Shortest duration of a plan, as in the firmware (s).
+
+
+class TrajectoryMemory:
+    """The trajectory memory of an ideal vehicle: that of the firmware, with messages.
+
+    Trajectories have the ids of scripts, which go to 255; those of the firmware go to 30.
+
+    Parameters
+    ----------
+    name : str
+        Of the vehicle.
+    warn : callable
+        Gets a text.
+    """
+
+    def __init__(self, name: str, warn: Callable[[str], None]):
+        self._name = name
+        self._warn = warn
+        self._pieces: dict[int, PolynomialPiece] = {}
+        self._rooms: dict[int, range] = {}
+
+    def upload(self, trajectory_id: int, piece_offset: int, pieces: Pieces) -> None:
+        """Write pieces; ValueError when there is no room."""
+        where = f"{self._name}.uploadTrajectory"
+        room = range(piece_offset, piece_offset + len(pieces))
+        if room.stop > MEMORY:
+            raise ValueError(
+                f"{where}: {len(pieces)} pieces from pieceOffset {piece_offset} on; expected no "
+                f"more than {MEMORY} in all, the room in the memory"
+            )
+        if trajectory_id not in self._rooms and len(self._rooms) >= _DEFINITIONS:
+            raise ValueError(
+                f"{where}: trajectoryId is {trajectory_id}; expected one of the {_DEFINITIONS} "
+                f"that are in use: {sorted(self._rooms)}"
+            )
+        if trajectory_id >= _DEFINITIONS:
+            self._warn(
+                f"{where}: trajectoryId is {trajectory_id}; a real vehicle refuses it, the "
+                f"firmware expects 0 to {_DEFINITIONS - 1}"
+            )
+        for other, taken in self._rooms.items():
+            if other != trajectory_id and set(taken) & set(room):
+                self._warn(
+                    f"{where}: pieces {room.start} to {room.stop - 1} overwrite trajectory "
+                    f"{other}; another pieceOffset keeps both"
+                )
+        self._rooms[trajectory_id] = room
+        self._pieces |= dict(zip(room, pieces, strict=True))
+
+    def __getitem__(self, trajectory_id: int) -> list[PolynomialPiece]:
+        """Return the pieces of a trajectory; ValueError for one that is not there."""
+        if trajectory_id not in self._rooms:
+            raise ValueError(
+                f"{self._name}.startTrajectory: trajectoryId is {trajectory_id}; expected one that "
+                f"uploadTrajectory has written: {sorted(self._rooms) or 'there is none'}"
+            )
+        return [self._pieces[number] for number in self._rooms[trajectory_id]]
 
 
 class IdealVehicle(MissionVehicle):
@@ -48,6 +107,8 @@ class IdealVehicle(MissionVehicle):
         self.trajectory = TimedTrajectory.hover(position, yaw)  #: The plan, also after its end.
         self._time = time
         self._flies = False
+        self.groups = 0  #: Mask of the groups that it belongs to.
+        self._memory = TrajectoryMemory(name, self._warn)
         self._prepared: Pieces = ()
 
     @property
@@ -116,11 +177,52 @@ class IdealVehicle(MissionVehicle):
         return self._fly(self._prepared)
 
     @override
+    def upload_trajectory(
+        self, trajectory_id: int, piece_offset: int, pieces: Pieces
+    ) -> "Future[Any]":
+        self._memory.upload(trajectory_id, piece_offset, pieces)
+        return done(None)
+
+    @override
+    def start_trajectory(
+        self,
+        trajectory_id: int,
+        time_scale: float = 1.0,
+        reverse: bool = False,
+        relative: bool = False,
+        group_mask: int = 0,
+    ) -> "Future[Any]":
+        trajectory = Trajectory(self._memory[trajectory_id], time_scale, reverse)
+        start = self.planned().position
+        return self._fly(trajectory.moved_to(start, None) if relative else trajectory)
+
+    @override
+    def set_group_mask(self, group_mask: int) -> "Future[Any]":
+        self.groups = group_mask
+        return done(None)
+
+    @override
+    def arm(self, arm: bool) -> "Future[Any]":
+        return done(None)
+
+    @override
+    def send(self, setpoint: Setpoint) -> None:
+        # The firmware's commander makes the planner forget its plan (commander.c).
+        IdealVehicle.stop(self)
+
+    @override
+    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int = 0) -> "Future[Any]":
+        return done(None)
+
+    @override
     def emergency(self) -> "Future[Any]":
         x, y, _ = self.position()
         self._flies = False
         self.trajectory = TimedTrajectory.hover((x, y, 0.0))
         return done(None)
+
+    def _warn(self, text: str) -> None:
+        """Process what a real vehicle would not do."""
 
     def _climb(self, height, duration, flies):
         start = self.planned()

@@ -5,25 +5,28 @@ from concurrent.futures import Future
 from typing import Any, Protocol
 
 from crazyflie_mission_api.limits import Bounds
+from crazyflie_mission_api.setpoints import Setpoint
 from crazyflie_model.angles import Triple
 from crazyflie_model.trajectory import Pieces
 
 MEMORY = 31  #: Number of pieces that fit into the memory of a vehicle.
 
 
-class HighLevelCommands(Protocol):
-    """Commands of missions and of Crazyswarm's scripts; see `crazyflie_py.backend`.
+class Commands(Protocol):
+    """Commands to a vehicle, or to all vehicles of a swarm at the same moment.
 
-    A ``group_mask`` other than 0 restricts a command to members of these groups.
+    A command returns a future, which is done when it has been accepted, not when it has been
+    carried out; its exception says why it was refused. A ``group_mask`` other than 0 restricts it
+    to members of these groups.
     """
 
-    def take_off(self, height: float, duration: float, group_mask: int = 0) -> Any:
+    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
         """Climb straight up to a height (m) in about a duration (s), keeping the heading."""
 
-    def land(self, height: float | None, duration: float, group_mask: int = 0) -> Any:
+    def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":
         """Sink straight down to a height (m), None is the ground, in about a duration (s)."""
 
-    def stop(self, group_mask: int = 0) -> Any:
+    def stop(self, group_mask: int = 0) -> "Future[Any]":
         """Stop the motors of a vehicle that has landed: those of the firmware idle on."""
 
     def go_to(
@@ -33,19 +36,28 @@ class HighLevelCommands(Protocol):
         duration: float,
         relative: bool = False,
         group_mask: int = 0,
-    ) -> Any:
+    ) -> "Future[Any]":
         """Fly to a point (m) and heading (rad), or by them from the plan, in a duration (s)."""
 
-    def emergency(self) -> Any:
+    def start_trajectory(
+        self,
+        trajectory_id: int,
+        time_scale: float = 1.0,
+        reverse: bool = False,
+        relative: bool = False,
+        group_mask: int = 0,
+    ) -> "Future[Any]":
+        """Fly along an uploaded trajectory; ``relative``: from the planned position."""
+
+    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int = 0) -> "Future[Any]":
+        """Return to high-level commands when the last setpoint is this old (ms)."""
+
+    def emergency(self) -> "Future[Any]":
         """Stop the motors at once."""
 
 
-class MissionVehicle(HighLevelCommands, Protocol):
-    """A vehicle of a mission.
-
-    A command returns a future, which is done when the vehicle has accepted it, not when it has
-    carried it out; its exception says why it was refused.
-    """
+class MissionVehicle(Commands, Protocol):
+    """A vehicle of missions and of Crazyswarm's scripts."""
 
     name: str
     bounds: Bounds  #: Box of its fence.
@@ -65,10 +77,24 @@ class MissionVehicle(HighLevelCommands, Protocol):
         """Return whether the vehicle is on the ground, with its motors off."""
 
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
-        """Prepare a trajectory, to be uploaded or streamed."""
+        """Prepare a trajectory, to be uploaded as number 0 or streamed."""
 
     def start(self) -> "Future[Any]":
         """Fly the trajectory that was prepared last."""
+
+    def upload_trajectory(
+        self, trajectory_id: int, piece_offset: int, pieces: Pieces
+    ) -> "Future[Any]":
+        """Write pieces into the trajectory memory, from an offset on."""
+
+    def set_group_mask(self, group_mask: int) -> "Future[Any]":
+        """Make the vehicle a member of groups, a bit each."""
+
+    def arm(self, arm: bool) -> "Future[Any]":
+        """Arm or disarm."""
+
+    def send(self, setpoint: Setpoint) -> None:
+        """Send a low-level setpoint once; ValueError for one that the vehicle cannot follow."""
 
 
 class Clock(Protocol):

@@ -9,15 +9,23 @@ from typing import Any, NamedTuple
 import genpy
 from geometry_msgs.msg import Point, PoseStamped
 from std_msgs.msg import String
-from std_srvs.srv import Empty, EmptyRequest
+from std_srvs.srv import Empty, SetBool
 from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_fleet.conversions import heading, to_message
 from crazyflie_fleet.high_level_services import HIGH_LEVEL, START_TOPIC
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
-from crazyflie_mission_api.mission_vehicle import MEMORY, MissionVehicle, done, forward, in_turn
-from crazyflie_mission_api.stream import SetpointStream
+from crazyflie_mission_api.mission_vehicle import (
+    MEMORY,
+    Commands,
+    MissionVehicle,
+    done,
+    forward,
+    in_turn,
+)
+from crazyflie_mission_api.setpoints import AttitudeSetpoint, Setpoint
+from crazyflie_mission_api.stream import SetpointPublishers, SetpointStream
 from crazyflie_mission_api.trajectories import START_SKEW
 from crazyflie_model.angles import Triple, quaternion_from_rpy
 from crazyflie_model.supervisor import SupervisorState
@@ -257,10 +265,70 @@ def common_services(services: Mapping[str, str], names: Collection[str]) -> str 
     return None
 
 
-class RosVehicle(RosVehicleState, MissionVehicle):
+class ServiceCommands(Commands):
+    """Commands by services: short names, such as go_to, to absolute names."""
+
+    def __init__(self, handle: NodeHandle, services: Mapping[str, str]):
+        self._handle = handle
+        self.services = services
+
+    @override
+    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
+        return self.call("takeoff", srv.Takeoff, group_mask, height, seconds(duration))
+
+    @override
+    def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":
+        return self.call("land", srv.Land, group_mask, height or 0.0, seconds(duration))
+
+    @override
+    def stop(self, group_mask: int = 0) -> "Future[Any]":
+        return self.call("stop", srv.Stop, group_mask)
+
+    @override
+    def go_to(
+        self,
+        goal: Triple,
+        yaw: float,
+        duration: float,
+        relative: bool = False,
+        group_mask: int = 0,
+    ) -> "Future[Any]":
+        arguments = (group_mask, relative, Point(*goal), yaw, seconds(duration))
+        return self.call("go_to", srv.GoTo, *arguments)
+
+    @override
+    def start_trajectory(
+        self,
+        trajectory_id: int,
+        time_scale: float = 1.0,
+        reverse: bool = False,
+        relative: bool = False,
+        group_mask: int = 0,
+    ) -> "Future[Any]":
+        arguments = (group_mask, trajectory_id, time_scale, reverse, relative)
+        return self.call("start_trajectory", srv.StartTrajectory, *arguments)
+
+    @override
+    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int = 0) -> "Future[Any]":
+        arguments = (group_mask, remain_valid_ms)
+        return self.call("notify_setpoints_stop", srv.NotifySetpointsStop, *arguments)
+
+    @override
+    def emergency(self) -> "Future[Any]":
+        return self.call("emergency", Empty)
+
+    def call(
+        self, name: str, service_type: Any, *arguments: Any, limit: float = CALL_TIMEOUT
+    ) -> "Future[Any]":
+        """Call a service by its short name; ``limit`` is in s of the machine's clock."""
+        request = service_type._request_class(*arguments)
+        return self._handle.call_service(self.services[name], service_type, request, limit)
+
+
+class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
     """A vehicle by the services of the driver, or by those of `HighLevelNode`.
 
-    ``services`` are short names, such as go_to, to absolute names. Vehicles that a controller
+    ``services`` are those of `ServiceCommands`. Vehicles that a controller
     flies, and not the driver, have a ``synchronized_start``. The attribute ``broadcast`` starts
     those of the driver together, if it is not None.
     """
@@ -275,14 +343,16 @@ class RosVehicle(RosVehicleState, MissionVehicle):
         has_yaw: bool = True,
     ):
         uses_driver = synchronized_start is None
-        super().__init__(name, handle, uses_driver, frames, has_yaw)
+        RosVehicleState.__init__(self, name, handle, uses_driver, frames, has_yaw)
+        ServiceCommands.__init__(self, handle, services)
         self.bounds = fence(handle, prefix(name))
         self.start_skew = START_SKEW if uses_driver else 0.0
-        self.services = services
         self._synchronized_start = synchronized_start
         self.broadcast: BroadcastStart | None = None
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
+        top = services["go_to"].rpartition("/")[0]
+        self._setpoints = SetpointPublishers(handle, top)
         if uses_driver:
             frame = "" if frames is None else frames[0]
             self._stream = SetpointStream(
@@ -301,7 +371,7 @@ class RosVehicle(RosVehicleState, MissionVehicle):
         self._ground = 0.0 if place is None else place[2]
 
         def climb():
-            return self.call("takeoff", srv.Takeoff, group_mask, height, seconds(duration))
+            return super(RosVehicle, self).take_off(height, duration, group_mask)
 
         if not self.uses_driver:
             return climb()
@@ -318,14 +388,8 @@ class RosVehicle(RosVehicleState, MissionVehicle):
     def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":
         self._landing_end = self._handle.time() + duration + _SETTLING_TIME
         end = self._ground if height is None else height
-        return self._hand_over(
-            lambda: self.call("land", srv.Land, group_mask, end, seconds(duration)),
-            _LANDING_RETRY_TIME,
-        )
-
-    @override
-    def stop(self, group_mask: int = 0) -> "Future[Any]":
-        return self.call("stop", srv.Stop, group_mask)
+        land = super().land
+        return self._hand_over(lambda: land(end, duration, group_mask), _LANDING_RETRY_TIME)
 
     @override
     def go_to(
@@ -336,8 +400,8 @@ class RosVehicle(RosVehicleState, MissionVehicle):
         relative: bool = False,
         group_mask: int = 0,
     ) -> "Future[Any]":
-        request = (group_mask, relative, Point(*goal), yaw, seconds(duration))
-        return self._hand_over(lambda: self.call("go_to", srv.GoTo, *request))
+        go_to = super().go_to
+        return self._hand_over(lambda: go_to(goal, yaw, duration, relative, group_mask))
 
     @override
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
@@ -351,8 +415,7 @@ class RosVehicle(RosVehicleState, MissionVehicle):
                     "what the vehicle's memory holds, or stream=True"
                 )
             )
-        messages = [to_message(piece) for piece in pieces]
-        return self.call("upload_trajectory", srv.UploadTrajectory, 0, 0, messages)
+        return self.upload_trajectory(0, 0, pieces)
 
     @override
     def start(self) -> "Future[Any]":
@@ -365,24 +428,39 @@ class RosVehicle(RosVehicleState, MissionVehicle):
 
     def _start_with_others(self):
         def start():
-            return self.call("start_trajectory", srv.StartTrajectory, 0, 0, 1.0, False, False)
+            return self.start_trajectory(0)
 
         return start() if self.broadcast is None else self.broadcast.start(self.name, start)
+
+    @override
+    def upload_trajectory(
+        self, trajectory_id: int, piece_offset: int, pieces: Pieces
+    ) -> "Future[Any]":
+        arguments = (trajectory_id, piece_offset, [to_message(piece) for piece in pieces])
+        return self.call("upload_trajectory", srv.UploadTrajectory, *arguments)
+
+    @override
+    def set_group_mask(self, group_mask: int) -> "Future[Any]":
+        return self.call("set_group_mask", srv.SetGroupMask, group_mask)
+
+    @override
+    def arm(self, arm: bool) -> "Future[Any]":
+        return self.call("arm", SetBool, arm) if self.uses_driver else done(None)
+
+    @override
+    def send(self, setpoint: Setpoint) -> None:
+        if isinstance(setpoint, AttitudeSetpoint) and not self.uses_driver:
+            raise ValueError(
+                f"{self.name}: cmdVel cannot be followed: a controller of the workspace flies it; "
+                "expected cmdPosition, cmdFullState, cmdVelocityWorld or cmdHover"
+            )
+        self._setpoints.publish(setpoint)
 
     @override
     def emergency(self) -> "Future[Any]":
         if self._stream is not None:
             self._stream.stop()
-        return self._handle.call_service(
-            self.services["emergency"], Empty, EmptyRequest(), CALL_TIMEOUT
-        )
-
-    def call(
-        self, name: str, service_type: Any, *arguments: Any, limit: float = CALL_TIMEOUT
-    ) -> "Future[Any]":
-        """Call a service by its short name; ``limit`` is in s of the machine's clock."""
-        request = service_type._request_class(*arguments)
-        return self._handle.call_service(self.services[name], service_type, request, limit)
+        return super().emergency()
 
     def _hand_over(self, send, retry_time=0.0):
         return send() if self._stream is None else self._stream.hand_over(send, retry_time)

@@ -1,5 +1,7 @@
-"""Setpoints along a trajectory, and the command that takes over from them."""
+"""Setpoints: single ones, and those along a trajectory with the command that takes over."""
 
+import math
+import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -7,14 +9,27 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from crazyflie_driver.msg import FullState
+from geometry_msgs.msg import Twist, Vector3
+from std_msgs.msg import Empty
+
+from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
 from crazyflie_driver.setpoint_gate import OVERLAP
 from crazyflie_fleet.conversions import full_state_message
 from crazyflie_mission_api.mission_vehicle import done
+from crazyflie_mission_api.setpoints import (
+    AttitudeSetpoint,
+    FullStateSetpoint,
+    HoverSetpoint,
+    MotorsOffSetpoint,
+    PositionSetpoint,
+    Setpoint,
+    VelocityWorldSetpoint,
+)
 from crazyflie_mission_api.trajectories import TimedTrajectory
 from crazyflie_model.polynomials import Goal
 from crazyflie_model.trajectory import Pieces
 from crazyflie_utils import NodeHandle
+from crazyflie_utils.topics import Publisher
 
 STEP = 0.02  #: Period of the setpoints (s).
 
@@ -23,6 +38,18 @@ STEP = 0.02  #: Period of the setpoints (s).
 MAX_ANSWER_TIME = OVERLAP / 2.0
 
 RETRY_PERIOD = 1.0  #: Time from a failed command to the next try (s).
+
+#: Timeout of the connection before the first setpoint (s of the machine's clock).
+_CONNECTION_LIMIT = 2.0
+
+_TOPICS: dict[type, tuple[str, Any]] = {
+    FullStateSetpoint: ("cmd_full_state", FullState),
+    PositionSetpoint: ("cmd_position", Position),
+    VelocityWorldSetpoint: ("cmd_velocity_world", VelocityWorld),
+    HoverSetpoint: ("cmd_hover", Hover),
+    AttitudeSetpoint: ("cmd_vel", Twist),
+    MotorsOffSetpoint: ("cmd_stop", Empty),
+}
 
 Send = Callable[[], "Future[Any]"]
 
@@ -157,3 +184,57 @@ class SetpointStream:
                 f"the trajectory has ended, and go_to has failed: {held.exception()}; setpoints "
                 "go on at its end"
             )
+
+
+class SetpointPublishers:
+    """Publishes low-level setpoints of a vehicle on the driver's topics below ``top``."""
+
+    def __init__(self, handle: NodeHandle, top: str):
+        self._handle = handle
+        self._top = top
+        self._publishers: dict[type, Publisher] = {}
+
+    def publish(self, setpoint: Setpoint) -> None:
+        """Publish a setpoint; the first of each type waits until a node subscribes."""
+        publisher = self._publishers.get(type(setpoint)) or self._connect(type(setpoint))
+        message = message_of(setpoint)
+        if hasattr(message, "header"):
+            message.header.stamp = self._handle.stamp()
+        publisher.publish(message)
+
+    def _connect(self, kind):
+        name, message_type = _TOPICS[kind]
+        publisher = self._handle.publisher(f"{self._top}/{name}", message_type)
+        self._publishers[kind] = publisher
+        end = time.monotonic() + _CONNECTION_LIMIT
+        while not publisher.has_subscribers() and time.monotonic() < end:
+            time.sleep(0.01)
+        return publisher
+
+
+def message_of(setpoint: Setpoint) -> Any:
+    """Return the driver's message, without a stamp; its yaw rates are clockwise, in deg/s."""
+    if isinstance(setpoint, FullStateSetpoint):
+        goal = Goal(
+            setpoint.position,
+            setpoint.velocity,
+            setpoint.acceleration,
+            setpoint.yaw,
+            setpoint.omega[2],
+        )
+        message = full_state_message(goal)
+        message.twist.angular = Vector3(*setpoint.omega)
+        return message
+    if isinstance(setpoint, PositionSetpoint):
+        x, y, z = setpoint.position
+        return Position(x=x, y=y, z=z, yaw=math.degrees(setpoint.yaw))
+    if isinstance(setpoint, VelocityWorldSetpoint):
+        return VelocityWorld(vel=Vector3(*setpoint.velocity), yawRate=-setpoint.yaw_rate)
+    if isinstance(setpoint, HoverSetpoint):
+        return Hover(
+            vx=setpoint.vx, vy=setpoint.vy, yawrate=-setpoint.yaw_rate, zDistance=setpoint.height
+        )
+    if isinstance(setpoint, AttitudeSetpoint):
+        linear = Vector3(setpoint.pitch, setpoint.roll, setpoint.thrust)
+        return Twist(linear, Vector3(0.0, 0.0, -setpoint.yaw_rate))
+    return Empty()

@@ -5,7 +5,7 @@ lengths in m, times in s.
 """
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,18 +14,20 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 from uav_trajectory import Trajectory
 
+from crazyflie_mission_api.setpoints import (
+    AttitudeSetpoint,
+    FullStateSetpoint,
+    HoverSetpoint,
+    MotorsOffSetpoint,
+    PositionSetpoint,
+    Setpoint,
+    VelocityWorldSetpoint,
+)
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_py import arguments as check
-from crazyflie_py.backend import DEFAULT_COLOR, Commands, SwarmBackend, VehicleBackend, Visualizer
-from crazyflie_py.setpoints import (
-    Attitude,
-    FullState,
-    Hover,
-    MotorsOff,
-    Position,
-    VelocityWorld,
-)
+from crazyflie_py.fleet import FleetVehicle
+from crazyflie_py.swarm import DEFAULT_COLOR, Order, Swarm, Visualizer
 
 _log = logging.getLogger(__name__)
 
@@ -46,52 +48,55 @@ class TimeHelper:
     crazyflies : sequence of Crazyflie
     """
 
-    def __init__(self, backend: SwarmBackend, crazyflies: Sequence[object]):
-        self._backend = backend
-        self.visualizer: Visualizer = backend.visualizer
+    def __init__(self, swarm: Swarm, crazyflies: Sequence[object]):
+        self._swarm = swarm
+        self.visualizer: Visualizer = swarm.visualizer
         self.crazyflies = crazyflies
 
     @property
     def dt(self) -> float:
         """Period of the simulation's steps, s."""
-        return self._backend.dt
+        return self._swarm.dt
 
     def time(self) -> float:
         """Return the time, s."""
-        return self._backend.time()
+        return self._swarm.time()
 
     def sleep(self, duration: float) -> None:
         """Wait for a duration, s."""
-        self._backend.sleep(check.number("timeHelper.sleep", "duration", duration))
+        self._swarm.sleep(check.number("timeHelper.sleep", "duration", duration))
 
     def sleepForRate(self, rateHz: float) -> None:
         """Wait, so that the calls of a loop are 1/rateHz apart."""
         rate = check.number("timeHelper.sleepForRate", "rateHz", rateHz, 1e-3, 1e5)
-        self._backend.sleep_for_rate(rate)
+        self._swarm.sleep_for_rate(rate)
 
     def isShutdown(self) -> bool:
         """Return whether the script should end, as after Ctrl-C."""
-        return self._backend.is_shutdown()
+        return self._swarm.is_shutdown()
 
     def nextPhase(self) -> None:
         """Begin the next file of --writecsv."""
-        self._backend.next_phase()
+        self._swarm.next_phase()
 
 
 class ScriptCommands:
-    """Checks arguments and sends commands.
+    """Checks arguments and sends commands to the vehicle ``name``, by default to all."""
 
-    Parameters
-    ----------
-    name : str
-        In messages.
-    commands : Commands
-        Of the back-end.
-    """
+    def __init__(self, swarm: Swarm, name: str | None = None):
+        self._swarm = swarm
+        self._vehicle = name
+        self._name = name or "allcfs"  # In messages.
 
-    def __init__(self, name: str, commands: Commands):
-        self._name = name
-        self._commands = commands
+    def _command(self, name: str, send: Callable[[Any], Any], *facts: Any, **options: Any) -> None:
+        self._swarm.command(Order(name, send, *facts, **options), self._vehicle)
+
+    def _send(self, setpoint: Setpoint) -> None:
+        self._swarm.send(setpoint, self._vehicle)
+
+    def _names(self) -> list[str]:
+        every = [vehicle.name for vehicle in self._swarm.fleet]
+        return every if self._vehicle is None else [self._vehicle]
 
     def _where(self, method: str) -> str:
         return f"{self._name}.{method}"
@@ -123,11 +128,22 @@ class ScriptCommands:
         groupMask : int
             0, or the groups that are meant; see `Crazyflie.setGroupMask`.
         """
-        self._commands.take_off(*self._climb("takeoff", targetHeight, duration, groupMask))
+        height, seconds, mask = self._climb("takeoff", targetHeight, duration, groupMask)
+        self._command(
+            "takeoff",
+            lambda vehicle: vehicle.take_off(height, seconds, mask),
+            mask,
+            flies=True,
+            goal=(np.nan, np.nan, height),
+            duration=seconds,
+        )
 
     def land(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
         """Fly straight down to a height and stop the motors there; see `takeoff`."""
-        self._commands.land(*self._climb("land", targetHeight, duration, groupMask))
+        height, seconds, mask = self._climb("land", targetHeight, duration, groupMask)
+        self._command(
+            "land", lambda vehicle: vehicle.land(height, seconds, mask), mask, duration=seconds
+        )
 
     def _climb(self, method, height, duration, mask):
         where = self._where(method)
@@ -139,16 +155,21 @@ class ScriptCommands:
 
     def stop(self, groupMask: int = 0) -> None:
         """Stop the motors: after a landing, as a vehicle in the air falls."""
-        self._commands.stop(self._mask(self._where("stop"), groupMask))
+        mask = self._mask(self._where("stop"), groupMask)
+        self._command("stop", lambda vehicle: vehicle.stop(mask), mask)
 
     def _go_to(self, goal, yaw, duration, relative, mask):
         where = self._where("goTo")
-        self._commands.go_to(
-            check.triple(where, "goal", goal),
-            check.number(where, "yaw", yaw),
-            check.number(where, "duration", duration, 0.0),
-            bool(relative),
-            self._mask(where, mask),
+        place, turn = check.triple(where, "goal", goal), check.number(where, "yaw", yaw)
+        seconds = check.number(where, "duration", duration, 0.0)
+        mask = self._mask(where, mask)
+        turn = self._swarm.checked_yaw(turn, self._vehicle)
+        self._command(
+            "go_to",
+            lambda vehicle: vehicle.go_to(place, turn, seconds, bool(relative), mask),
+            mask,
+            flies=True,
+            goal=None if relative else place,
         )
 
     def startTrajectory(
@@ -175,12 +196,16 @@ class ScriptCommands:
             See `Crazyflie.setGroupMask`.
         """
         where = self._where("startTrajectory")
-        self._commands.start_trajectory(
+        mask = self._mask(where, groupMask)
+        flown = (
             check.byte(where, "trajectoryId", trajectoryId),
             check.number(where, "timescale", timescale, 1e-3, 1e3),
             bool(reverse),
             bool(relative),
-            self._mask(where, groupMask),
+            mask,
+        )
+        self._command(
+            "start_trajectory", lambda vehicle: vehicle.start_trajectory(*flown), mask, flies=True
         )
 
     def notifySetpointsStop(self, remainValidMillisecs: int = 100, groupMask: int = 0) -> None:
@@ -195,19 +220,28 @@ class ScriptCommands:
         """
         where = self._where("notifySetpointsStop")
         remain = check.integer(where, "remainValidMillisecs", remainValidMillisecs, 0, 2**31 - 1)
-        self._commands.notify_setpoints_stop(remain, self._mask(where, groupMask))
+        mask = self._mask(where, groupMask)
+        self._command(
+            "notify_setpoints_stop",
+            lambda vehicle: vehicle.notify_setpoints_stop(remain, mask),
+            mask,
+        )
 
     def emergency(self) -> None:
         """Stop the motors at once; commands have no effect until a restart."""
-        self._commands.emergency()
+        self._command("emergency", lambda vehicle: vehicle.emergency())
 
     def arm(self, arm: bool = True) -> None:
         """Arm, or disarm."""
-        self._commands.arm(bool(arm))
+        self._command("arm", lambda vehicle: vehicle.arm(bool(arm)))
 
     def setParam(self, name: str, value: float) -> None:
         """Set a firmware parameter, GROUP/NAME or GROUP.NAME."""
-        self._commands.set_parameters(check.parameters(self._where("setParam"), {name: value}))
+        self._set_parameters(check.parameters(self._where("setParam"), {name: value}))
+
+    def _set_parameters(self, values: Mapping[str, float]) -> None:
+        for vehicle in self._names():
+            self._swarm.parameters[vehicle].update(values)
 
     def cmdFullState(
         self, pos: ArrayLike, vel: ArrayLike, acc: ArrayLike, yaw: float, omega: ArrayLike
@@ -217,21 +251,20 @@ class ScriptCommands:
         position, velocity = check.triple(where, "pos", pos), check.triple(where, "vel", vel)
         acceleration = check.triple(where, "acc", acc)
         heading, rates = check.number(where, "yaw", yaw), check.triple(where, "omega", omega)
-        self._commands.send(FullState(position, velocity, acceleration, heading, rates))
+        self._send(FullStateSetpoint(position, velocity, acceleration, heading, rates))
 
 
 class Crazyflie(ScriptCommands):
     """One vehicle."""
 
-    def __init__(self, vehicle: VehicleBackend):
-        super().__init__(vehicle.name, vehicle)
-        self._vehicle = vehicle
+    def __init__(self, swarm: Swarm, vehicle: FleetVehicle):
+        super().__init__(swarm, vehicle.name)
         self.id = vehicle.id  #: Last byte of its radio address.
         #: name, prefix: "cf1", "/cf1".
         self.name = vehicle.name
         self.prefix = f"/{vehicle.name}"
         #: Start point in the fleet file (m).
-        self.initialPosition: Array = np.array(vehicle.initial_position)
+        self.initialPosition: Array = np.array(vehicle.position)
         #: Colour that `setLEDColor` has set; before, Crazyswarm's colour in pictures.
         self.ledRGB = DEFAULT_COLOR
         self._group_mask = 0
@@ -242,7 +275,7 @@ class Crazyflie(ScriptCommands):
         A command with a mask other than 0 concerns vehicles that have a bit in common with it.
         """
         mask = check.byte(self._where("setGroupMask"), "groupMask", groupMask)
-        self._vehicle.set_group_mask(mask)
+        self._swarm.set_group_mask(mask, self.name)
         self._group_mask = mask
 
     def goTo(
@@ -271,41 +304,42 @@ class Crazyflie(ScriptCommands):
         trajectory : uav_trajectory.Trajectory
         """
         where = self._where("uploadTrajectory")
-        self._vehicle.upload_trajectory(
-            check.byte(where, "trajectoryId", trajectoryId),
-            check.byte(where, "pieceOffset", pieceOffset),
-            check.pieces(where, trajectory),
+        number = check.byte(where, "trajectoryId", trajectoryId)
+        offset = check.byte(where, "pieceOffset", pieceOffset)
+        pieces = self._swarm.checked_pieces(check.pieces(where, trajectory), self.name)
+        self._command(
+            "upload_trajectory", lambda vehicle: vehicle.upload_trajectory(number, offset, pieces)
         )
 
     # State.
 
     def position(self) -> Array:
         """Return the position, m, shape (3,)."""
-        return np.array(self._vehicle.state().position)
+        return np.array(self._swarm.state(self.name).position)
 
     def velocity(self) -> Array:
         """Return the velocity, m/s, shape (3,)."""
-        return np.array(self._vehicle.state().velocity)
+        return np.array(self._swarm.state(self.name).velocity)
 
     def acceleration(self) -> Array:
         """Return the acceleration, m/s^2, shape (3,)."""
-        return np.array(self._vehicle.state().acceleration)
+        return np.array(self._swarm.state(self.name).acceleration)
 
     def rpy(self) -> tuple[float, float, float]:
         """Return roll, pitch and yaw, rad; a positive pitch accelerates forward."""
-        return self._vehicle.state().rpy
+        return self._swarm.state(self.name).rpy
 
     def yaw(self) -> float:
         """Return the yaw, rad."""
-        return self._vehicle.state().rpy[2]
+        return self._swarm.state(self.name).rpy[2]
 
     def get_position(self) -> list[float]:
         """Return the position, m."""
-        return list(self._vehicle.state().position)
+        return list(self._swarm.state(self.name).position)
 
     def get_pose(self) -> dict[str, Any]:
         """Return "position" (x, y, z) and "orientation" (x, y, z, w), with these attributes."""
-        state = self._vehicle.state()
+        state = self._swarm.state(self.name)
         point = SimpleNamespace(**dict(zip("xyz", state.position, strict=True)))
         quaternion = quaternion_from_rpy(*state.rpy)
         orientation = SimpleNamespace(**dict(zip("xyzw", quaternion, strict=True)))
@@ -313,17 +347,18 @@ class Crazyflie(ScriptCommands):
 
     def get_status(self) -> dict[str, Any]:
         """Return battery voltage, supervisor bits and others, with crazyswarm2's keys."""
-        return self._vehicle.status()
+        return self._swarm.status(self.name)
 
     # Parameters.
 
     def getParam(self, name: str) -> float:
         """Return a firmware parameter, GROUP/NAME or GROUP.NAME."""
-        return self._vehicle.get_parameter(check.parameter_name(self._where("getParam"), name))
+        key = check.parameter_name(self._where("getParam"), name)
+        return self._swarm.parameters[self.name][key]
 
     def setParams(self, params: Mapping[str, float]) -> None:
         """Set firmware parameters, name -> value."""
-        self._vehicle.set_parameters(check.parameters(self._where("setParams"), params))
+        self._set_parameters(check.parameters(self._where("setParams"), params))
 
     def setLEDColor(self, r: float, g: float, b: float) -> None:
         """Set the colour of the LED ring, 0 to 1 each; its parameter ring/effect must be 7."""
@@ -333,7 +368,7 @@ class Crazyflie(ScriptCommands):
             f"ring.{name}": int(255.0 * check.number(where, *color, 0.0, 1.0))
             for name, color in colors.items()
         }
-        self._vehicle.set_parameters(levels)
+        self._set_parameters(levels)
         self.ledRGB = (r, g, b)
 
     # Setpoints. The firmware levels out 0.5 s after the last one and stops the motors after 2 s.
@@ -342,27 +377,27 @@ class Crazyflie(ScriptCommands):
         """Send a setpoint: position and yaw."""
         where = self._where("cmdPosition")
         position, heading = check.triple(where, "pos", pos), check.number(where, "yaw", yaw)
-        self._vehicle.send(Position(position, heading))
+        self._send(PositionSetpoint(position, heading))
 
     def cmdVelocityWorld(self, vel: ArrayLike, yawRate: float) -> None:
         """Send a setpoint: velocity in the world frame, yaw rate (deg/s, counter-clockwise)."""
         where = self._where("cmdVelocityWorld")
         velocity = check.triple(where, "vel", vel)
-        self._vehicle.send(VelocityWorld(velocity, check.number(where, "yawRate", yawRate)))
+        self._send(VelocityWorldSetpoint(velocity, check.number(where, "yawRate", yawRate)))
 
     def cmdHover(self, vx: float, vy: float, yawrate: float, zDistance: float) -> None:
         """Send a setpoint: velocity ahead and to the left, yaw rate (deg/s), height."""
         arguments = {"vx": vx, "vy": vy, "yawrate": yawrate, "zDistance": zDistance}
-        self._vehicle.send(Hover(*self._numbers("cmdHover", arguments)))
+        self._send(HoverSetpoint(*self._numbers("cmdHover", arguments)))
 
     def cmdVel(self, roll: float, pitch: float, yawrate: float, thrust: float) -> None:
         """Send a setpoint: roll, pitch (deg), yaw rate (deg/s), thrust (PWM, 0 to 65535)."""
         arguments = {"roll": roll, "pitch": pitch, "yawrate": yawrate, "thrust": thrust}
-        self._vehicle.send(Attitude(*self._numbers("cmdVel", arguments)))
+        self._send(AttitudeSetpoint(*self._numbers("cmdVel", arguments)))
 
     def cmdStop(self) -> None:
         """Send a setpoint that stops the motors."""
-        self._vehicle.send(MotorsOff())
+        self._send(MotorsOffSetpoint())
 
     def _numbers(self, method, arguments):
         where = self._where(method)
@@ -412,12 +447,12 @@ class Crazyflie(ScriptCommands):
             check.integer(where, "voronoiProjectionMaxIters", iterations, 1, 10**6),
         )
         found = check.instances(where, "others", others, Crazyflie)
-        vehicles = [other._vehicle for other in found if other is not self]
-        self._vehicle.enable_avoidance(vehicles, settings)
+        names = [other.name for other in found if other is not self]
+        self._swarm.avoid(self.name, names, settings)
 
     def disableCollisionAvoidance(self) -> None:
         """End collision avoidance."""
-        self._vehicle.disable_avoidance()
+        self._swarm.avoid(self.name, (), None)
 
 
 class _Found(dict[Any, Crazyflie]):
@@ -430,10 +465,10 @@ class _Found(dict[Any, Crazyflie]):
 class CrazyflieServer(ScriptCommands):
     """All vehicles; its commands are broadcast and concern all at the same moment."""
 
-    def __init__(self, backend: SwarmBackend):
-        super().__init__("allcfs", backend)
+    def __init__(self, swarm: Swarm):
+        super().__init__(swarm)
         #: In the order of the fleet file.
-        self.crazyflies = [Crazyflie(vehicle) for vehicle in backend.vehicles]
+        self.crazyflies = [Crazyflie(swarm, vehicle) for vehicle in swarm.fleet]
         self.crazyfliesById = _Found({cf.id: cf for cf in self.crazyflies})
         self.crazyfliesByName = _Found({cf.name: cf for cf in self.crazyflies})
 

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from crazyflie_py import fleet
-from crazyflie_py.backend import SwarmBackend
 from crazyflie_py.buttons import Input
 from crazyflie_py.crazyflie import CrazyflieServer, TimeHelper
+from crazyflie_py.swarm import Swarm
 
 
 def build_argparser(
@@ -80,10 +80,10 @@ class Crazyswarm:
         options, _ = parser.parse_known_args(args.split() if isinstance(args, str) else args)
         # The starting program decides that a script does not fly, whatever options it gives itself.
         options.sim = options.sim or bool(os.environ.get(fleet.DRY_RUN))
-        backend = _backend(crazyflies_yaml, options)
-        atexit.register(backend.close)
-        self.allcfs = CrazyflieServer(backend)
-        self.timeHelper = TimeHelper(backend, self.allcfs.crazyflies)
+        swarm = _swarm(crazyflies_yaml, options)
+        atexit.register(swarm.close)
+        self.allcfs = CrazyflieServer(swarm)
+        self.timeHelper = TimeHelper(swarm, self.allcfs.crazyflies)
         self.input = Input(self.timeHelper, options.sim)
 
 
@@ -96,7 +96,7 @@ def _print_warnings() -> None:
         log.addHandler(handler)
 
 
-def _backend(crazyflies_yaml: str | Path | None, options: argparse.Namespace) -> SwarmBackend:
+def _swarm(crazyflies_yaml: str | Path | None, options: argparse.Namespace) -> Swarm:
     _print_warnings()
     if options.sim:
         from crazyflie_py.simulation import Simulation
@@ -105,6 +105,6 @@ def _backend(crazyflies_yaml: str | Path | None, options: argparse.Namespace) ->
         names = fleet.chosen([vehicle.name for vehicle in vehicles])
         return Simulation([each for each in vehicles if each.name in names], options)
     # Only here, so that scripts with --sim need neither ROS nor the time to import it.
-    from crazyflie_py.ros_backend import RosBackend
+    from crazyflie_py.ros_swarm import RosSwarm
 
-    return RosBackend(crazyflies_yaml, options)
+    return RosSwarm(crazyflies_yaml, options)

@@ -9,10 +9,17 @@ from geometry_msgs.msg import Point
 from crazyflie_driver import srv
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
 from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, seconds, velocity_between
+from crazyflie_mission_api.setpoints import (
+    SETPOINT_TIMEOUT,
+    AttitudeSetpoint,
+    MotorsOffSetpoint,
+    PositionSetpoint,
+    Setpoint,
+    led_to,
+)
 from crazyflie_model.angles import Triple
 from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_py.ros_connection import ScriptConnection
-from crazyflie_py.setpoints import SETPOINT_TIMEOUT, Attitude, MotorsOff, Position, Setpoint, led_to
 
 _HOLD_DURATION = 0.8  #: In which a vehicle that is held stops, s.
 
@@ -41,9 +48,9 @@ class HeldVehicle:
     def passed(self, setpoint: Setpoint) -> Setpoint:
         """Return the setpoint to send in place of one that a script sends."""
         self._streamed = setpoint, self._connection.fleet.time()
-        if self._held_at is None or isinstance(setpoint, Attitude | MotorsOff):
+        if self._held_at is None or isinstance(setpoint, AttitudeSetpoint | MotorsOffSetpoint):
             return setpoint
-        return Position(self._held_at, self._vehicle.heading())
+        return PositionSetpoint(self._held_at, self._vehicle.heading())
 
     def free(self, duration: float) -> None:
         """Note that it takes off or lands, for a duration (s)."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from crazyflie_model.angles import Triple
-from crazyflie_py.backend import DEFAULT_COLOR
+from crazyflie_py.swarm import DEFAULT_COLOR
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.parameters import Parameter, parameter_specs

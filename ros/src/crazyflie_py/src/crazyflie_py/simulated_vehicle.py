@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any, NamedTuple, Self
 
@@ -11,29 +11,26 @@ from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_mission_api.ideal_vehicle import IdealVehicle
-from crazyflie_mission_api.mission_vehicle import MEMORY, done
+from crazyflie_mission_api.mission_vehicle import done
+from crazyflie_mission_api.setpoints import (
+    SETPOINT_TIMEOUT,
+    AttitudeSetpoint,
+    FullStateSetpoint,
+    HoverSetpoint,
+    MotorsOffSetpoint,
+    PositionSetpoint,
+    Setpoint,
+    VelocityWorldSetpoint,
+)
 from crazyflie_model.angles import Triple
 from crazyflie_model.collision_avoidance import AvoidanceSettings, CollisionAvoidance
-from crazyflie_model.polynomials import Goal, PolynomialPiece
-from crazyflie_model.trajectory import Trajectory
+from crazyflie_model.polynomials import Goal
 from crazyflie_model.units import GRAVITY
-from crazyflie_py.backend import VehicleBackend, VehicleState
 from crazyflie_py.fleet import FleetVehicle
-from crazyflie_py.setpoints import (
-    SETPOINT_TIMEOUT,
-    Attitude,
-    FullState,
-    Hover,
-    MotorsOff,
-    Position,
-    Setpoint,
-    VelocityWorld,
-)
 from crazyflie_py.simulated_parameters import SimulatedParameters
+from crazyflie_py.swarm import ScriptState
 
 Array = NDArray[np.float64]
-
-_DEFINITIONS = 31  #: Trajectories that can be defined at one time.
 
 _log = logging.getLogger(__name__)
 
@@ -79,7 +76,7 @@ class IdealMotion:
         """Return the motion of staying in place."""
         return SimulatedMotion(self.now.position, np.zeros(3), np.zeros(3), self.now.yaw)
 
-    def tracked(self, goal: Goal[float] | FullState, dt: float) -> SimulatedMotion:
+    def tracked(self, goal: Goal[float] | FullStateSetpoint, dt: float) -> SimulatedMotion:
         """Return the motion ``dt`` (s) from now, as far as avoidance and speed permit the goal."""
         vectors = (goal.position, goal.velocity, goal.acceleration)
         position, velocity, acceleration = map(np.array, vectors)
@@ -87,15 +84,15 @@ class IdealMotion:
 
     def at_setpoint(self, setpoint: Setpoint, dt: float) -> SimulatedMotion:
         """Return the motion ``dt`` (s) from now; an attitude keeps the vehicle in place."""
-        if isinstance(setpoint, FullState):
+        if isinstance(setpoint, FullStateSetpoint):
             return self.tracked(setpoint, dt)
-        if isinstance(setpoint, Position):
+        if isinstance(setpoint, PositionSetpoint):
             zero = np.zeros(3)
             goal = SimulatedMotion(np.array(setpoint.position), zero, zero, setpoint.yaw)
             return self._approached(self._limited(goal, dt), dt)
-        if isinstance(setpoint, VelocityWorld):
+        if isinstance(setpoint, VelocityWorldSetpoint):
             return self._at_velocity(np.array(setpoint.velocity), setpoint.yaw_rate, dt)
-        if isinstance(setpoint, Hover):
+        if isinstance(setpoint, HoverSetpoint):
             climb = (setpoint.height - self.now.position[2]) / dt
             velocity = np.array([*setpoint.velocity(self.now.yaw), climb])
             return self._at_velocity(velocity, setpoint.yaw_rate, dt)
@@ -155,67 +152,8 @@ def _clamped(vector, limit):
     return vector * (limit / length) if length > limit else vector
 
 
-class TrajectoryMemory:
-    """The trajectory memory of an ideal vehicle: that of the firmware, with messages.
-
-    Trajectories have the ids of scripts, which go to 255; those of the firmware go to 30.
-
-    Parameters
-    ----------
-    name : str
-        Of the vehicle.
-    warn : callable
-        Gets a text.
-    """
-
-    def __init__(self, name: str, warn: Callable[[str], None]):
-        self._name = name
-        self._warn = warn
-        self._pieces: dict[int, PolynomialPiece] = {}
-        self._rooms: dict[int, range] = {}
-
-    def upload(
-        self, trajectory_id: int, piece_offset: int, pieces: Sequence[PolynomialPiece]
-    ) -> None:
-        """Write pieces; ValueError when there is no room."""
-        where = f"{self._name}.uploadTrajectory"
-        room = range(piece_offset, piece_offset + len(pieces))
-        if room.stop > MEMORY:
-            raise ValueError(
-                f"{where}: {len(pieces)} pieces from pieceOffset {piece_offset} on; expected no "
-                f"more than {MEMORY} in all, the room in the memory"
-            )
-        if trajectory_id not in self._rooms and len(self._rooms) >= _DEFINITIONS:
-            raise ValueError(
-                f"{where}: trajectoryId is {trajectory_id}; expected one of the {_DEFINITIONS} "
-                f"that are in use: {sorted(self._rooms)}"
-            )
-        if trajectory_id >= _DEFINITIONS:
-            self._warn(
-                f"{where}: trajectoryId is {trajectory_id}; a real vehicle refuses it, the "
-                f"firmware expects 0 to {_DEFINITIONS - 1}"
-            )
-        for other, taken in self._rooms.items():
-            if other != trajectory_id and set(taken) & set(room):
-                self._warn(
-                    f"{where}: pieces {room.start} to {room.stop - 1} overwrite trajectory "
-                    f"{other}; another pieceOffset keeps both"
-                )
-        self._rooms[trajectory_id] = room
-        self._pieces |= dict(zip(room, pieces, strict=True))
-
-    def __getitem__(self, trajectory_id: int) -> list[PolynomialPiece]:
-        """Return the pieces of a trajectory; ValueError for one that is not there."""
-        if trajectory_id not in self._rooms:
-            raise ValueError(
-                f"{self._name}.startTrajectory: trajectoryId is {trajectory_id}; expected one that "
-                f"uploadTrajectory has written: {sorted(self._rooms) or 'there is none'}"
-            )
-        return [self._pieces[number] for number in self._rooms[trajectory_id]]
-
-
 class SimulatedVehicle(IdealVehicle):
-    """A vehicle of `crazyflie_py.backend.VehicleBackend`.
+    """The ideal vehicle of missions, which moves in steps.
 
     It follows its plan, or the last setpoint, as far as speed and avoidance permit. Where it does
     more than a real one would, a warning says so, once.
@@ -239,18 +177,16 @@ class SimulatedVehicle(IdealVehicle):
         disturbance: float,
         said: set[str],
     ):
+        self._warned: set[str] = set()
         super().__init__(vehicle.name, time, vehicle.position)
         self.id, self.initial_position = vehicle.id, vehicle.position
-        self.groups = 0  #: Mask of the groups that it belongs to.
         self._motion = IdealMotion(self.initial_position, max_speed, disturbance)
-        self._memory = TrajectoryMemory(self.name, self._warn)
-        self._parameters = SimulatedParameters(self.name, self, said)
+        self.parameters = SimulatedParameters(self.name, self, said)
         self._setpoint: Setpoint | None = None
         self._sent = 0.0
         self._expiry = math.inf
         self._locked = False
         self._armed = True
-        self._warned: set[str] = set()
 
     # Commands.
 
@@ -308,21 +244,23 @@ class SimulatedVehicle(IdealVehicle):
             return super().go_to(goal, yaw, duration, relative)
         return done(None)
 
-    def upload_trajectory(
-        self, trajectory_id: int, piece_offset: int, pieces: Sequence[PolynomialPiece]
-    ) -> None:
-        self._memory.upload(trajectory_id, piece_offset, pieces)
-
+    @override
     def start_trajectory(
-        self, trajectory_id: int, time_scale: float, reverse: bool, relative: bool, group_mask: int
-    ) -> None:
+        self,
+        trajectory_id: int,
+        time_scale: float = 1.0,
+        reverse: bool = False,
+        relative: bool = False,
+        group_mask: int = 0,
+    ) -> "Future[Any]":
         if self._may_plan("startTrajectory", group_mask):
-            trajectory = Trajectory(self._memory[trajectory_id], time_scale, reverse)
-            start = self.planned().position
-            self._fly(trajectory.moved_to(start, None) if relative else trajectory)
+            return super().start_trajectory(trajectory_id, time_scale, reverse, relative)
+        return done(None)
 
-    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
+    @override
+    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int = 0) -> "Future[Any]":
         self._expiry = self._time() + remain_valid_ms / 1000.0
+        return done(None)
 
     @override
     def emergency(self) -> "Future[Any]":
@@ -331,27 +269,20 @@ class SimulatedVehicle(IdealVehicle):
         self._locked = True
         return done(None)
 
-    def arm(self, arm: bool) -> None:
+    @override
+    def arm(self, arm: bool) -> "Future[Any]":
         self._armed = arm
+        return done(None)
 
-    def set_group_mask(self, group_mask: int) -> None:
-        self.groups = group_mask
-
-    def set_parameters(self, values: Mapping[str, float]) -> None:
-        self._parameters.update(values)
-
-    def get_parameter(self, name: str) -> float:
-        return self._parameters[name]
-
+    @override
     def send(self, setpoint: Setpoint) -> None:
         if self._locked:
             return
-        # The firmware's commander makes the planner forget its plan (commander.c).
-        super().stop()
+        super().send(setpoint)
         self._setpoint, self._expiry, self._sent = setpoint, math.inf, self._time()
-        if isinstance(setpoint, MotorsOff):
+        if isinstance(setpoint, MotorsOffSetpoint):
             self._stop_motors("cmdStop")
-        if isinstance(setpoint, Attitude):
+        if isinstance(setpoint, AttitudeSetpoint):
             self._warn(f"{self.name}.cmdVel: an ideal vehicle has no attitude; it stays in place")
 
     def _stop_motors(self, method):
@@ -364,14 +295,9 @@ class SimulatedVehicle(IdealVehicle):
         super().stop()
         self._setpoint = None
 
-    def enable_avoidance(
-        self, others: Sequence[VehicleBackend], settings: AvoidanceSettings
-    ) -> None:
-        motions = [other._motion for other in others if isinstance(other, SimulatedVehicle)]
-        self._motion.avoid(motions, settings)
-
-    def disable_avoidance(self) -> None:
-        self._motion.avoid((), None)
+    def avoid(self, others: Sequence[Self], settings: AvoidanceSettings | None) -> None:
+        """Avoid others; None for settings ends collision avoidance."""
+        self._motion.avoid([other._motion for other in others], settings)
 
     # State.
 
@@ -392,15 +318,17 @@ class SimulatedVehicle(IdealVehicle):
     @property
     def led_color(self) -> Triple:
         """Red, green and blue, 0 to 1."""
-        return self._parameters.led_color
+        return self.parameters.led_color
 
-    def state(self) -> VehicleState:
+    def state(self) -> ScriptState:
+        """Return position, velocity, acceleration and attitude."""
         *vectors, yaw = self.motion
         (x, y, z), (vx, vy, vz), (ax, ay, az) = (vector.tolist() for vector in vectors)
         rpy = attitude(self.motion.acceleration, yaw)
-        return VehicleState((x, y, z), (vx, vy, vz), (ax, ay, az), rpy)
+        return ScriptState((x, y, z), (vx, vy, vz), (ax, ay, az), rpy)
 
     def status(self) -> dict[str, Any]:
+        """Return the status with the keys of crazyswarm2's Crazyflie.get_status."""
         seconds = math.floor(self._time())
         # Bits as supervisor.info of the firmware has them.
         bits = 0b1001 | self._armed << 1 | self.is_flying << 4 | self._locked << 6
@@ -434,6 +362,7 @@ class SimulatedVehicle(IdealVehicle):
             return self._motion.tracked(self.trajectory.goal(now), dt)
         return self._motion.held()
 
+    @override
     def _warn(self, text: str) -> None:
         # A loop must not flood the terminal.
         if text not in self._warned:

@@ -1,16 +1,21 @@
-"""The back-end of --sim: ideal vehicles and a clock that passes as fast as it goes."""
+"""The swarm of --sim: ideal vehicles and a clock that passes as fast as it goes."""
 
 import argparse
 import logging
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
 from crazyflie_fleet.fleet_config import close_pairs
-from crazyflie_py.backend import EachVehicle
+from crazyflie_mission_api.setpoints import Setpoint
+from crazyflie_model.collision_avoidance import AvoidanceSettings
+from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.fleet import FleetVehicle
+from crazyflie_py.simulated_parameters import SimulatedParameters
 from crazyflie_py.simulated_vehicle import SimulatedVehicle
+from crazyflie_py.swarm import Order, ScriptState
 from crazyflie_py.visualizer import visualizer_for
 
 _log = logging.getLogger(__name__)
@@ -51,8 +56,8 @@ class CsvOutput:
         self._rows.clear()
 
 
-class Simulation(EachVehicle):
-    """A swarm of `crazyflie_py.backend.SwarmBackend` without ROS.
+class Simulation:
+    """A `crazyflie_py.swarm.Swarm` without ROS.
 
     Parameters
     ----------
@@ -63,16 +68,53 @@ class Simulation(EachVehicle):
 
     def __init__(self, fleet: Sequence[FleetVehicle], options: argparse.Namespace):
         self.dt: float = options.dt
+        self.fleet = fleet
         self._steps = 0
         self._residual = 0.0
         limits = (options.maxvel, options.disturbance, set[str]())
         self.vehicles = [SimulatedVehicle(vehicle, self.time, *limits) for vehicle in fleet]
+        self._by_name = {vehicle.name: vehicle for vehicle in self.vehicles}
         self._buffers = [vehicle.buffer for vehicle in fleet]
         self._close: set[tuple[int, int]] = set()
         self.visualizer = visualizer_for(options.vis, has_video=options.video is not None)
         if options.video is not None:
             self.visualizer.startVideoOutput(options.video, self.dt)
         self._output = CsvOutput() if options.writecsv else None
+
+    # Commands, which nothing restricts.
+
+    def _chosen(self, name: str | None) -> list[SimulatedVehicle]:
+        return self.vehicles if name is None else [self._by_name[name]]
+
+    def command(self, order: Order, name: str | None) -> None:
+        for vehicle in self._chosen(name):
+            order.send(vehicle)
+
+    def send(self, setpoint: Setpoint, name: str | None) -> None:
+        for vehicle in self._chosen(name):
+            vehicle.send(setpoint)
+
+    def set_group_mask(self, group_mask: int, name: str) -> None:
+        self._by_name[name].set_group_mask(group_mask)
+
+    def checked_yaw(self, yaw: float, name: str | None) -> float:
+        return yaw
+
+    def checked_pieces(self, pieces: list[PolynomialPiece], name: str) -> list[PolynomialPiece]:
+        return pieces
+
+    def avoid(self, name: str, others: Sequence[str], settings: AvoidanceSettings | None) -> None:
+        self._by_name[name].avoid([self._by_name[other] for other in others], settings)
+
+    @property
+    def parameters(self) -> dict[str, SimulatedParameters]:
+        return {vehicle.name: vehicle.parameters for vehicle in self.vehicles}
+
+    def state(self, name: str) -> ScriptState:
+        return self._by_name[name].state()
+
+    def status(self, name: str) -> dict[str, Any]:
+        return self._by_name[name].status()
 
     # The clock.
 

@@ -1,30 +1,31 @@
-"""Crazyswarm's API on vehicles that run: simulated, virtual or real ones, by ROS."""
+"""The swarm of vehicles that run: simulated, virtual or real ones, by ROS."""
 
 import argparse
+import math
 import re
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import rosgraph
-from geometry_msgs.msg import Point
 from std_msgs.msg import String
-from std_srvs.srv import Empty
 from typing_extensions import override
 
-from crazyflie_driver import srv
 from crazyflie_fleet.high_level_services import HIGH_LEVEL
-from crazyflie_fleet.settings import RobotSettings
 from crazyflie_mission_api import Fleet, MissionError
 from crazyflie_mission_api.fleet import catch_signals
-from crazyflie_mission_api.ros_vehicle import ALL_OF_FLEET, common_services, seconds
-from crazyflie_model.angles import Triple
+from crazyflie_mission_api.ros_vehicle import ALL_OF_FLEET, ServiceCommands, common_services
+from crazyflie_mission_api.setpoints import Setpoint
+from crazyflie_model.collision_avoidance import AvoidanceSettings
+from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py import fleet as fleet_files
-from crazyflie_py.backend import EachVehicle, SwarmBackend, Visualizer
+from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.ros_connection import ScriptConnection, running_vehicles
-from crazyflie_py.ros_vehicle import RosVehicleBackend
+from crazyflie_py.script_vehicle import ScriptVehicle
 from crazyflie_py.separation_watch import SeparationWatch
+from crazyflie_py.swarm import Order, ParameterStore, ScriptState, Swarm, Visualizer
 from crazyflie_py.visualizer import NullVisualizer
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.process import Process
@@ -33,9 +34,12 @@ _FIND_LIMIT = 10.0  #: Timeout of the search for the vehicles of a file (s, mach
 _WATCH_PERIOD = 0.05  #: Period of the checks of distances, as in a fleet (s).
 _LANDING_LIMIT = 15.0  #: Timeout of landings that the script has begun, at its end (s).
 
+#: Commands that the services for all carry out at the same moment.
+_COMMON = ("land", "stop", "go_to", "start_trajectory", "emergency")
 
-class RosBackend(EachVehicle, SwarmBackend):
-    """All vehicles; see `crazyflie_py.backend.SwarmBackend`.
+
+class RosSwarm(Swarm):
+    """A `crazyflie_py.swarm.Swarm` of running vehicles.
 
     ``crazyflies_yaml`` says which of the vehicles that run take part, by default all do. The
     process is made, unless it is given. Without a master or vehicles, the script ends with the
@@ -68,41 +72,58 @@ class RosBackend(EachVehicle, SwarmBackend):
             self._end()
             sys.exit(str(error))
         self._connection = ScriptConnection(handle, fleet, options.unchecked)
-        ids = [v.id for v in vehicles] if vehicles else ids_of(names)
-        places: list[Any] = [v.position for v in vehicles] if vehicles else [None] * len(names)
+        if vehicles is None:
+            places = [fleet.vehicle(name).position() or (math.nan,) * 3 for name in names]
+            vehicles = [
+                FleetVehicle(*each) for each in zip(names, ids_of(names), places, strict=True)
+            ]
+        self._fleet = vehicles
         services = handle.service_nodes()
-        self._vehicles = [
-            RosVehicleBackend(
-                fleet.vehicle(name),
-                number,
-                place,
+        self._vehicles = {
+            each.name: ScriptVehicle(
+                fleet.vehicle(each.name),
+                each,
                 self._connection,
-                f"/{name}/update_params" in services,
+                f"/{each.name}/update_params" in services,
             )
-            for name, number, place in zip(names, ids, places, strict=True)
-        ]
-        self._top = common_services(services, names)
-        self._watch_separation(vehicles or [])
+            for each in vehicles
+        }
+        self._common: ServiceCommands | None = None
+        self._shared: tuple[str, ...] = _COMMON
+        if (top := common_services(services, names)) is not None:
+            paths = {name: f"{top}/{name}" for name in ("takeoff", *_COMMON)}
+            # A fleet's emergency service is not one of its high-level services.
+            paths["emergency"] = f"{top.removesuffix(f'/{HIGH_LEVEL}')}/emergency"
+            self._common = ServiceCommands(handle, paths)
+            if top == ALL_OF_FLEET:
+                # One call: a hundred of them would keep the fleet from flying.
+                self._shared = ("takeoff", *_COMMON)
+        self._watch_separation()
         handle.subscribe("/fleet/waiting", String, self._on_held)
 
     @property
     @override
-    def vehicles(self) -> Sequence[RosVehicleBackend]:
-        return self._vehicles
+    def fleet(self) -> Sequence[FleetVehicle]:
+        return self._fleet
 
     @property
     @override
     def visualizer(self) -> Visualizer:
         return self._visualizer
 
-    def _watch_separation(self, configured):
+    @property
+    @override
+    def parameters(self) -> dict[str, ParameterStore]:
+        return {name: vehicle.parameters for name, vehicle in self._vehicles.items()}
+
+    def _watch_separation(self):
         # A fleet's process keeps apart what it flies.
-        watched = [vehicle for vehicle in self._vehicles if vehicle.uses_driver]
-        own = {vehicle.name: vehicle.buffer for vehicle in configured}
-        buffers = {**own, **self._connection.fleet.rules.buffers}
-        radii = [buffers.get(vehicle.name, RobotSettings.buffer) for vehicle in watched]
+        watched = [each for each in self._fleet if self._vehicles[each.name].vehicle.uses_driver]
+        buffers = self._connection.fleet.rules.buffers
+        radii = [buffers.get(each.name, each.buffer) for each in watched]
         if len(watched) > 1:
-            watch = SeparationWatch([vehicle.held for vehicle in watched], radii, self._connection)
+            held = [self._vehicles[each.name].held for each in watched]
+            watch = SeparationWatch(held, radii, self._connection)
             self._connection.handle.timer(_WATCH_PERIOD, lambda: self._look(watch))
 
     def _look(self, watch):
@@ -115,78 +136,70 @@ class RosBackend(EachVehicle, SwarmBackend):
             text = f"held by the fleet, since another vehicle is too near: {message.data}"
             self._connection.handle.warn(text)
 
-    # Commands to all.
+    # Commands.
+
+    def _chosen(self, name: str | None) -> list[ScriptVehicle]:
+        return [*self._vehicles.values()] if name is None else [self._vehicles[name]]
 
     @override
-    def take_off(self, height: float, duration: float, group_mask: int = 0) -> None:
-        members = {v.name: v for v in self._vehicles if v.is_member(group_mask)}
-        begun = [vehicle.has_begun for vehicle in members.values()]
-        if self._top == ALL_OF_FLEET:
-            # One call: a hundred of them would keep the fleet from flying.
-            for vehicle in members.values():
-                vehicle.check_takeoff(height)
-            arguments = (group_mask, height, seconds(duration))
-            self._call(
-                "takeoff", srv.Takeoff, *arguments, has_begun=lambda: all(b() for b in begun)
-            )
-            return
-        calls = {
-            name: vehicle.begin_takeoff(height, duration, group_mask)
-            for name, vehicle in members.items()
-        }
-        self._connection.finish("takeoff", calls, lambda name: members[name].has_begun())
-
-    @override
-    def land(self, height: float | None, duration: float, group_mask: int = 0) -> None:
-        for vehicle in self._vehicles:
-            if vehicle.is_member(group_mask):
-                vehicle.held.free(duration)
-        self._call("land", srv.Land, group_mask, height or 0.0, seconds(duration))
-        for vehicle in self._vehicles:
-            vehicle.note_landing(group_mask)
-
-    @override
-    def stop(self, group_mask: int = 0) -> None:
-        self._call("stop", srv.Stop, group_mask)
-
-    @override
-    def go_to(
-        self,
-        goal: Triple,
-        yaw: float,
-        duration: float,
-        relative: bool = False,
-        group_mask: int = 0,
-    ) -> None:
-        yaw = self._vehicles[0].checked_yaw(yaw)
-        self._call("go_to", srv.GoTo, group_mask, relative, Point(*goal), yaw, seconds(duration))
-
-    @override
-    def start_trajectory(
-        self, trajectory_id: int, time_scale: float, reverse: bool, relative: bool, group_mask: int
-    ) -> None:
-        arguments = (group_mask, trajectory_id, time_scale, reverse, relative)
-        self._call("start_trajectory", srv.StartTrajectory, *arguments)
-
-    @override
-    def emergency(self) -> None:
-        if self._top is None:
-            calls = {vehicle.name: vehicle.begin_emergency() for vehicle in self._vehicles}
+    def command(self, order: Order, name: str | None) -> None:
+        chosen = self._chosen(name)
+        members = chosen
+        if name is None:
+            members = [each for each in chosen if each.is_member(order.group_mask)]
+        for each in members:
+            each.prepare(order)
+        is_takeoff = order.name == "takeoff"
+        if order.name != "emergency":
+            for each in chosen:
+                each.held.end_setpoints()
+        if name is None and self._common is not None and order.name in self._shared:
+            calls = {"allcfs": order.send(self._common)}
         else:
-            # A fleet's emergency service is not one of its high-level services.
-            service = f"{self._top.removesuffix(f'/{HIGH_LEVEL}')}/emergency"
-            calls = {"allcfs": self._connection.call(service, Empty)}
-        self._connection.finish("emergency", calls)
+            called = members if is_takeoff else chosen
+            calls = {each.name: order.send(each.vehicle) for each in called}
 
-    def _call(self, name, service_type, *arguments, has_begun=lambda: False):
-        if self._top is None:
-            calls = {v.name: v.call(name, service_type, *arguments) for v in self._vehicles}
-        else:
-            for vehicle in self._vehicles:
-                vehicle.held.end_setpoints()
-            service = f"{self._top}/{name}"
-            calls = {"allcfs": self._connection.call(service, service_type, *arguments)}
-        self._connection.finish(name, calls, lambda _: has_begun())
+        def has_begun(called):
+            begun = members if called == "allcfs" else [self._vehicles[called]]
+            return is_takeoff and all(each.has_begun() for each in begun)
+
+        self._connection.finish(order.name, calls, has_begun)
+        if order.name == "land":
+            for each in chosen:
+                each.note_landing(order.group_mask)
+
+    @override
+    def send(self, setpoint: Setpoint, name: str | None) -> None:
+        for each in self._chosen(name):
+            each.send(setpoint)
+
+    @override
+    def set_group_mask(self, group_mask: int, name: str) -> None:
+        self._vehicles[name].groups = group_mask
+
+    @override
+    def checked_yaw(self, yaw: float, name: str | None) -> float:
+        return self._chosen(name)[0].checked_yaw(yaw)
+
+    @override
+    def checked_pieces(self, pieces: list[PolynomialPiece], name: str) -> list[PolynomialPiece]:
+        check = self._vehicles[name].checked_yaw
+        return [
+            replace(piece, yaw=[check(value) for value in piece.yaw]) if any(piece.yaw) else piece
+            for piece in pieces
+        ]
+
+    @override
+    def avoid(self, name: str, others: Sequence[str], settings: AvoidanceSettings | None) -> None:
+        self._vehicles[name].avoid(settings)
+
+    @override
+    def state(self, name: str) -> ScriptState:
+        return self._vehicles[name].states.state()
+
+    @override
+    def status(self, name: str) -> dict[str, Any]:
+        return self._vehicles[name].status()
 
     # Time.
 
@@ -229,12 +242,12 @@ class RosBackend(EachVehicle, SwarmBackend):
 
     def _land(self):
         fleet = self._connection.fleet
-        vehicles = {v.name: v for v in self._vehicles if v.name in fleet.flying}
+        vehicles = {name: self._vehicles[name] for name in fleet.flying}
         landing = [v for v in vehicles.values() if v.held.is_landing]
         limit = fleet.time() + _LANDING_LIMIT
-        fleet.clock.wait_until(lambda: all(v.has_landed() for v in landing), limit)
+        fleet.clock.wait_until(lambda: all(v.vehicle.has_landed() for v in landing), limit)
         for name, vehicle in vehicles.items():
-            if vehicle.has_landed():
+            if vehicle.vehicle.has_landed():
                 fleet.release(name)
             else:
                 # Its landing begins where it is now.

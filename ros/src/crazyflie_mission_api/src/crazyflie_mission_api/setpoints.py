@@ -1,4 +1,4 @@
-"""Low-level setpoints: what the cmd... methods of a Crazyflie send, once each."""
+"""Low-level setpoints of a vehicle, each of which is sent once."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ SETPOINT_TIMEOUT = 0.5
 
 
 @dataclass(frozen=True)
-class FullState:
+class FullStateSetpoint:
     """Position (m), velocity (m/s), acceleration (m/s^2), yaw (rad), body rates (rad/s)."""
 
     position: Triple
@@ -21,7 +21,7 @@ class FullState:
 
 
 @dataclass(frozen=True)
-class Position:
+class PositionSetpoint:
     """Position (m) and yaw (rad)."""
 
     position: Triple
@@ -29,7 +29,7 @@ class Position:
 
 
 @dataclass(frozen=True)
-class VelocityWorld:
+class VelocityWorldSetpoint:
     """Velocity in the world frame (m/s) and yaw rate (deg/s, counter-clockwise)."""
 
     velocity: Triple
@@ -37,7 +37,7 @@ class VelocityWorld:
 
 
 @dataclass(frozen=True)
-class Hover:
+class HoverSetpoint:
     """Velocity forward and to the left (m/s), yaw rate (deg/s, counter-clockwise), height (m)."""
 
     vx: float
@@ -52,7 +52,7 @@ class Hover:
 
 
 @dataclass(frozen=True)
-class Attitude:
+class AttitudeSetpoint:
     """Roll right, pitch forward (deg), yaw rate (deg/s, counter-clockwise), thrust (PWM)."""
 
     roll: float
@@ -62,11 +62,18 @@ class Attitude:
 
 
 @dataclass(frozen=True)
-class MotorsOff:
+class MotorsOffSetpoint:
     """Stops the motors; a later setpoint or command starts them again."""
 
 
-Setpoint = FullState | Position | VelocityWorld | Hover | Attitude | MotorsOff
+Setpoint = (
+    FullStateSetpoint
+    | PositionSetpoint
+    | VelocityWorldSetpoint
+    | HoverSetpoint
+    | AttitudeSetpoint
+    | MotorsOffSetpoint
+)
 
 
 def led_to(setpoint: Setpoint, place: Triple, yaw: float, duration: float) -> Triple | None:
@@ -75,12 +82,12 @@ def led_to(setpoint: Setpoint, place: Triple, yaw: float, duration: float) -> Tr
     None where that is not known.
     """
     x, y, z = place
-    if isinstance(setpoint, FullState | Position):
+    if isinstance(setpoint, FullStateSetpoint | PositionSetpoint):
         return setpoint.position
-    if isinstance(setpoint, VelocityWorld):
+    if isinstance(setpoint, VelocityWorldSetpoint):
         vx, vy, vz = setpoint.velocity
         return x + vx * duration, y + vy * duration, z + vz * duration
-    if isinstance(setpoint, Hover):
+    if isinstance(setpoint, HoverSetpoint):
         vx, vy = setpoint.velocity(yaw)
         return x + vx * duration, y + vy * duration, setpoint.height
     return None

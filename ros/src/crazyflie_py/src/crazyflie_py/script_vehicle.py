@@ -1,0 +1,256 @@
+"""A running vehicle of a script: what it may be commanded, its parameters and its state."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from crazyflie_driver import srv
+from crazyflie_fleet.settings import FirmwareNumber
+from crazyflie_mission_api.mission_vehicle import Clock
+from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, velocity_between
+from crazyflie_mission_api.setpoints import Setpoint
+from crazyflie_model.angles import Triple, rpy_from_quaternion
+from crazyflie_model.collision_avoidance import AvoidanceSettings
+from crazyflie_msgs.msg import FlightStatus, VehicleStatus
+from crazyflie_py.fleet import FleetVehicle
+from crazyflie_py.ros_connection import ScriptConnection
+from crazyflie_py.separation_watch import HeldVehicle
+from crazyflie_py.simulated_parameters import SimulatedParameters
+from crazyflie_py.swarm import Order, ParameterStore, ScriptState
+from crazyflie_utils import ParameterError
+
+_STATE_TIMEOUT = 10.0  #: Timeout of a pose (s of the vehicles' time).
+_VELOCITY_SPAN = 0.2  #: Longest time between the two poses of a velocity (s).
+
+_UNKNOWN: Triple = (math.nan, math.nan, math.nan)
+
+#: Replaces infinite corners (m): the parameter server has no infinity.
+_FIRMWARE_INFINITY = 1e9
+
+_NOT_FLYING = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
+
+
+class MeasuredStates:
+    """States of one vehicle; accelerations are not known, NaN."""
+
+    def __init__(self, vehicle: RosVehicle, clock: Clock):
+        self._vehicle = vehicle
+        self._clock = clock
+        self._last: TimedPose | None = None
+        self._velocity = _UNKNOWN
+
+    def state(self) -> ScriptState:
+        """Return the state; its velocity is that between two poses.
+
+        Raises
+        ------
+        TimeoutError
+            No pose has come for 10 s.
+        """
+        pose, last = self._wait(lambda pose: True), self._last
+        if last is None or pose.time - last.time > _VELOCITY_SPAN:
+            last, pose = pose, self._wait(lambda new: new.time > pose.time)
+        if pose.time > last.time:
+            self._velocity = velocity_between(last, pose)
+        self._last = pose
+        rpy = rpy_from_quaternion(*pose.rotation)
+        return ScriptState(pose.position, self._velocity, _UNKNOWN, rpy)
+
+    def _wait(self, condition: Callable[[TimedPose], bool]) -> TimedPose:
+        def is_there():
+            pose = self._vehicle.pose()
+            return pose is not None and condition(pose)
+
+        self._clock.wait_until(is_there, self._clock.time() + _STATE_TIMEOUT)
+        pose = self._vehicle.pose()
+        if pose is None:
+            raise TimeoutError(
+                f"{self._vehicle.name}: no position for {_STATE_TIMEOUT:g} s; does motion capture "
+                "track it?"
+            )
+        return pose
+
+
+def avoidance_parameters(settings: AvoidanceSettings) -> dict[str, float]:
+    """Return the firmware parameters of collision avoidance.
+
+    Names are those of bitcraze/crazyflie-firmware, collision_avoidance.c.
+    """
+    values: dict[str, float] = {
+        "colAv.horizon": settings.horizon,
+        "colAv.maxSpeed": settings.max_speed,
+        "colAv.sidestepThrsh": settings.sidestep_threshold,
+        "colAv.vorTol": settings.tolerance,
+        "colAv.vorIters": settings.max_iterations,
+    }
+    for axis, radius, low, high in zip(
+        "XYZ", settings.radii, settings.box_min, settings.box_max, strict=True
+    ):
+        values[f"colAv.ellipsoid{axis}"] = radius
+        values[f"colAv.bboxMin{axis}"] = max(low, -_FIRMWARE_INFINITY)
+        values[f"colAv.bboxMax{axis}"] = min(high, _FIRMWARE_INFINITY)
+    return values
+
+
+class FirmwareParameters:
+    """The `ParameterStore` of a vehicle with firmware, behind the driver."""
+
+    def __init__(self, vehicle: RosVehicle, connection: ScriptConnection):
+        self.name = vehicle.name
+        self._vehicle = vehicle
+        self._connection = connection
+
+    def update(self, values: Mapping[str, float]) -> None:
+        """Set parameters; ValueError for unknown names."""
+        for name in values:
+            self[name]
+        paths = {key.replace(".", "/"): value for key, value in values.items()}
+        for path, value in paths.items():
+            self._connection.handle.set_param(f"/{self.name}/{path}", value)
+        call = self._vehicle.call("update_params", srv.UpdateParams, [*paths])
+        self._connection.finish("update_params", {self.name: call})
+
+    def __getitem__(self, name: str) -> float:
+        """Return a value; ValueError for an unknown name."""
+        path = f"/{self.name}/{name.replace('.', '/')}"
+        try:
+            value: float = self._connection.handle.get_param(path, FirmwareNumber())
+        except ParameterError:
+            raise ValueError(
+                f"{self.name}: the firmware has no parameter {name}, as the driver has not set "
+                f"{path}; expected one that `rosparam list /{self.name}` prints"
+            ) from None
+        return value
+
+
+class ScriptVehicle:
+    """One running vehicle: checks of its commands, what is noted of them, and its state."""
+
+    def __init__(
+        self,
+        vehicle: RosVehicle,
+        config: FleetVehicle,
+        connection: ScriptConnection,
+        has_firmware: bool,
+    ):
+        self.name = vehicle.name
+        self.vehicle = vehicle
+        self.held = HeldVehicle(vehicle, connection)
+        self.states = MeasuredStates(vehicle, connection.fleet.clock)
+        self.parameters: ParameterStore = (
+            FirmwareParameters(vehicle, connection)
+            if has_firmware
+            else SimulatedParameters(self.name, self, connection.said)
+        )
+        self._start = config.position
+        self._connection = connection
+        self._groups = 0
+
+    # Commands.
+
+    @property
+    def groups(self) -> int:
+        """Mask of the groups that the script has made it a member of."""
+        return self._groups
+
+    @groups.setter
+    def groups(self, mask: int) -> None:
+        self.held.end_setpoints()
+        call = self.vehicle.set_group_mask(mask)
+        self._connection.finish("set_group_mask", {self.name: call})
+        self._groups = mask
+
+    def is_member(self, group_mask: int) -> bool:
+        """Return whether a command to groups concerns the vehicle."""
+        return group_mask == 0 or bool(group_mask & self._groups)
+
+    def prepare(self, order: Order) -> None:
+        """Refuse a command to a goal out of the fence; note what follows from it otherwise."""
+        if order.goal is not None:
+            self._check("goTo" if order.name == "go_to" else order.name, order.goal)
+        if order.flies:
+            self.note_flight()
+        self.held.free(order.duration)
+
+    def send(self, setpoint: Setpoint) -> None:
+        """Send a setpoint; one that holds the vehicle, while it is too near to another."""
+        self.note_flight()
+        self.vehicle.send(self.held.passed(setpoint))
+
+    def checked_yaw(self, yaw: float) -> float:
+        """Return a yaw that the vehicle can have, rad; another is refused."""
+        if yaw == 0.0 or self.vehicle.has_yaw:
+            return yaw
+        self._connection.refuse(
+            f"{self.name}: a yaw of {yaw:.3g}: its controller keeps the heading 0; expected 0"
+        )
+        return 0.0
+
+    def _check(self, what, goal):
+        """Refuse a goal (m) that is out of the fence of the vehicle, or below the ground."""
+        bounds, place = self.vehicle.bounds, self.vehicle.position() or self._start
+        goal = [old if math.isnan(new) else new for new, old in zip(goal, place, strict=True)]
+        for value, low, high, axis in zip(goal, bounds.lower, bounds.upper, "xyz", strict=True):
+            if not low <= value <= high:
+                self._connection.refuse(
+                    f"{self.name}: {what}: {axis} is {value:.3g} m, out of the fence; expected "
+                    f"{low:g} to {high:g} m"
+                )
+
+    def avoid(self, settings: AvoidanceSettings | None) -> None:
+        """Set collision avoidance of the firmware; None ends it."""
+        if not self.vehicle.uses_driver:
+            if settings is not None:
+                self._connection.handle.warn(
+                    f"{self.name}: enableCollisionAvoidance has no effect: the fleet keeps "
+                    "vehicles that its controllers fly apart, by the buffers of the fleet file"
+                )
+            return
+        if settings is None:
+            self.parameters.update({"colAv.enable": 0})
+            self.held.avoids = False
+            return
+        try:
+            self.parameters.update({**avoidance_parameters(settings), "colAv.enable": 1})
+            self.held.avoids = True
+        except ValueError as error:
+            self._connection.refuse(f"{self.name}: enableCollisionAvoidance: {error}")
+
+    # End of the flight.
+
+    def note_flight(self) -> None:
+        """Note that the vehicle is landed at the end of the script."""
+        self.held.is_landing = False
+        self._connection.fleet.adopt(self.name)
+
+    def note_landing(self, group_mask: int) -> None:
+        """Note that the script has vehicles of groups land."""
+        self.held.is_landing = self.held.is_landing or self.is_member(group_mask)
+
+    def has_begun(self) -> bool:
+        """Return whether a takeoff under the workspace's controller is under way."""
+        status = self.vehicle.flight_status.state
+        return status in (FlightStatus.TAKING_OFF, FlightStatus.FLYING)
+
+    # State.
+
+    def status(self) -> dict[str, Any]:
+        """Return the status with the keys of crazyswarm2's Crazyflie.get_status."""
+        status = self.vehicle.driver_status
+        supervisor, battery = status.supervisor, status.battery_voltage
+        if not self.vehicle.uses_driver:
+            is_flying = self.vehicle.flight_status.state not in _NOT_FLYING
+            ready = VehicleStatus.CAN_BE_ARMED | VehicleStatus.ARMED | VehicleStatus.CAN_FLY
+            supervisor, battery = ready | is_flying * VehicleStatus.FLYING, math.nan
+        names = ("num_rx_broadcast", "num_tx_broadcast", "num_rx_unicast", "num_tx_unicast")
+        return {
+            "id": self.name,
+            "timestamp_sec": status.header.stamp.secs,
+            "timestamp_nsec": status.header.stamp.nsecs,
+            "supervisor": supervisor,
+            "battery": battery,
+            "pm_state": getattr(status, "pm_state", 0),
+            "rssi": status.rssi,
+            "latency_unicast": round(1e3 * status.latency) if status.latency > 0.0 else 0,
+            **{name: getattr(status, name, 0) for name in names},
+        }

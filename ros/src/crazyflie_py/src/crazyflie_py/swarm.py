@@ -1,0 +1,131 @@
+"""The interface of a swarm, behind the classes that Crazyswarm's scripts see.
+
+`crazyflie_py.crazyflie` checks arguments. Commands are those of the vehicles of missions, see
+`crazyflie_mission_api.mission_vehicle`; two swarms pass them on: `crazyflie_py.simulation` (--sim)
+and `crazyflie_py.ros_swarm`.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+from crazyflie_mission_api.setpoints import Setpoint
+from crazyflie_model.angles import Triple
+from crazyflie_model.collision_avoidance import AvoidanceSettings
+from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_py.fleet import FleetVehicle
+
+#: Colour in which Crazyswarm draws vehicles: red, green and blue, 0 to 1.
+DEFAULT_COLOR = (0.5, 0.5, 1.0)
+
+
+class ScriptState(NamedTuple):
+    """Position (m), velocity (m/s), acceleration (m/s^2) and roll, pitch, yaw (rad).
+
+    In the world frame; ``R = Rz(yaw) Ry(pitch) Rx(roll)``, a positive pitch accelerates forward.
+    """
+
+    position: Triple
+    velocity: Triple
+    acceleration: Triple
+    rpy: Triple
+
+
+class Order(NamedTuple):
+    """A command of a script, and what a swarm checks and notes before it sends it."""
+
+    name: str  #: Name of the service, for errors: "go_to".
+    send: Callable[[Any], Any]  #: Calls the method of a `MissionVehicle` or of `Commands`.
+    group_mask: int = 0
+    flies: bool = False  #: Whether a flight may begin, which the end of the script has to end.
+    goal: Triple | None = None  #: Where it leads (m), if that must be in the fence; NaN: as now.
+    duration: float = -math.inf  #: Time for which it takes off or lands (s).
+
+
+class ParameterStore(Protocol):
+    """Firmware parameters of a vehicle, "group.name" -> value."""
+
+    def __getitem__(self, name: str) -> float:
+        """Return a value; ValueError for an unknown name."""
+
+    def update(self, values: Mapping[str, float]) -> None:
+        """Set parameters; ValueError for unknown names."""
+
+
+class Visualizer(Protocol):
+    """Methods of ``timeHelper.visualizer`` that scripts call."""
+
+    def setGraph(self, edges: Sequence[tuple[int, int]]) -> None:
+        """Draw lines between vehicles, given by their numbers in ``crazyflies``."""
+
+    def showEllipsoids(self, radii: Sequence[float]) -> None:
+        """Draw an ellipsoid around each vehicle, radii in m."""
+
+    def startVideoOutput(self, path: str, dt: float) -> None:
+        """Write a video, a frame each ``dt`` (s)."""
+
+    def finishVideoOutput(self) -> None:
+        """End the video."""
+
+
+class Swarm(Protocol):
+    """All vehicles and the clock; where a name is expected, None is all vehicles."""
+
+    dt: float  #: Period of the clock's steps, s; of the real clock 0.
+
+    @property
+    def fleet(self) -> Sequence[FleetVehicle]:
+        """At least one vehicle; ids and names are different."""
+
+    @property
+    def visualizer(self) -> Visualizer:
+        """The visualizer of --sim; otherwise one that draws nothing."""
+
+    @property
+    def parameters(self) -> Mapping[str, ParameterStore]:
+        """Firmware parameters by the names of the vehicles."""
+
+    def command(self, order: Order, name: str | None) -> None:
+        """Send a command; returns when it is accepted, not when it is carried out."""
+
+    def send(self, setpoint: Setpoint, name: str | None) -> None:
+        """Send a low-level setpoint once."""
+
+    def set_group_mask(self, group_mask: int, name: str) -> None:
+        """Make a vehicle a member of groups, a bit each."""
+
+    def checked_yaw(self, yaw: float, name: str | None) -> float:
+        """Return a yaw that the vehicles can have, rad."""
+
+    def checked_pieces(self, pieces: list[PolynomialPiece], name: str) -> list[PolynomialPiece]:
+        """Return pieces with yaws that the vehicle can have."""
+
+    def avoid(self, name: str, others: Sequence[str], settings: AvoidanceSettings | None) -> None:
+        """Avoid collisions with others; None for settings ends that.
+
+        With hardware the firmware determines the others.
+        """
+
+    def state(self, name: str) -> ScriptState:
+        """Return the state; TimeoutError if none is received for 10 s."""
+
+    def status(self, name: str) -> dict[str, Any]:
+        """Return the status with the keys of crazyswarm2's Crazyflie.get_status."""
+
+    def time(self) -> float:
+        """Return the time, s."""
+
+    def sleep(self, duration: float) -> None:
+        """Return after a duration (s) of the vehicles' time."""
+
+    def sleep_for_rate(self, rate: float) -> None:
+        """Sleep until 1/rate (s) after the return of the last call with this rate (Hz)."""
+
+    def is_shutdown(self) -> bool:
+        """Return whether the script should end."""
+
+    def next_phase(self) -> None:
+        """Begin the next file of a record, if there is one."""
+
+    def close(self) -> None:
+        """Land and release the vehicles; called once at the end, also after an exception."""

@@ -11,11 +11,11 @@ from sensor_msgs.msg import Range
 
 from crazyflie_ranging.follow_object_node import FollowObjectNode
 from crazyflie_ranging.obstacle_stop_node import ObstacleStopNode
-from crazyflie_ranging.reactions import AXES, Follower, ObstacleStop
+from crazyflie_ranging.reactions import AXES, ObjectFollower, ObstacleStop
 from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils.testing import FakeProcess
 
-COURSE = Follower(back_off=0.1, follow=0.3, lost=1.0, scale_linear=1.0, scale_angular=0.5)
+COURSE = ObjectFollower(back_off=0.1, follow=0.3, lost=1.0, scale_linear=1.0, scale_angular=0.5)
 STOP = ObstacleStop(distance=0.5, deceleration=0.5, reaction=0.3)
 
 

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_vision.follow import Follower, GainParameters, SpeedParameters
+from crazyflie_vision.follow import TargetFollower, GainParameters, SpeedParameters
 from crazyflie_vision.trackers import Target
 
 F = 208.0
 CENTRE = (159.5, 119.5)
-FOLLOWER = Follower(
+FOLLOWER = TargetFollower(
     distance=1.0,
     radius=0.12,
     gains=GainParameters(forward=1.0, up=1.0, turn=1.5),

@@ -6,12 +6,12 @@ from geometry_msgs.msg import Twist, Vector3
 from typing_extensions import override
 
 from crazyflie_ranging.range_topics import LatestRanges
-from crazyflie_ranging.reactions import Follower
+from crazyflie_ranging.reactions import ObjectFollower
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 
 
-class FollowObjectParameters(Follower):
+class FollowObjectParameters(ObjectFollower):
     """Parameters of `FollowObjectNode`."""
 
     front_topic: str = parameter(TOPIC, "the sensor in front", "range/front", "topics/front")

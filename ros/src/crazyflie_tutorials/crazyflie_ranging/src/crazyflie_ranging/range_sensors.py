@@ -79,10 +79,7 @@ class RangeSensor(Parameters):
 def load(path: str | Path) -> tuple[RangeSensor, ...]:
     """Return the sensors in a file, which has a list ``sensors``.
 
-    Raises
-    ------
-    ParameterError
-        About everything that is wrong in it: file, line and what was expected.
+    `ParameterError` names everything that is wrong in it: file, line and what was expected.
     """
     file = yaml_file.load(path)
     sensors: list[RangeSensor] = []
@@ -116,21 +113,11 @@ _GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 
 
 def cone(spread: float, count: int) -> NDArray[np.float64]:
-    """Return directions that fill a cone about the x axis evenly, the first along its axis.
+    """Return unit vectors, shape (count, 3), that fill a cone about the x axis evenly.
 
-    They are on a spiral, each turned from the last by the golden angle (Vogel, A better way to
-    construct the sunflower head, 1979).
-
-    Parameters
-    ----------
-    spread : float
-        From edge to edge, rad.
-    count : int
-
-    Returns
-    -------
-    ndarray, shape (count, 3)
-        Of length 1.
+    The first is along the axis. They are on a spiral, each turned from the last by the golden angle
+    (Vogel, A better way to construct the sunflower head, 1979); ``spread`` is from edge to edge,
+    rad.
     """
     k = np.arange(count)
     off = spread / 2.0 * np.sqrt(k / max(count - 1, 1))
@@ -141,14 +128,7 @@ def cone(spread: float, count: int) -> NDArray[np.float64]:
 
 
 class Ranger:
-    """Sensors on a vehicle that measure at the same time.
-
-    Parameters
-    ----------
-    sensors : sequence of RangeSensor
-    random : numpy.random.Generator
-        Of the noise.
-    """
+    """Sensors on a vehicle that measure at the same time; ``random`` is the source of their noise."""
 
     def __init__(self, sensors: Sequence[RangeSensor], random: np.random.Generator):
         self._sensors = sensors
@@ -167,15 +147,10 @@ class Ranger:
         self._rays = np.concatenate(rays)
 
     def measure(self, world: World, position: Triple, attitude: Quaternion) -> list[float]:
-        """Return what each sensor says, m: the nearest of what is in its cone.
+        """Return the reading of each sensor, m: the distance to the nearest object in its cone.
 
-        Parameters
-        ----------
-        world : World
-        position : tuple of float
-            Of the vehicle in the world's frame, m.
-        attitude : tuple of float
-            From the body's to the world's frame, (x, y, z, w), of norm 1.
+        Position (m) and attitude (a quaternion of norm 1) are those of the vehicle in the world's
+        frame.
         """
         turn = Rotation.from_quat(attitude)
         distances, _ = world.cast(position + turn.apply(self._origins), turn.apply(self._rays))

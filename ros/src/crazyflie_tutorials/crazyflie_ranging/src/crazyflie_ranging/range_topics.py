@@ -13,17 +13,7 @@ from crazyflie_utils import NodeHandle
 
 
 class RangePublisher:
-    """Publishes what sensors measure, and where on the vehicle they are.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    sensors : sequence of RangeSensor
-    topic : str
-        Below which each sensor has its topic.
-    frame : str
-        Of the vehicle.
-    """
+    """Publishes the readings of sensors, each below ``topic``, and their frames on the vehicle's."""
 
     def __init__(self, handle: NodeHandle, sensors: Sequence[RangeSensor], topic: str, frame: str):
         self._publishers = [handle.publisher(f"{topic}/{each.name}", Range) for each in sensors]
@@ -57,14 +47,7 @@ class RangePublisher:
 
 
 class LatestRanges:
-    """Listens to range sensors.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    topics : dict
-        Name by which a sensor is asked for -> its topic.
-    """
+    """The latest readings of range sensors; ``topics`` has their topics by name."""
 
     def __init__(self, handle: NodeHandle, topics: dict[str, str]):
         self._handle = handle

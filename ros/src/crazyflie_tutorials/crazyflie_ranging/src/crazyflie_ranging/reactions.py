@@ -13,7 +13,7 @@ from crazyflie_utils.parameters.types import DURATION, Number
 _DISTANCE = Number("m", above=0.0)
 
 
-class Follower(Parameters):
+class ObjectFollower(Parameters):
     """Follows what is in front: at full speed ahead or back, or not at all.
 
     Nearer than ``back_off`` it backs off; beyond ``follow``, up to ``lost``, it follows; else it
@@ -52,10 +52,7 @@ class Follower(Parameters):
     ) -> tuple[float, float]:
         """Return the velocity ahead (m/s) and the yaw rate (rad/s, counter-clockwise).
 
-        Parameters
-        ----------
-        front, left, right : float or None
-            Distances, m; infinite where nothing is, None where a sensor is silent.
+        Distances are in m: infinite where there is nothing, None where a sensor is silent.
         """
         if front < self.back_off:
             return -self.scale_linear, 0.0
@@ -104,12 +101,8 @@ class ObstacleStop(Parameters):
     def limit(self, velocity: Velocity, clearances: Mapping[str, float | None]) -> Velocity:
         """Return a velocity (heading frame) as far as it leads to no obstacle.
 
-        Parameters
-        ----------
-        velocity : Velocity
-        clearances : mapping
-            Of the directions that are guarded, m; None where the sensor is silent: nothing
-            leads there.
+        ``clearances`` are those of the guarded directions, m; None, where the sensor is silent,
+        permits no motion.
         """
         for direction, clearance in clearances.items():
             axis, sign = AXES[direction]

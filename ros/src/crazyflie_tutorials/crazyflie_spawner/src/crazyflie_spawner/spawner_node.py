@@ -27,18 +27,10 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def vehicle_name(wanted: str, taken: Container[str]) -> str:
-    """Return the name that a vehicle gets.
+    """Return the name of a vehicle, its namespace and its tf frame.
 
-    Parameters
-    ----------
-    wanted : str
-        Of a namespace and a tf frame; empty for the first free one of crazyflie1, crazyflie2, ...
-    taken : container of str
-
-    Raises
-    ------
-    RefusalError
-        It is no name, or another vehicle has it.
+    Without a wanted one it is the first free one of crazyflie1, crazyflie2, ... `RefusalError`: the
+    wanted one is no name, or another vehicle has it.
     """
     if not wanted:
         return next(name for k in itertools.count(1) if (name := f"crazyflie{k}") not in taken)
@@ -56,13 +48,7 @@ END_LIMIT = 15.0  #: Time after which nodes that roslaunch has not ended are kil
 
 
 class VehicleProcess:
-    """A vehicle that is started when the object is made.
-
-    Parameters
-    ----------
-    arguments : list of str
-        Of roslaunch.
-    """
+    """A vehicle that is started, with arguments of roslaunch, when the object is made."""
 
     def __init__(self, arguments: list[str]):
         # A session of its own: its nodes get no Ctrl-C but that of `end`, and are killed together.

@@ -26,14 +26,9 @@ class Segment(ABC):
 
 
 class Line(Segment):
-    """A straight piece.
+    """A straight piece between two different points.
 
-    Parameters
-    ----------
-    begin, end : Point
-        Two different ones.
-    is_lane : bool
-        Whether it sweeps the area; otherwise it only leads somewhere.
+    A lane sweeps the area; other pieces only lead somewhere.
     """
 
     def __init__(self, begin: Point, end: Point, is_lane: bool = True):
@@ -61,17 +56,10 @@ class Line(Segment):
 
 
 class Arc(Segment):
-    """A circular piece, horizontal.
+    """A circular piece, horizontal, of a radius in m.
 
-    Parameters
-    ----------
-    centre : Point
-    radius : float
-        m.
-    begin : float
-        Angle of its first point as seen from the centre, rad.
-    turn : float
-        Angle to its last one, rad; positive is counter-clockwise.
+    ``begin`` is the angle of its first point as seen from the centre, ``turn`` that to its last one,
+    rad; positive is counter-clockwise.
     """
 
     def __init__(self, centre: Point, radius: float, begin: float, turn: float):
@@ -118,7 +106,7 @@ class LanePath:
 
 
 def lane_offsets(width: float, lane_width: float) -> list[float]:
-    """Return where lanes lie beside each other, from one side of a strip, m.
+    """Return the distances of lanes from one side of a strip, m.
 
     They are as many as are needed, and equally far apart: at most ``lane_width``.
     """

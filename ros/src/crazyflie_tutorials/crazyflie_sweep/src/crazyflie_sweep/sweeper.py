@@ -11,15 +11,9 @@ from crazyflie_sweep.velocities import OSCILLATOR_BEGIN, OSCILLATOR_END, OSCILLA
 
 
 class Coverage:
-    """Cells of an area, and which of them something that sees a disc has passed over.
+    """Cells of an area that a sensor has passed over, which sees a disc of diameter ``swath`` (m).
 
-    Parameters
-    ----------
-    area : Area
-    cell : float
-        Largest width of a cell, m.
-    swath : float
-        Diameter of the disc, m.
+    ``cell`` is the largest width of a cell, m.
     """
 
     def __init__(self, area: Area, cell: float, swath: float):
@@ -65,13 +59,8 @@ class Sweeper:
     """Moves a reference along lanes and arcs, and measures the vehicle that follows it.
 
     Velocities on lanes come from a service that knows the interval [2, 9] only, so
-    lanes are scaled to it: positions and velocities by the same factor.
-
-    Parameters
-    ----------
-    plan : Plan
-    start : Point
-        Position of the vehicle.
+    lanes are scaled to it: positions and velocities by the same factor. ``start`` is the position
+    of the vehicle.
     """
 
     def __init__(self, plan: Plan, start: Point):

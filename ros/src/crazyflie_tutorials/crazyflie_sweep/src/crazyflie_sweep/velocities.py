@@ -12,25 +12,11 @@ OSCILLATOR_LENGTH = OSCILLATOR_END - OSCILLATOR_BEGIN
 
 
 def oscillator_velocity(x: float) -> float:
-    """Return the velocity of a harmonic oscillator: slow at both ends, fast in the middle.
+    """Return the velocity of a harmonic oscillator, 0.1 to 2.1 units of ``x`` per second.
 
-    vel = 0.1 + 2 sin(pi x / 7 - 2 pi / 7), from an exercise of the course Robot Programming with
-    ROS (C. T. Recchiuto, Genova). The summand 0.1 is what makes it leave its ends.
-
-    Parameters
-    ----------
-    x : float
-        From 2 to 9.
-
-    Returns
-    -------
-    float
-        From 0.1 to 2.1, in units of ``x`` per second.
-
-    Raises
-    ------
-    RefusalError
-        ``x`` is outside, or no number.
+    It is slow at both ends and fast in the middle: vel = 0.1 + 2 sin(pi x / 7 - 2 pi / 7), from an
+    exercise of the course Robot Programming with ROS (C. T. Recchiuto, Genova). The summand 0.1
+    makes it leave its ends. `RefusalError`: ``x`` is outside of 2 to 9, or no number.
     """
     if not OSCILLATOR_BEGIN <= x <= OSCILLATOR_END:
         raise RefusalError(f"x is {x:g}; expected {OSCILLATOR_BEGIN:g} to {OSCILLATOR_END:g}")
@@ -40,10 +26,7 @@ def oscillator_velocity(x: float) -> float:
 def random_velocities(least: float, most: float, source: random.Random) -> tuple[float, float]:
     """Return two velocities, each uniformly distributed in an interval.
 
-    Raises
-    ------
-    RefusalError
-        The interval is empty or not finite.
+    `RefusalError`: the interval is empty or not finite.
     """
     if not (math.isfinite(least) and math.isfinite(most) and least <= most):
         raise RefusalError(f"min is {least:g}, max is {most:g}; expected finite min <= max")
@@ -51,16 +34,9 @@ def random_velocities(least: float, most: float, source: random.Random) -> tuple
 
 
 class VelocitySource:
-    """The last velocity that a service has answered, while it may be used.
+    """The last velocity that a service has answered, which may be used for ``limit`` (s).
 
-    Parameters
-    ----------
-    limit : float
-        How long an answer may be used, s.
-    most : float
-        A velocity that is not > 0 and <= this is nonsense.
-    start : float
-        When the service is asked for the first time, s.
+    One that is not > 0 and <= ``most`` is nonsense. ``start`` is the time of the first call, s.
     """
 
     def __init__(self, limit: float, most: float, start: float):

@@ -11,15 +11,8 @@ from crazyflie_utils.parameters.types import Integer, Number
 def circle_velocity(radius: float, speed: float, clockwise: bool) -> Velocity:
     """Return the velocity, in the heading frame, of a vehicle that looks along its circle.
 
-    The yaw rate is v / r; as seen from above, a clockwise turn has a negative one.
-
-    Parameters
-    ----------
-    radius : float
-        m.
-    speed : float
-        m/s.
-    clockwise : bool
+    The yaw rate is speed (m/s) over radius (m), negative for a turn that is clockwise as seen from
+    above.
     """
     yaw_dot = speed / radius
     return Velocity(x=speed, yaw_dot=-yaw_dot if clockwise else yaw_dot)

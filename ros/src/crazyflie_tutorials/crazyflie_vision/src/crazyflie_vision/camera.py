@@ -56,12 +56,9 @@ class CameraParameters(Parameters):
 
 
 def load(path: str | Path) -> CameraParameters:
-    """Return what a camera's YAML file holds.
+    """Return the parameters in a camera's YAML file.
 
-    Raises
-    ------
-    ParameterError
-        About everything wrong with it: file, line and what was expected.
+    `ParameterError` names everything that is wrong in it: file, line and what was expected.
     """
     return yaml_file.load(path).read(CameraParameters)
 
@@ -116,16 +113,9 @@ _MARGIN = 64
 class PixelNoise:
     """Normally distributed noise, the same for every pixel and colour.
 
-    Drawn once, on a larger image, of which every image gets another part: random numbers for
-    every pixel of every image would take longer than drawing it.
-
-    Parameters
-    ----------
-    width, height : int
-        Of the images.
-    deviation : float
-        Standard deviation of a value from 0 to 255.
-    seed : int
+    Drawn once, on a larger image, of which every image (width, height in pixels) gets another part:
+    random numbers for every pixel of every image would take longer than drawing it. ``deviation``
+    is the standard deviation of a value from 0 to 255.
     """
 
     def __init__(self, width: int, height: int, deviation: float, seed: int = 0):

@@ -23,12 +23,7 @@ def grey(image: Image) -> Image:
 def blur(image: Image, size: int) -> Image:
     """Return a smoother image: each pixel the mean of its neighbours, weighed by a Gaussian.
 
-    Parameters
-    ----------
-    image : ndarray of uint8
-        Coloured or grey.
-    size : int
-        Of the square of neighbours; odd, pixels.
+    ``size`` is that of the square of neighbours; odd, pixels.
     """
     return cv2.GaussianBlur(image, (size, size), 0.0)
 
@@ -36,27 +31,13 @@ def blur(image: Image, size: int) -> Image:
 def edges(image: Image, low: float, high: float, size: int) -> Image:
     """Return where brightness changes: 255 on an edge, elsewhere 0, shape (height, width).
 
-    Canny, A Computational Approach to Edge Detection, 1986.
-
-    Parameters
-    ----------
-    image : ndarray of uint8, shape (height, width, 3)
-    low, high : float
-        A pixel whose gradient is above ``high`` begins an edge, which goes on over pixels above
-        ``low``.
-    size : int
-        The image is blurred before, see `blur`; noise has edges, too.
+    Canny, A Computational Approach to Edge Detection, 1986. A pixel of the coloured image whose
+    gradient is above ``high`` begins an edge, which goes on over pixels above ``low``. The image is
+    blurred before, see `blur`, since noise has edges, too.
     """
     return cv2.Canny(blur(grey(image), size), low, high)
 
 
 def threshold(image: Image, level: int) -> Image:
-    """Return 255 where an image is brighter than a level, elsewhere 0, shape (height, width).
-
-    Parameters
-    ----------
-    image : ndarray of uint8, shape (height, width, 3)
-    level : int
-        0 to 255.
-    """
+    """Return 255 where a coloured image is brighter than a level (0 to 255), elsewhere 0."""
     return cv2.threshold(grey(image), level, 255, cv2.THRESH_BINARY)[1]

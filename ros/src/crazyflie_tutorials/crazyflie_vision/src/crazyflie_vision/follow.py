@@ -31,7 +31,7 @@ class SpeedParameters(Parameters):
     turn: float = parameter(Number("rad/s", minimum=0.0), "to either side", 1.0, live=True)
 
 
-class Follower(Parameters):
+class TargetFollower(Parameters):
     """A proportional controller from a target in an image to a velocity."""
 
     distance: float = parameter(_LENGTH, "to be kept to the target", 1.0, live=True)
@@ -42,24 +42,11 @@ class Follower(Parameters):
     def velocity(
         self, target: Target, focal_length: float, centre: tuple[float, float]
     ) -> Velocity:
-        """Return the velocity that brings a target to its place.
+        """Return the velocity, in the heading frame, that brings a target to its place.
 
-        How far away it is follows from its size, since radius / depth is the same in the
-        image as in the world.
-
-        Parameters
-        ----------
-        target : Target
-            Its radius is > 0.
-        focal_length : float
-            Of the camera, pixels.
-        centre : tuple of float
-            Where the optical axis is in the image: cx, cy, pixels.
-
-        Returns
-        -------
-        Velocity
-            In the heading frame of a vehicle whose camera looks ahead.
+        The depth follows from the target's radius (> 0), since radius / depth is the same in the
+        image as in the world. Focal length and ``centre``, the place of the optical axis (cx, cy),
+        are those of a camera that looks ahead, pixels.
         """
         gains, limits = self.gains, self.limits
         depth = focal_length * self.radius / target.radius

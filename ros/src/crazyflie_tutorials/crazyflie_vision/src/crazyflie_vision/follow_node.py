@@ -9,11 +9,11 @@ from typing_extensions import override
 from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
-from crazyflie_vision.follow import Follower
+from crazyflie_vision.follow import TargetFollower
 from crazyflie_vision.trackers import Target
 
 
-class FollowParameters(Follower):
+class FollowParameters(TargetFollower):
     """Parameters of `FollowNode`."""
 
     silence: float = parameter(

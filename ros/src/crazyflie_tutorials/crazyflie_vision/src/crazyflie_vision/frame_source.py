@@ -21,30 +21,16 @@ class FrameSource:
     def read(self) -> NDArray[Any]:
         """Return the next image, shape (height, width, 3): blue, green, red.
 
-        Raises
-        ------
-        OSError
-            The source has ended.
+        OSError: the source has ended.
         """
         raise NotImplementedError
 
 
 class Webcam(FrameSource):
-    """A camera, which is waited for.
+    """A camera, which is waited for: its number or path, such as "0" or "/dev/video0".
 
-    Parameters
-    ----------
-    device : str
-        Its number or path, such as "0" or "/dev/video0".
-    width, height : int
-        Of the images, pixels, and
-    rate : float
-        how many in a second: all are asked for, and the camera does what it can.
-
-    Raises
-    ------
-    OSError
-        It cannot be used; the text says which cameras there are.
+    Width and height (pixels) and rate (1/s) are asked for, and the camera does what it can. OSError
+    if it cannot be used; the text says which cameras there are.
     """
 
     is_live = True
@@ -68,13 +54,7 @@ class Webcam(FrameSource):
 
 
 class Video(FrameSource):
-    """A video file, over and over.
-
-    Raises
-    ------
-    OSError
-        OpenCV cannot read it.
-    """
+    """A video file, over and over; OSError if OpenCV cannot read it."""
 
     def __init__(self, path: Path):
         self._path = path
@@ -96,10 +76,7 @@ class Video(FrameSource):
 class Pictures(FrameSource):
     """A picture, or all of a folder in the order of their names, over and over.
 
-    Raises
-    ------
-    OSError
-        The folder has no picture, or one cannot be read.
+    OSError: the folder has no picture, or one cannot be read.
     """
 
     def __init__(self, path: Path):
@@ -115,13 +92,7 @@ class Pictures(FrameSource):
 
 
 def open_source(device: str, width: int, height: int, rate: float) -> FrameSource:
-    """Return a webcam, see `Webcam`; or what there is at a path.
-
-    Raises
-    ------
-    OSError
-        Nothing that gives images.
-    """
+    """Return a `Webcam`, or the source of images at a path; OSError if it has no images."""
     if device.isdecimal() or device.startswith("/dev/"):
         return Webcam(device, width, height, rate)
     path = Path(device)

@@ -20,12 +20,9 @@ _BRIDGE = CvBridge()
 
 
 def to_array(message: Image) -> NDArray[np.uint8]:
-    """Return what an image shows, shape (height, width, 3): blue, green, red.
+    """Return the pixels of an image, shape (height, width, 3): blue, green, red.
 
-    Raises
-    ------
-    ValueError
-        It has an encoding that has no such meaning, or too little data.
+    ValueError: it has an encoding that has no such meaning, or too little data.
     """
     what = f"an image of {message.width} x {message.height}, {message.encoding!r}"
     if message.width == 0 or message.height == 0:
@@ -45,7 +42,7 @@ def to_message(image: NDArray[np.uint8], header: Header) -> Image:
 
 
 def camera_info(camera: Pinhole, header: Header) -> CameraInfo:
-    """Return what others have to know of a camera; without distortion."""
+    """Return the message that describes a camera; without distortion."""
     k = camera.matrix
     message = CameraInfo(header=header, width=camera.width, height=camera.height)
     message.distortion_model = "plumb_bob"
@@ -82,13 +79,8 @@ class ImageNode(Node):
         handle.subscribe(topic, Image, convert)
 
     def on_image(self, image: NDArray[Any], header: Header) -> None:
-        """Process an image.
+        """Process an image; see `to_array`.
 
-        Parameters
-        ----------
-        image : ndarray of uint8, shape (height, width, 3)
-            Blue, green, red.
-        header : Header
-            When it was taken, and the camera's optical frame.
+        The header has the time at which it was taken, and the camera's optical frame.
         """
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""What a camera sees of a world: flat faces, plain or with a picture on them.
+"""The image that a camera has of a world: flat faces, plain or with a picture on them.
 
 Everything is drawn into a buffer that knows how near each pixel is (Catmull, A Subdivision
 Algorithm for Computer Display of Curved Surfaces, 1974). It holds the inverse of the depth,
@@ -80,13 +80,7 @@ def face_of(floor: Floor) -> Face:
 
 @cache
 def load_picture(path: str) -> Image:
-    """Return the picture in a file.
-
-    Raises
-    ------
-    OSError
-        The file does not exist, or OpenCV cannot read it.
-    """
+    """Return the picture in a file; OSError if there is none that OpenCV can read."""
     picture = cv2.imread(path, cv2.IMREAD_COLOR)
     if picture is None:
         raise OSError(f"{path} is no picture that can be read")
@@ -154,18 +148,9 @@ _SUBPIXEL_BITS = 4
 
 
 class Renderer:
-    """Draws images of a world whose objects may move.
+    """Draws images of a world whose objects may move; those without a path are prepared once.
 
-    Parameters
-    ----------
-    camera : Pinhole
-    world : World
-        What has no path is prepared once.
-
-    Raises
-    ------
-    OSError
-        A picture of a box cannot be read.
+    OSError: a picture of a box cannot be read.
     """
 
     def __init__(self, camera: Pinhole, world: World):
@@ -183,19 +168,9 @@ class Renderer:
             faces_of(each)
 
     def render(self, pose: Pose, moving: Iterable[Shape] = ()) -> Image:
-        """Return what is seen.
+        """Return the image from a pose of the optical frame in the world, see `Image`.
 
-        Parameters
-        ----------
-        pose : Pose
-            Of the optical frame in the world.
-        moving : iterable of Shape
-            The objects that move, where they are now.
-
-        Returns
-        -------
-        ndarray of uint8, shape (height, width, 3)
-            Blue, green, red.
+        ``moving`` are the objects that move, where they are now.
         """
         camera = self._camera
         self._image = np.full((camera.height, camera.width, 3), SKY, dtype=np.uint8)

@@ -97,15 +97,8 @@ def find(image: NDArray[Any], bounds: ColourBounds, smallest_area: float) -> Tar
     """Return the largest thing of a colour in an image, as a disc with its centre and area.
 
     With the moments m of its mask the centre is (m10 / m00, m01 / m00), and the area m00
-    (Hu, Visual Pattern Recognition by Moment Invariants, 1962).
-
-    Parameters
-    ----------
-    image : ndarray of uint8, shape (height, width, 3)
-        Blue, green, red.
-    bounds : ColourBounds
-    smallest_area : float
-        Area below which a thing is no target (pixels).
+    (Hu, Visual Pattern Recognition by Moment Invariants, 1962). A thing of less than
+    ``smallest_area`` (pixels) is no target.
     """
     moments = cv2.moments(largest_blob(bounds.mask(image)), binaryImage=True)
     area = moments["m00"]
@@ -119,22 +112,11 @@ CASCADE = "/usr/share/opencv4/haarcascades/haarcascade_frontalface_default.xml"
 
 
 class FaceDetector:
-    """Finds the largest face in an image.
+    """Finds the largest face in an image, by a cascade: a file with features and their weights.
 
-    Parameters
-    ----------
-    cascade : str
-        File with the features and their weights.
-    smallest : int
-        Width of the smallest face, pixels; the time that it takes is about 1 / smallest^2.
-    neighbours : int
-        How many overlapping finds make a face; more of them miss more faces, and find fewer where
-        none is.
-
-    Raises
-    ------
-    OSError
-        The file is not there, or holds no cascade.
+    ``smallest`` is the width of the smallest face, pixels; the time that it takes is about 1 /
+    smallest^2. ``neighbours`` is the number of overlapping finds that make a face; more of them
+    miss more faces, and find fewer false ones. OSError: the file is not there, or holds no cascade.
     """
 
     def __init__(self, cascade: str = CASCADE, smallest: int = 24, neighbours: int = 4):
@@ -149,13 +131,7 @@ class FaceDetector:
         self.neighbours = neighbours
 
     def find(self, image: NDArray[Any]) -> Target | None:
-        """Return the largest face, its radius being half its width; None for none.
-
-        Parameters
-        ----------
-        image : ndarray of uint8, shape (height, width, 3)
-            Blue, green, red.
-        """
+        """Return the largest face in a coloured image, its radius half its width; None without."""
         grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
         faces = self._cascade.detectMultiScale(
             grey, 1.1, self.neighbours, minSize=(self.smallest, self.smallest)

@@ -116,14 +116,18 @@ def flight():
     ):
         ticks.get(timeout=LIMIT)
         measurements.get(timeout=LIMIT)
-        wait_until(lambda: hears_of_flights("/cf/sensors/instrument"), "the connection")
+        wait_until(lambda: hears_of_flights("/cf/sensors/instrument"), "the flight")
         yield pilot, other
 
 
 def hears_of_flights(node):
+    """Return whether a node has received a message about flights: a connection is not enough."""
     slave = xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node))
-    connections = slave.getBusInfo("/test")[2]
-    return any(each[2] == "i" and each[4] == "/flights" and each[5] for each in connections)
+    _, subscriptions, _ = slave.getBusStats("/test")[2]
+    return any(
+        topic == "/flights" and any(received > 0 for _, _, received, *_ in connections)
+        for topic, connections in subscriptions
+    )
 
 
 @pytest.mark.parametrize("ask", [interrupt, terminate])

@@ -1,8 +1,13 @@
 """What processes tell each other about flights."""
 
+import signal
+import time
+from types import SimpleNamespace
+
 import pytest
 from std_msgs.msg import String
 
+from crazyflie_utils import Node, shutdown
 from crazyflie_utils.flights import Flights
 from crazyflie_utils.testing import FakeProcess
 
@@ -74,3 +79,23 @@ def test_a_handle_that_is_closed_has_no_flights(process):
     handle.inhibit_shutdown()(True)
     handle.close()
     assert process.own_flights == []
+
+
+class Pilot(Node):
+    needed_in_flight = True
+
+
+def test_a_signal_that_comes_with_the_notice_ends_the_wait(process, monkeypatch):
+    signals = []
+    waiting = shutdown.Shutdown(process, {PILOT: Pilot()}, signals)
+    process.handle(PILOT).inhibit_shutdown()(True)
+    # Who reads the notice may send the signal before the process goes on.
+    process.transport.log = lambda level, text: signals.append(signal.SIGINT)
+
+    def sleep(_):
+        pytest.fail("the signal does not count")
+
+    clock = SimpleNamespace(monotonic=time.monotonic, sleep=sleep)
+    monkeypatch.setattr(shutdown, "time", clock)
+    waiting.wait_for_flights()
+    assert signals == [signal.SIGINT]

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sensor_msgs.msg import Range
 
-from crazyflie_ranging.follow_object_node import FollowObjectNode
-from crazyflie_ranging.obstacle_stop_node import ObstacleStopNode
+from crazyflie_ranging.reaction_nodes import FollowObjectNode, ObstacleStopNode
 from crazyflie_ranging.reactions import AXES, ObjectFollower, ObstacleStop
 from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils.testing import FakeProcess

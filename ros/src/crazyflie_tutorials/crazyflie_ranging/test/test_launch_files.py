@@ -6,10 +6,8 @@ from pathlib import Path
 import pytest
 import rospkg
 
-from crazyflie_ranging.deck_ranger_node import DeckRangerNode
-from crazyflie_ranging.follow_object_node import FollowObjectNode
-from crazyflie_ranging.obstacle_stop_node import ObstacleStopNode
-from crazyflie_ranging.simulated_ranger_node import SimulatedRangerNode
+from crazyflie_ranging.ranger_nodes import DeckRangerNode, SimulatedRangerNode
+from crazyflie_ranging.reaction_nodes import FollowObjectNode, ObstacleStopNode
 from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess, launch_files, launching
 

@@ -10,8 +10,7 @@ from sensor_msgs.msg import Range
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_driver.msg import GenericLogData
-from crazyflie_ranging.deck_ranger_node import DeckRangerNode
-from crazyflie_ranging.simulated_ranger_node import SimulatedRangerNode
+from crazyflie_ranging.ranger_nodes import DeckRangerNode, SimulatedRangerNode
 from crazyflie_utils.testing import FakeProcess
 
 CONFIG = Path(rospkg.RosPack().get_path("crazyflie_ranging")) / "config"

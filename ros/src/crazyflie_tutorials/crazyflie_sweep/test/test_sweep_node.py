@@ -14,9 +14,8 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_sweep.sweep_node import SweepNode
+from crazyflie_sweep.sweep_node import SweepNode, VelocityServerNode
 from crazyflie_sweep.sweep_parameters import Plan
-from crazyflie_sweep.velocity_server_node import VelocityServerNode
 from crazyflie_tutorial_msgs.msg import SweepReport
 from crazyflie_tutorial_msgs.srv import VelocityAtResponse
 from crazyflie_utils import ServiceError

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from crazyflie_sweep.sweep_node import VelocityServerNode
 from crazyflie_sweep.velocities import VelocitySource, oscillator_velocity, random_velocities
-from crazyflie_sweep.velocity_server_node import VelocityServerNode
 from crazyflie_tutorial_msgs.srv import VelocityAtRequest, VelocityRequest
 from crazyflie_utils import ServiceError
 from crazyflie_utils.refusal import RefusalError

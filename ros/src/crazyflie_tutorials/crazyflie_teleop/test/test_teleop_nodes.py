@@ -13,8 +13,12 @@ from std_srvs.srv import EmptyResponse
 from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
 from crazyflie_references.velocity_reference import Velocity
 from crazyflie_references.velocity_reference_node import VelocityReferenceNode
-from crazyflie_teleop.heading_lift_lqr_node import HeadingLiftLqrNode
-from crazyflie_teleop.nodes import CircleNode, JoyVelocityNode, TakeoffCallerNode
+from crazyflie_teleop.nodes import (
+    CircleNode,
+    HeadingLiftLqrNode,
+    JoyVelocityNode,
+    TakeoffCallerNode,
+)
 from crazyflie_teleop.velocities import circle_velocity
 from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess, launch_files

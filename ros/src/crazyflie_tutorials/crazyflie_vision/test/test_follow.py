@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_vision.follow import TargetFollower, GainParameters, SpeedParameters
+from crazyflie_vision.follow import GainParameters, SpeedParameters, TargetFollower
 from crazyflie_vision.trackers import Target
 
 F = 208.0

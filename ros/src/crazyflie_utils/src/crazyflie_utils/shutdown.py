@@ -88,13 +88,14 @@ class Shutdown:
         flights = self._flights
         if flights is None or not flights.in_flight:
             return
+        # Before the log says that another signal ends this: one may come at once.
+        begin, signals = time.monotonic(), len(self._signals)
         own = self._process.own_flights
         if own:
             self._log_waiting(own)
         # Not in this thread: a callback may never return.
         prepare = self._process.prepare_shutdown
         threading.Thread(target=prepare, args=(self._nodes,), name="end", daemon=True).start()
-        begin, signals = time.monotonic(), len(self._signals)
         is_logged = bool(own)
         while flights.in_flight and time.monotonic() < begin + _FLIGHT_LIMIT:
             if len(self._signals) > signals:

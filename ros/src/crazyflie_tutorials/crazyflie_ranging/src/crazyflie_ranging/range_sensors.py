@@ -128,7 +128,7 @@ def cone(spread: float, count: int) -> NDArray[np.float64]:
 
 
 class Ranger:
-    """Sensors on a vehicle that measure at the same time; ``random`` is the source of their noise."""
+    """Sensors on a vehicle that measure at the same time; ``random`` draws their noise."""
 
     def __init__(self, sensors: Sequence[RangeSensor], random: np.random.Generator):
         self._sensors = sensors

@@ -58,8 +58,8 @@ class Line(Segment):
 class Arc(Segment):
     """A circular piece, horizontal, of a radius in m.
 
-    ``begin`` is the angle of its first point as seen from the centre, ``turn`` that to its last one,
-    rad; positive is counter-clockwise.
+    ``begin`` is the angle of its first point as seen from the centre, ``turn`` that to its last
+    one, rad; positive is counter-clockwise.
     """
 
     def __init__(self, centre: Point, radius: float, begin: float, turn: float):

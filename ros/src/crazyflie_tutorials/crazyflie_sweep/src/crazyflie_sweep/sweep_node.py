@@ -1,5 +1,7 @@
 """ROS interface of the sweep: takes off, flies the lanes, lands, reports, and shows it in RViz."""
 
+import random
+
 import genpy
 import numpy as np
 from geometry_msgs.msg import Point
@@ -16,10 +18,17 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_sweep.sweep_parameters import SweepParameters
 from crazyflie_sweep.sweeper import Sweeper
-from crazyflie_sweep.velocities import VelocitySource
+from crazyflie_sweep.velocities import VelocitySource, oscillator_velocity, random_velocities
 from crazyflie_tutorial_msgs.msg import SweepReport, Vel
-from crazyflie_tutorial_msgs.srv import VelocityAt, VelocityAtRequest
-from crazyflie_utils import Node, NodeHandle, flight_status
+from crazyflie_tutorial_msgs.srv import (
+    Velocity,
+    VelocityAt,
+    VelocityAtRequest,
+    VelocityAtResponse,
+    VelocityResponse,
+)
+from crazyflie_utils import Node, NodeHandle, Parameters, flight_status, parameter
+from crazyflie_utils.parameters.types import SERVICE, Integer
 
 COVERED_COLOUR = ColorRGBA(0.15, 0.65, 0.35, 0.75)
 UNCOVERED_COLOUR = ColorRGBA(0.75, 0.78, 0.82, 0.6)
@@ -309,3 +318,38 @@ class SweepNode(Node):
                 self._markers.publish(markers(sweeper, self._parameters.fixed_frame))
         self._report.publish(report)
         return report
+
+
+class VelocityServerParameters(Parameters):
+    """Parameters of `VelocityServerNode`."""
+
+    random_service: str = parameter(
+        SERVICE, "two random velocities in an interval", "velocity", "srv/velocity"
+    )
+    oscillator_service: str = parameter(
+        SERVICE, "the oscillator's velocity at a position", "oscillator", "srv/oscillator"
+    )
+    seed: int | None = parameter(
+        Integer(0, 2**32 - 1), "of the random velocities; without it each run has others", None
+    )
+
+
+class VelocityServerNode(Node):
+    """Answer calls for velocities."""
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(VelocityServerParameters)
+        self._random = random.Random(self._parameters.seed)
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        handle.advertise_service(parameters.random_service, Velocity, self._on_random)
+        handle.advertise_service(parameters.oscillator_service, VelocityAt, self._on_oscillator)
+
+    def _on_random(self, request):
+        return VelocityResponse(*random_velocities(request.min, request.max, self._random))
+
+    def _on_oscillator(self, request):
+        return VelocityAtResponse(oscillator_velocity(request.x))

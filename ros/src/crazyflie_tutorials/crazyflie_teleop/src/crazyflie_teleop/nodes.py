@@ -1,4 +1,4 @@
-"""The ROS interfaces: circle and joystick to cmd_vel, and a call of takeoff."""
+"""The ROS interfaces: circle and joystick to cmd_vel, a call of takeoff, and the controller."""
 
 import math
 
@@ -7,6 +7,10 @@ from sensor_msgs.msg import Joy
 from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
+from crazyflie_lqr.lqr_nodes import (
+    PositionVelocityYawStateLiftLqrNode,
+)
+from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_teleop.velocities import AXIS_NUMBER, JoyVelocity, circle_velocity
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, SERVICE, TIME_STEP, TOPIC, Number
@@ -149,3 +153,13 @@ class TakeoffCallerNode(Node):
             self._handle.info("the vehicle flies")
         else:
             self._handle.error(str(reply.exception()))
+
+
+class HeadingLiftLqrNode(PositionVelocityYawStateLiftLqrNode):
+    """Saturated linear feedback with an integrator, to a position, velocity and yaw.
+
+    Without an integrator a real vehicle, which is heavier than the nominal one, flies far too low.
+    """
+
+    reference_type = PositionVelocityYawStateStamped
+    reference_tail = ()

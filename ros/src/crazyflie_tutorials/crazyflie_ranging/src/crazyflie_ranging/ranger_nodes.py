@@ -1,0 +1,212 @@
+"""ROS interfaces of range sensors: those of a Multi-ranger deck, and simulated ones."""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from functools import partial
+
+import genpy
+import numpy as np
+from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from sensor_msgs.msg import Range
+from typing_extensions import override
+
+from crazyflie_driver.msg import GenericLogData
+from crazyflie_ranging.range_sensors import SENSOR_FILE, ULTRASONIC, Ranger, RangeSensor
+from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TEXT, TIME_STEP, TOPIC, Integer, ListOf
+from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
+from crazyflie_world.world import World
+from crazyflie_world.world_file import WORLD_FILE
+
+
+class RangePublisher:
+    """Publishes readings of sensors, each below ``topic``, and their frames on the vehicle's."""
+
+    def __init__(self, handle: NodeHandle, sensors: Sequence[RangeSensor], topic: str, frame: str):
+        self._publishers = [handle.publisher(f"{topic}/{each.name}", Range) for each in sensors]
+        self._broadcast = handle.broadcast_transforms()
+        self._sensors = sensors
+        self._frame = frame
+
+    def publish(self, readings: dict[int, float], stamp: genpy.Time) -> None:
+        """Publish the readings (m) of some sensors, by their number, and the sensors' frames."""
+        for index, reading in readings.items():
+            sensor = self._sensors[index]
+            message = Range(
+                radiation_type=Range.ULTRASOUND if sensor.type == ULTRASONIC else Range.INFRARED,
+                field_of_view=sensor.spread_angle,
+                min_range=sensor.min_range,
+                max_range=sensor.max_range,
+                range=reading,
+            )
+            message.header.stamp = stamp
+            message.header.frame_id = sensor.frame_id
+            self._publishers[index].publish(message)
+        self._broadcast([self._transform(self._sensors[index], stamp) for index in readings])
+
+    def _transform(self, sensor, stamp):
+        transform = TransformStamped(child_frame_id=sensor.frame_id)
+        transform.header.stamp = stamp
+        transform.header.frame_id = self._frame
+        transform.transform.translation = Vector3(*sensor.position)
+        transform.transform.rotation = Quaternion(*sensor.attitude)
+        return transform
+
+
+_MILLIMETRE = 0.001
+
+
+class DeckRangerParameters(Parameters):
+    """Parameters of `DeckRangerNode`."""
+
+    sensors: tuple[RangeSensor, ...] = parameter(SENSOR_FILE, "the sensors, a YAML file")
+    variables: tuple[str, ...] = parameter(
+        ListOf(TEXT),
+        "of the log block in their order, as in the driver's parameter",
+        name="genericLogTopic_ranges_Variables",
+    )
+    log_topic: str = parameter(TOPIC, "of the log block", "crazyflie/ranges", "topics/log")
+    ranges_topic: str = parameter(
+        TOPIC, "below it, each sensor has its topic", "range", name="topics/ranges"
+    )
+    robot_frame: str = parameter(FRAME, "tf frame of the vehicle", "crazyflie", "frames/robot")
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        for sensor in self.sensors:
+            if sensor.log_variable not in self.variables:
+                yield (
+                    f"the sensor {sensor.name} reads {sensor.log_variable}; expected one of "
+                    f"genericLogTopic_ranges_Variables, {', '.join(self.variables)}"
+                )
+
+
+class DeckRangerNode(Node):
+    """Publish what the sensors on a vehicle's deck measure."""
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(DeckRangerParameters)
+        places = {name: place for place, name in enumerate(self._parameters.variables)}
+        self._places = [places[sensor.log_variable] for sensor in self._parameters.sensors]
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._publisher = RangePublisher(
+            handle, parameters.sensors, parameters.ranges_topic, parameters.robot_frame
+        )
+        handle.subscribe(parameters.log_topic, GenericLogData, self._on_log)
+
+    def _on_log(self, message):
+        parameters = self._parameters
+        topic = self._handle.resolve(parameters.log_topic)
+        if len(message.values) != len(parameters.variables):
+            text = f"it has {len(message.values)} values; expected {len(parameters.variables)}"
+            self._handle.warn(f"ignoring a message on {topic}: {text}", throttle=5.0)
+            return
+        if not all(map(math.isfinite, message.values)):
+            text = "its values are not finite"
+            self._handle.warn(f"ignoring a message on {topic}: {text}", throttle=5.0)
+            return
+        readings = {}
+        for number, (sensor, place) in enumerate(
+            zip(parameters.sensors, self._places, strict=True)
+        ):
+            # The firmware's variable is 0 until its sensor has measured, and without a sensor.
+            if message.values[place] > 0.0:
+                readings[number] = sensor.reading(_MILLIMETRE * message.values[place])
+            else:
+                text = f"{sensor.log_variable} on {topic} is 0: is there a deck?"
+                self._handle.warn(text, throttle=5.0)
+        if readings:
+            self._publisher.publish(readings, message.header.stamp)
+
+
+class SimulatedRangerParameters(Parameters):
+    """Parameters of `SimulatedRangerNode`."""
+
+    world: World = parameter(WORLD_FILE, "what the sensors see, a YAML file")
+    sensors: tuple[RangeSensor, ...] = parameter(SENSOR_FILE, "the sensors, a YAML file")
+    ranges_topic: str = parameter(
+        TOPIC, "below it, each sensor has its topic", "range", name="topics/ranges"
+    )
+    robot_frame: str = parameter(FRAME, "tf frame of the vehicle", "crazyflie", "frames/robot")
+    silence: float = parameter(
+        TIME_STEP, "when a pose is older, nothing is published that rests on it", 0.5
+    )
+    seed: int = parameter(Integer(0, 2**31 - 1), "of the noise", 0)
+    enabled: bool = parameter(
+        BOOLEAN, "measure; false: silent, as sensors that have failed", True, live=True
+    )
+
+
+class SimulatedRangerNode(Node):
+    """Measure distances to what is in a world, where /tf says that the vehicle is."""
+
+    def __init__(self) -> None:
+        self._stamps: dict[int, genpy.Time] = {}
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(SimulatedRangerParameters, self._reconfigure)
+        numbers = defaultdict(list)
+        for number, sensor in enumerate(self._parameters.sensors):
+            numbers[sensor.desired_frequency].append(number)
+        random = np.random.default_rng(self._parameters.seed)
+        self._groups = {
+            1.0 / frequency: (
+                Ranger([self._parameters.sensors[number] for number in group], random),
+                group,
+            )
+            for frequency, group in numbers.items()
+        }
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._publisher = RangePublisher(
+            handle, parameters.sensors, parameters.ranges_topic, parameters.robot_frame
+        )
+        self._lookup = handle.listen_to_transforms()
+        for period, (ranger, numbers) in self._groups.items():
+            handle.timer(period, partial(self._on_timer, ranger, numbers))
+
+    def _reconfigure(self, parameters):
+        self._parameters = parameters
+
+    def _on_timer(self, ranger, numbers):
+        if not self._parameters.enabled:
+            return
+        world = self._parameters.world
+        try:
+            robot = self._pose(self._parameters.robot_frame)
+            centres = {each.name: _position(self._pose(each.name)) for each in world.moving}
+        except TransformError as error:
+            self._handle.warn(f"no ranges: {error}", throttle=5.0)
+            return
+        # What rests on a pose is said once.
+        if self._stamps.get(numbers[0]) == robot.header.stamp:
+            return
+        self._stamps[numbers[0]] = robot.header.stamp
+        rotation = robot.transform.rotation
+        readings = ranger.measure(
+            world.placed(centres),
+            _position(robot),
+            (rotation.x, rotation.y, rotation.z, rotation.w),
+        )
+        self._publisher.publish(dict(zip(numbers, readings, strict=True)), robot.header.stamp)
+
+    def _pose(self, frame: str) -> TransformStamped:
+        pose = self._lookup(self._parameters.world.frame, frame)
+        age = (self._handle.stamp() - pose.header.stamp).to_sec()
+        # A pose far ahead of now is one from before the clock was set back.
+        if not -MAX_FUTURE_STAMP_SIMULATED <= age <= self._parameters.silence:
+            raise TransformError(f"the pose of {frame} is {age:.1f} s old")
+        return pose
+
+
+def _position(pose):
+    translation = pose.transform.translation
+    return translation.x, translation.y, translation.z

@@ -1,6 +1,7 @@
 """The process that flies a fleet, without ROS: all nodes on hand-moved time."""
 
 import math
+from collections import Counter
 
 import pytest
 import rospy
@@ -14,6 +15,7 @@ from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamp
 from crazyflie_utils import Node, ParameterError, ServiceError
 from crazyflie_utils.parameters.types import FRAME, Number
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.topics import Publisher
 
 
 class Waver(Node):
@@ -215,3 +217,34 @@ def test_a_model_without_a_heading_refuses_one(tmp_path):
     for service in ("/a/go_to", "/a/high_level/go_to"):
         with pytest.raises(ServiceError, match="the controller keeps the heading 0; expected 0"):
             swarm.call(service, request)
+
+
+def test_a_moving_vehicle_makes_no_references_that_nobody_reads(monkeypatch):
+    is_heard = []
+    monkeypatch.setattr(Publisher, "is_heard_outside", lambda self: self.topic in is_heard)
+    counts = Counter()
+    publish = Publisher.publish
+
+    def counted(self, message, *before):
+        counts[self.topic] += 1
+        publish(self, message, *before)
+
+    monkeypatch.setattr(Publisher, "publish", counted)
+    swarm = Swarm(fleet={"n": 1})
+    swarm.call("/all/takeoff")
+    swarm.process.advance(3.0)
+
+    def moved(x):
+        counts.clear()
+        goal, duration = Point(x, 0.0, 1.0), rospy.Duration.from_sec(1.0)
+        swarm.call("/cf1/go_to", GoToRequest(0, False, goal, math.nan, duration))
+        swarm.process.advance(1.5)
+        assert swarm.position("cf1")[0] == pytest.approx(x, abs=0.05)
+        return counts["/cf1/ref_safe"], counts["/cf1/ref"]
+
+    inside, outside = moved(0.2)
+    assert inside >= 50
+    assert outside == 0
+    is_heard.append("/cf1/ref")
+    inside, outside = moved(0.0)
+    assert outside == inside

@@ -21,7 +21,7 @@ from crazyflie_fleet.high_level_services import (
     relay,
 )
 from crazyflie_model.polynomials import Goal, at_rest
-from crazyflie_msgs.msg import FlightStatus, PositionVelocityStateStamped
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, ServiceError, flight_status
 from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.last_valid import HOLD_LIMIT
@@ -97,13 +97,14 @@ class HighLevelNode(Node):
             parameters.flight_state_topic,
             self._on_flight_status,
         )
-        reference_type = parameters.reference_type
-        if self._vehicle is not None:
-            reference_type = PositionVelocityStateStamped
+        if self._vehicle is None:
+            topic = parameters.reference_topic
+            handle.subscribe(topic, parameters.reference_type, lambda _: self._on_reference())
+        else:
+            self._vehicle.on_reference = self._on_reference
             self._vehicle.on_interruption = self._references.forget
             self._vehicle.ahead = self._references.ahead
             handle.advertise_service("go_to", srv.GoTo, self._on_limited_go_to)
-        handle.subscribe(parameters.reference_topic, reference_type, self._on_reference)
         handle.subscribe(parameters.start_topic, String, self._on_start_all)
         SetpointSubscribers(handle, self._on_setpoint, parameters.has_yaw)
 
@@ -140,7 +141,7 @@ class HighLevelNode(Node):
         self._takeoff = None
         self._begin_next()
 
-    def _on_reference(self, _):
+    def _on_reference(self):
         # With the hover point the server hands the vehicle over to the controller.
         takeoff = self._takeoff
         if takeoff is None or takeoff.handover or self._status.state != FlightStatus.TAKING_OFF:

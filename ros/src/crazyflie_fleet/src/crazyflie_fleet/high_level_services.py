@@ -36,6 +36,7 @@ class FleetVehicle(Protocol):
     is_held: bool  #: Whether it is kept at its place, since another vehicle is too near.
     is_to_land: bool  #: Whether only the fleet moves it, until it lands.
     on_interruption: Callable[[], None]  #: Called when the fleet, or another node, commands it.
+    on_reference: Callable[[], None]  #: Called after the reference of another node.
     #: Returns where its own references lead in a time (s), m; None if they do not move.
     ahead: Callable[[float], Triple | None]
 

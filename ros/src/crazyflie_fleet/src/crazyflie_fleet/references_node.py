@@ -47,6 +47,7 @@ class TrackedVehicle:
         self.is_held = False
         self.is_to_land = False
         self.on_interruption: Callable[[], None] = lambda: None
+        self.on_reference: Callable[[], None] = lambda: None
         self.ahead: Callable[[float], Triple | None] = lambda time: None
         #: End of its takeoffs by the fleet file, if the file has no start point for it (m).
         self.hover_point: Triple | None = None
@@ -75,12 +76,13 @@ class TrackedVehicle:
 
     def follow(self, goal: Goal[float]) -> None:
         """Make the vehicle follow a goal, which is published as a reference, too."""
-        self._own = reference_message(goal, has_yaw=False)
-        self._own.header.stamp = self._handle.stamp()
-        self._own.header.frame_id = self._frame
+        header = Header(0, self._handle.stamp(), self._frame)
         self._heading = goal.yaw
-        self._command(goal, self._own.header)
-        self._public.publish(self._own)
+        self._command(goal, header)
+        if self._public.has_subscribers(excluding=1):
+            self._own = reference_message(goal, has_yaw=False)
+            self._own.header = header
+            self._public.publish(self._own)
 
     def destination(self, time: float) -> Triple | None:
         """Return where the references lead in a time (s), m; None without any.
@@ -136,6 +138,7 @@ class TrackedVehicle:
         else:
             # The controller handles invalid references.
             self._publish(goal, message.header)
+        self.on_reference()
 
     def _command(self, goal, header):
         self._commanded = goal

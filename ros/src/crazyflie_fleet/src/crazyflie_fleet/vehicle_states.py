@@ -1,5 +1,6 @@
 """States and flight states of the vehicles of a fleet, as received."""
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 
@@ -76,9 +77,11 @@ class VehicleStates:
 
     def goal(self, number: int) -> Goal[float] | None:
         """Return position, velocity and heading of one as a goal; None if they are not fresh."""
-        if not self.are_fresh()[number]:
-            return None
+        # For one of a hundred vehicles that move, as `are_fresh` for all would take longer.
+        age = self._handle.time() - self._times.item(number)
         x, y, z, *velocity, yaw = self._states[number].tolist()
+        if not (0.0 <= age < MAX_POSITION_AGE and math.isfinite(x + y + z)):
+            return None
         return Goal((x, y, z), tuple(velocity), (0.0, 0.0, 0.0), yaw, 0.0)
 
     def are_in_flight(self) -> NDArray[np.bool_]:

@@ -28,6 +28,12 @@ def evaluate(
 
     The constant is the first of its coefficients.
     """
+    if derivatives == 2:
+        # The loop below without an inner one: trajectories are evaluated at each reference.
+        value = first = half = 0.0 * t
+        for c in reversed(coefficients):
+            half, first, value = half * t + first, first * t + value, value * t + c
+        return [value, first, 2 * half]
     terms = [0.0 * t] * (derivatives + 1)
     for c in reversed(coefficients):
         for k in range(derivatives, 0, -1):

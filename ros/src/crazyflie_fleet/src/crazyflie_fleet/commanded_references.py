@@ -10,7 +10,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_fleet.conversions import reference_message
 from crazyflie_fleet.follower import CommandFollower, Velocity
-from crazyflie_fleet.high_level_services import FleetVehicle, HighLevelParameters
+from crazyflie_fleet.high_level_services import FleetVehicle, HighLevelParameters, TimerShare
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_model.trajectory import Trajectory
@@ -18,7 +18,6 @@ from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.timers import Timer
 
 _COLOUR = ColorRGBA(0.95, 0.55, 0.05, 0.8)
 _WIDTH = 0.01  #: Width of the line (m).
@@ -82,7 +81,7 @@ class CommandedReferences:
         self._is_move = False  # Not a trajectory, which other vehicles may fly at the same time.
         # When the last setpoint came; None without a stream.
         self._setpoint_time: float | None = None
-        self._timer: Timer | None = None
+        self._timer: TimerShare | None = None
         self._state: Goal[float] | None = None
         self._state_time = 0.0
         self._vehicle = vehicle
@@ -194,7 +193,9 @@ class CommandedReferences:
             self._plan.clear()
         is_needed = self._is_moving or self._setpoint_time is not None
         if is_needed and self._timer is None:
-            self._timer = self._handle.timer(self._parameters.time_step, self._on_timer)
+            timers = self._handle if self._vehicle is None else self._vehicle
+            on_timer = self._handle.guard(self._on_timer)
+            self._timer = timers.timer(self._parameters.time_step, on_timer)
         elif not is_needed and self._timer is not None:
             self._timer.stop()
             self._timer = None

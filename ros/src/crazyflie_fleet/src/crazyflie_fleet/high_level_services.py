@@ -49,6 +49,16 @@ class FleetVehicle(Protocol):
     def follow(self, goal: Goal[float]) -> None:
         """Make the vehicle follow a goal."""
 
+    def timer(self, period: float, callback: Callable[[], None]) -> "TimerShare":
+        """Call ``callback()`` every ``period`` seconds, by one timer of all vehicles."""
+
+
+class TimerShare(Protocol):
+    """A callback of a timer."""
+
+    def stop(self) -> None:
+        """End the calls."""
+
 
 class HighLevelParameters(Parameters):
     """Parameters of `HighLevelNode`."""

@@ -21,6 +21,7 @@ from crazyflie_msgs.msg import PositionVelocityYawStateStamped as Reference
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
+from crazyflie_utils.timers import Timer
 from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import is_finite, to_tuple
 
@@ -37,11 +38,56 @@ class ReferencesParameters(Parameters):
     )
 
 
+class SharedTimer:
+    """One timer with callbacks of many vehicles; it runs while there are any."""
+
+    def __init__(self, handle: NodeHandle, period: float):
+        self._handle = handle
+        self._period = period
+        self._shares: dict[_Share, None] = {}
+        self._timer: Timer | None = None
+
+    def add(self, callback: Callable[[], None]) -> "_Share":
+        """Call ``callback()`` at each tick from now on."""
+        share = _Share(self, callback)
+        self._shares[share] = None
+        if self._timer is None:
+            self._timer = self._handle.timer(self._period, self._on_timer)
+        return share
+
+    def remove(self, share: "_Share") -> None:
+        """End the calls of a callback."""
+        self._shares.pop(share, None)
+        if not self._shares and self._timer is not None:
+            self._timer.stop()
+            self._timer = None
+
+    def _on_timer(self):
+        for share in [*self._shares]:
+            share.callback()
+
+
+class _Share:
+    def __init__(self, timer: SharedTimer, callback: Callable[[], None]):
+        self.callback = callback
+        self._timer = timer
+
+    def stop(self) -> None:
+        self._timer.remove(self)
+
+
 class TrackedVehicle:
     """A vehicle whose references pass through `ReferencesNode`; see `FleetVehicle`."""
 
-    def __init__(self, number: int, config: VehicleConfig, states: VehicleStates):
+    def __init__(
+        self,
+        number: int,
+        config: VehicleConfig,
+        states: VehicleStates,
+        timers: dict[float, SharedTimer],
+    ):
         self.number = number
+        self._timers = timers  # By their periods (s).
         self.name = config.name
         self.buffer = config.buffer
         self.is_held = False
@@ -83,6 +129,12 @@ class TrackedVehicle:
             self._own = reference_message(goal, has_yaw=False)
             self._own.header = header
             self._public.publish(self._own)
+
+    def timer(self, period: float, callback: Callable[[], None]) -> "_Share":
+        """Call ``callback()`` every ``period`` seconds, by one timer of all vehicles."""
+        if period not in self._timers:
+            self._timers[period] = SharedTimer(self._handle, period)
+        return self._timers[period].add(callback)
 
     def destination(self, time: float) -> Triple | None:
         """Return where the references lead in a time (s), m; None without any.
@@ -184,9 +236,11 @@ class ReferencesNode(Node):
         all_vehicles = (*vehicles, *others)
         self.states = VehicleStates(all_vehicles, vectorized or {})
         self._separation = Separation([vehicle.buffer for vehicle in all_vehicles])
+        timers: dict[float, SharedTimer] = {}
         #: The own vehicles.
         self.vehicles = [
-            TrackedVehicle(number, vehicle, self.states) for number, vehicle in enumerate(vehicles)
+            TrackedVehicle(number, vehicle, self.states, timers)
+            for number, vehicle in enumerate(vehicles)
         ]
         for tracked, vehicle in zip(self.vehicles, vehicles, strict=True):
             if vehicle.name in unplaced:

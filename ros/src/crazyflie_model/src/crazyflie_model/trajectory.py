@@ -101,6 +101,8 @@ class Trajectory:
         time = clip(time, 0.0, total)
         piece, local = self._piece_at((total - time if self.backwards else time) / self.time_scale)
         goal = piece.evaluate(local)
+        if is_over is False and self.time_scale == 1.0 and not self.backwards:
+            return goal
         rate = (-1.0 if self.backwards else 1.0) / self.time_scale
         vx, vy, vz = (where(is_over, 0.0, rate * v) for v in goal.velocity)
         ax, ay, az = (where(is_over, 0.0, rate * rate * a) for a in goal.acceleration)

@@ -14,12 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from crazyflie_virtual import natnet
 from crazyflie_virtual.mocap import MocapSwitches, Scene
-from crazyflie_virtual.natnet import BodyPose, Encoder
+from crazyflie_virtual.natnet import Encoder, StreamedBody
 from crazyflie_virtual.server import Observation
 
 BODIES = [
-    BodyPose(1, "cf1", (1.0, 2.0, 3.0), (0.0, 0.0, 0.6, 0.8), True),
-    BodyPose(9, "cf9", (4.0, 5.0, 6.0), (0.5, 0.5, 0.5, 0.5), False),
+    StreamedBody(1, "cf1", (1.0, 2.0, 3.0), (0.0, 0.0, 0.6, 0.8), True),
+    StreamedBody(9, "cf9", (4.0, 5.0, 6.0), (0.5, 0.5, 0.5, 0.5), False),
 ]
 
 

@@ -3,8 +3,8 @@
 import pytest
 
 from mocap_optitrack.bodies import RigidBodyDictionary
-from mocap_optitrack.frames import Body
-from mocap_optitrack.health import ERROR, OK, WARN, Event, Health
+from mocap_optitrack.frames import SeenBody
+from mocap_optitrack.health import ERROR, OK, WARN, FrameEvent, Health
 
 BODIES = RigidBodyDictionary()({"1": {"pose": "one"}, "cf7": {"pose": "seven"}}).bodies
 ONE, SEVEN = BODIES
@@ -96,12 +96,12 @@ def test_a_connection_that_is_silent(health):
 
 
 def test_while_the_clock_is_learned(health):
-    health.count(Event.LEARNING)
+    health.count(FrameEvent.LEARNING)
     assert health.report(1.0)[0][1:3] == (WARN, "learning the server's clock")
 
 
 def test_stale_frames_only(health):
-    health.count(Event.STALE)
+    health.count(FrameEvent.STALE)
     stream_status = health.report(1.0)[0]
     assert stream_status.level == ERROR
     assert "all frames are stale" in stream_status.message
@@ -110,11 +110,11 @@ def test_stale_frames_only(health):
 
 def test_a_clock_that_jumps_once_is_no_fault_but_again_and_again_is(health):
     stream(health, 0.0, 1.0, ONE)
-    health.count(Event.CLOCK_SET)
+    health.count(FrameEvent.CLOCK_SET)
     assert health.report(1.0)[0].level == OK
     stream(health, 1.0, 2.0, ONE)
-    health.count(Event.CLOCK_SET)
-    health.count(Event.CLOCK_SET)
+    health.count(FrameEvent.CLOCK_SET)
+    health.count(FrameEvent.CLOCK_SET)
     level, message = health.report(2.0)[0][1:3]
     assert level == ERROR
     assert "two servers" in message
@@ -124,7 +124,7 @@ def test_a_clock_that_jumps_once_is_no_fault_but_again_and_again_is(health):
 def test_frames_of_two_servers(health, foreign, level):
     stream(health, 0.0, 1.0, ONE)
     for _ in range(foreign):
-        health.count(Event.FOREIGN)
+        health.count(FrameEvent.FOREIGN)
     assert health.report(1.0)[0].level == level
 
 
@@ -164,7 +164,7 @@ def test_bodies_that_were_never_seen(health, until, level):
 def test_a_body_that_is_missing_is_reported_with_those_that_are_there(health):
     stream(health, 0.0, 1.0, ONE)
     for other in [(2, "cf2"), (3, None), (None, "wand")]:
-        health.other(Body(*other, (0, 0, 0), (0, 0, 0, 1), True))
+        health.other(SeenBody(*other, (0, 0, 0), (0, 0, 0, 1), True))
     assert health.report(1.0)[2].message.endswith("not configured: 2 (cf2), 3, wand")
 
 

@@ -13,7 +13,7 @@ from geometry_msgs.msg import Point, Pose2D, Quaternion
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 from mocap_optitrack.client_nodes import ViconBridgeNode, VrpnClientNode
-from mocap_optitrack.frames import Body, Frame
+from mocap_optitrack.frames import Frame, SeenBody
 from mocap_optitrack.library_source import LibrarySource
 from mocap_optitrack.mocap_node import MocapNode
 from mocap_optitrack.natnet_source import NatNetSource
@@ -68,7 +68,7 @@ def refusal(parameters):
 
 def body(number, name=None, is_tracked=True):
     """Return a body that is somewhere."""
-    return Body(number, name, (1.0, 2.0, 3.0), TURNED, is_tracked)
+    return SeenBody(number, name, (1.0, 2.0, 3.0), TURNED, is_tracked)
 
 
 def show(process, node, *bodies):
@@ -304,7 +304,8 @@ def test_subjects_of_vicon_are_transforms_of_their_names():
     assert process.launch(node, "/vicon", {"datastream_hostport": "10.0.0.2:801"})
     assert isinstance(node.source, LibrarySource)
     for _ in range(2):
-        show(process, node, Body(None, "cf1", (1.0, 2.0, 3.0), TURNED, True), body(4, "big drone"))
+        seen = SeenBody(None, "cf1", (1.0, 2.0, 3.0), TURNED, True)
+        show(process, node, seen, body(4, "big drone"))
     message = process.published("/vicon/cf1/cf1")[-1]
     assert (message.header.frame_id, message.child_frame_id) == ("world", "vicon/cf1/cf1")
     assert message.transform.translation.y == 2.0
@@ -320,7 +321,7 @@ def test_trackers_that_are_not_listed_are_not_published():
     process, node = FakeProcess(), SilentVrpn()
     given = {"server": "10.0.0.1", "trackers": ["cf1"], "broadcast_tf": False}
     assert process.launch(node, "/vrpn_client_node", given)
-    show(process, node, Body(None, "cf1", (1.0, 2.0, 3.0), TURNED, True), body(4, "cf2"))
+    show(process, node, SeenBody(None, "cf1", (1.0, 2.0, 3.0), TURNED, True), body(4, "cf2"))
     assert process.published("/vrpn_client_node/cf1/pose")
     assert not process.transport.publishers.keys() & {"/tf", "/vrpn_client_node/cf2/pose"}
 

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_virtual.natnet import VERSIONS, BodyPose, Encoder
+from crazyflie_virtual.natnet import VERSIONS, Encoder, StreamedBody
 from mocap_optitrack import natnet_messages as natnet
-from mocap_optitrack.frames import Body
+from mocap_optitrack.frames import SeenBody
 
 FREQUENCY = 1_000_000_000
 POSES = [
-    BodyPose(1, "cf1", (1.0, 2.0, 3.0), (0.0, 0.0, 0.5, 0.5), True),
-    BodyPose(7, "cf7", (-1.0, 0.5, 0.25), (0.0, 0.0, 0.0, 1.0), False),
+    StreamedBody(1, "cf1", (1.0, 2.0, 3.0), (0.0, 0.0, 0.5, 0.5), True),
+    StreamedBody(7, "cf7", (-1.0, 0.5, 0.25), (0.0, 0.0, 0.0, 1.0), False),
 ]
 NAMES = {1: "cf1", 7: "cf7"}
 
@@ -59,7 +59,7 @@ def test_frames(version):
     message = Encoder(version).frame(5, POSES, 100.0, 100.002, 100.005)
     frame = natnet.read_frame(payload(message, natnet.FRAME), version, FREQUENCY, NAMES, 7.5)
     assert frame.arrival == 7.5
-    assert frame.bodies == tuple(Body(*pose) for pose in POSES)
+    assert frame.bodies == tuple(SeenBody(*pose) for pose in POSES)
     assert frame.exposure == pytest.approx(100.0, abs=1e-9)
     # Before version 3.0 there is but one time.
     assert frame.sent == pytest.approx(100.005 if version >= "3.0" else 100.0, abs=1e-9)
@@ -93,8 +93,8 @@ def test_rigid_bodies_are_found_among_everything_else():
     content = full_frame_3_0(1, 2, 3)
     frame = natnet.read_frame(content, "3.0", 10_000_000, {12: "wand"}, 0.0)
     assert frame.bodies == (
-        Body(12, "wand", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0), True),
-        Body(13, None, (4.0, 5.0, 6.0), (0.0, 1.0, 0.0, 0.0), False),
+        SeenBody(12, "wand", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0), True),
+        SeenBody(13, None, (4.0, 5.0, 6.0), (0.0, 1.0, 0.0, 0.0), False),
     )
 
 

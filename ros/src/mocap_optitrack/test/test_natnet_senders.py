@@ -21,7 +21,7 @@ def forger(encoder):
 
     They come from another address of this machine, and show body 1 elsewhere.
     """
-    elsewhere = natnet.BodyPose(1, "forged", (9.0, 9.0, 9.0), (0.0, 0.0, 0.0, 1.0), True)
+    elsewhere = natnet.StreamedBody(1, "forged", (9.0, 9.0, 9.0), (0.0, 0.0, 0.0, 1.0), True)
     now = time.monotonic()
     messages = [
         encoder.server_info("forged", 1511, None),

@@ -3,7 +3,7 @@
 import pytest
 
 from mocap_optitrack.bodies import RigidBody, RigidBodyDictionary, RigidBodyParameters
-from mocap_optitrack.parameters import Address, StreamVersion
+from mocap_optitrack.parameters import IpAddress, StreamVersion
 
 ROBOT = {
     "pose": "Robot_1/pose",
@@ -94,22 +94,22 @@ def test_bad_bodies_are_refused(value, reason):
 
 @pytest.mark.parametrize("value", ["192.168.1.20", "127.0.0.1"])
 def test_addresses(value):
-    assert Address()(value) == value
+    assert IpAddress()(value) == value
     with pytest.raises(ValueError):
-        Address(multicast=True)(value)
+        IpAddress(multicast=True)(value)
 
 
 @pytest.mark.parametrize("value", ["224.0.0.1", "239.255.42.99"])
 def test_addresses_of_groups(value):
-    assert Address(multicast=True)(value) == value
+    assert IpAddress(multicast=True)(value) == value
     with pytest.raises(ValueError):
-        Address()(value)
+        IpAddress()(value)
 
 
 @pytest.mark.parametrize("value", ["", "motive", "300.1.1.1", 5, None])
 def test_what_is_no_address(value):
     with pytest.raises(ValueError):
-        Address()(value)
+        IpAddress()(value)
 
 
 @pytest.mark.parametrize("value", ["3.1", 3.1, "3.1.0.0", [3, 1, 0, 0], [3, 1]])

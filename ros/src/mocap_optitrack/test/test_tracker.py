@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from mocap_optitrack.bodies import RigidBodyDictionary
-from mocap_optitrack.frames import Body, Frame
+from mocap_optitrack.frames import Frame, SeenBody
 from mocap_optitrack.health import Health
 from mocap_optitrack.tracker import Tracker
 
@@ -24,7 +24,7 @@ def tracker(up_axis="z", stale_after=0.2, health=None):
 
 def body(number=1, name=None, position=(1.0, 2.0, 3.0), quaternion=UPRIGHT, is_tracked=True):
     """Return a body of a frame."""
-    return Body(number, name, position, quaternion, is_tracked)
+    return SeenBody(number, name, position, quaternion, is_tracked)
 
 
 def frame(*bodies, time=10.0):

@@ -192,7 +192,7 @@ def _flown_fleet(n: int, *arguments: str) -> Iterator[int]:
 
 _URL = "http://127.0.0.1:8642"
 _VEHICLES = 100
-_CLIMB = 0.5  #: Of all vehicles, m: of a fleet in hover a page is sent nothing.
+_CLIMB = 0.5  #: Climb of all vehicles (m): of a fleet in hover a page is sent nothing.
 _LEAST_RATE = 15.0  #: Scenes that come in a s; the page sends 20 of vehicles in motion.
 
 

@@ -19,25 +19,14 @@ _ROSTEST = "rostest.runner.RosTest"
 
 @dataclass(frozen=True)
 class Case:
-    """One test in a file of results.
+    """One test in a file of results."""
 
-    Attributes
-    ----------
-    report : Path
-        The file.
-    classname, name : str
-        As they stand there; empty for a file without a test.
-    verdict : str
-        "passed", "failed", "skipped" or "flaky".
-    reason : str
-        The first line of what has failed.
-    """
-
-    report: Path
+    report: Path  #: The file.
+    #: classname, name: As in the file; empty for a file without a test.
     classname: str
     name: str
-    verdict: str
-    reason: str = ""
+    verdict: str  #: "passed", "failed", "skipped" or "flaky".
+    reason: str = ""  #: First line of the failure.
 
     def label(self, folder: Path) -> str:
         """Return the file of results, relative to a folder, and the name of the test."""

@@ -26,7 +26,7 @@ _TAKEOFF = "rosservice call /takeoff"  #: The line that the demo prints when it 
 
 WIDTH, HEIGHT = 1000, 420
 _COLUMNS = 62  #: Characters in a line of the terminal.
-_BEFORE, _AFTER = 1.5, 4.0  #: Of the animation before the takeoff and after the last line, s.
+_BEFORE, _AFTER = 1.5, 4.0  #: Time before the takeoff and after the last line (s).
 _RATE = 12.5  #: Points of the animated path, Hz.
 _SCALE = 170.0  #: Pixels of a metre.
 _ORIGIN = (775.0, 310.0)  #: Pixel of the place (0, 0, 0).

@@ -9,7 +9,7 @@ import rosgraph
 
 from crazyflie_doctor import computer, graph, installation, running_graph, timing, vehicle
 from crazyflie_doctor.finding import ERROR, WARN, Check, Finding, lines, warn
-from crazyflie_doctor.recorder import record
+from crazyflie_doctor.running_graph import record
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import parse_arguments
 from crazyflie_utils.parameters.types import BOOLEAN, Number, Text

@@ -1,8 +1,10 @@
-"""Asks the ROS master and the nodes of a running graph; each answer has a time limit."""
+"""A running graph: answers of the master and the nodes, with a time limit, and a recording."""
 
 import contextlib
 import io
+import os
 import socket
+import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -11,9 +13,15 @@ from xmlrpc.client import ServerProxy
 
 import rosgraph
 import roslib.message
+from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph.network import read_ros_handshake_header, write_ros_handshake_header
+from rosgraph_msgs.msg import Clock
+from tf2_msgs.msg import TFMessage
 
 from crazyflie_doctor.graph import Graph, Type
+from crazyflie_doctor.timing import Recording, Transform
+from crazyflie_msgs.msg import ControlStamped
+from crazyflie_utils.main import begin
 
 LIMIT = 2.0  #: Longest wait for one answer (s).
 
@@ -145,3 +153,61 @@ def _handshake(connection: socket.socket, fields: dict[str, str]) -> Type | None
     if "type" not in answer or "md5sum" not in answer:
         return None
     return answer["type"], answer["md5sum"]
+
+
+def record(graph: Graph, duration: float) -> Recording:
+    """Return what is published within ``duration`` seconds of the machine's clock.
+
+    The node publishes nothing, and subscribes to topics of the graph that have a publisher.
+    """
+    process = begin(f"doctor_{os.getpid()}")
+    handle = process.handle(f"/doctor_{os.getpid()}")
+    recording = Recording()
+
+    def now():
+        return handle.stamp().to_sec()
+
+    def on_transforms(message, is_static):
+        source = message._connection_header["callerid"]
+        for transform in message.transforms:
+            recording.transforms.append(
+                Transform(
+                    transform.header.frame_id.strip("/"),
+                    transform.child_frame_id.strip("/"),
+                    source,
+                    transform.header.stamp.to_sec(),
+                    now(),
+                    is_static,
+                )
+            )
+
+    def on_control(topic, message):
+        stamp = message.header.stamp.to_sec()
+        # A control without a stamp does not say how old the pose is.
+        if stamp > 0.0:
+            recording.delays.setdefault(topic, []).append(now() - stamp)
+            recording.control_stamps.setdefault(topic, []).append(stamp)
+
+    def on_diagnostics(message):
+        source = message._connection_header["callerid"]
+        for status in message.status:
+            if "://" in status.hardware_id:
+                recording.reported.setdefault(status.hardware_id, set()).add(source)
+
+    def subscribe(topic, message_type, callback):
+        if graph.publishers.get(topic):
+            handle.subscribe(topic, message_type, callback)
+
+    subscribe("/tf", TFMessage, lambda message: on_transforms(message, False))
+    subscribe("/tf_static", TFMessage, lambda message: on_transforms(message, True))
+    subscribe("/clock", Clock, lambda message: recording.clocks.append(message.clock.to_sec()))
+    subscribe("/diagnostics", DiagnosticArray, on_diagnostics)
+    for topic in sorted(
+        {t for (_, t), (name, _) in graph.topic_types.items() if name == ControlStamped._type}
+    ):
+        subscribe(topic, ControlStamped, lambda message, topic=topic: on_control(topic, message))
+    process.start()
+    time.sleep(duration)
+    process.stop()
+    handle.close()
+    return recording

@@ -136,7 +136,7 @@ def _battery_test(facts: VehicleFacts) -> Iterator[Finding]:
 
 @dataclass(eq=False)
 class _Watch:
-    """What the vehicle logs and answers, from its link's thread."""
+    """The log and the answers of the vehicle, from its link's thread."""
 
     voltages: list[float] = field(default_factory=list)
     variances: list[tuple[float, ...]] = field(default_factory=list)

@@ -51,7 +51,7 @@ class Braking:
     #: What can be counted on, m/s^2: along x and y at most `MAX_HORIZONTAL_BRAKING`, along z at
     #: most `MAX_VERTICAL_BRAKING`.
     deceleration: float
-    reaction_time: float  #: From a state until the vehicle decelerates because of it, s.
+    reaction_time: float  #: Time from a state until the vehicle decelerates because of it (s).
 
 
 class Geofence:

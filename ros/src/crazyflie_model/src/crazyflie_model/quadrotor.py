@@ -62,7 +62,7 @@ class QuadrotorParameters:
     #: PWM, thrust_linear f + thrust_quadratic f^2, N. `HOVER_PWM` carries the default mass.
     thrust_linear: float = 0.027 * GRAVITY / 4.0 * FULL_PWM / HOVER_PWM
     thrust_quadratic: float = 0.0
-    delay: float = 0.0  #: From the arrival of a command at the driver to the motion, s.
+    delay: float = 0.0  #: Time from the arrival of a command at the driver to the motion (s).
     #: roll_lag, pitch_lag, yaw_lag: First-order lag of roll, pitch and yaw rate behind their
     #: commands, s; None: as the inner loops lead to it.
     roll_lag: float | None = None

@@ -26,7 +26,7 @@ from crazyflie_world.world import World
 
 SIDES = ("front", "back", "left", "right")
 STEP = 0.05  #: Between two moments, s.
-SPREAD = 0.47  #: Of the sensors' cones, rad.
+SPREAD = 0.47  #: Angle of the sensors' cones (rad).
 
 VEHICLE, OBJECT, CONE, GREY = "#0b62b0", "#e07b00", "#7fb2e5", "#7a7a7a"
 

@@ -15,7 +15,7 @@ from crazyflie_simulator.disturbances import MotionCapture
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, TEXT, Integer, Number, Text
 from crazyflie_virtual import natnet
-from crazyflie_virtual.natnet import VERSIONS, BodyPose, Encoder
+from crazyflie_virtual.natnet import VERSIONS, Encoder, StreamedBody
 from crazyflie_virtual.quaternions import turned
 from crazyflie_virtual.server import (
     Address,
@@ -91,7 +91,7 @@ class Scene:
             self._cameras[body_id] = MotionCapture(*self._noise, seed=(self._seed, body_id))
         self._observations[body_id] = observation
 
-    def bodies(self, time: float) -> list[BodyPose]:
+    def bodies(self, time: float) -> list[StreamedBody]:
         """Return every rigid body as it is seen at ``time`` (s), in the order of their numbers.
 
         A body that is not tracked has the pose it was seen at last.
@@ -149,7 +149,7 @@ class Scene:
             self._seen[body_id] = (position, quaternion)
         never = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
         position, quaternion = self._seen.get(body_id, never)
-        return BodyPose(body_id, name, position, quaternion, not lost)
+        return StreamedBody(body_id, name, position, quaternion, not lost)
 
 
 def _extrapolate(observation, time):
@@ -237,7 +237,7 @@ class MocapSettings(Parameters):
 
     def switches(self) -> MocapSwitches:
         """Return the switches as they are at the beginning."""
-        return MocapSwitches(self.dropout, self.invalid, self.silent, self.ghosts, self.occlusions)
+        return MocapSwitches(**{name: getattr(self, name) for name in vars(MocapSwitches())})
 
 
 _CLIENT_LIMIT = 5.0  #: Age of a client's last message above which it gets no frames (s).
@@ -276,7 +276,7 @@ class MocapServer(Server):
         self._period = 1.0 / settings.rate
         self._begin = time.monotonic()
         self._frames = 0
-        self._pending: deque[tuple[float, float, int, list[BodyPose], list[Triple]]] = deque()
+        self._pending: deque[tuple[float, float, int, list[StreamedBody], list[Triple]]] = deque()
 
     @property
     @override

@@ -29,7 +29,7 @@ _MARKER_SIZE = 0.0095  #: Diameter of a marker, m.
 _HEADER = struct.Struct("<HH")
 
 
-class BodyPose(NamedTuple):
+class StreamedBody(NamedTuple):
     """A rigid body in a frame."""
 
     body_id: int
@@ -68,7 +68,7 @@ class Encoder:
         )
         return _message(SERVER_INFO, payload)
 
-    def model(self, bodies: Sequence[BodyPose]) -> bytes:
+    def model(self, bodies: Sequence[StreamedBody]) -> bytes:
         """Return the answer to `REQUEST_MODEL`: names and numbers of the bodies."""
         payload = struct.pack("<i", len(bodies))
         for body in bodies:
@@ -89,7 +89,7 @@ class Encoder:
     def frame(
         self,
         number: int,
-        bodies: Sequence[BodyPose],
+        bodies: Sequence[StreamedBody],
         exposure: float,
         received: float,
         sent: float,

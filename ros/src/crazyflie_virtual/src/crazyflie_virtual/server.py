@@ -177,7 +177,7 @@ class Observation(NamedTuple):
     #: body_id, name: those of the vehicle; the name has at most 31 bytes.
     body_id: int
     name: str
-    time: float  #: Of the machine's monotonic clock, which all its processes share (s).
+    time: float  #: Time by the machine's monotonic clock, which its processes share (s).
     #: position, velocity: m and m/s, fixed frame.
     position: Triple
     velocity: Triple

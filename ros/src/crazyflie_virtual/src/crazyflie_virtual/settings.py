@@ -161,12 +161,4 @@ class VehicleSettings(Parameters):
 
     def switches(self) -> FaultSwitches:
         """Return the fault switches as they are at the beginning."""
-        return FaultSwitches(
-            self.loss,
-            self.delay,
-            self.silence,
-            int(self.low_battery),
-            self.motor_failure,
-            self.occluded,
-            self.smooth,
-        )
+        return FaultSwitches(**{name: getattr(self, name) for name in vars(FaultSwitches())})

@@ -1,4 +1,4 @@
-"""Vehicles for tests, in the process of the test: a whole one, and one that does as it is told.
+"""Vehicles for tests, in the process of the test: a virtual one, and one that the test controls.
 
 `FakeVehicle` is for tests of clients. Commands and setpoints are the virtual firmware's, see
 `FakeFlight`; log variables, parameters and replies are the test's. It connects in 0.02 s where a
@@ -50,7 +50,7 @@ _LINK_BITS = 3 << 2
 _NULL_PACKET = (15, 3)  #: Port and channel of the packet by which vehicles are searched.
 
 _THAW = bytes(40)  #: A datagram that ends a freeze; packets are shorter.
-_THAW_LIMIT = 60.0  #: How long that may take on a busy machine, s.
+_THAW_LIMIT = 60.0  #: Longest time until a vehicle thaws on a busy machine (s).
 
 
 class FakeFlight(Firmware):
@@ -159,7 +159,7 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         self.lose: Callable[[int], bool] = lambda count: False
         #: What begins like this has the vehicle stop, before it is read, until `resume`.
         self.stalls_at: tuple[int, int, bytes] | None = None
-        #: How far the clock of its log data is ahead of this machine's, ms.
+        #: Time by which the clock of its log data is ahead of this machine's (ms).
         self.clock_ahead_ms = 0
         self._resumed = threading.Event()
         self._is_frozen = False
@@ -193,7 +193,7 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         assert self._thawed.wait(_THAW_LIMIT), "the thread of the vehicle hangs"
 
     def resume(self) -> None:
-        """Have a vehicle that has stopped, see `stalls_at`, read what has come meanwhile."""
+        """Let a vehicle that has stopped at `stalls_at` read what has come meanwhile."""
         self.stalls_at = None
         self._resumed.set()
 

@@ -7,7 +7,7 @@ Vector3 = tuple[float, float, float]  #: x, y, z.
 Quaternion = tuple[float, float, float, float]  #: (x, y, z, w).
 
 
-class Body(NamedTuple):
+class SeenBody(NamedTuple):
     """A rigid body in a frame."""
 
     body_id: int | None  #: Number that the server streams the body under; None when it has none.
@@ -26,7 +26,7 @@ class Frame(NamedTuple):
     exposure: float | None
     sent: float | None  #: Time of sending by the same clock (s); None like `exposure`.
     arrival: float  #: Time of reception by the local clock (s).
-    bodies: tuple[Body, ...]
+    bodies: tuple[SeenBody, ...]
     #: Time that it had been on this machine by then (s); for streams without `exposure`.
     waited: float = 0.0
     #: Markers that the system has not assigned to a body, m, in the server's coordinates.

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
-from mocap_optitrack.bodies import Body as ConfiguredBody
-from mocap_optitrack.frames import Body
+from mocap_optitrack.bodies import Body
+from mocap_optitrack.frames import SeenBody
 
 OK, WARN, ERROR = range(3)  #: Levels, as in diagnostic_msgs/DiagnosticStatus.
 
@@ -20,7 +20,7 @@ _MOST_OTHERS = 10
 _TWO_SERVERS = "the server's clock keeps jumping: do two servers send to the same address?"
 
 
-class Event(Enum):
+class FrameEvent(Enum):
     """Events that are counted, apart from good frames."""
 
     LEARNING = "a frame came before the server's clock was known"
@@ -49,7 +49,7 @@ class Health:
 
     def __init__(
         self,
-        bodies: Sequence[ConfiguredBody],
+        bodies: Sequence[Body],
         stale_after: float,
         now: float,
         rate_limits: tuple[float, float] | None = None,
@@ -63,16 +63,16 @@ class Health:
         self._silence = "no frames"
         self._last_frame: float | None = None
         self._stream_begin: float | None = None
-        self._others: dict[tuple[int | None, str | None], Body] = {}
+        self._others: dict[tuple[int | None, str | None], SeenBody] = {}
         self._begin_period(now)
 
-    def add(self, body: ConfiguredBody) -> None:
+    def add(self, body: Body) -> None:
         """Report on a body, too."""
         self._bodies[body.key] = _BodyCount()
         self._labels[body.key] = body.component
         self._others.pop((None, body.key), None)
 
-    def count(self, event: Event) -> None:
+    def count(self, event: FrameEvent) -> None:
         """Count an event."""
         self._events[event] += 1
 
@@ -86,7 +86,7 @@ class Health:
         self._silence = "no frames"
         self._latencies.append(latency)
 
-    def body(self, body: ConfiguredBody, now: float, is_tracked: bool, why: str = "") -> None:
+    def body(self, body: Body, now: float, is_tracked: bool, why: str = "") -> None:
         """Count a configured body in a good frame; ``why`` it is not tracked, if that is known."""
         count = self._bodies[body.key]
         count.why = why
@@ -95,8 +95,8 @@ class Health:
             count.tracked += 1
             count.last = now
 
-    def other(self, body: Body) -> None:
-        """Record a `Body` in a good frame that is not configured."""
+    def other(self, body: SeenBody) -> None:
+        """Record a `SeenBody` in a good frame that is not configured."""
         if len(self._others) < _MOST_OTHERS:
             self._others[body.body_id, body.name] = body
 
@@ -132,7 +132,7 @@ class Health:
         self._begin = now
         self._latencies: list[float] = []
         self._longest_gap = 0.0
-        self._events: Counter[Event] = Counter()
+        self._events: Counter[FrameEvent] = Counter()
         for count in self._bodies.values():
             count.begin_period()
 
@@ -147,9 +147,9 @@ class Health:
             "server": self._server or "none",
             "rate (Hz)": f"{rate:.1f}",
             "longest gap (ms)": _milliseconds(gap),
-            "stale frames": str(self._events[Event.STALE]),
-            "repeated frames": str(self._events[Event.REPEATED]),
-            "frames of another clock": str(self._events[Event.FOREIGN]),
+            "stale frames": str(self._events[FrameEvent.STALE]),
+            "repeated frames": str(self._events[FrameEvent.REPEATED]),
+            "frames of another clock": str(self._events[FrameEvent.FOREIGN]),
         }
         if frames:
             mean = math.fsum(self._latencies) / frames
@@ -161,13 +161,13 @@ class Health:
     def _stream_assessment(self, values, gap, rate):
         if self._server is None:
             return ERROR, self._failure
-        foreign = self._events[Event.FOREIGN]
-        if self._events[Event.CLOCK_SET] > 1 or foreign > len(self._latencies):
+        foreign = self._events[FrameEvent.FOREIGN]
+        if self._events[FrameEvent.CLOCK_SET] > 1 or foreign > len(self._latencies):
             return ERROR, _TWO_SERVERS
         if not self._latencies:
-            if self._events[Event.LEARNING]:
+            if self._events[FrameEvent.LEARNING]:
                 return WARN, "learning the server's clock"
-            if self._events[Event.STALE]:
+            if self._events[FrameEvent.STALE]:
                 return ERROR, "all frames are stale: is the server paused or playing a recording?"
             return ERROR, self._silence
         if foreign > 1:

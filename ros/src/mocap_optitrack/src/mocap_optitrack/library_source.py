@@ -14,7 +14,7 @@ from typing_extensions import override
 
 from mocap_optitrack import library_worker
 from mocap_optitrack.frame_times import ArrivalTimes
-from mocap_optitrack.frames import Body, Frame
+from mocap_optitrack.frames import Frame, SeenBody
 from mocap_optitrack.source import Source, SourceError
 
 SYSTEMS = ("vicon", "qualisys", "vrpn")  #: Systems other than NatNet.
@@ -112,7 +112,7 @@ class LibrarySource(Source):
     def _body(self, name, *pose):
         is_new = self._last.get(name, pose) != pose
         self._last[name] = pose
-        return Body(None, name, tuple(pose[:3]), tuple(pose[3:]), is_new)
+        return SeenBody(None, name, tuple(pose[:3]), tuple(pose[3:]), is_new)
 
     def _parse(self, line):
         value = json.loads(line)

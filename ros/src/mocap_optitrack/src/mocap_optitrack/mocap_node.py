@@ -34,8 +34,8 @@ from mocap_optitrack.tracker import BodyPose, Tracker
 _REPORT_PERIOD = 1.0  #: Period of the diagnostics (s): REP 107 wants one report a second.
 _REPEAT = 5.0  #: The same warning comes at most this often, s.
 
-#: How long a heading counts, s: a gyroscope drifts by some degrees a minute, and the driver's come
-#: every 0.1 s.
+#: Age up to which a heading is used (s): a gyroscope drifts by some degrees a minute, and the
+#: driver's headings come every 0.1 s.
 MAX_HEADING_AGE = 2.0
 
 
@@ -43,7 +43,7 @@ class MocapNode(Node):
     """Publish where the rigid bodies of a motion capture system are, as topics and on tf."""
 
     needed_in_flight = True
-    pose_type: type = PoseStamped  #: Of the topics with poses.
+    pose_type: type = PoseStamped  #: Message type of the topics with poses.
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:

@@ -14,7 +14,7 @@ from natnet import DataDescriptions, DataFrame, NatNetClient, NatNetError, Versi
 from natnet import ServerInfo as _Info
 from natnet.packet_buffer import PacketBuffer
 
-from mocap_optitrack.frames import Body, Frame
+from mocap_optitrack.frames import Frame, SeenBody
 
 CONNECT = NatNetClient.NAT_CONNECT
 SERVER_INFO = NatNetClient.NAT_SERVERINFO
@@ -105,7 +105,7 @@ def read_frame(
     if not math.isfinite(sent):
         raise DecodeError(f"a frame of {sent:g} s has no time")
     bodies = tuple(
-        Body(body.id_num, names.get(body.id_num), body.pos, body.rot, _is_tracked(body))
+        SeenBody(body.id_num, names.get(body.id_num), body.pos, body.rot, _is_tracked(body))
         for body in frame.rigid_bodies
     )
     return Frame(exposure, sent, arrival, bodies, points=_unlabelled(frame))

@@ -34,7 +34,7 @@ _PORT = Integer(1, 65535)
 
 
 @dataclass(frozen=True)
-class Address(ParameterType):
+class IpAddress(ParameterType):
     """An IPv4 address; with ``multicast``, that of a group."""
 
     multicast: bool = False
@@ -90,13 +90,13 @@ class NatNetParameters(Parameters):
         None,
     )
     local_address: str | None = parameter(
-        Address(),
+        IpAddress(),
         "natnet: address of this machine in the cameras' network, the only one that datagrams are "
         "received at. Without it, that of the interface that leads to the server",
         None,
     )
     multicast_address: str | None = parameter(
-        Address(multicast=True),
+        IpAddress(multicast=True),
         "natnet: group that frames are sent to, unless the server names one",
         None,
     )

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from mocap_optitrack.bodies import Body, SingleMarker
 from mocap_optitrack.frame_times import ClockOffset, FrameOrder
 from mocap_optitrack.frames import Frame, Quaternion, Vector3, normalized, to_z_up
-from mocap_optitrack.health import Event, Health
+from mocap_optitrack.health import FrameEvent, Health
 from mocap_optitrack.marker_tracker import MarkerTracker
 
 #: Largest time of a stamp ahead of its arrival (s): the offset of the server's clock is known to a
@@ -15,9 +15,9 @@ from mocap_optitrack.marker_tracker import MarkerTracker
 _LEAD = 0.005
 
 _EVENTS = {
-    FrameOrder.OLD: Event.REPEATED,
-    FrameOrder.FOREIGN: Event.FOREIGN,
-    FrameOrder.RESTART: Event.CLOCK_SET,
+    FrameOrder.OLD: FrameEvent.REPEATED,
+    FrameOrder.FOREIGN: FrameEvent.FOREIGN,
+    FrameOrder.RESTART: FrameEvent.CLOCK_SET,
 }
 
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -31,7 +31,7 @@ class BodyPose(NamedTuple):
     body: Body
     time: float  #: Time by the local clock (s).
     position: Vector3  #: m, z up.
-    quaternion: Quaternion | None  #: Of norm 1; None for a single marker.
+    quaternion: Quaternion | None  #: Norm 1; None for a single marker.
 
 
 class Tracker:
@@ -126,10 +126,10 @@ class Tracker:
 
     def _fault(self, time, age):
         if time <= self._newest:
-            return Event.REPEATED
+            return FrameEvent.REPEATED
         if age < -_LEAD:
-            return Event.FOREIGN
-        return Event.STALE if age > self.stale_after else None
+            return FrameEvent.FOREIGN
+        return FrameEvent.STALE if age > self.stale_after else None
 
     def _time_of(self, frame):
         if frame.exposure is None:
@@ -140,7 +140,7 @@ class Tracker:
         if order in (FrameOrder.OLD, FrameOrder.FOREIGN):
             return None
         if not self._clock.is_settled:
-            self._health.count(Event.LEARNING)
+            self._health.count(FrameEvent.LEARNING)
             return None
         return self._clock.to_local(frame.exposure)
 

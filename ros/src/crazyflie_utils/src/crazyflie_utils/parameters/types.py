@@ -176,7 +176,7 @@ class GraphName(ParameterType):
 
 
 @dataclass(frozen=True)
-class Frame(ParameterType):
+class FrameName(ParameterType):
     """The name of a tf frame; a leading slash, as tf 1 wrote it, is dropped."""
 
     label = "string"
@@ -250,5 +250,5 @@ BOOLEAN = Boolean()
 TEXT = Text()
 TOPIC = GraphName()
 SERVICE = GraphName()
-FRAME = Frame()
+FRAME = FrameName()
 POSITION = ListOf(METRES, 3)

@@ -102,10 +102,7 @@ def is_model(name: str) -> bool:
 def load(name: str) -> QuadrotorParameters:
     """Return the model of a type, or of a model file.
 
-    Raises
-    ------
-    ParameterError
-        About everything that is wrong: file, line, value, and what was expected.
+    `ParameterError` names everything that is wrong: file, line, value, and what was expected.
     """
     if name in TYPES:
         return TYPES[name]

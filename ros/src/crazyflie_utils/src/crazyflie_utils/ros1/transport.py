@@ -53,7 +53,7 @@ class _RosPublisher(ExternalPublisher):
 
 
 class _RosSubscriber(ExternalSubscriber):
-    """What ``register()`` returns; ``run(work)`` has work done that waits for the master."""
+    """The subscriber of ``register()``; ``run(work)`` does work that waits for the master."""
 
     def __init__(
         self, register: Callable[[], rospy.Subscriber], run: Callable[[Callable[[], None]], None]

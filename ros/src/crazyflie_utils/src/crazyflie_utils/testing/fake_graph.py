@@ -1,4 +1,4 @@
-"""A whole graph without ROS: processes that are killed, frozen and started anew; time by hand."""
+"""A whole graph without ROS: processes that are killed, frozen and started again; time by hand."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class FakeGraph:
             del self._latched[publication]
 
     def interrupt(self, name: str) -> None:
-        """Have a process prepare its end, as SIGINT and ``rosnode kill`` do; it goes on."""
+        """Ask a process to prepare its end, as SIGINT and ``rosnode kill`` do; it goes on."""
         process = self._processes[name]
         process.prepare_shutdown({name: process.node})
 
@@ -79,7 +79,7 @@ class FakeGraph:
         self._processes[name].is_frozen = True
 
     def thaw(self, name: str) -> None:
-        """Let a frozen process go on, with what has waited."""
+        """Resume a frozen process, with the messages and calls that have waited."""
         process = self._processes[name]
         process.is_frozen = False
         process.move_to(self.time)
@@ -108,7 +108,7 @@ class FakeGraph:
         self._route(caller, topic, message)
 
     def listen(self, topic: str, callback: Deliver) -> None:
-        """Have ``callback(message)`` called with what is published on a topic, faults aside."""
+        """Call ``callback(message)`` with each message published on a topic, without its faults."""
         self._listeners.setdefault(topic, []).append(callback)
 
     def services(self) -> dict[str, type]:
@@ -132,7 +132,7 @@ class FakeGraph:
         return self.find_service(service)(request)
 
     def advance(self, duration: float) -> None:
-        """Let time pass (s), stopping at every timer's deadline."""
+        """Move time forward (s), with a stop at every timer's deadline."""
         pass_time(duration, lambda: self.time, self._next_deadline, self._move_to)
 
     def _next_deadline(self):

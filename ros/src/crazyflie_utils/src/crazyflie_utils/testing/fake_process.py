@@ -14,7 +14,7 @@ from crazyflie_utils.process import Process
 from crazyflie_utils.testing.fake_transport import FakeTransport
 from crazyflie_utils.timers import SteadyTimers, TimerQueue
 
-#: How often a timer of period 0, which the machine fires as often as it can, fires here, s.
+#: Period at which a timer of period 0 fires here (s); the machine fires it as often as it can.
 _SHORTEST_PERIOD = 1e-4
 
 
@@ -96,11 +96,11 @@ class FakeProcess(Process):
         return [text for logged_at, text in self.transport.log_records if logged_at == level]
 
     def advance(self, duration: float) -> None:
-        """Let time pass (s), by both clocks, stopping at every timer's deadline."""
+        """Move both clocks forward (s), with a stop at every timer's deadline."""
         pass_time(duration, self.clock.time, self.next_deadline, self.move_to)
 
     def advance_machine(self, duration: float) -> None:
-        """Let the machine's time pass (s), while simulated time is not published."""
+        """Move the machine's clock forward (s), while simulated time is not published."""
         machine = self.machine_clock
         pass_time(duration, machine.time, self._machine_queue.next_deadline, machine.set)
 

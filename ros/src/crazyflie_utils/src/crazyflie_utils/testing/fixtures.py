@@ -10,7 +10,7 @@ _LIMIT = 120.0  #: The longest that a test may take, s.
 
 @pytest.fixture(autouse=True)
 def own_cache(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Let links keep the tables of parameters and log variables in a folder of the test's own."""
+    """Set a folder of the test's own for the tables that links keep."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
 
 

@@ -56,8 +56,8 @@ class HostilePublisher:
             "latching": "0",
         }
         self._sockets: list[socket.socket] = []
-        self.accepted = 0  #: How many connections have been made so far,
-        self.refused = 0  #: and how many of them came too early.
+        self.accepted = 0  #: Number of connections so far.
+        self.refused = 0  #: Number of them that came too early.
         self._server = socket.create_server((_ADDRESS, 0))
         self._slave = SimpleXMLRPCServer((_ADDRESS, 0), logRequests=False)
         port = self._server.getsockname()[1]

@@ -14,7 +14,7 @@ import rosgraph
 
 from crazyflie_utils.testing.programs import free_port, running
 
-_START_LIMIT = 60.0  #: How long roslaunch may take until its master answers, s.
+_START_LIMIT = 60.0  #: Longest time until roslaunch's master answers (s).
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _COMPLAINT = re.compile(r"\[(ERROR|FATAL)\]|RLException|process has died")
@@ -60,7 +60,7 @@ def master(log: Path) -> Iterator[None]:
 
 
 def _set_master():
-    """Let this process, and what it starts, have a master on a free port; return the port."""
+    """Set a free port for the master of this process and of those it starts; return the port."""
     port = free_port(socket.SOCK_STREAM)
     os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
     os.environ["ROS_IP"] = "127.0.0.1"

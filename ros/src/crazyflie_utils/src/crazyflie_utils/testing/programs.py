@@ -9,7 +9,7 @@ import subprocess
 from collections.abc import Iterator
 from typing import Any
 
-#: How long a program may take to end after each signal, s; roslaunch gives its nodes 15.
+#: Longest time until a program ends after each signal (s); roslaunch gives its nodes 15 s.
 _END_LIMIT = 60.0
 
 _PORTS = range(20000, 32768)  #: Above the usual ones of virtual vehicles.

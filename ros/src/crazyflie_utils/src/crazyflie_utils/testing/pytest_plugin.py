@@ -1,4 +1,4 @@
-"""What every unit test of the workspace rests on: a plugin of pytest.
+"""The plugin of pytest for all unit tests of the workspace.
 
 Hypothesis tries few examples, the same every time, however long a machine takes over one.
 In the profile that HYPOTHESIS_PROFILE=nightly chooses, it tries more, others each time.

@@ -13,8 +13,8 @@ from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO, FaultSwitches, VehicleSettings
 
-_POSITION_DEVIATION = 0.003  #: Of the deck that knows the true pose, m.
-_ATTITUDE_DEVIATION = 0.003  #: rad, of all decks.
+_POSITION_DEVIATION = 0.003  #: Deviation of the deck that knows the true pose (m).
+_ATTITUDE_DEVIATION = 0.003  #: Deviation of all decks (rad).
 
 #: Deviations of a position by Lighthouse with one and with two base stations, m: one knows the
 #: distance only from the angle between the deck's sensors, which are 3 cm apart.

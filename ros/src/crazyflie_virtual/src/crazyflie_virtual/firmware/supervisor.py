@@ -282,7 +282,7 @@ _LOW_AFTER = 5.0  #: Time of low voltage until the state `LOW`, s.
 _LEVELS = OPEN_CIRCUIT_VOLTAGES[:-1]
 
 
-_MOST_SAG = 0.95  #: Of a good battery in its self test, V: as in health.c of the firmware.
+_MAX_SAG = 0.95  #: Largest sag of a good battery in its self test (V): health.c of the firmware.
 _LOAD = 1.0  #: Load of that test, over that of hover.
 
 
@@ -307,7 +307,7 @@ class Health:
         if self.battery_asked:
             self.battery_asked = 0
             self.battery_sag = sag(_LOAD)
-            self.battery_passed = int(self.battery_sag < _MOST_SAG and not self._faults.low_battery)
+            self.battery_passed = int(self.battery_sag < _MAX_SAG and not self._faults.low_battery)
             self.tests += 1
 
 

@@ -21,8 +21,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess, launch_files
+from crazyflie_utils.testing import launch_files
 from crazyflie_utils.vectors import to_vector
 
 LAUNCH = rospkg.RosPack().get_path(LAUNCH_FILE[0]) + "/launch/" + LAUNCH_FILE[1]
@@ -75,12 +74,7 @@ def straight(reference):
     ],
 )
 def test_the_nodes_fly_it_calmly(controller, dynamics, message):
-    _, parameters = launch_files.expand(
-        LAUNCH, controller=controller, dynamics=dynamics, rviz="false", composed="true"
-    )
-    process = FakeProcess(parameters)
-    for name, node_class in NodeClasses()(launch_files.composed_nodes(parameters)).items():
-        assert process.launch(node_class(), f"/{name}"), process.logged("error")
+    process = launch_files.launch(LAUNCH, controller=controller, dynamics=dynamics)
     process.advance(1.0)
     process.call("/takeoff", EmptyRequest())
     process.advance(9.0)

@@ -9,7 +9,7 @@ from roslaunch.core import RLException
 
 from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess, launch_files
+from crazyflie_utils.testing import launch_files
 
 PACKAGES = rospkg.RosPack()
 LAUNCH = Path(PACKAGES.get_path("crazyflie_examples")) / "launch"
@@ -37,12 +37,8 @@ def test_executables_and_classes_are_the_same_nodes(dynamics):
 @pytest.mark.parametrize("estimator_filter", ["finite_difference", "kalman"])
 @pytest.mark.parametrize("dynamics", DYNAMICS)
 def test_every_node_accepts_its_parameters(dynamics, estimator_filter):
-    _, parameters = expand(
-        dynamics=dynamics, estimator_filter=estimator_filter, composed="true", sim_time="true"
-    )
-    process = FakeProcess(parameters)
-    for name, node_class in NodeClasses()(launch_files.composed_nodes(parameters)).items():
-        assert process.launch(node_class(), f"/{name}"), process.logged("error")
+    arguments = {"dynamics": dynamics, "estimator_filter": estimator_filter, "sim_time": "true"}
+    assert launch_files.launch(SW_HOVER, **arguments).uses_sim_time
 
 
 def test_the_estimator_is_told_the_final_control():

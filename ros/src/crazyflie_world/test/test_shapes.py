@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_world.paths import Circle, Waypoints
-from crazyflie_world.shapes import Ball, Box, Cylinder, cast, wall
+from crazyflie_world.shapes import Ball, Box, Circle, Cylinder, Waypoints, cast, wall
 from crazyflie_world.world import Floor, World
 
 BOX = Box(name="box", centre=(2.0, 0.0, 1.0), extent=(1.0, 2.0, 0.5))

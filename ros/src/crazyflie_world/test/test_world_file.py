@@ -13,8 +13,7 @@ from crazyflie_utils.testing.wrong_files import (
     with_an_odd_word,
 )
 from crazyflie_world import world_file
-from crazyflie_world.paths import Circle, Waypoints
-from crazyflie_world.shapes import Ball, Box, Cylinder
+from crazyflie_world.shapes import Ball, Box, Circle, Cylinder, Waypoints
 from crazyflie_world.world import Floor
 
 LAB = Path(rospkg.RosPack().get_path("crazyflie_world")) / "config" / "lab.yaml"

@@ -8,15 +8,13 @@ below it is made of its rows; the first row's state is the initial one::
 ``python3 -m crazyflie_dev.state_diagrams PAGE...`` updates the diagrams.
 """
 
-import argparse
 import operator
 import re
-import sys
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 from crazyflie_takeoff.transition_table import Table, Transition, words
+from crazyflie_utils.parameters.tables import update_pages
 
 _PLACE = re.compile(r"(<!-- states: (\S+):(\S+) -->\n)(?:\n?```mermaid\n(?:.*\n)*?```\n)?")
 
@@ -48,14 +46,5 @@ def with_diagrams(page: str) -> str:
     return _PLACE.sub(place, page)
 
 
-def main() -> int:
-    """Update the diagrams of the pages named on the command line."""
-    parser = argparse.ArgumentParser(description="Update the state diagrams in pages.")
-    parser.add_argument("pages", nargs="+", type=Path, metavar="PAGE")
-    for page in parser.parse_args().pages:
-        page.write_text(with_diagrams(page.read_text()))
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    update_pages("Update the state diagrams in pages.", with_diagrams)

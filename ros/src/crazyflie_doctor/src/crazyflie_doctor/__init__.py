@@ -1,5 +1,5 @@
 """Checks of an installation and of a running graph, each with a remedy.
 
 The checks (`installation`, `graph`, `timing`) are functions from data to findings and need
-no ROS; `computer`, `running_graph` and `recorder` gather the data.
+no ROS; `computer` and `running_graph` gather the data.
 """

@@ -123,19 +123,9 @@ class Geofence:
         axis its own weight: a wall ahead does not keep the vehicle from moving along
         it, or from holding its height.
 
-        Parameters
-        ----------
-        position, velocity : ndarray, shape (3,)
-            m and m/s, fixed frame.
-        yaw : float
-            rad.
-        regular : ndarray, shape (4,)
-            Regular control: roll, pitch in rad, yaw rate in rad/s, thrust in m/s^2.
-
-        Returns
-        -------
-        ndarray, shape (4,), and float
-            Control, with the regular yaw rate, and priority, 0 ... 1.
+        Position and velocity have shape (3,), m and m/s, fixed frame; the yaw is in rad. Controls
+        have shape (4,): roll and pitch (rad), yaw rate (rad/s), which is the regular one's, and
+        thrust (m/s^2).
         """
         excess = self.excess(position, velocity)
         weight = self.weight(excess)

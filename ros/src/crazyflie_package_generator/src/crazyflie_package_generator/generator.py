@@ -30,11 +30,8 @@ class GeneratorError(Exception):
 def check_name(what: str, name: str) -> None:
     """Check the name of a package or node (``what``), which also becomes that of a Python module.
 
-    Raises
-    ------
-    GeneratorError
-        It does not follow REP 144: lower case letters, digits and underscores, at least two
-        characters, the first one a letter, no two underscores in a row.
+    `GeneratorError`: it does not follow REP 144: lower case letters, digits and underscores, at
+    least two characters, the first one a letter, no two underscores in a row.
     """
     if not _NAME.fullmatch(name) or keyword.iskeyword(name):
         raise GeneratorError(
@@ -111,11 +108,8 @@ def _in_order(imports):
 def create(package: Package, folder: Path) -> Path:
     """Write a package into a folder, such as a workspace's src; return the package's folder.
 
-    Raises
-    ------
-    GeneratorError
-        A name cannot be used, there is such a folder already, or it cannot be written.
-        Nothing is left behind then.
+    `GeneratorError`: a name cannot be used, there is such a folder already, or it cannot be
+    written. Nothing is left behind then.
     """
     package.check()
     if not folder.is_dir():

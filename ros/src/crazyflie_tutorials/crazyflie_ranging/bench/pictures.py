@@ -18,8 +18,7 @@ from matplotlib.patches import Circle, Polygon, Wedge
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_ranging.range_sensors import DIRECTIONS
-from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess, launch_files
+from crazyflie_utils.testing import launch_files
 from crazyflie_world import world_file
 from crazyflie_world.shapes import Box
 from crazyflie_world.world import World
@@ -49,12 +48,8 @@ class Flight:
 
     def __init__(self, file: str, **arguments: str):
         path = Path(rospkg.RosPack().get_path("crazyflie_ranging")) / "launch" / file
-        common = {"composed": "true", "rviz": "false", "simulator_dt": "0.01"}
-        _, parameters = launch_files.expand(path, **common, **arguments)
-        self.process = FakeProcess(parameters, start=0.0)
-        for name, node in NodeClasses()(launch_files.composed_nodes(parameters)).items():
-            assert self.process.launch(node(), f"/{name}"), self.process.logged("error")
-        self._world = world_file.load(str(parameters["/world/world"]))
+        self.process = launch_files.launch(path, 0.0, simulator_dt="0.01", **arguments)
+        self._world = world_file.load(str(self.process.transport.parameters["/world/world"]))
         self.process.advance(1.0)
         answer = self.process.call("/takeoff", EmptyRequest())
         while not answer.done():

@@ -17,8 +17,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from std_srvs.srv import EmptyRequest
 
-from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess, launch_files
+from crazyflie_utils.testing import launch_files
 from crazyflie_vision.images import to_array
 
 STEP = 0.1  #: Between two moments, s.
@@ -31,11 +30,7 @@ class Flight:
 
     def __init__(self, file: str):
         path = Path(rospkg.RosPack().get_path("crazyflie_vision")) / "launch" / file
-        common = {"composed": "true", "rviz": "false", "sim_time": "true", "simulator_dt": "0.01"}
-        _, parameters = launch_files.expand(path, **common)
-        self._process = FakeProcess(parameters, start=0.0)
-        for name, node in NodeClasses()(launch_files.composed_nodes(parameters)).items():
-            assert self._process.launch(node(), f"/{name}"), self._process.logged("error")
+        self._process = launch_files.launch(path, 0.0, sim_time="true", simulator_dt="0.01")
         self._process.advance(1.0)
         answer = self._process.call("/takeoff", EmptyRequest())
         while not answer.done():

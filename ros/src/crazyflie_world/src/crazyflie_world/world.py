@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.types import ListOf, Number, Text
-from crazyflie_world.paths import Position
-from crazyflie_world.shapes import COLOUR, Box, Colour, Shape, cast
+from crazyflie_world.shapes import COLOUR, Box, Colour, Position, Shape, cast
 
 FLOOR = "floor"  #: Name of the floor among the solids.
 TEXTURES = ("plain", "checkers", "speckles")  #: Textures of floors.

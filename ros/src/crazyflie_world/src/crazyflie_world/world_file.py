@@ -24,8 +24,18 @@ from crazyflie_utils.parameters.types import (
 )
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_utils.text import shortened, shown
-from crazyflie_world.paths import Circle, Path, Waypoints
-from crazyflie_world.shapes import COLOUR, WALL_COLOUR, Ball, Box, Cylinder, Shape, wall
+from crazyflie_world.shapes import (
+    COLOUR,
+    WALL_COLOUR,
+    Ball,
+    Box,
+    Circle,
+    Cylinder,
+    Path,
+    Shape,
+    Waypoints,
+    wall,
+)
 from crazyflie_world.world import FLOOR, Floor, World
 
 _LENGTH = Number("m", above=0.0)

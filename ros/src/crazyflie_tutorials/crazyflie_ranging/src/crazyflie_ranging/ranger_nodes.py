@@ -2,7 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 
 import genpy
@@ -20,14 +20,26 @@ from crazyflie_world.world import World
 from crazyflie_world.world_file import WORLD_FILE
 
 
-class RangePublisher:
-    """Publishes readings of sensors, each below ``topic``, and their frames on the vehicle's."""
+class RangerParameters(Parameters):
+    """Parameters that both nodes have."""
 
-    def __init__(self, handle: NodeHandle, sensors: Sequence[RangeSensor], topic: str, frame: str):
-        self._publishers = [handle.publisher(f"{topic}/{each.name}", Range) for each in sensors]
+    sensors: tuple[RangeSensor, ...] = parameter(SENSOR_FILE, "the sensors, a YAML file")
+    ranges_topic: str = parameter(
+        TOPIC, "below it, each sensor has its topic", "range", name="topics/ranges"
+    )
+    robot_frame: str = parameter(FRAME, "tf frame of the vehicle", "crazyflie", "frames/robot")
+
+
+class RangePublisher:
+    """Publishes the readings of sensors, and their frames on the vehicle's."""
+
+    def __init__(self, handle: NodeHandle, parameters: RangerParameters):
+        topic, self._frame = parameters.ranges_topic, parameters.robot_frame
+        self._sensors = parameters.sensors
+        self._publishers = [
+            handle.publisher(f"{topic}/{each.name}", Range) for each in self._sensors
+        ]
         self._broadcast = handle.broadcast_transforms()
-        self._sensors = sensors
-        self._frame = frame
 
     def publish(self, readings: dict[int, float], stamp: genpy.Time) -> None:
         """Publish the readings (m) of some sensors, by their number, and the sensors' frames."""
@@ -57,20 +69,15 @@ class RangePublisher:
 _MILLIMETRE = 0.001
 
 
-class DeckRangerParameters(Parameters):
+class DeckRangerParameters(RangerParameters):
     """Parameters of `DeckRangerNode`."""
 
-    sensors: tuple[RangeSensor, ...] = parameter(SENSOR_FILE, "the sensors, a YAML file")
     variables: tuple[str, ...] = parameter(
         ListOf(TEXT),
         "of the log block in their order, as in the driver's parameter",
         name="genericLogTopic_ranges_Variables",
     )
     log_topic: str = parameter(TOPIC, "of the log block", "crazyflie/ranges", "topics/log")
-    ranges_topic: str = parameter(
-        TOPIC, "below it, each sensor has its topic", "range", name="topics/ranges"
-    )
-    robot_frame: str = parameter(FRAME, "tf frame of the vehicle", "crazyflie", "frames/robot")
 
     @override
     def complaints(self) -> Iterator[str]:
@@ -93,11 +100,8 @@ class DeckRangerNode(Node):
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        parameters = self._parameters
-        self._publisher = RangePublisher(
-            handle, parameters.sensors, parameters.ranges_topic, parameters.robot_frame
-        )
-        handle.subscribe(parameters.log_topic, GenericLogData, self._on_log)
+        self._publisher = RangePublisher(handle, self._parameters)
+        handle.subscribe(self._parameters.log_topic, GenericLogData, self._on_log)
 
     def _on_log(self, message):
         parameters = self._parameters
@@ -124,15 +128,10 @@ class DeckRangerNode(Node):
             self._publisher.publish(readings, message.header.stamp)
 
 
-class SimulatedRangerParameters(Parameters):
+class SimulatedRangerParameters(RangerParameters):
     """Parameters of `SimulatedRangerNode`."""
 
     world: World = parameter(WORLD_FILE, "what the sensors see, a YAML file")
-    sensors: tuple[RangeSensor, ...] = parameter(SENSOR_FILE, "the sensors, a YAML file")
-    ranges_topic: str = parameter(
-        TOPIC, "below it, each sensor has its topic", "range", name="topics/ranges"
-    )
-    robot_frame: str = parameter(FRAME, "tf frame of the vehicle", "crazyflie", "frames/robot")
     silence: float = parameter(
         TIME_STEP, "when a pose is older, nothing is published that rests on it", 0.5
     )
@@ -165,10 +164,7 @@ class SimulatedRangerNode(Node):
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        parameters = self._parameters
-        self._publisher = RangePublisher(
-            handle, parameters.sensors, parameters.ranges_topic, parameters.robot_frame
-        )
+        self._publisher = RangePublisher(handle, self._parameters)
         self._lookup = handle.listen_to_transforms()
         for period, (ranger, numbers) in self._groups.items():
             handle.timer(period, partial(self._on_timer, ranger, numbers))

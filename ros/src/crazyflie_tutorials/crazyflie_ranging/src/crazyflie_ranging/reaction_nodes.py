@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from crazyflie_ranging.reactions import AXES, ObjectFollower, ObstacleStop
 from crazyflie_references.velocity_reference import Velocity
-from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, ListOf, Text
 from crazyflie_utils.vectors import is_finite
 
@@ -34,16 +34,10 @@ class LatestRanges:
         return reading if self._handle.time() - time <= age else None
 
 
-class FollowObjectParameters(ObjectFollower):
-    """Parameters of `FollowObjectNode`."""
+class SilenceParameters(Parameters):
+    """Times of both nodes: a sensor is silent, and velocities are published."""
 
-    front_topic: str = parameter(TOPIC, "the sensor in front", "range/front", "topics/front")
-    left_topic: str = parameter(TOPIC, "the one at the left", "range/left", "topics/left")
-    right_topic: str = parameter(TOPIC, "the one at the right", "range/right", "topics/right")
-    cmd_vel_topic: str = parameter(TOPIC, "where velocities go", "cmd_vel", "topics/cmd_vel")
-    silence: float = parameter(
-        TIME_STEP, "so long after the last reading of the sensor in front it stands still", 0.15
-    )
+    silence: float = parameter(TIME_STEP, "so long after its last reading a sensor is silent", 0.15)
     time_step: float = parameter(TIME_STEP, "between two velocities", 0.02)
 
     @override
@@ -51,6 +45,20 @@ class FollowObjectParameters(ObjectFollower):
         yield from super().complaints()
         if self.time_step >= self.silence:
             yield f"time_step is {self.time_step:g}; expected < silence, {self.silence:g} (s)"
+
+    @property
+    def reading_age(self) -> float:
+        """Age up to which a reading counts (s): a velocity holds until the next one."""
+        return self.silence - self.time_step
+
+
+class FollowObjectParameters(SilenceParameters, ObjectFollower):
+    """Parameters of `FollowObjectNode`."""
+
+    front_topic: str = parameter(TOPIC, "the sensor in front", "range/front", "topics/front")
+    left_topic: str = parameter(TOPIC, "the one at the left", "range/left", "topics/left")
+    right_topic: str = parameter(TOPIC, "the one at the right", "range/right", "topics/right")
+    cmd_vel_topic: str = parameter(TOPIC, "where velocities go", "cmd_vel", "topics/cmd_vel")
 
 
 class FollowObjectNode(Node):
@@ -83,8 +91,7 @@ class FollowObjectNode(Node):
         self._parameters = parameters
 
     def _on_timer(self):
-        # A velocity holds until the next one.
-        age = self._parameters.silence - self._parameters.time_step
+        age = self._parameters.reading_age
         front, left, right = (
             self._ranges.reading(name, age) for name in ("front", "left", "right")
         )
@@ -97,7 +104,7 @@ class FollowObjectNode(Node):
         self._publisher.publish(Twist(linear=Vector3(x=speed), angular=Vector3(z=yaw_dot)))
 
 
-class ObstacleStopParameters(ObstacleStop):
+class ObstacleStopParameters(SilenceParameters, ObstacleStop):
     """Parameters of `ObstacleStopNode`."""
 
     in_topic: str = parameter(
@@ -114,16 +121,9 @@ class ObstacleStopParameters(ObstacleStop):
         "that are guarded; a silent sensor stops all motion there",
         ("front", "back", "left", "right", "up"),
     )
-    silence: float = parameter(TIME_STEP, "so long after its last reading a sensor is silent", 0.15)
     command_silence: float = parameter(
         TIME_STEP, "so long after the last velocity, zero is published once", 0.5
     )
-    time_step: float = parameter(TIME_STEP, "between two velocities", 0.02)
-
-    @override
-    def complaints(self) -> Iterator[str]:
-        if self.time_step >= self.silence:
-            yield f"time_step is {self.time_step:g}; expected < silence, {self.silence:g} (s)"
 
 
 class ObstacleStopNode(Node):
@@ -176,8 +176,7 @@ class ObstacleStopNode(Node):
             self._publish(self._command)
 
     def _publish(self, command):
-        # A velocity holds until the next one.
-        age = self._parameters.silence - self._parameters.time_step
+        age = self._parameters.reading_age
         clearances = {each: self._ranges.reading(each, age) for each in self._parameters.directions}
         silent = [each for each, clearance in clearances.items() if clearance is None]
         if silent:

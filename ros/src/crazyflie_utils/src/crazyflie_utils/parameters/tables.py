@@ -9,13 +9,13 @@ below it is theirs::
 """
 
 import argparse
-import importlib
 import itertools
 import re
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, Parameters
+from crazyflie_utils.program import load
 
 _PLACE = re.compile(r"(<!-- parameters: (.+?) -->\n)(?:\n?(?:\|.*\n)+)?")
 
@@ -61,27 +61,21 @@ def with_tables(page: str) -> str:
     """Return the text of a page with its tables as the code declares them now."""
 
     def place(match):
-        return f"{match[1]}\n{table(*map(_class, match[2].split()))}"
+        return f"{match[1]}\n{table(*map(load, match[2].split()))}"
 
     return _PLACE.sub(place, page)
 
 
-def _class(path):
-    module, _, name = path.partition(":")
-    return getattr(importlib.import_module(module), name)
-
-
-def main() -> int:
-    """Update the tables of the pages named on the command line."""
-    parser = argparse.ArgumentParser(description="Update the tables of parameters in pages.")
+def update_pages(description: str, update: Callable[[str], str]) -> None:
+    """Update the texts of the pages named on the command line, by ``update(text)``."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("pages", nargs="+", type=Path, metavar="PAGE")
     for path in parser.parse_args().pages:
         text = path.read_text()
-        if (new := with_tables(text)) != text:
+        if (new := update(text)) != text:
             path.write_text(new)
             print(f"{path} is new")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    update_pages("Update the tables of parameters in pages.", with_tables)

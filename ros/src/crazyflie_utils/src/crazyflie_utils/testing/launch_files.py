@@ -1,4 +1,4 @@
-"""Expands launch files as roslaunch does, without a master."""
+"""Launch files without a master: expanded as roslaunch does, and their nodes in one process."""
 
 import re
 from pathlib import Path
@@ -8,6 +8,9 @@ from roslaunch.config import ROSLaunchConfig
 from roslaunch.core import Node
 from roslaunch.xmlloader import XmlLoader
 from roslib.packages import find_node
+
+from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.testing.fake_process import FakeProcess
 
 
 def expand(path: Path, **arguments: object) -> tuple[dict[str, Node], dict[str, object]]:
@@ -32,6 +35,18 @@ def composed_nodes(parameters: dict[str, object]) -> dict[str, str]:
         for name, value in parameters.items()
         if name.startswith(listed)
     }
+
+
+def launch(path: Path, start: float = 100.0, **arguments: object) -> FakeProcess:
+    """Return a process without ROS, begun at ``start`` (s), with the nodes of a launch file.
+
+    The file has the argument ``composed``; see `expand`.
+    """
+    _, parameters = expand(path, **{"composed": "true", "rviz": "false", **arguments})
+    process = FakeProcess(parameters, start)
+    for name, node in NodeClasses()(composed_nodes(parameters)).items():
+        assert process.launch(node(), f"/{name}"), process.logged("error")
+    return process
 
 
 def node_class(node: Node) -> str:

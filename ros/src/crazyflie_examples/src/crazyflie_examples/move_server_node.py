@@ -1,6 +1,6 @@
 """ROS interface of a route: a service that sends the vehicle to its next point."""
 
-from collections.abc import Sequence
+import itertools
 from typing import Any
 
 from std_srvs.srv import Empty, EmptyResponse
@@ -49,26 +49,6 @@ def _point(number, item):
         raise ValueError(f"point {number} is {shown(item)}") from None
 
 
-class Route:
-    """A cycle through points.
-
-    Parameters
-    ----------
-    points : sequence of Point
-        At least one.
-    """
-
-    def __init__(self, points: Sequence[Point]):
-        self._points = tuple(points)
-        self._next = 0
-
-    def next_point(self) -> Point:
-        """Return the next point, the first again after the last."""
-        point = self._points[self._next]
-        self._next = (self._next + 1) % len(self._points)
-        return point
-
-
 class MoveServerParameters(Parameters):
     """Parameters of `MoveServerNode`."""
 
@@ -85,7 +65,7 @@ class MoveServerNode(Node):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(MoveServerParameters)
-        self._route = Route(self._parameters.points)
+        self._route = itertools.cycle(self._parameters.points)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -95,7 +75,7 @@ class MoveServerNode(Node):
         handle.advertise_service(self._parameters.service, Empty, self._on_move)
 
     def _on_move(self, _):
-        x, y, z = self._route.next_point()
+        x, y, z = next(self._route)
         reference = PositionVelocityStateStamped(state=PositionVelocityState(x=x, y=y, z=z))
         reference.header.stamp = self._handle.stamp()
         self._publisher.publish(reference)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from typing_extensions import override
 
+from crazyflie_model.angles import Triple
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import (
     FRAME,
@@ -18,7 +19,6 @@ from crazyflie_utils.parameters.types import (
     ParameterType,
 )
 from crazyflie_utils.text import shortened, shown
-from mocap_optitrack.frames import Vector3
 from mocap_optitrack.marker_motion import MotionLimits
 from mocap_optitrack.marker_vehicle import SEPARATION, MarkerVehicle
 
@@ -92,7 +92,7 @@ class Bodies:
 class SingleMarkerParameters(OutputParameters):
     """An entry of ``single_markers``: a vehicle with one marker, and how it is published."""
 
-    initial_position: Vector3 = parameter(
+    initial_position: Triple = parameter(
         POSITION, "of the vehicle, in the frame of the coordinates, when the node starts"
     )
     position: str | None = parameter(
@@ -104,10 +104,10 @@ class SingleMarkerParameters(OutputParameters):
         "and tf need it",
         None,
     )
-    offset: Vector3 = parameter(
+    offset: Triple = parameter(
         POSITION, "from the marker to the vehicle, along the axes of the coordinates", (0.0,) * 3
     )
-    max_velocity: Vector3 = parameter(
+    max_velocity: Triple = parameter(
         ListOf(Number("m/s", above=0.0), 3), "along x, y and z", MotionLimits().max_velocity
     )
     max_acceleration: float = parameter(

@@ -3,8 +3,7 @@
 import math
 from typing import NamedTuple
 
-Vector3 = tuple[float, float, float]  #: x, y, z.
-Quaternion = tuple[float, float, float, float]  #: (x, y, z, w).
+from crazyflie_model.angles import Quaternion, Triple
 
 
 class SeenBody(NamedTuple):
@@ -12,7 +11,7 @@ class SeenBody(NamedTuple):
 
     body_id: int | None  #: Number that the server streams the body under; None when it has none.
     name: str | None  #: Name of the body on the server; None when it is not known.
-    position: Vector3  #: m, in the server's coordinates.
+    position: Triple  #: m, in the server's coordinates.
     quaternion: Quaternion  #: Rotation from the body's axes to the server's coordinates.
     #: Whether the cameras saw the body in this frame; otherwise the pose is an old one, or none.
     is_tracked: bool
@@ -30,14 +29,14 @@ class Frame(NamedTuple):
     #: Time that it had been on this machine by then (s); for streams without `exposure`.
     waited: float = 0.0
     #: Markers that the system has not assigned to a body, m, in the server's coordinates.
-    points: tuple[Vector3, ...] = ()
+    points: tuple[Triple, ...] = ()
 
 
 UP_AXES = ("z", "y")  #: Axes that may point up in a stream.
 _NORM_TOLERANCE = 0.01  #: Largest difference of the norm of a measured quaternion from 1.
 
 
-def to_z_up(up_axis: str, position: Vector3, quaternion: Quaternion) -> tuple[Vector3, Quaternion]:
+def to_z_up(up_axis: str, position: Triple, quaternion: Quaternion) -> tuple[Triple, Quaternion]:
     """Return a pose (m, quaternion) of a stream in coordinates whose z axis points up.
 
     From y up, the axes are turned by +90 degrees about x, those of the body too: what was (x, y, z)
@@ -59,13 +58,3 @@ def normalized(quaternion: Quaternion) -> Quaternion | None:
         return None
     x, y, z, w = quaternion
     return x / norm, y / norm, z / norm, w / norm
-
-
-def heading(quaternion: Quaternion) -> float:
-    """Return where the body's x axis points on the ground, rad in [-pi, pi] from +x to +y.
-
-    The quaternion has norm 1, in coordinates whose z axis points up. This is tf's yaw (roll, pitch
-    and yaw about fixed axes), as ground poses have it.
-    """
-    x, y, z, w = quaternion
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

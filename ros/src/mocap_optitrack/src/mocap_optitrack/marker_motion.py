@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from mocap_optitrack.frames import Vector3
+from crazyflie_model.angles import Triple
 
 Point = npt.NDArray[np.float64]  #: x, y, z in m, z up.
 GATE = 4.0  #: Standard deviations: of three normal variables together, 1 in 1000 is farther away.
@@ -30,7 +30,7 @@ class MotionLimits(NamedTuple):
     """Limits of a vehicle's motion."""
 
     #: Along each axis, m/s; those of crazyswarm2's dynamics configurations.
-    max_velocity: Vector3 = (2.0, 2.0, 3.0)
+    max_velocity: Triple = (2.0, 2.0, 3.0)
     max_acceleration: float = 8.0  #: m/s^2; three standard deviations of the filter's acceleration.
 
 

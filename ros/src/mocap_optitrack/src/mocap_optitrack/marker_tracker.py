@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mocap_optitrack.frames import Vector3
+from crazyflie_model.angles import Triple
 from mocap_optitrack.marker_motion import MarkerMotion, MotionLimits, assign
 from mocap_optitrack.marker_vehicle import (
     FORGET_TIME,
@@ -46,7 +46,7 @@ class MarkerTracker:
         self._time = -math.inf
         self._n_points = 0
 
-    def update(self, time: float, points: Sequence[Vector3]) -> dict[str, Vector3]:
+    def update(self, time: float, points: Sequence[Triple]) -> dict[str, Triple]:
         """Return the measured positions (m) of the vehicles whose markers are in a frame.
 
         The vehicles are `UNSEEN` again when its time (s) is before the last one's. ``points`` are

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mocap_optitrack.frames import Vector3
+from crazyflie_model.angles import Triple
 from mocap_optitrack.marker_motion import MarkerMotion, MotionLimits, Point
 
 #: The markers of two vehicles are at least this far apart, m: a Crazyflie has 92 mm from motor to
@@ -36,7 +36,7 @@ class MarkerVehicle(NamedTuple):
     """A vehicle with one marker."""
 
     name: str
-    start: Vector3  #: Position of its marker before the first flight, z up (m).
+    start: Triple  #: Position of its marker before the first flight, z up (m).
     limits: MotionLimits = MotionLimits()
 
 

@@ -21,9 +21,10 @@ from std_msgs.msg import Float32, Header
 from std_srvs.srv import Trigger, TriggerResponse
 from typing_extensions import override
 
+from crazyflie_model.angles import quaternion_from_zyx, zyx_from_quaternion
 from crazyflie_utils import Node, NodeHandle
 from mocap_optitrack.bodies import RigidBody
-from mocap_optitrack.frames import Frame, heading
+from mocap_optitrack.frames import Frame
 from mocap_optitrack.health import ERROR, Health
 from mocap_optitrack.library_source import LibrarySource
 from mocap_optitrack.natnet_source import NatNetSource
@@ -153,7 +154,8 @@ class MocapNode(Node):
                 self._poses[body.key].publish(self.pose_message(header, oriented))
             if body.key in self._poses2d:
                 x, y, _ = pose.position
-                self._poses2d[body.key].publish(Pose2D(x, y, heading(quaternion)))
+                yaw = zyx_from_quaternion(quaternion)[2]
+                self._poses2d[body.key].publish(Pose2D(x, y, yaw))
             if body.parameters.child_frame_id is not None:
                 transforms.append(transform_of(header, oriented))
         if transforms and self._broadcast is not None:
@@ -183,7 +185,7 @@ class MocapNode(Node):
                 key=f"heading {body.key}",
             )
             return None
-        return 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+        return quaternion_from_zyx(0.0, 0.0, yaw)
 
     def _reset_lost(self, _):
         names = ", ".join(self._tracker.reset_lost())

@@ -4,9 +4,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from crazyflie_model.angles import Quaternion, Triple
 from mocap_optitrack.bodies import Body, SingleMarker
 from mocap_optitrack.frame_times import ClockOffset, FrameOrder
-from mocap_optitrack.frames import Frame, Quaternion, Vector3, normalized, to_z_up
+from mocap_optitrack.frames import Frame, normalized, to_z_up
 from mocap_optitrack.health import FrameEvent, Health
 from mocap_optitrack.marker_tracker import MarkerTracker
 
@@ -30,7 +31,7 @@ class BodyPose(NamedTuple):
 
     body: Body
     time: float  #: Time by the local clock (s).
-    position: Vector3  #: m, z up.
+    position: Triple  #: m, z up.
     quaternion: Quaternion | None  #: Norm 1; None for a single marker.
 
 

@@ -19,14 +19,18 @@ WORDS = {
 
 
 def subscribe(
-    handle: NodeHandle, topic: str, text_topic: str | None, callback: Callable[[FlightStatus], None]
+    handle: NodeHandle,
+    topic: str | None,
+    text_topic: str | None,
+    callback: Callable[[FlightStatus], None],
 ) -> None:
-    """Call ``callback(status)`` for each flight status on a topic.
+    """Call ``callback(status)`` for each flight status on a topic, if there is one.
 
     A takeoff server without flight status has a ``text_topic`` of std_msgs/String: names of states
     in small letters; any other text is `FlightStatus.UNKNOWN`.
     """
-    handle.subscribe(topic, FlightStatus, callback)
+    if topic is not None:
+        handle.subscribe(topic, FlightStatus, callback)
     if text_topic is not None:
         handle.subscribe(text_topic, String, lambda message: callback(_from_text(message.data)))
 

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, ClassVar
 
 from typing_extensions import override
 
@@ -66,48 +66,41 @@ class _ObjectParameters(Parameters):
         POSITION, "of an object that does not move", None
     )
 
-    def shape(self, path: Path | None) -> Shape:
-        """Return what is declared, at the beginning of its path if it has one."""
-        raise NotImplementedError
+    #: Its arguments are these parameters and a path.
+    shape_type: ClassVar[type[Shape]]
 
-    def _common(self, path: Path | None) -> dict[str, Any]:
+    def shape(self, path: Path | None) -> Shape:
+        """Return the shape, at the beginning of its path if it has one."""
         centre = self.centre if path is None else path.position(0.0)
-        return {"name": self.name, "colour": self.colour, "centre": centre, "path": path}
+        return self.shape_type(**{**vars(self), "centre": centre, "path": path})
 
 
 class BoxParameters(_ObjectParameters):
     """A box."""
 
-    size: tuple[float, float, float] = parameter(ListOf(_LENGTH, 3), "along its x, y and z")
+    shape_type = Box
+    extent: tuple[float, float, float] = parameter(
+        ListOf(_LENGTH, 3), "along its x, y and z", name="size"
+    )
     yaw: float = parameter(_ANGLE, "turned about the vertical", 0.0)
     picture: str = parameter(
         TEXT, "file of a picture on its front, which looks along its own x", ""
     )
 
-    @override
-    def shape(self, path: Path | None) -> Box:
-        return Box(extent=self.size, yaw=self.yaw, picture=self.picture, **self._common(path))
-
 
 class CylinderParameters(_ObjectParameters):
     """An upright cylinder."""
 
+    shape_type = Cylinder
     radius: float = parameter(_LENGTH, "of the cylinder")
     height: float = parameter(_LENGTH, "of the cylinder")
-
-    @override
-    def shape(self, path: Path | None) -> Cylinder:
-        return Cylinder(radius=self.radius, height=self.height, **self._common(path))
 
 
 class BallParameters(_ObjectParameters):
     """A ball."""
 
+    shape_type = Ball
     radius: float = parameter(_LENGTH, "of the ball")
-
-    @override
-    def shape(self, path: Path | None) -> Ball:
-        return Ball(radius=self.radius, **self._common(path))
 
 
 class WallParameters(Parameters):

@@ -1,13 +1,13 @@
 """ROS interface of a world: moves what has a path, and shows all in RViz."""
 
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, TransformStamped, Vector3
-from std_msgs.msg import ColorRGBA, String
+from std_msgs.msg import ColorRGBA
 from typing_extensions import override
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import FlightStatus
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, flight_status, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_world.shapes import Ball, Box, Cylinder, Shape
 from crazyflie_world.world import World
@@ -88,25 +88,19 @@ class WorldNode(Node):
         }
         self._broadcast = handle.broadcast_transforms()
         handle.publisher(parameters.markers_topic, MarkerArray, latch=True).publish(markers(world))
-        if parameters.flight_status_topic:
-            handle.subscribe(
-                parameters.flight_status_topic,
-                FlightStatus,
-                lambda message: self._set_flying(message.state == FlightStatus.FLYING),
-            )
-        if parameters.flight_state_topic:
-            handle.subscribe(
-                parameters.flight_state_topic,
-                String,
-                lambda message: self._set_flying(message.data == "flying"),
-            )
+        flight_status.subscribe(
+            handle,
+            parameters.flight_status_topic,
+            parameters.flight_state_topic,
+            self._on_flight_status,
+        )
         if not (parameters.flight_status_topic or parameters.flight_state_topic):
             self._begin = handle.time()
         if world.moving:
             handle.timer(parameters.time_step, self._on_timer)
 
-    def _set_flying(self, is_flying):
-        if self._begin is None and is_flying:
+    def _on_flight_status(self, status):
+        if self._begin is None and status.state == FlightStatus.FLYING:
             self._begin = self._handle.time()
 
     def _on_timer(self):

@@ -22,8 +22,7 @@ from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
 
 PICTURE = "from_above.png"
 
-_DEFAULT_COUNT = 5
-"""Vehicles of a script that names none."""
+_DEFAULT_COUNT = 5  #: Number of vehicles of a script that names none.
 
 
 def vehicles_of(script: str) -> int:

@@ -22,17 +22,10 @@ from pathlib import Path
 
 from crazyflie_dev.count_results import Case, cases, results_of_nodes, summarize
 
-LONG = "long"
-"""Label of ctest and marker of pytest for what ``--all`` adds."""
-
-REPEATS = 3
-"""How often a failed test must pass alone to count as flaky."""
-
-MOST_REPEATED = 10
-"""If more tests have failed than this, something is broken, and none is repeated."""
-
-LIMIT = 900
-"""The longest that one repetition may take, s."""
+LONG = "long"  #: Label of ctest and marker of pytest for the tests that ``--all`` adds.
+REPEATS = 3  #: Number of passes alone with which a failed test counts as flaky.
+MOST_REPEATED = 10  #: If more tests have failed, something is broken, and none is repeated.
+LIMIT = 900  #: Longest time of one repetition (s).
 
 
 @dataclass(frozen=True)

@@ -36,9 +36,9 @@ from crazyflie_model.units import GRAVITY
 
 #: Horizontal acceleration that the fence asks for at most, m/s^2.
 MAX_HORIZONTAL = GRAVITY * math.tan(MAX_TILT)
-#: What of it is left for an axis when both brake, in a corner of the box, m/s^2.
+#: The share of an axis when both brake, in a corner of the box (m/s^2).
 MAX_HORIZONTAL_BRAKING = MAX_HORIZONTAL / math.sqrt(2.0)
-#: What thrust can do upwards as well as downwards, m/s^2.
+#: Acceleration by thrust that is possible upwards as well as downwards (m/s^2).
 MAX_VERTICAL_BRAKING = min(GRAVITY - MIN_THRUST, MAX_THRUST - GRAVITY)
 
 Vector = NDArray[np.float64]
@@ -46,9 +46,9 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Braking:
-    """How the vehicle can be stopped along an axis."""
+    """Braking of the vehicle along an axis."""
 
-    #: What can be counted on, m/s^2: along x and y at most `MAX_HORIZONTAL_BRAKING`, along z at
+    #: Reliable deceleration (m/s^2): along x and y at most `MAX_HORIZONTAL_BRAKING`, along z at
     #: most `MAX_VERTICAL_BRAKING`.
     deceleration: float
     reaction_time: float  #: Time from a state until the vehicle decelerates because of it (s).

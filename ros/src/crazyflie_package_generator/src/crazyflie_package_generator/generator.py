@@ -50,7 +50,7 @@ def check_name(what: str, name: str) -> None:
 class Package:
     """Names that are filled in."""
 
-    #: name, node: Of the package, and of its node without ``_node``.
+    #: name, node: Names of the package, and of its node without ``_node``.
     name: str
     node: str
     messages: bool = False  #: Whether it has a message of its own.

@@ -32,14 +32,14 @@ VEHICLE, OBJECT, CONE, GREY = "#0b62b0", "#e07b00", "#7fb2e5", "#7a7a7a"
 
 @dataclass(frozen=True)
 class Moment:
-    """What was seen at a moment."""
+    """The vehicle, its sensors and the world at a moment."""
 
     time: float  #: s since the takeoff.
-    #: x, y: Where the vehicle was, m.
+    #: x, y: Position of the vehicle (m).
     x: float
     y: float
-    ranges: dict[str, float]  #: What each sensor said, m.
-    command: float  #: Velocity ahead that it was given, m/s.
+    ranges: dict[str, float]  #: Reading of each sensor (m).
+    command: float  #: Commanded velocity ahead (m/s).
     world: World
 
 
@@ -58,7 +58,7 @@ class Flight:
         self._lookup = self.process.handle("/pictures").listen_to_transforms()
 
     def watch(self) -> Moment:
-        """Let `STEP` seconds pass; return what is seen then."""
+        """Advance by `STEP`; return the moment after it."""
         self.process.advance(STEP)
         x, y, _ = self._place("crazyflie")
         commands = self.process.published("/cmd_vel")

@@ -39,7 +39,7 @@ class Flight:
         self._lookup = self._process.handle("/pictures").listen_to_transforms()
 
     def advance(self, duration: float) -> None:
-        """Let time pass, s; images that are not needed any more are dropped."""
+        """Advance (s); images that are not needed any more are dropped."""
         for _ in range(round(duration / STEP)):
             self._process.advance(STEP)
             for topic, publisher in self._process.transport.publishers.items():

@@ -7,6 +7,7 @@ from std_msgs.msg import String
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.handle import NodeHandle
 
+#: Constant of `FlightStatus` to words.
 WORDS = {
     FlightStatus.UNKNOWN: "not known to fly",
     FlightStatus.ON_GROUND: "on the ground",
@@ -15,7 +16,6 @@ WORDS = {
     FlightStatus.DESCENDING: "descending",
     FlightStatus.LANDING: "landing",
 }
-"""Constant of `FlightStatus` to words."""
 
 
 def subscribe(

@@ -10,7 +10,7 @@ _RESERVED = 3 << 2  #: Bits of the header that are set, but in broadcast packets
 
 
 class Port(IntEnum):
-    """Who a packet is for."""
+    """The receiver of a packet in the firmware."""
 
     CONSOLE = 0x0
     PARAMETERS = 0x2

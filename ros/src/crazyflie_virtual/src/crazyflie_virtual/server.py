@@ -46,7 +46,7 @@ class Server(ABC):
     @property
     @abstractmethod
     def description(self) -> str:
-        """Where clients find the server."""
+        """The server and its address, for the log."""
 
     @abstractmethod
     def serve(self) -> None:

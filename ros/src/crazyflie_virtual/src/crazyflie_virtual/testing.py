@@ -157,7 +157,7 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         self.answers: dict[tuple[int, int, int | None], bytes] = {}
         #: ``lose(count)`` returns whether the reply with this number is lost.
         self.lose: Callable[[int], bool] = lambda count: False
-        #: What begins like this has the vehicle stop, before it is read, until `resume`.
+        #: A packet that begins like this stops the vehicle, before it is read, until `resume`.
         self.stalls_at: tuple[int, int, bytes] | None = None
         #: Time by which the clock of its log data is ahead of this machine's (ms).
         self.clock_ahead_ms = 0
@@ -193,7 +193,7 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         assert self._thawed.wait(_THAW_LIMIT), "the thread of the vehicle hangs"
 
     def resume(self) -> None:
-        """Let a vehicle that has stopped at `stalls_at` read what has come meanwhile."""
+        """Resume a vehicle that has stopped at `stalls_at`; it reads what has come meanwhile."""
         self.stalls_at = None
         self._resumed.set()
 

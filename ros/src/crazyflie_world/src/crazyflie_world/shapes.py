@@ -22,7 +22,7 @@ Position = tuple[float, float, float]  #: x, y, z in m.
 
 
 class Path(Parameters):
-    """Where something is, over time; as declared in a world file."""
+    """The position of an object over time; as declared in a world file."""
 
     def position(self, time: float) -> Position:
         """Return where it is ``time`` seconds after it began; until then it waits there."""

@@ -147,7 +147,7 @@ class RigidBodyDictionary(ParameterType):
 
     label = "dictionary"
     key = "rigid_bodies"  #: The dictionary's name.
-    #: entry_type, body_type: Of an entry's parameters, and of what it becomes.
+    #: entry_type, body_type: Types of an entry's parameters, and of its body.
     entry_type: type[OutputParameters] = RigidBodyParameters
     body_type: type[Body] = RigidBody
     #: An entry has one of these parameters at least.

@@ -1,4 +1,4 @@
-"""When frames were taken or arrived, for streams with and without time stamps."""
+"""Times of exposure or arrival of frames, for streams with and without time stamps."""
 
 from collections import deque
 from enum import Enum

@@ -20,8 +20,7 @@ class SeenBody(NamedTuple):
 class Frame(NamedTuple):
     """All rigid bodies, and markers of none, at one moment."""
 
-    #: When the cameras took the frame, s of the server's clock; None when the stream does not have
-    #: it.
+    #: Time of exposure, s of the server's clock; None when the stream does not have it.
     exposure: float | None
     sent: float | None  #: Time of sending by the same clock (s); None like `exposure`.
     arrival: float  #: Time of reception by the local clock (s).

@@ -27,7 +27,7 @@ _HEADER = struct.Struct("<HH")
 
 _INFO_SIZE = 264  #: Bytes of a server's name and versions, which natnet decodes.
 
-#: What servers from 3.0 on add: ticks per second of their clock, data port, whether they send to a
+#: Fields that servers add from 3.0 on: ticks per second of their clock, data port, whether they send to a
 #: group, and the group.
 _CONNECTION = struct.Struct("<QHB4B")
 
@@ -39,7 +39,8 @@ class DecodeError(Exception):
 class ServerInfo(NamedTuple):
     """A server's answer to `CONNECT`."""
 
-    #: name, version: Of the application, such as "Motive"; of the stream, such as "3.1".
+    #: name, version: Name of the application, such as "Motive"; version of the stream, such as
+    #: "3.1".
     name: str
     version: str
     clock_frequency: int | None = None  #: Ticks of its clock per second.

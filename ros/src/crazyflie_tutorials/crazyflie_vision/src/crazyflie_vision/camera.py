@@ -24,7 +24,7 @@ OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
 class MountParameters(Parameters):
-    """Where a camera sits on a vehicle."""
+    """The place of a camera on a vehicle."""
 
     x: float = parameter(METRES, "ahead of the vehicle's middle", 0.03)
     y: float = parameter(METRES, "to the left of it", 0.0)
@@ -67,7 +67,7 @@ def load(path: str | Path) -> CameraParameters:
 class Pinhole:
     """The projection x = f X / Z + cx, y = f Y / Z + cy of the optical frame's X, Y, Z."""
 
-    #: width, height: Of the image, pixels.
+    #: width, height: Size of the image (pixels).
     width: int
     height: int
     focal_length: float  #: f, pixels.
@@ -79,7 +79,7 @@ class Pinhole:
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Where the optical axis is in the image: cx, cy."""
+        """Place of the optical axis in the image: cx, cy."""
         return (self.width - 1) / 2.0, (self.height - 1) / 2.0
 
     @property
@@ -91,7 +91,7 @@ class Pinhole:
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a frame is: R and p of x' = R x + p."""
+    """Rotation and position of a frame: R and p of x' = R x + p."""
 
     rotation: NDArray[np.float64]  #: Shape (3, 3).
     position: NDArray[np.float64]  #: Shape (3,); m.

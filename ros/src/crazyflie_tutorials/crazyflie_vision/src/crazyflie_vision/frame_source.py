@@ -1,4 +1,4 @@
-"""Where images come from that are not simulated: a webcam, a video, a folder of pictures."""
+"""Sources of images that are not simulated: a webcam, a video, a folder of pictures."""
 
 import itertools
 from pathlib import Path

@@ -37,7 +37,7 @@ class Face:
     #: Shape (n, 3). Counter-clockwise as seen from outside, m, world frame.
     corners: NDArray[np.float64]
     colour: NDArray[np.float64]  #: Shape (3,). Blue, green, red, from 0 to 255.
-    #: What is to be seen on it, if it has four corners: they are those at the lower left, lower
+    #: Picture on a face with four corners: they are those at the lower left, lower
     #: right, upper right and upper left.
     texture: Image | None = None
     normal: NDArray[np.float64] = field(init=False)

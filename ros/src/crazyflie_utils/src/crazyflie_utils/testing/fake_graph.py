@@ -35,7 +35,7 @@ class FakeGraph:
 
     def __init__(self, parameters: dict[str, object], start: float = 100.0):
         self.time = start  #: Now, s.
-        #: What a fault makes of the messages on a topic: ``fault(message)`` returns those that
+        #: Faults of topics: ``fault(message)`` returns the messages that
         #: arrive in its place.
         self.faults: dict[str, Callable[[Any], list[Any]]] = {}
         #: Process and topic: messages that do not reach this process.

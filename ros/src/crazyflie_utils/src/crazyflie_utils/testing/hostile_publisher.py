@@ -87,7 +87,7 @@ class HostilePublisher:
 
     @property
     def connections(self) -> int:
-        """How many subscribers are connected."""
+        """Number of subscribers that are connected."""
         return len(self._sockets)
 
     def send(self, data: bytes) -> None:

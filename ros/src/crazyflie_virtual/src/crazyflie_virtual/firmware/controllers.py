@@ -41,7 +41,7 @@ class FirmwarePid:
         self._dt = dt
         self._integral = 0.0
         self._last: float | None = None
-        #: desired, out_p, out_i, out_d, out_ff: Of the last update, for the log.
+        #: desired, out_p, out_i, out_d, out_ff: Values of the last update, for the log.
         self.desired = 0.0
         self.out_p = self.out_i = self.out_d = self.out_ff = 0.0
 

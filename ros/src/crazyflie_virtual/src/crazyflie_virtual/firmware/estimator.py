@@ -186,7 +186,7 @@ class Localization:
 
     @property
     def milliseconds(self) -> float:
-        """When the last external measurement came, ms, in the 16 bits of the log."""
+        """Arrival of the last external measurement, ms, in the 16 bits of the log."""
         return 0.0 if self.time is None else 1000.0 * self.time % 65536.0
 
     def take_position(self, time: float, position: Triple) -> None:

@@ -27,8 +27,8 @@ _HEADER = struct.Struct("<HH")
 
 _INFO_SIZE = 264  #: Bytes of a server's name and versions, which natnet decodes.
 
-#: Fields that servers add from 3.0 on: ticks per second of their clock, data port, whether they send to a
-#: group, and the group.
+#: Fields that servers add from 3.0 on: ticks per second of their clock, data port, whether they
+#: send to a group, and the group.
 _CONNECTION = struct.Struct("<QHB4B")
 
 

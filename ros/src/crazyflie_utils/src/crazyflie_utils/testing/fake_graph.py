@@ -35,8 +35,7 @@ class FakeGraph:
 
     def __init__(self, parameters: dict[str, object], start: float = 100.0):
         self.time = start  #: Now, s.
-        #: Faults of topics: ``fault(message)`` returns the messages that
-        #: arrive in its place.
+        #: Faults of topics: ``fault(message)`` returns the messages that arrive in its place.
         self.faults: dict[str, Callable[[Any], list[Any]]] = {}
         #: Process and topic: messages that do not reach this process.
         self.unheard: set[tuple[str, str]] = set()

@@ -114,9 +114,8 @@ def test_vehicles_on_their_way_stop_before_they_land(tower):
 
 
 def test_who_does_not_reach_a_free_place_stays_in_the_air_and_is_named(tower):
-    def stay(goal, yaw, duration):
-        x, y, z = tower.position("cf1")
-        return go_to((x, y, z), yaw, duration)
+    def stay(move):
+        return go_to(move._replace(goal=tower.position("cf1")))
 
     go_to = tower._vehicles["cf1"].go_to
     tower._vehicles["cf1"].go_to = stay
@@ -143,9 +142,9 @@ def test_the_way_aside_takes_as_long_as_the_limits_demand(tower, monkeypatch):
     vehicle, ways = tower._vehicles["cf1"], []
     go_to = vehicle.go_to
 
-    def note(goal, yaw, duration):
-        ways.append((math.dist(vehicle.position(), goal), duration))
-        return go_to(goal, yaw, duration)
+    def note(move):
+        ways.append((math.dist(vehicle.position(), move.goal), move.duration))
+        return go_to(move)
 
     monkeypatch.setattr(vehicle, "go_to", note)
     tower["cf1"].land()

@@ -7,7 +7,7 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
-from crazyflie_mission_api.mission_vehicle import MEMORY, MissionVehicle, done
+from crazyflie_mission_api.mission_vehicle import MEMORY, MissionVehicle, Move, Playback, done
 from crazyflie_mission_api.setpoints import Setpoint
 from crazyflie_mission_api.trajectories import TimedTrajectory
 from crazyflie_model.angles import Triple
@@ -138,34 +138,35 @@ class IdealVehicle(MissionVehicle):
 
     @override
     def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
+        if not self._may_plan("takeoff", group_mask):
+            return done(None)
+        if self.is_active:
+            self._warn(f"{self.name}.takeoff: it flies; a real vehicle ignores the command")
+            return done(None)
         return self._climb(height, duration, flies=True)
 
     @override
     def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":
+        is_landing = self.is_active and not self._flies
+        if not self._may_plan("land", group_mask) or is_landing:
+            return done(None)
         return self._climb(height or 0.0, duration, flies=False)
 
     @override
     def stop(self, group_mask: int = 0) -> "Future[Any]":
-        start = self.planned()
-        self._flies = False
-        self.trajectory = TimedTrajectory.hover(start.position, start.yaw)
+        if self._may_plan("stop", group_mask):
+            self._stop_motors("stop")
         return done(None)
 
     @override
-    def go_to(
-        self,
-        goal: Triple,
-        yaw: float,
-        duration: float,
-        relative: bool = False,
-        group_mask: int = 0,
-    ) -> "Future[Any]":
-        start = self.planned()
-        if relative:
+    def go_to(self, move: Move, group_mask: int = 0) -> "Future[Any]":
+        if not self._may_plan("goTo", group_mask):
+            return done(None)
+        start, goal, yaw = self.planned(), move.goal, move.yaw
+        if move.relative:
             x, y, z = (a + b for a, b in zip(goal, start.position, strict=True))
             goal, yaw = (x, y, z), yaw + start.yaw
-        piece = smooth_piece(start, goal, yaw, max(duration, _MIN_DURATION))
-        return self._fly([piece])
+        return self._fly([smooth_piece(start, goal, yaw, max(move.duration, _MIN_DURATION))])
 
     @override
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
@@ -184,17 +185,13 @@ class IdealVehicle(MissionVehicle):
         return done(None)
 
     @override
-    def start_trajectory(
-        self,
-        trajectory_id: int,
-        time_scale: float = 1.0,
-        reverse: bool = False,
-        relative: bool = False,
-        group_mask: int = 0,
-    ) -> "Future[Any]":
-        trajectory = Trajectory(self._memory[trajectory_id], time_scale, reverse)
+    def start_trajectory(self, flight: Playback, group_mask: int = 0) -> "Future[Any]":
+        if not self._may_plan("startTrajectory", group_mask):
+            return done(None)
+        pieces = self._memory[flight.number]
+        trajectory = Trajectory(pieces, flight.time_scale, flight.reverse)
         start = self.planned().position
-        return self._fly(trajectory.moved_to(start, None) if relative else trajectory)
+        return self._fly(trajectory.moved_to(start, None) if flight.relative else trajectory)
 
     @override
     def set_group_mask(self, group_mask: int) -> "Future[Any]":
@@ -208,7 +205,7 @@ class IdealVehicle(MissionVehicle):
     @override
     def send(self, setpoint: Setpoint) -> None:
         # The firmware's commander makes the planner forget its plan (commander.c).
-        IdealVehicle.stop(self)
+        self._forget_plan()
 
     @override
     def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int = 0) -> "Future[Any]":
@@ -221,8 +218,21 @@ class IdealVehicle(MissionVehicle):
         self.trajectory = TimedTrajectory.hover((x, y, 0.0))
         return done(None)
 
+    def _may_plan(self, method: str, group_mask: int) -> bool:
+        """Return whether a high-level command concerns this vehicle."""
+        return group_mask == 0 or bool(group_mask & self.groups)
+
     def _warn(self, text: str) -> None:
         """Process what a real vehicle would not do."""
+
+    def _stop_motors(self, method: str) -> None:
+        """Stop where it is."""
+        self._forget_plan()
+
+    def _forget_plan(self):
+        start = self.planned()
+        self._flies = False
+        self.trajectory = TimedTrajectory.hover(start.position, start.yaw)
 
     def _climb(self, height, duration, flies):
         start = self.planned()

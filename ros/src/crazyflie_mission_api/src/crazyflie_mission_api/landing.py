@@ -10,7 +10,7 @@ from typing_extensions import override
 from crazyflie_fleet.landing import LandingSide, Place, Situation, land_in_rounds
 from crazyflie_mission_api.group_state import GroupState, raise_failures
 from crazyflie_mission_api.limits import EVERYWHERE
-from crazyflie_mission_api.mission_vehicle import never
+from crazyflie_mission_api.mission_vehicle import Move, never
 from crazyflie_mission_api.observer import command
 from crazyflie_mission_api.trajectories import TimedTrajectory, check_with_skew, straight
 
@@ -100,7 +100,7 @@ class LandingGroup(GroupState):
 
         def go_to(name):
             goal, yaw = poses[name]
-            return self._vehicles[name].go_to(goal, yaw, duration)
+            return self._vehicles[name].go_to(Move(goal, yaw, duration))
 
         failures = self._answers(go_to, poses)
         self._commanded.update({n: move for n, move in moves.items() if n not in failures})

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from crazyflie_mission_api.limits import Bounds
 from crazyflie_mission_api.setpoints import Setpoint
@@ -10,6 +10,24 @@ from crazyflie_model.angles import Triple
 from crazyflie_model.trajectory import Pieces
 
 MEMORY = 31  #: Number of pieces that fit into the memory of a vehicle.
+
+
+class Move(NamedTuple):
+    """A smooth move to a point (m) and heading (rad), or by them from the plan (relative)."""
+
+    goal: Triple
+    yaw: float
+    duration: float  # (s).
+    relative: bool = False
+
+
+class Playback(NamedTuple):
+    """A flight along the uploaded trajectory of a number; relative: from the planned position."""
+
+    number: int
+    time_scale: float = 1.0
+    reverse: bool = False
+    relative: bool = False
 
 
 class Commands(Protocol):
@@ -29,25 +47,11 @@ class Commands(Protocol):
     def stop(self, group_mask: int = 0) -> "Future[Any]":
         """Stop the motors of a vehicle that has landed: those of the firmware idle on."""
 
-    def go_to(
-        self,
-        goal: Triple,
-        yaw: float,
-        duration: float,
-        relative: bool = False,
-        group_mask: int = 0,
-    ) -> "Future[Any]":
-        """Fly to a point (m) and heading (rad), or by them from the plan, in a duration (s)."""
+    def go_to(self, move: Move, group_mask: int = 0) -> "Future[Any]":
+        """Fly to a point."""
 
-    def start_trajectory(
-        self,
-        trajectory_id: int,
-        time_scale: float = 1.0,
-        reverse: bool = False,
-        relative: bool = False,
-        group_mask: int = 0,
-    ) -> "Future[Any]":
-        """Fly along an uploaded trajectory; ``relative``: from the planned position."""
+    def start_trajectory(self, flight: Playback, group_mask: int = 0) -> "Future[Any]":
+        """Fly along an uploaded trajectory."""
 
     def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int = 0) -> "Future[Any]":
         """Return to high-level commands when the last setpoint is this old (ms)."""

@@ -20,6 +20,8 @@ from crazyflie_mission_api.mission_vehicle import (
     MEMORY,
     Commands,
     MissionVehicle,
+    Move,
+    Playback,
     done,
     forward,
     in_turn,
@@ -285,28 +287,12 @@ class ServiceCommands(Commands):
         return self.call("stop", srv.Stop, group_mask)
 
     @override
-    def go_to(
-        self,
-        goal: Triple,
-        yaw: float,
-        duration: float,
-        relative: bool = False,
-        group_mask: int = 0,
-    ) -> "Future[Any]":
-        arguments = (group_mask, relative, Point(*goal), yaw, seconds(duration))
-        return self.call("go_to", srv.GoTo, *arguments)
+    def go_to(self, move: Move, group_mask: int = 0) -> "Future[Any]":
+        return self.call("go_to", srv.GoTo, *_numbers(move, group_mask))
 
     @override
-    def start_trajectory(
-        self,
-        trajectory_id: int,
-        time_scale: float = 1.0,
-        reverse: bool = False,
-        relative: bool = False,
-        group_mask: int = 0,
-    ) -> "Future[Any]":
-        arguments = (group_mask, trajectory_id, time_scale, reverse, relative)
-        return self.call("start_trajectory", srv.StartTrajectory, *arguments)
+    def start_trajectory(self, flight: Playback, group_mask: int = 0) -> "Future[Any]":
+        return self.call("start_trajectory", srv.StartTrajectory, group_mask, *flight)
 
     @override
     def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int = 0) -> "Future[Any]":
@@ -392,16 +378,9 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
         return self._hand_over(lambda: land(end, duration, group_mask), _LANDING_RETRY_TIME)
 
     @override
-    def go_to(
-        self,
-        goal: Triple,
-        yaw: float,
-        duration: float,
-        relative: bool = False,
-        group_mask: int = 0,
-    ) -> "Future[Any]":
+    def go_to(self, move: Move, group_mask: int = 0) -> "Future[Any]":
         go_to = super().go_to
-        return self._hand_over(lambda: go_to(goal, yaw, duration, relative, group_mask))
+        return self._hand_over(lambda: go_to(move, group_mask))
 
     @override
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
@@ -428,7 +407,7 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
 
     def _start_with_others(self):
         def start():
-            return self.start_trajectory(0)
+            return self.start_trajectory(Playback(0))
 
         return start() if self.broadcast is None else self.broadcast.start(self.name, start)
 
@@ -466,8 +445,13 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
         return send() if self._stream is None else self._stream.hand_over(send, retry_time)
 
     def _hold(self, goal):
-        request = (0, False, Point(*goal.position), goal.yaw, seconds(_HOLD_DURATION))
-        return self.call("go_to", srv.GoTo, *request, limit=_HOLD_TIMEOUT)
+        move = _numbers(Move(goal.position, goal.yaw, _HOLD_DURATION), 0)
+        return self.call("go_to", srv.GoTo, *move, limit=_HOLD_TIMEOUT)
+
+
+def _numbers(move, group_mask):
+    """Return the fields of the request of go_to."""
+    return group_mask, move.relative, Point(*move.goal), move.yaw, seconds(move.duration)
 
 
 def fence(handle: NodeHandle, top: str) -> Bounds:

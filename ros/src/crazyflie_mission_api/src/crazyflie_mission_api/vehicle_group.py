@@ -11,6 +11,7 @@ from crazyflie_mission_api import formations, trajectories
 from crazyflie_mission_api.group_state import raise_failures, text
 from crazyflie_mission_api.landing import LandingGroup
 from crazyflie_mission_api.limits import Array, MissionError, number, point
+from crazyflie_mission_api.mission_vehicle import Move
 from crazyflie_mission_api.observer import command
 from crazyflie_mission_api.trajectories import (
     TimedTrajectory,
@@ -117,7 +118,7 @@ class VehicleGroup(LandingGroup):
         def command(name):
             if name in together:
                 return self._vehicles[name].start()
-            return self._vehicles[name].go_to(places[name], yaws[name], seconds)
+            return self._vehicles[name].go_to(Move(places[name], yaws[name], seconds))
 
         self._fly(moves, "go_to", command, wait)
 

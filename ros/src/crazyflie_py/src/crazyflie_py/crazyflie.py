@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 from uav_trajectory import Trajectory
 
+from crazyflie_mission_api.mission_vehicle import Move, Playback
 from crazyflie_mission_api.setpoints import (
     AttitudeSetpoint,
     FullStateSetpoint,
@@ -164,9 +165,10 @@ class ScriptCommands:
         seconds = check.number(where, "duration", duration, 0.0)
         mask = self._mask(where, mask)
         turn = self._swarm.checked_yaw(turn, self._vehicle)
+        move = Move(place, turn, seconds, bool(relative))
         self._command(
             "go_to",
-            lambda vehicle: vehicle.go_to(place, turn, seconds, bool(relative), mask),
+            lambda vehicle: vehicle.go_to(move, mask),
             mask,
             flies=True,
             goal=None if relative else place,
@@ -197,15 +199,17 @@ class ScriptCommands:
         """
         where = self._where("startTrajectory")
         mask = self._mask(where, groupMask)
-        flown = (
+        flight = Playback(
             check.byte(where, "trajectoryId", trajectoryId),
             check.number(where, "timescale", timescale, 1e-3, 1e3),
             bool(reverse),
             bool(relative),
-            mask,
         )
         self._command(
-            "start_trajectory", lambda vehicle: vehicle.start_trajectory(*flown), mask, flies=True
+            "start_trajectory",
+            lambda vehicle: vehicle.start_trajectory(flight, mask),
+            mask,
+            flies=True,
         )
 
     def notifySetpointsStop(self, remainValidMillisecs: int = 100, groupMask: int = 0) -> None:

@@ -4,11 +4,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from geometry_msgs.msg import Point
 
-from crazyflie_driver import srv
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, seconds, velocity_between
+from crazyflie_mission_api.mission_vehicle import Move
+from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, velocity_between
 from crazyflie_mission_api.setpoints import (
     SETPOINT_TIMEOUT,
     AttitudeSetpoint,
@@ -85,8 +84,8 @@ class HeldVehicle:
         if self.streamed_goal(place) is not None:
             self._held_at = place
             return
-        arguments = (0, False, Point(*place), self._vehicle.heading(), seconds(_HOLD_DURATION))
-        self._vehicle.call("go_to", srv.GoTo, *arguments).add_done_callback(self._note_hold)
+        move = Move(place, self._vehicle.heading(), _HOLD_DURATION)
+        self._vehicle.go_to(move).add_done_callback(self._note_hold)
 
     def release(self) -> None:
         """Release it: it follows its setpoints again."""

@@ -190,9 +190,9 @@ class SimulatedVehicle(IdealVehicle):
 
     # Commands.
 
+    @override
     def _may_plan(self, method: str, group_mask: int) -> bool:
-        """Prepare for a high-level command; return whether it concerns this vehicle."""
-        if self._locked or (group_mask and not group_mask & self.groups):
+        if self._locked or not super()._may_plan(method, group_mask):
             return False
         if self._setpoint is not None and math.isinf(self._expiry):
             self._warn(
@@ -209,53 +209,6 @@ class SimulatedVehicle(IdealVehicle):
         *vectors, yaw = self.motion
         position, velocity, _ = (vector.tolist() for vector in vectors)
         return Goal(tuple(position), tuple(velocity), (0.0, 0.0, 0.0), yaw, 0.0)
-
-    @override
-    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
-        if self._may_plan("takeoff", group_mask):
-            if not self.is_active:
-                return super().take_off(height, duration)
-            self._warn(f"{self.name}.takeoff: it flies; a real vehicle ignores the command")
-        return done(None)
-
-    @override
-    def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":
-        is_landing = self.is_active and not self._flies
-        if self._may_plan("land", group_mask) and not is_landing:
-            return super().land(height, duration)
-        return done(None)
-
-    @override
-    def stop(self, group_mask: int = 0) -> "Future[Any]":
-        if self._may_plan("stop", group_mask):
-            self._stop_motors("stop")
-        return done(None)
-
-    @override
-    def go_to(
-        self,
-        goal: Triple,
-        yaw: float,
-        duration: float,
-        relative: bool = False,
-        group_mask: int = 0,
-    ) -> "Future[Any]":
-        if self._may_plan("goTo", group_mask):
-            return super().go_to(goal, yaw, duration, relative)
-        return done(None)
-
-    @override
-    def start_trajectory(
-        self,
-        trajectory_id: int,
-        time_scale: float = 1.0,
-        reverse: bool = False,
-        relative: bool = False,
-        group_mask: int = 0,
-    ) -> "Future[Any]":
-        if self._may_plan("startTrajectory", group_mask):
-            return super().start_trajectory(trajectory_id, time_scale, reverse, relative)
-        return done(None)
 
     @override
     def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int = 0) -> "Future[Any]":
@@ -285,14 +238,15 @@ class SimulatedVehicle(IdealVehicle):
         if isinstance(setpoint, AttitudeSetpoint):
             self._warn(f"{self.name}.cmdVel: an ideal vehicle has no attitude; it stays in place")
 
-    def _stop_motors(self, method):
+    @override
+    def _stop_motors(self, method: str) -> None:
         height = self.motion.position[2] - self.initial_position[2]
         if height > _FALL_HEIGHT:
             self._warn(
                 f"{self.name}.{method}: the motors stop {height:.2f} m above the start; a real "
                 "vehicle falls, this one stays in place"
             )
-        super().stop()
+        super()._stop_motors(method)
         self._setpoint = None
 
     def avoid(self, others: Sequence[Self], settings: AvoidanceSettings | None) -> None:

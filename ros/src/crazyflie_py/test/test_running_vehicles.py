@@ -9,7 +9,7 @@ from uav_trajectory import Polynomial4D, Trajectory
 
 from crazyflie_fleet import fleet_process
 from crazyflie_mission_api import fleet
-from crazyflie_mission_api.ideal_vehicle import IdealVehicle
+from crazyflie_mission_api.dry_run import IdealVehicle
 from crazyflie_mission_api.mission_vehicle import MissionVehicle
 from crazyflie_mission_api.ros_vehicle import RosVehicle
 from crazyflie_py import Crazyswarm

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from crazyflie_mission_api.ros_vehicle import TimedPose
-from crazyflie_mission_api.setpoints import (
+from crazyflie_mission_api.mission_vehicle import (
     AttitudeSetpoint,
     FullStateSetpoint,
     HoverSetpoint,
@@ -12,6 +11,7 @@ from crazyflie_mission_api.setpoints import (
     VelocityWorldSetpoint,
     led_to,
 )
+from crazyflie_mission_api.ros_vehicle import TimedPose
 from crazyflie_py.separation_watch import SeparationWatch
 
 STEP = 0.05

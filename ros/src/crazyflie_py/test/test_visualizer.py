@@ -9,7 +9,8 @@ from PIL import Image
 from sim import PAIR
 
 import crazyflie_py
-from crazyflie_py.visualizer import MatplotlibVisualizer, NullVisualizer
+from crazyflie_py.swarm import NullVisualizer
+from crazyflie_py.visualizer import MatplotlibVisualizer
 
 
 @pytest.fixture(autouse=True)

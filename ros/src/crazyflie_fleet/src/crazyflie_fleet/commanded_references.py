@@ -8,9 +8,9 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from crazyflie_fleet.conversions import reference_message
 from crazyflie_fleet.follower import CommandFollower, Velocity
-from crazyflie_fleet.high_level_services import FleetVehicle, HighLevelParameters, TimerShare
+from crazyflie_fleet.high_level_services import HighLevelParameters, reference_message
+from crazyflie_fleet.references_node import TimerShare, TrackedVehicle
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_model.trajectory import Trajectory
@@ -18,6 +18,7 @@ from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.timers import Timer
 
 _COLOUR = ColorRGBA(0.95, 0.55, 0.05, 0.8)
 _WIDTH = 0.01  #: Width of the line (m).
@@ -72,7 +73,7 @@ class CommandedReferences:
         self,
         handle: NodeHandle,
         parameters: HighLevelParameters,
-        vehicle: FleetVehicle | None,
+        vehicle: TrackedVehicle | None,
     ):
         self._handle = handle
         self._parameters = parameters
@@ -81,7 +82,7 @@ class CommandedReferences:
         self._is_move = False  # Not a trajectory, which other vehicles may fly at the same time.
         # When the last setpoint came; None without a stream.
         self._setpoint_time: float | None = None
-        self._timer: TimerShare | None = None
+        self._timer: Timer | TimerShare | None = None
         self._state: Goal[float] | None = None
         self._state_time = 0.0
         self._vehicle = vehicle

@@ -1,15 +1,316 @@
-"""Vehicles that fly together."""
+"""Vehicles that fly together, their settings, and the types of these settings' values."""
 
 import dataclasses
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
+from typing_extensions import override
 
-from crazyflie_driver.positioning import MOCAP
-from crazyflie_fleet.settings import MachineSettings, RobotSettings
+from crazyflie_driver.positioning import MOCAP, SOURCES
+from crazyflie_link.address import EXPECTED, Address
+from crazyflie_link.errors import AddressError
+from crazyflie_model.quadrotor import TYPES
+from crazyflie_utils import ParameterError, Parameters, parameter
+from crazyflie_utils.parameters.types import (
+    BOOLEAN,
+    FINITE,
+    FRAME,
+    POSITION,
+    TEXT,
+    Integer,
+    ListOf,
+    Number,
+    ParameterType,
+    Text,
+)
+from crazyflie_utils.parameters.vehicle_model import load
+from crazyflie_utils.text import number_from_text
+
+#: Help of settings that are read and reported in a remark.
+WITHOUT_EFFECT = "crazyswarm2's; has no effect here"
+#: Tracking of a vehicle: by the motion capture system, or by the vehicle's only marker.
+VENDOR, SINGLE_MARKER = "vendor", "single_marker"
+#: Marker configurations with one marker.
+_SINGLE_MARKERS = ("default_single_marker", SINGLE_MARKER)
+LOCAL = "local"  #: Default machine of vehicles.
+
+#: Key in ``default_topics`` -> standard topic of the driver; empty if there is no such topic.
+DEFAULT_TOPICS = {
+    "imu": "imu",
+    "temperature": "temperature",
+    "magnetic_field": "magnetic_field",
+    "pressure": "pressure",
+    "battery": "battery",
+    "pose": "pose",
+    "packets": "packets",
+    "status": "battery",
+    "odom": "",
+    "scan": "",
+}
+
+
+class _Pattern(ParameterType):
+    """A text that a regular expression matches."""
+
+    label = "string"
+
+    def __init__(self, pattern: "re.Pattern[str]", expected: str):
+        self._pattern = pattern
+        self._expected = expected
+
+    @override
+    def __call__(self, value: Any) -> str:
+        if not isinstance(value, str) or not self._pattern.fullmatch(value):
+            raise ValueError
+        return value
+
+    @override
+    def __str__(self) -> str:
+        return self._expected
+
+
+#: Name of a vehicle's namespace and frame; /all/takeoff is a service for all vehicles.
+VEHICLE_NAME = _Pattern(
+    re.compile(r"(?!all$)[A-Za-z][A-Za-z0-9_]*"),
+    "letters, digits and underscores, the first a letter, and not 'all'",
+)
+
+
+class VehicleUri(ParameterType):
+    """A vehicle's address for `crazyflie_link`; crazyswarm2's ``*`` is any dongle."""
+
+    label = "string"
+
+    @override
+    def __call__(self, value: Any) -> str:
+        if not isinstance(value, str):
+            raise ValueError
+        vehicle_key(value)
+        return value
+
+    @override
+    def __str__(self) -> str:
+        return EXPECTED
+
+
+def vehicle_key(uri: str) -> str:
+    """Return a key that is equal for all addresses of a vehicle; `ValueError` if malformed."""
+    try:
+        return Address.parse(uri.replace("radio://*/", "radio://0/")).key
+    except AddressError:
+        raise ValueError from None
+
+
+class StartPosition(ParameterType):
+    """Position of a vehicle before takeoff: x, y, z in m, z not below the ground."""
+
+    label, unit, range = POSITION.label, POSITION.unit, "z >= 0"
+
+    @override
+    def __call__(self, value: Any) -> tuple[float, float, float]:
+        x, y, z = POSITION(value)
+        if z < 0.0:
+            raise ValueError(f"z is {z:g}, below the ground")
+        return x, y, z
+
+    @override
+    def __str__(self) -> str:
+        return f"{POSITION}, z at least 0"
+
+
+class FirmwareNumber(ParameterType):
+    """The value of a firmware parameter; 1e-3, which YAML takes for a text, is a number too."""
+
+    label = "float"
+
+    @override
+    def __call__(self, value: Any) -> int | float:
+        if isinstance(value, str):
+            value = number_from_text(value)
+        if isinstance(value, bool):
+            return int(value)
+        FINITE(value)
+        return value
+
+    @override
+    def __str__(self) -> str:
+        return "a finite number"
+
+
+#: Dynamics in simulation; on hardware they are the default type of vehicle.
+DYNAMICS = ("near_hover", "coupled_7d", "quadrotor")
+
+
+class FleetModel(ParameterType):
+    """Dynamics in simulation, a type of vehicle, or a model file."""
+
+    label = "string"
+    range = ", ".join(f"`{name}`" for name in (*DYNAMICS, *TYPES)) + ", or a file"
+
+    @override
+    def __call__(self, value: Any) -> str:
+        if not isinstance(value, str):
+            raise ValueError
+        if value not in DYNAMICS and not value.endswith((".yaml", ".yml")):
+            try:
+                load(value)
+            except ParameterError as error:
+                raise ValueError(str(error)) from None
+        return value
+
+    @override
+    def __str__(self) -> str:
+        return f"one of {', '.join((*DYNAMICS, *TYPES))}, or a model file"
+
+
+class LogTopicSettings(Parameters):
+    """A topic of firmware variables."""
+
+    frequency: float = parameter(Number("Hz", minimum=0.4, maximum=100.0), "messages per second")
+    variables: tuple[str, ...] = parameter(ListOf(TEXT), "such as pm.vbat", name="vars")
+
+
+class DefaultTopicSettings(Parameters):
+    """A standard topic; it comes at the driver's own rate."""
+
+    frequency: float = parameter(Number("Hz", above=0.0), WITHOUT_EFFECT, 10.0)
+
+
+class Settings(Parameters):
+    """Settings of a vehicle, which override those of its type, which override those of ``all``."""
+
+    model: str = parameter(
+        FleetModel(),
+        "dynamics in simulation; or a type of vehicle or a model file, relative to this file, for "
+        "simulation (as a quadrotor), hardware and gains",
+        "coupled_7d",
+    )
+    buffer: float = parameter(
+        Number("m", above=0.0), "radius of the space that is the vehicle's own", 0.15
+    )
+    hover_height: float = parameter(
+        Number("m", above=0.0), "where a takeoff ends, above the start point", 1.0
+    )
+    positioning: str = parameter(
+        Text(SOURCES),
+        "on hardware, source of the pose: motion capture, or the vehicle's own estimate by its "
+        "Lighthouse, Flow or Loco deck",
+        MOCAP,
+    )
+    lighthouse: str = parameter(
+        Text(may_be_empty=True),
+        "file with the geometry of base stations, as cfclient writes it, for the vehicle; relative "
+        "to this file; empty for none",
+        "",
+    )
+    machine: str = parameter(
+        TEXT, "computer that flies it, of `machines`; `local` is always one of them", LOCAL
+    )
+    voltage_warning: float = parameter(
+        Number("V", minimum=0.0),
+        "with less there is a warning; and takeoff is refused with `act`, else below 3.2",
+        3.2,
+        "battery/voltage_warning",
+    )
+    voltage_critical: float = parameter(
+        Number("V", minimum=0.0),
+        "with less there is a warning; and the vehicle is landed with `act`, else below 3",
+        3.0,
+        "battery/voltage_critical",
+    )
+    voltages_act: bool = parameter(
+        BOOLEAN, "the two voltages count for takeoffs and landings", False, "battery/act"
+    )
+    mocap_enabled: bool = parameter(BOOLEAN, WITHOUT_EFFECT, True, "motion_capture/enabled")
+    mocap_frame: str | None = parameter(
+        FRAME, "motion capture's frame; by default the vehicle's name", None, "motion_capture/frame"
+    )
+    mocap_tracking: str = parameter(
+        Text((VENDOR, SINGLE_MARKER, "librigidbodytracker")),
+        "on hardware: `vendor` is a rigid body of motion capture; `single_marker` one marker that "
+        "is tracked by fleet_mocap_node, and so is `librigidbodytracker` with the marker "
+        "`default_single_marker`, which is else taken as `vendor`",
+        VENDOR,
+        "motion_capture/tracking",
+    )
+    mocap_marker: str = parameter(
+        TEXT,
+        "of mocap_node's `marker_configurations`; see `motion_capture/tracking`",
+        "default",
+        "motion_capture/marker",
+    )
+    mocap_dynamics: str = parameter(
+        TEXT,
+        "a single marker's limits of velocity, of mocap_node's `dynamics_configurations`",
+        "default",
+        "motion_capture/dynamics",
+    )
+    big_quad: bool = parameter(BOOLEAN, WITHOUT_EFFECT, False)
+    reference_frame: str = parameter(TEXT, WITHOUT_EFFECT, "world")
+
+    @property
+    def dynamics(self) -> str:
+        """Dynamics in simulation, one of `DYNAMICS`."""
+        return self.model if self.model in DYNAMICS else "quadrotor"
+
+    @property
+    def vehicle_model(self) -> str:
+        """Type of the vehicle, or path of its model file."""
+        return "cf21" if self.model in DYNAMICS else self.model
+
+    @property
+    def has_single_marker(self) -> bool:
+        """Whether motion capture tracks the vehicle by its only marker."""
+        if self.positioning != MOCAP:
+            return False
+        if self.mocap_tracking == "librigidbodytracker":
+            return self.mocap_marker in _SINGLE_MARKERS
+        return self.mocap_tracking == SINGLE_MARKER
+
+
+class PartialSettings(Settings):
+    """Settings in one place, of a vehicle, its type or ``all``, before they are merged."""
+
+    enabled: bool = parameter(BOOLEAN, "whether it takes part", True)
+    uri: str | None = parameter(VehicleUri(), "its address; not needed in simulation", None)
+    position: tuple[float, float, float] | None = parameter(
+        StartPosition(), "its position before takeoff", None, "initial_position"
+    )
+    type: str | None = parameter(TEXT, "of `robot_types`", None)
+
+
+class RobotSettings(PartialSettings):
+    """Settings of one vehicle below ``robots``."""
+
+    position: tuple[float, float, float] = parameter(
+        StartPosition(), "its position before takeoff", name="initial_position"
+    )
+
+
+class BroadcastSettings(Parameters):
+    """Broadcasts of commands to all vehicles of a radio."""
+
+    repeats: int = parameter(Integer(1, 100), "of each command", 5, "num_repeats")
+    period_ms: float = parameter(
+        Number("ms", minimum=0.0, maximum=100.0),
+        "from one to the next",
+        1.0,
+        "delay_between_repeats_ms",
+    )
+
+
+class MachineSettings(Parameters):
+    """Another computer, with the attributes of roslaunch's tag ``machine``."""
+
+    address: str = parameter(TEXT, "name or number in the network")
+    env_loader: str = parameter(TEXT, "script there that sets ROS's environment")
+    user: str | None = parameter(TEXT, "user that logs in there by ssh", None)
+
 
 #: Vertical distance of two vehicles over their horizontal one: the downwash of the rotors reduces
 #: the lift of a vehicle below.

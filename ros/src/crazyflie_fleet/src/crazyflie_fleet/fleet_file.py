@@ -6,9 +6,8 @@ from pathlib import Path
 
 import yaml
 
-from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
+from crazyflie_fleet.fleet_config import SINGLE_MARKER, FleetConfig, RobotSettings, VehicleConfig
 from crazyflie_fleet.fleet_parser import FleetParser, close_vehicles
-from crazyflie_fleet.settings import SINGLE_MARKER, RobotSettings
 from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.types import Integer

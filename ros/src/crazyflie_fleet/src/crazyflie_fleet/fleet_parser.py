@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from crazyflie_fleet.fleet_config import FleetConfig, LogTopic, VehicleConfig, close_pairs
-from crazyflie_fleet.settings import (
+from crazyflie_fleet.fleet_config import (
     DEFAULT_TOPICS,
     DYNAMICS,
     LOCAL,
@@ -19,10 +18,14 @@ from crazyflie_fleet.settings import (
     BroadcastSettings,
     DefaultTopicSettings,
     FirmwareNumber,
+    FleetConfig,
+    LogTopic,
     LogTopicSettings,
     MachineSettings,
     PartialSettings,
     RobotSettings,
+    VehicleConfig,
+    close_pairs,
     vehicle_key,
 )
 from crazyflie_model.quadrotor import TYPES

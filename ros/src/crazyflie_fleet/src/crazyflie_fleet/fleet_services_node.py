@@ -13,7 +13,7 @@ from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_fleet.high_level_services import HIGH_LEVEL, START_TOPIC
 from crazyflie_fleet.lander import SERVICE_TIMEOUT, Lander, Refusals
 from crazyflie_fleet.mission_watch import MISSION_TIMEOUT, MissionWatch
-from crazyflie_fleet.vehicle_states import VehicleStates
+from crazyflie_fleet.references_node import VehicleStates
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, ServiceError
 

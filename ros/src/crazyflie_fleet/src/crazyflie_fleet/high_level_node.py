@@ -11,15 +11,15 @@ from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_fleet.commanded_references import CommandedReferences
-from crazyflie_fleet.conversions import from_message
 from crazyflie_fleet.follower import CommandFollower
 from crazyflie_fleet.high_level_services import (
-    FleetVehicle,
     Groups,
     HighLevelParameters,
     SetpointSubscribers,
+    from_message,
     relay,
 )
+from crazyflie_fleet.references_node import TrackedVehicle
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, ServiceError, flight_status
@@ -56,7 +56,7 @@ class HighLevelNode(Node):
 
     needed_in_flight = True
 
-    def __init__(self, vehicle: FleetVehicle | None = None) -> None:
+    def __init__(self, vehicle: TrackedVehicle | None = None) -> None:
         self._vehicle = vehicle
         self._status = FlightStatus()
         self._groups = Groups()

@@ -1,22 +1,91 @@
-"""Parts of the driver's interface for a vehicle that a controller flies: groups, setpoints."""
+"""The driver's interface for a vehicle that a controller flies: messages, groups, setpoints."""
 
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any, Protocol
+from typing import Any
 
+import genpy
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from std_msgs.msg import Empty as EmptyMessage
 from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_driver import srv
-from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
-from crazyflie_fleet.conversions import setpoint_goal
+from crazyflie_driver.msg import (
+    FullState,
+    Hover,
+    Position,
+    TrajectoryPolynomialPiece,
+    VelocityWorld,
+)
 from crazyflie_fleet.follower import Velocity
-from crazyflie_model.angles import Triple
-from crazyflie_model.polynomials import Goal
-from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
+from crazyflie_model.angles import quaternion_from_rpy
+from crazyflie_model.polynomials import Goal, PolynomialPiece, at_rest
+from crazyflie_msgs.msg import (
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_utils import NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, SERVICE, TIME_STEP, TOPIC
+
+
+def to_message(piece: PolynomialPiece) -> TrajectoryPolynomialPiece:
+    """Return a piece for the service upload_trajectory."""
+    return TrajectoryPolynomialPiece(*piece.padded_axes, genpy.Duration.from_sec(piece.duration))
+
+
+def from_message(message: TrajectoryPolynomialPiece) -> PolynomialPiece:
+    """Return an uploaded piece."""
+    axes = (message.poly_x, message.poly_y, message.poly_z, message.poly_yaw)
+    return PolynomialPiece(message.duration.to_sec(), *axes)
+
+
+def reference_message(
+    goal: Goal[float], has_yaw: bool
+) -> PositionVelocityYawStateStamped | PositionVelocityStateStamped:
+    """Return a controller's reference, without a stamp."""
+    if has_yaw:
+        state = PositionVelocityYawState(*goal.position, *goal.velocity, goal.yaw)
+        return PositionVelocityYawStateStamped(state=state)
+    return PositionVelocityStateStamped(state=PositionVelocityState(*goal.position, *goal.velocity))
+
+
+def full_state_message(goal: Goal[float], frame: str = "world") -> FullState:
+    """Return the driver's setpoint in the fixed frame, without a stamp."""
+    message = FullState(
+        pose=Pose(Point(*goal.position), Quaternion(*quaternion_from_rpy(0.0, 0.0, goal.yaw))),
+        twist=Twist(Vector3(*goal.velocity), Vector3(0.0, 0.0, goal.yaw_rate)),
+        acc=Vector3(*goal.acceleration),
+    )
+    message.header.frame_id = frame
+    return message
+
+
+def heading(x: float, y: float, z: float, w: float) -> float:
+    """Return the rotation of a quaternion about the vertical, rad: the yaw of a level vehicle."""
+    return math.remainder(2.0 * math.atan2(z, w), 2.0 * math.pi)
+
+
+def setpoint_goal(message: FullState | Position) -> Goal[float]:
+    """Return the goal of a setpoint of position."""
+    if isinstance(message, Position):
+        return at_rest((message.x, message.y, message.z), math.radians(message.yaw))
+    p, v, a, q = (
+        message.pose.position,
+        message.twist.linear,
+        message.acc,
+        message.pose.orientation,
+    )
+    return Goal(
+        (p.x, p.y, p.z),
+        (v.x, v.y, v.z),
+        (a.x, a.y, a.z),
+        heading(q.x, q.y, q.z, q.w),
+        message.twist.angular.z,
+    )
+
 
 #: Namespace, below a vehicle's name, of the node; below /all of the same services for all.
 HIGH_LEVEL = "high_level"
@@ -28,36 +97,6 @@ START_TOPIC = "/all/start_trajectory"
 
 #: In place of a yaw, for `HighLevelNode` only: the vehicle keeps its heading.
 KEEP_HEADING = math.nan
-
-
-class FleetVehicle(Protocol):
-    """A vehicle in the process of its fleet, for its `HighLevelNode`."""
-
-    is_held: bool  #: Whether it is kept at its place, since another vehicle is too near.
-    is_to_land: bool  #: Whether only the fleet moves it, until it lands.
-    on_interruption: Callable[[], None]  #: Called when the fleet, or another node, commands it.
-    on_reference: Callable[[], None]  #: Called after the reference of another node.
-    #: Returns where its own references lead in a time (s), m; None if they do not move.
-    ahead: Callable[[float], Triple | None]
-
-    def goal(self) -> Goal[float] | None:
-        """Return the measured state; None if it is not known."""
-
-    def commanded(self) -> Goal[float] | None:
-        """Return the last reference of any node; None if the vehicle is not near it."""
-
-    def follow(self, goal: Goal[float]) -> None:
-        """Make the vehicle follow a goal."""
-
-    def timer(self, period: float, callback: Callable[[], None]) -> "TimerShare":
-        """Call ``callback()`` every ``period`` seconds, by one timer of all vehicles."""
-
-
-class TimerShare(Protocol):
-    """A callback of a timer."""
-
-    def stop(self) -> None:
-        """End the calls."""
 
 
 class HighLevelParameters(Parameters):

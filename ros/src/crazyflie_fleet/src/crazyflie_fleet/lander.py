@@ -22,10 +22,9 @@ from crazyflie_fleet.landing import (
     Situation,
     land_in_rounds,
 )
-from crazyflie_fleet.references_node import LANDING_TOPIC
+from crazyflie_fleet.references_node import LANDING_TOPIC, VehicleStates
 from crazyflie_fleet.separation import RELEASE_RATIO
 from crazyflie_fleet.vehicle_nodes import DESCENT, SAFE_DESCENT
-from crazyflie_fleet.vehicle_states import VehicleStates
 from crazyflie_model.planner import shortest_duration
 from crazyflie_msgs.msg import (
     FlightStatus,

@@ -5,7 +5,7 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from crazyflie_fleet import fleet_file
-from crazyflie_fleet.settings import LOCAL
+from crazyflie_fleet.fleet_config import LOCAL
 from crazyflie_utils import ParameterError
 
 

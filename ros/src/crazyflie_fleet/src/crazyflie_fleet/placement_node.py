@@ -6,8 +6,8 @@ from std_msgs.msg import String
 from typing_extensions import override
 
 from crazyflie_fleet.fleet_config import FleetConfig, close_pairs
+from crazyflie_fleet.references_node import VehicleStates
 from crazyflie_fleet.vehicle_nodes import INHIBITION
-from crazyflie_fleet.vehicle_states import VehicleStates
 from crazyflie_utils import Node, NodeHandle
 
 _PERIOD = 0.2  #: Period of the checks (s).

@@ -1,22 +1,27 @@
-"""Passes on the references of a fleet's vehicles, and keeps the vehicles apart."""
+"""The vehicles of a fleet: their states, and their references, which keep them apart."""
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
-from std_msgs.msg import Header, String
+from numpy.typing import NDArray
+from std_msgs.msg import Float64MultiArray, Header, String
 from tf2_msgs.msg import TFMessage
 from typing_extensions import override
 
-from crazyflie_fleet.conversions import reference_message
 from crazyflie_fleet.fleet_config import VehicleConfig
+from crazyflie_fleet.high_level_services import reference_message
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_fleet.vehicle_nodes import REFERENCE, SAFE_REFERENCE
-from crazyflie_fleet.vehicle_states import VehicleStates
+from crazyflie_fleet.vehicle_nodes import FLIGHT_STATUS, REFERENCE, SAFE_REFERENCE, STATE
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal, at_rest
-from crazyflie_msgs.msg import FlightStatus, PositionVelocityStateStamped
+from crazyflie_msgs.msg import (
+    FlightStatus,
+    PositionVelocityStateStamped,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped as Reference
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
@@ -24,6 +29,102 @@ from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_utils.timers import Timer
 from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import is_finite, to_tuple
+
+_IN_FLIGHT = (FlightStatus.TAKING_OFF, FlightStatus.FLYING, FlightStatus.DESCENDING)
+
+
+class VehicleStates:
+    """The last states and flight states of vehicles, which have numbers in the order given.
+
+    ``vectorized`` are topics with the states of several of them in one message.
+    """
+
+    def __init__(
+        self,
+        vehicles: Sequence[VehicleConfig],
+        vectorized: Mapping[str, Sequence[VehicleConfig]],
+    ):
+        self.names = [vehicle.name for vehicle in vehicles]
+        #: Shape (n,); `FlightStatus.state` of each; UNKNOWN before the first.
+        self.flight_states = np.full(len(vehicles), FlightStatus.UNKNOWN)
+        #: Reason for which each vehicle would refuse a takeoff; empty if it would not.
+        self.takeoff_refusals = [
+            f"nothing has come on /{name}/{FLIGHT_STATUS}" for name in self.names
+        ]
+        self._vectorized = vectorized
+        self._states = np.full((len(vehicles), 7), np.nan)
+        self._times = np.full(len(vehicles), -np.inf)
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Last positions, shape (n, 3), m, fixed frame; NaN before the first."""
+        return self._states[:, :3]
+
+    @property
+    def velocities(self) -> NDArray[np.float64]:
+        """Last velocities, shape (n, 3), m/s, fixed frame; NaN before the first."""
+        return self._states[:, 3:6]
+
+    @property
+    def headings(self) -> NDArray[np.float64]:
+        """Last headings, shape (n,), rad; NaN before the first."""
+        return self._states[:, 6]
+
+    def subscribe(self, handle: NodeHandle) -> None:
+        """Subscribe to the topics of all vehicles through the handle of a node."""
+        self._handle = handle
+        for number, name in enumerate(self.names):
+            on_status = partial(self._on_flight_status, number)
+            handle.subscribe(f"/{name}/{FLIGHT_STATUS}", FlightStatus, on_status)
+        scalar = {name: number for number, name in enumerate(self.names)}
+        for topic, vehicles in self._vectorized.items():
+            numbers = np.array([scalar.pop(vehicle.name) for vehicle in vehicles])
+            handle.subscribe(topic, Float64MultiArray, partial(self._on_states, numbers))
+        for name, number in scalar.items():
+            on_state = partial(self._on_state, number)
+            handle.subscribe(f"/{name}/{STATE}", PositionVelocityYawStateStamped, on_state)
+
+    def are_fresh(self) -> NDArray[np.bool_]:
+        """Return which positions are finite and younger than `MAX_POSITION_AGE`, shape (n,)."""
+        age = self._handle.time() - self._times
+        return (age >= 0.0) & (age < MAX_POSITION_AGE) & np.isfinite(self.positions).all(axis=1)
+
+    def goal(self, number: int) -> Goal[float] | None:
+        """Return position, velocity and heading of one as a goal; None if they are not fresh."""
+        # For one of a hundred vehicles that move, as `are_fresh` for all would take longer.
+        age = self._handle.time() - self._times.item(number)
+        x, y, z, *velocity, yaw = self._states[number].tolist()
+        if not (0.0 <= age < MAX_POSITION_AGE and math.isfinite(x + y + z)):
+            return None
+        return Goal((x, y, z), tuple(velocity), (0.0, 0.0, 0.0), yaw, 0.0)
+
+    def are_in_flight(self) -> NDArray[np.bool_]:
+        """Return which vehicles are in flight, so that others must keep apart, shape (n,)."""
+        return np.isin(self.flight_states, _IN_FLIGHT)
+
+    def flying(self) -> set[str]:
+        """Return the names of those in flight."""
+        return {self.names[number] for number in np.flatnonzero(self.are_in_flight())}
+
+    def _on_state(self, number, message):
+        self._states[number] = to_tuple(message.state)
+        self._times[number] = self._handle.time()
+
+    def _on_states(self, numbers, message):
+        if len(message.data) != 7 * len(numbers):
+            self._handle.warn(
+                f"ignoring {len(message.data)} numbers as states of {len(numbers)} vehicles",
+                throttle=1.0,
+                key="states",
+            )
+            return
+        self._states[numbers] = np.reshape(message.data, (-1, 7))
+        self._times[numbers] = self._handle.time()
+
+    def _on_flight_status(self, number, message):
+        self.flight_states[number] = message.state
+        self.takeoff_refusals[number] = message.takeoff_refusal
+
 
 LANDING_TOPIC = "/fleet/landing"  #: Names of vehicles that only the fleet moves, until they land.
 SILENCE_PERIOD = 5.0  #: Period of warnings about a vehicle whose states do not come (s).
@@ -44,18 +145,18 @@ class SharedTimer:
     def __init__(self, handle: NodeHandle, period: float):
         self._handle = handle
         self._period = period
-        self._shares: dict[_Share, None] = {}
+        self._shares: dict[TimerShare, None] = {}
         self._timer: Timer | None = None
 
-    def add(self, callback: Callable[[], None]) -> "_Share":
+    def add(self, callback: Callable[[], None]) -> "TimerShare":
         """Call ``callback()`` at each tick from now on."""
-        share = _Share(self, callback)
+        share = TimerShare(self, callback)
         self._shares[share] = None
         if self._timer is None:
             self._timer = self._handle.timer(self._period, self._on_timer)
         return share
 
-    def remove(self, share: "_Share") -> None:
+    def remove(self, share: "TimerShare") -> None:
         """End the calls of a callback."""
         self._shares.pop(share, None)
         if not self._shares and self._timer is not None:
@@ -67,17 +168,20 @@ class SharedTimer:
             share.callback()
 
 
-class _Share:
+class TimerShare:
+    """A callback of a `SharedTimer`."""
+
     def __init__(self, timer: SharedTimer, callback: Callable[[], None]):
         self.callback = callback
         self._timer = timer
 
     def stop(self) -> None:
+        """End the calls."""
         self._timer.remove(self)
 
 
 class TrackedVehicle:
-    """A vehicle whose references pass through `ReferencesNode`; see `FleetVehicle`."""
+    """A vehicle whose references pass through `ReferencesNode`; its `HighLevelNode` gives some."""
 
     def __init__(
         self,
@@ -90,10 +194,13 @@ class TrackedVehicle:
         self._timers = timers  # By their periods (s).
         self.name = config.name
         self.buffer = config.buffer
-        self.is_held = False
-        self.is_to_land = False
+        self.is_held = False  #: Whether it is kept at its place, as another one is too near.
+        self.is_to_land = False  #: Whether only the fleet moves it, until it lands.
+        #: Called when the fleet, or another node, commands it.
         self.on_interruption: Callable[[], None] = lambda: None
+        #: Called after the reference of another node.
         self.on_reference: Callable[[], None] = lambda: None
+        #: Returns where its own references lead in a time (s), m; None if they do not move.
         self.ahead: Callable[[float], Triple | None] = lambda time: None
         #: End of its takeoffs by the fleet file, if the file has no start point for it (m).
         self.hover_point: Triple | None = None
@@ -130,7 +237,7 @@ class TrackedVehicle:
             self._own.header = header
             self._public.publish(self._own)
 
-    def timer(self, period: float, callback: Callable[[], None]) -> "_Share":
+    def timer(self, period: float, callback: Callable[[], None]) -> "TimerShare":
         """Call ``callback()`` every ``period`` seconds, by one timer of all vehicles."""
         if period not in self._timers:
             self._timers[period] = SharedTimer(self._handle, period)

@@ -1,16 +1,260 @@
-"""Dry runs: missions of ideal vehicles, with the checks of a flight, without waiting."""
+"""Ideal vehicles, and dry runs: missions of ideal vehicles, with the checks of a flight."""
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from typing import Any
 
 from typing_extensions import override
 
 from crazyflie_mission_api.group_state import Rules
-from crazyflie_mission_api.ideal_vehicle import IdealVehicle
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, MissionError
-from crazyflie_mission_api.mission_vehicle import Clock
+from crazyflie_mission_api.mission_vehicle import (
+    MEMORY,
+    Clock,
+    MissionVehicle,
+    Move,
+    Playback,
+    Setpoint,
+    done,
+)
+from crazyflie_mission_api.trajectories import TimedTrajectory
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_model.angles import Triple
+from crazyflie_model.planner import smooth_piece
+from crazyflie_model.polynomials import Goal, PolynomialPiece, at_rest
+from crazyflie_model.trajectory import Pieces, Trajectory
+
+_DEFINITIONS = 31  #: Number of trajectories that can be defined at one time.
+_MIN_DURATION = 0.01  #: Shortest duration of a plan, as in the firmware (s).
+
+
+class TrajectoryMemory:
+    """The trajectory memory of an ideal vehicle: that of the firmware, with messages.
+
+    Trajectories have the ids of scripts, which go to 255; those of the firmware go to 30.
+
+    Parameters
+    ----------
+    name : str
+        Of the vehicle.
+    warn : callable
+        Gets a text.
+    """
+
+    def __init__(self, name: str, warn: Callable[[str], None]):
+        self._name = name
+        self._warn = warn
+        self._pieces: dict[int, PolynomialPiece] = {}
+        self._rooms: dict[int, range] = {}
+
+    def upload(self, trajectory_id: int, piece_offset: int, pieces: Pieces) -> None:
+        """Write pieces; ValueError when there is no room."""
+        where = f"{self._name}.uploadTrajectory"
+        room = range(piece_offset, piece_offset + len(pieces))
+        if room.stop > MEMORY:
+            raise ValueError(
+                f"{where}: {len(pieces)} pieces from pieceOffset {piece_offset} on; expected no "
+                f"more than {MEMORY} in all, the room in the memory"
+            )
+        if trajectory_id not in self._rooms and len(self._rooms) >= _DEFINITIONS:
+            raise ValueError(
+                f"{where}: trajectoryId is {trajectory_id}; expected one of the {_DEFINITIONS} "
+                f"that are in use: {sorted(self._rooms)}"
+            )
+        if trajectory_id >= _DEFINITIONS:
+            self._warn(
+                f"{where}: trajectoryId is {trajectory_id}; a real vehicle refuses it, the "
+                f"firmware expects 0 to {_DEFINITIONS - 1}"
+            )
+        for other, taken in self._rooms.items():
+            if other != trajectory_id and set(taken) & set(room):
+                self._warn(
+                    f"{where}: pieces {room.start} to {room.stop - 1} overwrite trajectory "
+                    f"{other}; another pieceOffset keeps both"
+                )
+        self._rooms[trajectory_id] = room
+        self._pieces |= dict(zip(room, pieces, strict=True))
+
+    def __getitem__(self, trajectory_id: int) -> list[PolynomialPiece]:
+        """Return the pieces of a trajectory; ValueError for one that is not there."""
+        if trajectory_id not in self._rooms:
+            raise ValueError(
+                f"{self._name}.startTrajectory: trajectoryId is {trajectory_id}; expected one that "
+                f"uploadTrajectory has written: {sorted(self._rooms) or 'there is none'}"
+            )
+        return [self._pieces[number] for number in self._rooms[trajectory_id]]
+
+
+class IdealVehicle(MissionVehicle):
+    """A vehicle that follows the plans of the firmware's high-level commander without an error.
+
+    Parameters
+    ----------
+    name : str
+    time : callable
+        Returns the time, s.
+    position : tuple, 3 components
+        Position at the beginning, on the ground, m.
+    yaw : float
+        rad.
+    bounds, start_skew
+        Those of the real one.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        time: Callable[[], float],
+        position: Triple,
+        yaw: float = 0.0,
+        bounds: Bounds = EVERYWHERE,
+        start_skew: float = 0.0,
+    ):
+        self.name = name
+        self.bounds = bounds
+        self.start_skew = start_skew
+        self.trajectory = TimedTrajectory.hover(position, yaw)  #: The plan, also after its end.
+        self._time = time
+        self._flies = False
+        self.groups = 0  #: Mask of the groups that it belongs to.
+        self._memory = TrajectoryMemory(name, self._warn)
+        self._prepared: Pieces = ()
+
+    @property
+    def is_active(self) -> bool:
+        """Whether a plan keeps the motors running: in flight, or in a landing."""
+        return self._flies or self._time() < self.trajectory.end
+
+    def planned(self) -> Goal[float]:
+        """Return the present goal of the plan, at which the next plan begins."""
+        return self.trajectory.goal(self._time())
+
+    @override
+    def position(self) -> Triple:
+        return self.planned().position
+
+    @override
+    def heading(self) -> float:
+        return self.planned().yaw
+
+    @override
+    def fault(self) -> str:
+        return ""
+
+    @override
+    def has_landed(self) -> bool:
+        return not self.is_active
+
+    @override
+    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
+        if not self._may_plan("takeoff", group_mask):
+            return done(None)
+        if self.is_active:
+            self._warn(f"{self.name}.takeoff: it flies; a real vehicle ignores the command")
+            return done(None)
+        return self._climb(height, duration, flies=True)
+
+    @override
+    def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":
+        is_landing = self.is_active and not self._flies
+        if not self._may_plan("land", group_mask) or is_landing:
+            return done(None)
+        return self._climb(height or 0.0, duration, flies=False)
+
+    @override
+    def stop(self, group_mask: int = 0) -> "Future[Any]":
+        if self._may_plan("stop", group_mask):
+            self._stop_motors("stop")
+        return done(None)
+
+    @override
+    def go_to(self, move: Move, group_mask: int = 0) -> "Future[Any]":
+        if not self._may_plan("goTo", group_mask):
+            return done(None)
+        start, goal, yaw = self.planned(), move.goal, move.yaw
+        if move.relative:
+            x, y, z = (a + b for a, b in zip(goal, start.position, strict=True))
+            goal, yaw = (x, y, z), yaw + start.yaw
+        return self._fly([smooth_piece(start, goal, yaw, max(move.duration, _MIN_DURATION))])
+
+    @override
+    def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
+        self._prepared = pieces
+        return done(None)
+
+    @override
+    def start(self) -> "Future[Any]":
+        return self._fly(self._prepared)
+
+    @override
+    def upload_trajectory(
+        self, trajectory_id: int, piece_offset: int, pieces: Pieces
+    ) -> "Future[Any]":
+        self._memory.upload(trajectory_id, piece_offset, pieces)
+        return done(None)
+
+    @override
+    def start_trajectory(self, flight: Playback, group_mask: int = 0) -> "Future[Any]":
+        if not self._may_plan("startTrajectory", group_mask):
+            return done(None)
+        pieces = self._memory[flight.number]
+        trajectory = Trajectory(pieces, flight.time_scale, flight.reverse)
+        start = self.planned().position
+        return self._fly(trajectory.moved_to(start, None) if flight.relative else trajectory)
+
+    @override
+    def set_group_mask(self, group_mask: int) -> "Future[Any]":
+        self.groups = group_mask
+        return done(None)
+
+    @override
+    def arm(self, arm: bool) -> "Future[Any]":
+        return done(None)
+
+    @override
+    def send(self, setpoint: Setpoint) -> None:
+        # The firmware's commander makes the planner forget its plan (commander.c).
+        self._forget_plan()
+
+    @override
+    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int = 0) -> "Future[Any]":
+        return done(None)
+
+    @override
+    def emergency(self) -> "Future[Any]":
+        x, y, _ = self.position()
+        self._flies = False
+        self.trajectory = TimedTrajectory.hover((x, y, 0.0))
+        return done(None)
+
+    def _may_plan(self, method: str, group_mask: int) -> bool:
+        """Return whether a high-level command concerns this vehicle."""
+        return group_mask == 0 or bool(group_mask & self.groups)
+
+    def _warn(self, text: str) -> None:
+        """Process what a real vehicle would not do."""
+
+    def _stop_motors(self, method: str) -> None:
+        """Stop where it is."""
+        self._forget_plan()
+
+    def _forget_plan(self):
+        start = self.planned()
+        self._flies = False
+        self.trajectory = TimedTrajectory.hover(start.position, start.yaw)
+
+    def _climb(self, height, duration, flies):
+        start = self.planned()
+        (x, y, _), yaw = start.position, start.yaw
+        duration = max(duration, _MIN_DURATION)
+        piece = smooth_piece(at_rest(start.position, yaw), (x, y, height), yaw, duration)
+        return self._fly([piece], flies)
+
+    def _fly(self, plan: Pieces | Trajectory, flies: bool = True) -> "Future[Any]":
+        self._flies = flies
+        self.trajectory = TimedTrajectory(plan, self._time())
+        return done(None)
+
 
 _STEP = 0.05  #: Time step (s).
 

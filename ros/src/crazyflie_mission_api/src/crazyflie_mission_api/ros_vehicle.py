@@ -13,20 +13,20 @@ from std_srvs.srv import Empty, SetBool
 from typing_extensions import override
 
 from crazyflie_driver import srv
-from crazyflie_fleet.conversions import heading, to_message
-from crazyflie_fleet.high_level_services import HIGH_LEVEL, START_TOPIC
+from crazyflie_fleet.high_level_services import HIGH_LEVEL, START_TOPIC, heading, to_message
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.mission_vehicle import (
     MEMORY,
+    AttitudeSetpoint,
     Commands,
     MissionVehicle,
     Move,
     Playback,
+    Setpoint,
     done,
     forward,
     in_turn,
 )
-from crazyflie_mission_api.setpoints import AttitudeSetpoint, Setpoint
 from crazyflie_mission_api.stream import SetpointPublishers, SetpointStream
 from crazyflie_mission_api.trajectories import START_SKEW
 from crazyflie_model.angles import Triple, quaternion_from_rpy

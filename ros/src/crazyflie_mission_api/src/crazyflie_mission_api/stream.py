@@ -14,9 +14,8 @@ from std_msgs.msg import Empty
 
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
 from crazyflie_driver.setpoint_gate import OVERLAP
-from crazyflie_fleet.conversions import full_state_message
-from crazyflie_mission_api.mission_vehicle import done
-from crazyflie_mission_api.setpoints import (
+from crazyflie_fleet.high_level_services import full_state_message
+from crazyflie_mission_api.mission_vehicle import (
     AttitudeSetpoint,
     FullStateSetpoint,
     HoverSetpoint,
@@ -24,6 +23,7 @@ from crazyflie_mission_api.setpoints import (
     PositionSetpoint,
     Setpoint,
     VelocityWorldSetpoint,
+    done,
 )
 from crazyflie_mission_api.trajectories import TimedTrajectory
 from crazyflie_model.polynomials import Goal

@@ -14,12 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 from uav_trajectory import Trajectory
 
-from crazyflie_mission_api.mission_vehicle import Move, Playback
-from crazyflie_mission_api.setpoints import (
+from crazyflie_mission_api.mission_vehicle import (
     AttitudeSetpoint,
     FullStateSetpoint,
     HoverSetpoint,
     MotorsOffSetpoint,
+    Move,
+    Playback,
     PositionSetpoint,
     Setpoint,
     VelocityWorldSetpoint,
@@ -28,7 +29,7 @@ from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_py import arguments as check
 from crazyflie_py.fleet import FleetVehicle
-from crazyflie_py.swarm import DEFAULT_COLOR, Order, Swarm, Visualizer
+from crazyflie_py.swarm import DEFAULT_COLOR, NullVisualizer, Order, Swarm
 
 _log = logging.getLogger(__name__)
 
@@ -44,14 +45,14 @@ class TimeHelper:
     ----------
     dt : float
         Period of the simulation's steps, s; 0 without --sim.
-    visualizer : Visualizer
+    visualizer : NullVisualizer
         What --sim draws with; without --sim it does nothing.
     crazyflies : sequence of Crazyflie
     """
 
     def __init__(self, swarm: Swarm, crazyflies: Sequence[object]):
         self._swarm = swarm
-        self.visualizer: Visualizer = swarm.visualizer
+        self.visualizer: NullVisualizer = swarm.visualizer
         self.crazyflies = crazyflies
 
     @property

@@ -16,8 +16,8 @@ from typing_extensions import override
 from crazyflie_fleet.high_level_services import HIGH_LEVEL
 from crazyflie_mission_api import Fleet, MissionError
 from crazyflie_mission_api.fleet import catch_signals
+from crazyflie_mission_api.mission_vehicle import Setpoint
 from crazyflie_mission_api.ros_vehicle import ALL_OF_FLEET, ServiceCommands, common_services
-from crazyflie_mission_api.setpoints import Setpoint
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py import fleet as fleet_files
@@ -25,8 +25,7 @@ from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.ros_connection import ScriptConnection, running_vehicles
 from crazyflie_py.script_vehicle import ScriptVehicle
 from crazyflie_py.separation_watch import SeparationWatch
-from crazyflie_py.swarm import Order, ParameterStore, ScriptState, Swarm, Visualizer
-from crazyflie_py.visualizer import NullVisualizer
+from crazyflie_py.swarm import NullVisualizer, Order, ParameterStore, ScriptState, Swarm
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.process import Process
 
@@ -108,7 +107,7 @@ class RosSwarm(Swarm):
 
     @property
     @override
-    def visualizer(self) -> Visualizer:
+    def visualizer(self) -> NullVisualizer:
         return self._visualizer
 
     @property

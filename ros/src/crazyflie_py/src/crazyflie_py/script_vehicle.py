@@ -5,10 +5,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from crazyflie_driver import srv
-from crazyflie_fleet.settings import FirmwareNumber
-from crazyflie_mission_api.mission_vehicle import Clock
+from crazyflie_fleet.fleet_config import FirmwareNumber
+from crazyflie_mission_api.mission_vehicle import Clock, Setpoint
 from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, velocity_between
-from crazyflie_mission_api.setpoints import Setpoint
 from crazyflie_model.angles import Triple, rpy_from_quaternion
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_msgs.msg import FlightStatus, VehicleStatus

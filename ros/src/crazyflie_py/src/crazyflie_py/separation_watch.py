@@ -6,16 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_mission_api.mission_vehicle import Move
-from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, velocity_between
-from crazyflie_mission_api.setpoints import (
+from crazyflie_mission_api.mission_vehicle import (
     SETPOINT_TIMEOUT,
     AttitudeSetpoint,
     MotorsOffSetpoint,
+    Move,
     PositionSetpoint,
     Setpoint,
     led_to,
 )
+from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, velocity_between
 from crazyflie_model.angles import Triple
 from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_py.ros_connection import ScriptConnection

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
-from crazyflie_mission_api.ideal_vehicle import IdealVehicle
-from crazyflie_mission_api.mission_vehicle import done
-from crazyflie_mission_api.setpoints import (
+from crazyflie_mission_api.dry_run import IdealVehicle
+from crazyflie_mission_api.mission_vehicle import (
     SETPOINT_TIMEOUT,
     AttitudeSetpoint,
     FullStateSetpoint,
@@ -21,6 +20,7 @@ from crazyflie_mission_api.setpoints import (
     PositionSetpoint,
     Setpoint,
     VelocityWorldSetpoint,
+    done,
 )
 from crazyflie_model.angles import Triple
 from crazyflie_model.collision_avoidance import AvoidanceSettings, CollisionAvoidance

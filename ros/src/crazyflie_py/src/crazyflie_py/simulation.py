@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from crazyflie_fleet.fleet_config import close_pairs
-from crazyflie_mission_api.setpoints import Setpoint
+from crazyflie_mission_api.mission_vehicle import Setpoint
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.fleet import FleetVehicle

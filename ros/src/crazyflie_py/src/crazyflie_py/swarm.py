@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
-from crazyflie_mission_api.setpoints import Setpoint
+from crazyflie_mission_api.mission_vehicle import Setpoint
 from crazyflie_model.angles import Triple
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import PolynomialPiece
@@ -52,20 +52,23 @@ class ParameterStore(Protocol):
         """Set parameters; ValueError for unknown names."""
 
 
-class Visualizer(Protocol):
-    """Methods of ``timeHelper.visualizer`` that scripts call."""
+class NullVisualizer:
+    """``timeHelper.visualizer``, with the methods that scripts call: draws nothing."""
 
     def setGraph(self, edges: Sequence[tuple[int, int]]) -> None:
-        """Draw lines between vehicles, given by their numbers in ``crazyflies``."""
+        """Draw lines between vehicles from now on."""
 
     def showEllipsoids(self, radii: Sequence[float]) -> None:
-        """Draw an ellipsoid around each vehicle, radii in m."""
+        """Draw an ellipsoid with these radii (m) around each vehicle from now on."""
 
     def startVideoOutput(self, path: str, dt: float) -> None:
         """Write a video, a frame each ``dt`` (s)."""
 
     def finishVideoOutput(self) -> None:
-        """End the video."""
+        """End the video, if there is one."""
+
+    def update(self, t: float, crazyflies: Sequence[Any]) -> None:
+        """Draw vehicles at a time, s."""
 
 
 class Swarm(Protocol):
@@ -78,7 +81,7 @@ class Swarm(Protocol):
         """At least one vehicle; ids and names are different."""
 
     @property
-    def visualizer(self) -> Visualizer:
+    def visualizer(self) -> NullVisualizer:
         """The visualizer of --sim; otherwise one that draws nothing."""
 
     @property

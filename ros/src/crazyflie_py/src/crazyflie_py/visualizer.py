@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from crazyflie_py.simulated_vehicle import SimulatedVehicle
+from crazyflie_py.swarm import NullVisualizer
 
 _log = logging.getLogger(__name__)
 
@@ -20,25 +21,6 @@ _LINE_COLOR = (0.3, 0.3, 0.3)
 
 _POINT_SIZE = 60  #: Area of a vehicle, in squared typographic points.
 _POINTS = 24  #: Number of points of each of the three circles of an ellipsoid.
-
-
-class NullVisualizer:
-    """Draws nothing."""
-
-    def setGraph(self, edges: Sequence[tuple[int, int]]) -> None:
-        """Draw lines between vehicles from now on."""
-
-    def showEllipsoids(self, radii: Sequence[float]) -> None:
-        """Draw an ellipsoid with these radii (m) around each vehicle from now on."""
-
-    def startVideoOutput(self, path: str, dt: float) -> None:
-        """Write a video, a frame each ``dt`` (s)."""
-
-    def finishVideoOutput(self) -> None:
-        """End the video, if there is one."""
-
-    def update(self, t: float, crazyflies: Sequence[SimulatedVehicle]) -> None:
-        """Draw vehicles at a time, s."""
 
 
 class MatplotlibVisualizer(NullVisualizer):

@@ -17,6 +17,7 @@ from typing import Any
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual import ports
 from crazyflie_virtual.body import Physics
+from crazyflie_virtual.crtp import Packet, Port, decode, is_broadcast
 from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
 from crazyflie_virtual.firmware.planner import ACTIVE, TrajectoryState
 from crazyflie_virtual.firmware.setpoints import PRIORITY_CRTP
@@ -46,8 +47,18 @@ _LOG_CODES = {each.format: code for code, each in LOG_TYPES.items()}
 _PARAMETER_CODES = {each.format: code for code, each in PARAMETER_TYPES.items()}
 
 _EMERGENCY_STOP = 0x03
-_LINK_BITS = 3 << 2
 _NULL_PACKET = (15, 3)  #: Port and channel of the packet by which vehicles are searched.
+
+#: Port and channel -> handler of the firmware. Other ports are those of the fake vehicle.
+_FIRMWARE_HANDLERS: dict[tuple[int, int], Callable[[Firmware, int, bytes], bytes | None]] = {
+    (Port.SETPOINT, 0): ports.handle_attitude,
+    (Port.GENERIC_SETPOINT, 0): ports.handle_generic,
+    (Port.GENERIC_SETPOINT, 1): ports.handle_generic,
+    (Port.HIGH_LEVEL, 0): ports.handle_high_level,
+    (Port.PLATFORM, 1): ports.handle_platform,
+    (Port.LINK, 0): ports.handle_link,
+    (Port.LINK, 1): ports.handle_link,
+}
 
 _THAW = bytes(40)  #: A datagram that ends a freeze; packets are shorter.
 _THAW_LIMIT = 60.0  #: Longest time until a vehicle thaws on a busy machine (s).
@@ -215,7 +226,7 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
 
     def send(self, port: int, channel: int, data: bytes) -> None:
         """Send a packet without being asked."""
-        self.send_datagram(bytes([port << 4 | 3 << 2 | channel]) + data)
+        self.send_datagram(Packet(port, channel, data).encode())
 
     def send_datagram(self, datagram: bytes) -> None:
         """Send any datagram."""
@@ -252,23 +263,23 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
                 self._is_frozen = False
                 self._thawed.set()
                 continue
-            if self._is_frozen or not datagram:
+            packet = decode(datagram)
+            if self._is_frozen or packet is None:
                 continue
-            port, channel, data = datagram[0] >> 4, datagram[0] & 3, datagram[1:]
-            if self.stalls_at is not None and _begins((port, channel, data), self.stalls_at):
+            if self.stalls_at is not None and _begins(packet, self.stalls_at):
                 self._resumed.wait(_THAW_LIMIT)
-            is_broadcast = not datagram[0] & _LINK_BITS
-            if is_broadcast and not self.hears_broadcasts:
+            is_for_all = is_broadcast(datagram)
+            if is_for_all and not self.hears_broadcasts:
                 continue
-            if not is_broadcast:
+            if not is_for_all:
                 self._peer = peer
             with self._changed:
-                self.received.append((port, channel, data))
-                if is_broadcast:
-                    self.broadcasts.append((port, channel, data))
+                self.received.append(packet)
+                if is_for_all:
+                    self.broadcasts.append(packet)
                 self._changed.notify_all()
-            if not any(_begins((port, channel, data), each) for each in self.deaf):
-                self._reply(port, channel, data)
+            if not any(_begins(packet, each) for each in self.deaf):
+                self._reply(*packet)
 
     def _reply(self, port, channel, data):
         if (port, channel) == _NULL_PACKET:
@@ -276,9 +287,8 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
             return
         answer = self.answers.get((port, channel, data[0] if data else None))
         if answer is None:
-            method = getattr(self, f"_on_{port}_{channel}", None)
             self.flight.update()
-            answer = method(data) if method is not None else None
+            answer = self._answer(port, channel, data)
             self.flight.update()
         if answer is None:
             return
@@ -286,16 +296,11 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         if not self.lose(self._replies):
             self.send(port, channel, answer)
 
-    # Link and platform.
-
-    def _on_15_0(self, data):
-        return ports.handle_link(self.flight, 0, data)
-
-    def _on_15_1(self, data):
-        return ports.handle_link(self.flight, 1, data)
-
-    def _on_13_1(self, data):
-        return ports.handle_platform(self.flight, 1, data)
+    def _answer(self, port, channel, data):
+        if (port, channel) in _FIRMWARE_HANDLERS:
+            return _FIRMWARE_HANDLERS[port, channel](self.flight, channel, data)
+        method = getattr(self, f"_on_{port}_{channel}", None)
+        return None if method is None else method(data)
 
     # Log.
 
@@ -375,19 +380,7 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
     def _on_2_3(self, data):
         return data[:3] + b"\0\x01"
 
-    # Setpoints and commands.
-
-    def _on_3_0(self, data):
-        ports.handle_attitude(self.flight, 0, data)
-
-    def _on_7_0(self, data):
-        ports.handle_generic(self.flight, 0, data)
-
-    def _on_7_1(self, data):
-        ports.handle_generic(self.flight, 1, data)
-
-    def _on_8_0(self, data):
-        return ports.handle_high_level(self.flight, 0, data)
+    # Supervisor.
 
     def _on_9_0(self, data):
         if self.protocol < SUPERVISOR_PROTOCOL:

@@ -52,7 +52,7 @@ def test_base_stations_are_occluded(occluded, active):
     bench = Bench(positioning="lighthouse", occluded=occluded)
     bench.run(1.0)
     deck = bench.firmware.deck
-    assert (deck.received, deck.active_stations, deck.known_stations) == (active, active, 3)
+    assert (deck.received, deck.active_stations, deck.located_stations) == (active, active, 3)
     assert (bench.firmware.estimator.variance_position < 1e-4) is (active > 0)
 
 

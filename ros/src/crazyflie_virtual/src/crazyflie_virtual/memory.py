@@ -140,23 +140,24 @@ class MemoryTester(Memory):
 
 
 class LighthouseMemory(Memory):
-    """Geometry and calibration of base stations; kept, but nothing is located with them.
+    """Geometry and calibration of base stations.
 
     What is ``stored``, by page, outlives a restart.
     """
 
     STATIONS = 4  #: As many as the firmware is built for unless it is configured otherwise.
 
-    _CALIBRATION_PAGE = 16
+    CALIBRATION_PAGE = 16  #: Number of the first calibration's page; geometries begin at 0.
+
     _PAGE_SIZE = 0x100
     _GEOMETRY_SIZE = 49
     _CALIBRATION_SIZE = 61
 
     def __init__(self, stored: dict[int, bytes]):
-        size = self._CALIBRATION_PAGE * self._PAGE_SIZE + self.STATIONS * self._CALIBRATION_SIZE
+        size = self.CALIBRATION_PAGE * self._PAGE_SIZE + self.STATIONS * self._CALIBRATION_SIZE
         super().__init__(LIGHTHOUSE, b"", size=size)
         self._stored = stored
-        sizes = ((0, self._GEOMETRY_SIZE), (self._CALIBRATION_PAGE, self._CALIBRATION_SIZE))
+        sizes = ((0, self._GEOMETRY_SIZE), (self.CALIBRATION_PAGE, self._CALIBRATION_SIZE))
         self._pages = {
             first + i: Memory(LIGHTHOUSE, bytearray(stored.get(first + i, bytes(size))))
             for first, size in sizes
@@ -165,12 +166,17 @@ class LighthouseMemory(Memory):
 
     def store(self, geometries: int, calibrations: int) -> bool:
         """Keep what is marked in two bit masks over a restart; return whether all was there."""
-        masks = ((0, geometries), (self._CALIBRATION_PAGE, calibrations))
+        masks = ((0, geometries), (self.CALIBRATION_PAGE, calibrations))
         marked = [first + i for first, mask in masks for i in range(16) if mask >> i & 1]
         pages = {number: self._pages[number] for number in marked if number in self._pages}
-        for number, page in pages.items():
-            self._stored[number] = page.read(0, page.size) or b""
+        for number in pages:
+            self._stored[number] = self.page(number)
         return len(pages) == len(marked)
+
+    def page(self, number: int) -> bytes:
+        """Return a geometry, or a calibration, which ends in whether it is valid."""
+        page = self._pages[number]
+        return page.read(0, page.size) or b""
 
     @override
     def read(self, address: int, count: int) -> bytes | None:

@@ -179,7 +179,7 @@ _GROUPS = {
         *_rows(FLOAT, maxPos=100.0, maxVel=10.0),
     ],
     "locSrv": [
-        *_rows(U8, enRangeStreamFP32=0, enLhAngleStream=0),
+        *_rows(U8, enRangeStreamFP32=0, enLhAngleStream="deck.sends_angles"),
         *_rows(FLOAT, extPosStdDev="localization.position_deviation"),
         *_rows(FLOAT, extQuatStdDev="localization.attitude_deviation"),
     ],

@@ -147,7 +147,7 @@ def _version(firmware, command):
     return None
 
 
-_POSITION, _GENERIC, _PACKED_POSITIONS = 0, 1, 2
+_POSITION, GENERIC, _PACKED_POSITIONS = 0, 1, 2  #: Channels of localization.
 _STOP_MESSAGE, _WATCHDOG_MESSAGE, _POSE, _PACKED_POSES = 3, 4, 8, 9
 _STORE_LIGHTHOUSE = 11
 
@@ -175,10 +175,10 @@ class LocalizationPort:
             for values in _each(_PACKED_POSITION, data):
                 if values[0] == self._address:
                     self._take_position([part / 1000.0 for part in values[1:]])
-        elif channel == _GENERIC and len(data) == 5 and data[0] == _STORE_LIGHTHOUSE:
+        elif channel == GENERIC and len(data) == 5 and data[0] == _STORE_LIGHTHOUSE:
             done = self._lighthouse.store(*struct.unpack_from("<HH", data, 1))
             return bytes([_STORE_LIGHTHOUSE, done])
-        elif channel == _GENERIC and data:
+        elif channel == GENERIC and data:
             self._generic(data[0], data[1:])
         else:
             text = f"LOC: nothing done with {len(data)} bytes on channel {channel}"

@@ -2,6 +2,9 @@
 
 import math
 
+import numpy as np
+import numpy.typing as npt
+
 from crazyflie_model.angles import Quaternion
 
 _BITS = 9
@@ -24,6 +27,35 @@ def normalized(x: float, y: float, z: float, w: float) -> Quaternion:
     """Return the unit quaternion in a direction."""
     scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
     return x * scale, y * scale, z * scale, w * scale
+
+
+def product(p: Quaternion, q: Quaternion) -> Quaternion:
+    """Return the product of two unit quaternions: the rotation q, then p."""
+    (a, b, c, d), (x, y, z, w) = p, q
+    return normalized(
+        d * x + a * w + b * z - c * y,
+        d * y + b * w + c * x - a * z,
+        d * z + c * w + a * y - b * x,
+        d * w - a * x - b * y - c * z,
+    )
+
+
+def from_matrix(rotation: npt.NDArray[np.float64]) -> Quaternion:
+    """Return the unit quaternion of a rotation matrix, (3, 3).
+
+    Source: I. Y. Bar-Itzhack, New method for extracting the quaternion from a rotation matrix,
+    Journal of Guidance, Control, and Dynamics 23 (2000).
+    """
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    matrix = [
+        [a - e - i, b + d, c + g, h - f],
+        [b + d, e - a - i, f + h, c - g],
+        [c + g, f + h, i - a - e, d - b],
+        [h - f, c - g, d - b, a + e + i],
+    ]
+    # The eigenvector of the largest eigenvalue.
+    x, y, z, w = map(float, np.linalg.eigh(matrix)[1][:, 3])
+    return x, y, z, w
 
 
 def compress_quaternion(quaternion: Quaternion) -> int:

@@ -56,7 +56,7 @@ class VehicleSettings(Parameters):
     smooth_y: float = parameter(METRES, "the same", 0.0, "smooth/y")
     base_stations: int = parameter(Integer(1, 2), "of Lighthouse", 2)
     knows_stations: bool = parameter(
-        BOOLEAN, "geometry and calibration of the base stations are on the vehicle", True
+        BOOLEAN, "the geometry of the base stations is on the vehicle", True
     )
     multiranger: bool = parameter(
         BOOLEAN, "carry a Multi-ranger deck, which sees the ground and what is in `world`", False

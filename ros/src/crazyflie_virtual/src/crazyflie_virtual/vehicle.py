@@ -9,6 +9,7 @@ from crazyflie_utils.parameters import vehicle_model
 from crazyflie_virtual import crtp, ports
 from crazyflie_virtual.body import LOW_CHARGE, OFF, STEP, Battery, Physics
 from crazyflie_virtual.crtp import FirmwareAssertionError, Packet, Port
+from crazyflie_virtual.firmware.decks import lighthouse_pages
 from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
 from crazyflie_virtual.log import LogPort
 from crazyflie_virtual.memory import LighthouseMemory, MemoryPort, decks, eeprom, memories
@@ -29,7 +30,7 @@ class Storage:
             (deck.serial, deck.one_wire())
             for deck in decks(settings.positioning, settings.multiranger)
         ]
-        self.lighthouse: dict[int, bytes] = {}
+        self.lighthouse = lighthouse_pages(settings)
         self.parameters: dict[str, float] = {}
 
 
@@ -46,7 +47,7 @@ class Board:
     ):
         firmware = self.firmware = Firmware(physics, faults, settings, failure)
         self._log = LogPort(firmware)
-        lighthouse = LighthouseMemory(storage.lighthouse)
+        lighthouse = firmware.deck.memory = LighthouseMemory(storage.lighthouse)
         memory = MemoryPort(
             memories(
                 storage.eeprom,
@@ -88,6 +89,8 @@ class Board:
         """Return the packets that answer no request: log data and console."""
         packets = self._log.collect()
         firmware = self.firmware
+        for angles in firmware.deck.take_angles():
+            packets.append(Packet(Port.LOCALIZATION, ports.GENERIC, angles))
         while firmware.link_statistics.is_connected:
             piece = firmware.console.pop()
             if piece is None:

@@ -6,11 +6,17 @@ device.
 
 import math
 import random
+import struct
 from dataclasses import dataclass
+from functools import lru_cache
 
-from crazyflie_model.angles import Triple
+import numpy as np
+
+from crazyflie_model.angles import Quaternion, Triple, rotate
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.estimator import Estimator
+from crazyflie_virtual.memory import LighthouseMemory
+from crazyflie_virtual.quaternions import from_matrix, product
 from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO, FaultSwitches, VehicleSettings
 
 _POSITION_DEVIATION = 0.003  #: Deviation of the deck that knows the true pose (m).
@@ -27,6 +33,58 @@ _DRIFT = 0.015
 #: Process noise of a velocity that is not measured, m^2/s^3: 0.5 m/s after 1 s.
 _UNMEASURED = 0.25
 
+#: Places of the base stations (m), which look at the middle of the floor; one for each that
+#: `VehicleSettings.base_stations` may count.
+_STATIONS = ((-2.0, 1.5, 2.2), (2.0, 1.0, 2.4))
+
+#: Places of the Lighthouse deck's four sensors on the vehicle (m).
+_SENSORS = tuple((x, y, 0.0) for x in (-0.015, 0.015) for y in (0.0075, -0.0075))
+
+_ANGLE_DEVIATION = 1e-4  #: Deviation of an angle that a sensor measures (rad).
+_ANGLE_PERIOD = 2  #: Calls of `PositioningDeck.measure` from one set of angles to the next.
+_ANGLES = 10  #: Type of the packet that carries them.
+_GEOMETRY, _CALIBRATION = struct.Struct("<12f?"), struct.Struct("<14fI?")
+
+
+def _rows(x: float, y: float, z: float) -> list[Triple]:
+    # Rotation matrix, by rows, of a base station that looks at the origin: its x axis is forward.
+    yaw, pitch = math.atan2(-y, -x), math.atan2(z, math.hypot(x, y))
+    cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
+    return [(cy * cp, -sy, cy * sp), (sy * cp, cy, sy * sp), (-sp, 0.0, cp)]
+
+
+_ROTATIONS = [_rows(*place) for place in _STATIONS]
+#: True geometries as the vehicle's memory has them: place, rotation matrix, valid.
+GEOMETRIES = [
+    _GEOMETRY.pack(*place, *(each for row in rows for each in row), True)
+    for place, rows in zip(_STATIONS, _ROTATIONS, strict=True)
+]
+
+
+def lighthouse_pages(settings: VehicleSettings) -> dict[int, bytes]:
+    """Return pages of the memory of base stations, by number, as they are at the beginning.
+
+    The calibration comes with the light of a base station, its geometry from an earlier estimate.
+    """
+    if settings.positioning != LIGHTHOUSE:
+        return {}
+    numbers = range(settings.base_stations)
+    geometries = {number: GEOMETRIES[number] for number in numbers}
+    first = LighthouseMemory.CALIBRATION_PAGE
+    calibrations = {n + first: _CALIBRATION.pack(*[0.0] * 14, 1 + n, True) for n in numbers}
+    return calibrations | (geometries if settings.knows_stations else {})
+
+
+@lru_cache(maxsize=64)
+def _frame(station: int, page: bytes) -> tuple[Quaternion, Triple] | None:
+    # Attitude and origin of the world in the frame of a stored geometry; None if it is not valid.
+    values, true = _GEOMETRY.unpack(page), _GEOMETRY.unpack(GEOMETRIES[station])
+    rotation = np.reshape(values[3:12], (3, 3)) @ np.reshape(true[3:12], (3, 3)).T
+    if not values[-1] or abs(np.linalg.det(rotation) - 1.0) > 0.01:
+        return None
+    x, y, z = map(float, np.array(values[:3]) - rotation @ true[:3])
+    return from_matrix(rotation), (x, y, z)
+
 
 @dataclass(eq=False)
 class PositioningDeck:
@@ -40,6 +98,7 @@ class PositioningDeck:
     #: a velocity which is not measured at present.
     unmeasured: float = 0.0
     received: int = 0  #: Bit mask of the base stations whose light the deck has received last.
+    sends_angles: int = 0  #: Not 0: the measured angles are sent to the client.
 
     def __post_init__(self) -> None:
         kind = self.settings.positioning
@@ -51,6 +110,10 @@ class PositioningDeck:
         #: Difference of the position by optical flow from the true one, m.
         self._drift = [0.0, 0.0]
         self._is_drift_known = False
+        #: Geometry and calibration of the base stations.
+        self.memory = LighthouseMemory({})
+        self._angles: list[bytes] = []
+        self._angle_phase = 0
 
     @property
     def is_there(self) -> bool:
@@ -58,15 +121,27 @@ class PositioningDeck:
         return self.has_flow or self.has_lighthouse or self.has_loco
 
     @property
-    def known_stations(self) -> int:
-        """Bit mask of the base stations of which the vehicle has geometry and calibration."""
-        has_light = self.settings.positioning == LIGHTHOUSE
-        return self._stations if has_light and self.settings.knows_stations else 0
+    def located_stations(self) -> int:
+        """Bit mask of the base stations of which the vehicle has a valid geometry."""
+        pages = map(self.memory.page, range(len(_STATIONS)))
+        return sum(1 << i for i, page in enumerate(pages) if _frame(i, page) is not None)
+
+    @property
+    def calibrated_stations(self) -> int:
+        """Bit mask of the base stations of which the vehicle has a valid calibration."""
+        first = LighthouseMemory.CALIBRATION_PAGE
+        pages = (self.memory.page(first + i) for i in range(len(_STATIONS)))
+        return sum(1 << i for i, page in enumerate(pages) if page[-1])
 
     @property
     def active_stations(self) -> int:
         """Bit mask of the base stations that contribute to the position."""
-        return self.received & self.known_stations
+        return self.received & self.located_stations & self.calibrated_stations
+
+    def take_angles(self) -> list[bytes]:
+        """Return the packets with measured angles since the last call."""
+        angles, self._angles = self._angles, []
+        return angles
 
     def measure(self, dt: float) -> None:
         """Correct the estimate by the measurements of ``dt`` s."""
@@ -76,13 +151,49 @@ class PositioningDeck:
             return
         if kind == LIGHTHOUSE:
             self.received = self._stations & ~self.faults.occluded
-            number = self.active_stations.bit_count()
-            if not number:
-                return
-            deviation = _LIGHTHOUSE_DEVIATIONS[number - 1]
-        else:
-            deviation = _LOCO_DEVIATION if kind == LOCO else 0.0
+            self._angle_phase = (self._angle_phase + 1) % _ANGLE_PERIOD
+            if self.sends_angles and not self._angle_phase:
+                self._angles += map(self._measured_angles, _numbers(self.received))
+            self._measure_lighthouse(_numbers(self.active_stations))
+            return
+        deviation = _LOCO_DEVIATION if kind == LOCO else 0.0
         self._correct(self._noisy(deviation), deviation or _POSITION_DEVIATION)
+
+    def _measure_lighthouse(self, active):
+        if not active:
+            return
+        deviation = _LIGHTHOUSE_DEVIATIONS[len(active) - 1]
+        position, quaternion = self._noisy(deviation), self.physics.quaternion
+        frames = [_frame(i, page) for i in active if (page := self.memory.page(i)) != GEOMETRIES[i]]
+        if frames:
+            # Each base station is believed to be elsewhere, and so is the vehicle.
+            places = [
+                [a + b for a, b in zip(rotate(attitude, position), origin, strict=True)]
+                for attitude, origin in frames
+            ] + [position] * (len(active) - len(frames))
+            position = [sum(parts) / len(active) for parts in zip(*places, strict=True)]
+            quaternion = product(frames[0][0], quaternion)
+        self._correct(position, deviation, quaternion)
+
+    def _measured_angles(self, station):
+        # A packet with the horizontal and the vertical angle of each sensor (rad), those of the
+        # second to the fourth as differences from the first in half precision.
+        quaternion, columns = self.physics.quaternion, list(zip(*_ROTATIONS[station], strict=True))
+        angles = []
+        for sensor in _SENSORS:
+            place = zip(
+                self.physics.position, rotate(quaternion, sensor), _STATIONS[station], strict=True
+            )
+            way = [middle + arm - origin for middle, arm, origin in place]
+            x, y, z = (sum(a * b for a, b in zip(axis, way, strict=True)) for axis in columns)
+            angles.append([math.atan2(y, x), math.atan2(z, x)])
+        noise = self._random.gauss
+        fields = []
+        for first, *others in zip(*angles, strict=True):
+            measured = first + noise(0.0, _ANGLE_DEVIATION)
+            fields.append(measured)
+            fields += [measured - each - noise(0.0, _ANGLE_DEVIATION) for each in others]
+        return struct.pack("<BBf3ef3e", _ANGLES, station, *fields)
 
     def _noisy(self, deviation: float) -> Triple:
         x, y, z = self.physics.position
@@ -111,6 +222,12 @@ class PositioningDeck:
         s = self.settings
         return math.hypot(x - s.smooth_x, y - s.smooth_y) >= self.faults.smooth
 
-    def _correct(self, position: Triple, deviation: float) -> None:
+    def _correct(self, position, deviation, quaternion=None):
         self.estimator.correct_position(*position, deviation)
-        self.estimator.correct_attitude(*self.physics.quaternion, _ATTITUDE_DEVIATION)
+        self.estimator.correct_attitude(
+            *(quaternion or self.physics.quaternion), _ATTITUDE_DEVIATION
+        )
+
+
+def _numbers(mask):
+    return [number for number in range(mask.bit_length()) if mask >> number & 1]

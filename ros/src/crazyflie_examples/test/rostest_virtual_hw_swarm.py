@@ -1,6 +1,7 @@
 """Virtual vehicles take off, go and land together, over the radio's protocol.
 
-Motion capture knows one of them as a rigid body and two by one marker each.
+Motion capture knows one of them as a rigid body and two by one marker each; or each flies by the
+estimate of its deck.
 """
 
 import math

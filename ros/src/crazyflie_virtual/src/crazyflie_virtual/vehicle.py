@@ -133,7 +133,7 @@ class VirtualVehicle:
         if settings.world:
             self.physics.world = world_file.load(settings.world)
         self.battery = Battery(settings.battery)
-        self._storage = Storage(settings)
+        self.storage = Storage(settings)  #: What outlives a restart.
         self._steps = 0
         self._is_dead = False
         self._failure = ""
@@ -234,4 +234,4 @@ class VirtualVehicle:
 
     def _start(self, failure=""):
         self._restart_time = math.inf
-        self.board = Board(self.physics, self.faults, self._settings, self._storage, failure)
+        self.board = Board(self.physics, self.faults, self._settings, self.storage, failure)

@@ -164,15 +164,15 @@ class PositioningDeck:
             return
         deviation = _LIGHTHOUSE_DEVIATIONS[len(active) - 1]
         position, quaternion = self._noisy(deviation), self.physics.quaternion
-        frames = [_frame(i, page) for i in active if (page := self.memory.page(i)) != GEOMETRIES[i]]
-        if frames:
-            # Each base station is believed to be elsewhere, and so is the vehicle.
+        if any(self.memory.page(i) != GEOMETRIES[i] for i in active):
+            # A base station is believed to be elsewhere, and so is the vehicle.
+            frames = [frame for i in active if (frame := _frame(i, self.memory.page(i)))]
             places = [
                 [a + b for a, b in zip(rotate(attitude, position), origin, strict=True)]
                 for attitude, origin in frames
-            ] + [position] * (len(active) - len(frames))
-            position = [sum(parts) / len(active) for parts in zip(*places, strict=True)]
-            quaternion = product(frames[0][0], quaternion)
+            ]
+            x, y, z = (sum(parts) / len(frames) for parts in zip(*places, strict=True))
+            position, quaternion = (x, y, z), product(frames[0][0], quaternion)
         self._correct(position, deviation, quaternion)
 
     def _measured_angles(self, station):
@@ -222,11 +222,9 @@ class PositioningDeck:
         s = self.settings
         return math.hypot(x - s.smooth_x, y - s.smooth_y) >= self.faults.smooth
 
-    def _correct(self, position, deviation, quaternion=None):
+    def _correct(self, position: Triple, deviation: float, q: Quaternion | None = None) -> None:
         self.estimator.correct_position(*position, deviation)
-        self.estimator.correct_attitude(
-            *(quaternion or self.physics.quaternion), _ATTITUDE_DEVIATION
-        )
+        self.estimator.correct_attitude(*(q or self.physics.quaternion), _ATTITUDE_DEVIATION)
 
 
 def _numbers(mask):

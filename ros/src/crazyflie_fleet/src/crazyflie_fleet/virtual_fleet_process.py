@@ -67,6 +67,10 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
         nodes[name] = VirtualCrazyflieNode()
         if vehicle.settings.has_single_marker:
             single_markers.append(str(number + 1))
+    seen = bodies(fleet, config.fixed_frame)
+    if not seen:
+        # All vehicles fly by their decks.
+        return nodes
     ports = {"command_port": config.command_port, "data_port": config.data_port}
     noise = {"position": config.position_noise, "attitude": config.attitude_noise}
     own = {**ports, "observer": {"port": config.observer_port}, "noise": noise}
@@ -77,7 +81,7 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     client = {
         "backend": "natnet",
         "up_axis": "z",
-        **bodies(fleet, config.fixed_frame),
+        **seen,
         "optitrack_config": {**ports, **local},
     }
     handle.set_param("/mocap_node", client)

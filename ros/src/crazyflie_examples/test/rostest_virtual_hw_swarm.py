@@ -44,7 +44,7 @@ def wait_for(places, offset):
         goal = [a + b for a, b in zip(start, offset, strict=True)]
         peer.wait_until(
             lambda name=name, goal=goal: math.dist(places[name], goal) < TOLERANCE,
-            f"{name} at {goal}",
+            f"{name} at {goal}: it is at {places[name]}",
         )
 
 

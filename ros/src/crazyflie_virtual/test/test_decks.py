@@ -38,6 +38,15 @@ def test_optical_flow_drifts_with_the_way_and_not_with_time():
     assert 0.5 < root_mean_square / (0.015 * math.sqrt(2 * 4.0)) < 1.5
 
 
+def test_a_restarted_estimator_begins_where_it_is_told_to():
+    bench = Bench(positioning="flow")
+    bench.run(1.0)
+    bench.firmware.estimator.initial_y = 0.5
+    bench.firmware.reset_estimation = 1
+    bench.run(2.0)
+    assert bench.firmware.estimate.y == pytest.approx(0.5, abs=0.01)
+
+
 def test_without_texture_the_velocity_is_not_measured():
     bench = Bench(positioning="flow", smooth_x=2.0, smooth=0.5)
     bench.take_off()

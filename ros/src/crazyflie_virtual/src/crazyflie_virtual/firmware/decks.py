@@ -143,6 +143,10 @@ class PositioningDeck:
         angles, self._angles = self._angles, []
         return angles
 
+    def forget_drift(self) -> None:
+        """Measure by optical flow from the present estimate on: it has been set."""
+        self._is_drift_known = False
+
     def measure(self, dt: float) -> None:
         """Correct the estimate by the measurements of ``dt`` s."""
         kind = self.settings.positioning

@@ -141,6 +141,7 @@ class Firmware:
         if self.reset_estimation:
             self.reset_estimation = 0
             self.estimator.reset()
+            self.deck.forget_drift()
         self.estimator.grow_variances(_POSITION_PERIOD)
         if self.deck.is_there and not self.localization.is_fed(self.time):
             self.deck.measure(_POSITION_PERIOD)

@@ -100,7 +100,7 @@ def base_stations(path, *numbers):
 
 def test_base_stations_from_a_file(virtual, tmp_path):
     server, vehicle = virtual
-    pages = vehicle._storage.lighthouse
+    pages = vehicle.storage.lighthouse
     server.call("/cf9/write_lighthouse", base_stations(tmp_path / "two.yaml", 0, 3))
     assert struct.unpack_from("<3f", pages[3]) == (1.0, 2.0, 5.0)
     assert struct.unpack("<L?", pages[16 + 3][-5:]) == (1003, True)

@@ -1,7 +1,10 @@
 """What a process does about a ROS master that is gone, started anew, or does not know it."""
 
+from types import SimpleNamespace
+
 import pytest
 import rosgraph
+from rospy.impl import registration
 
 from crazyflie_utils.ros1 import master_watch
 from crazyflie_utils.ros1.master_watch import MasterWatch
@@ -107,3 +110,52 @@ def test_the_same_master_that_is_back_is_no_news(world):
     world.watch.look()
     assert len(world.said) == 1
     assert world.registered == 0
+
+
+@pytest.fixture
+def registered(monkeypatch):
+    """Return the registrations, and updates for rospy, of a process with topics and services."""
+    own, other = "http://own", "http://other"
+    subscriptions = {
+        "/handed_over": SimpleNamespace(has_connection=lambda uri: uri == own),
+        "/from_outside": SimpleNamespace(has_connection=lambda uri: False),
+        "/silent": SimpleNamespace(has_connection=lambda uri: False),
+    }
+    uris = {"/handed_over": [own], "/from_outside": [own, other], "/silent": []}
+    topics = SimpleNamespace(
+        subs=subscriptions,
+        get_publications=lambda: [("/handed_over", "a/B")],
+        get_subscriptions=lambda: [(name, "a/B") for name in subscriptions],
+    )
+    offered = ("/cf1/takeoff", "/cf1/upload_trajectory", "/cf1/high_level/go_to", "/cf1/land")
+    services = SimpleNamespace(get_services=lambda: [(name, own) for name in offered])
+    calls, updates = [], []
+
+    def multicall(requests):
+        calls.extend((each["methodName"], each["params"][1]) for each in requests)
+        return [[[1, "", uris.get(each["params"][1], 0)]] for each in requests]
+
+    master = SimpleNamespace(system=SimpleNamespace(multicall=multicall))
+    listener = SimpleNamespace(publisher_update=lambda *update: updates.append(update))
+    monkeypatch.setattr("rospy.core.xmlrpcapi", lambda uri: master)
+    monkeypatch.setattr("rospy.get_node_uri", lambda: own)
+    monkeypatch.setattr(registration, "get_topic_manager", lambda: topics)
+    monkeypatch.setattr(registration, "get_service_manager", lambda: services)
+    listeners = SimpleNamespace(listeners=[listener])
+    monkeypatch.setattr(registration, "get_registration_listeners", lambda: listeners)
+    master_watch.register()
+    return calls, updates
+
+
+def test_rospy_is_told_only_of_publishers_that_are_not_connected_yet(registered):
+    """It checks each topic of the process for each update: 100 vehicles took a core for minutes."""
+    _, updates = registered
+    assert updates == [("/from_outside", ["http://own", "http://other"])]
+
+
+def test_who_sees_the_takeoff_of_a_vehicle_sees_how_it_is_flown(registered):
+    """A mission looked in between, and called the takeoff server as if it were a driver."""
+    services = [name for method, name in registered[0] if method == "registerService"]
+    assert len(services) == 4
+    assert services.index("/cf1/high_level/go_to") < services.index("/cf1/takeoff")
+    assert services.index("/cf1/takeoff") < services.index("/cf1/upload_trajectory")

@@ -20,7 +20,7 @@ from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 from crazyflie_utils import ServiceError
 from crazyflie_utils.ros1 import calls, patches
 from crazyflie_utils.ros1.calls import wait_for_answer
-from crazyflie_utils.ros1.own_topics import OwnSubscription
+from crazyflie_utils.ros1.own_topics import OwnPublication, OwnSubscription
 from crazyflie_utils.ros1.transport import RosTransport
 from crazyflie_utils.testing.waiting import wait_until
 
@@ -99,6 +99,24 @@ def test_the_first_of_two_connections_to_a_publisher_stays():
     # That of a publisher that has ended is not in the way of a new one.
     connections[0].close()
     assert topic.add_connection(connections[3])
+
+
+@pytest.mark.parametrize(
+    "topic",
+    [
+        OwnSubscription("/a", String, lambda: True, ignore, False, frozenset()),
+        OwnPublication("/a", String, 1, False),
+    ],
+)
+def test_a_topic_without_connections_is_not_polled(topic):
+    """rospy checks all topics twice a second: a system call for each."""
+    topic.connection_poll = SimpleNamespace(error_iter=lambda: polls.append(topic) or ())
+    polls = []
+    topic.check()
+    assert polls == []
+    topic.connections = [None]
+    topic.check()
+    assert polls == [topic]
 
 
 def test_connections_that_come_at_once_are_not_put_off(monkeypatch):

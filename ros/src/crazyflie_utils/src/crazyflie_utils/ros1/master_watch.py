@@ -26,11 +26,13 @@ def register() -> None:
     """Register all topics and services of this process with the master."""
     listeners = registration.get_registration_listeners()
     topics, services = registration.get_topic_manager(), registration.get_service_manager()
-    # With publishers first, the master need not notify the subscribers that come next.
+    # With publishers first, the master need not notify the subscribers that come next. Services are
+    # in the order of their names: whoever looks meanwhile and finds a vehicle's takeoff finds its
+    # high_level/go_to, which says how it is flown.
     registered = [
         *(("pub", *each) for each in topics.get_publications()),
         *(("sub", *each) for each in topics.get_subscriptions()),
-        *(("srv", *each) for each in services.get_services()),
+        *(("srv", *each) for each in sorted(services.get_services())),
     ]
     request: Any = xmlrpc.client.MultiCall(rospy.core.xmlrpcapi(rosgraph.get_master_uri()))
     for kind, name, type_or_uri in registered:
@@ -47,7 +49,11 @@ def register() -> None:
         if code != 1:
             rospy.logfatal(f"unable to register {name} with master: {text}")
         elif kind == "sub":
-            update_publishers(name, uris)
+            # rospy checks all topics of the process at each update.
+            subscription = topics.subs.get(name)
+            missing = [uri for uri in uris if subscription and not subscription.has_connection(uri)]
+            if missing:
+                update_publishers(name, missing)
 
 
 def update_publishers(topic: str, uris: list[str]) -> None:

@@ -155,6 +155,12 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
         self._limits_rate = limits_rate
         self._patches = patches
 
+    @override
+    def check(self) -> None:
+        # A system call for each topic, twice a second and at each update of the master's.
+        if self.connections:
+            super().check()
+
     def _is_own(self):
         """Return whether only handles have subscribed."""
         return all(isinstance(callback, OwnCallback) for callback, _ in self.callbacks or ())
@@ -193,6 +199,11 @@ class OwnPublication(rospy.topics._PublisherImpl):
         # Set now: as soon as the topic is registered, subscribers connect.
         self._limit = queue_size
         self.is_latch = latch
+
+    @override
+    def check(self) -> None:
+        if self.connections:
+            super().check()
 
     @override
     def set_queue_size(self, queue_size: int) -> None:

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Print how long it takes from Escape, pressed twice in the page, until the motors are off.
 
 Three simulated vehicles take off before each measurement, in the time of the machine's clock.

@@ -109,7 +109,7 @@ def test_the_first_of_two_connections_to_a_publisher_stays():
     ],
 )
 def test_a_topic_without_connections_is_not_polled(topic):
-    """rospy checks all topics twice a second: a system call for each."""
+    """All topics are checked by rospy twice a second: a system call each."""
     topic.connection_poll = SimpleNamespace(error_iter=lambda: polls.append(topic) or ())
     polls = []
     topic.check()

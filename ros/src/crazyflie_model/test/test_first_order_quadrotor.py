@@ -5,6 +5,7 @@ import math
 
 import pytest
 
+from crazyflie_model.angles import rotate
 from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor, lags
 from crazyflie_model.quadrotor import CRAZYFLIE
 
@@ -28,6 +29,15 @@ def test_each_axis_reaches_63_percent_after_its_lag():
     assert flown([0.1, 0.0, 0.0, 9.81], 0.05)[6] == pytest.approx(0.1 * share, rel=1e-6)
     assert flown([0.0, 0.1, 0.0, 9.81], 0.08)[7] == pytest.approx(0.1 * share, rel=1e-6)
     assert flown([0.0, 0.0, 1.0, 9.81], 0.1)[9] == pytest.approx(share, rel=1e-6)
+
+
+def test_the_pose_is_tilted_to_where_it_accelerates():
+    x = [0.0] * 6 + [0.1, 0.2, 2.0, 0.0, math.sqrt(9.81)]
+    dynamics = FirstOrderQuadrotor(MODEL)
+    acceleration = dynamics.rates(0.0, x, [0.0] * 4)[3:6]
+    _, attitude = dynamics.pose(x, [0.0] * 4)
+    up = rotate(attitude, (0.0, 0.0, 9.81))
+    assert (up[0], up[1], up[2] - 9.81) == pytest.approx(acceleration, abs=0.02)
 
 
 def test_drag_is_that_of_the_airframe_in_hover():

@@ -8,10 +8,10 @@ import pytest
 from cflib.utils.encoding import compress_quaternion as reference
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from virtual_bench import Bench
+from virtual_bench import Bench, generic
 
 from crazyflie_model.angles import zyx_from_quaternion
-from crazyflie_model.quadrotor import TYPES
+from crazyflie_model.quadrotor import CRAZYFLIE, TYPES
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 from crazyflie_utils import ParameterError
 from crazyflie_virtual.body import (
@@ -339,3 +339,53 @@ def test_a_virtual_vehicle_of_a_model_file_flies_it(tmp_path):
     with pytest.raises(ParameterError, match="mass .* is 33"):
         path.write_text("mass: 33\n")
         VehicleSettings.from_mapping({"model": str(path)})
+
+
+def lagging(**figures):
+    """Return the body of a vehicle at 2 m, which hovers, of a model with lags."""
+    figures = {"roll_lag": 0.1, "pitch_lag": 0.05, "yaw_lag": 0.2, **figures}
+    physics = Physics((0.0, 0.0, 2.0), yaw=1.0, model=dataclasses.replace(CRAZYFLIE, **figures))
+    fly(physics, (HOVER_PWM,) * 4, 2.0)
+    return physics
+
+
+def attitude(physics):
+    return zyx_from_quaternion(physics.quaternion)
+
+
+def test_a_model_with_lags_follows_the_attitude_that_is_asked_for():
+    share = 1.0 - math.exp(-1.0)
+    for k, lag in ((0, 0.1), (1, 0.05)):
+        physics = lagging()
+        physics.desired = (0.1, 0.0, 0.0) if k == 0 else (0.0, 0.1, 0.0)
+        fly(physics, (HOVER_PWM,) * 4, lag)
+        assert attitude(physics)[k] == pytest.approx(0.1 * share, rel=1e-3)
+        # What a gyroscope measures.
+        assert physics.rates[k] == pytest.approx(0.1 * (1.0 - share) / lag, rel=0.03)
+    physics = lagging()
+    physics.desired = (0.0, 0.0, 0.5)
+    fly(physics, (HOVER_PWM,) * 4, 0.2)
+    assert physics.rates[2] == pytest.approx(0.5 * share, rel=0.02)
+
+
+def test_it_is_late_by_its_delay_and_drifts_by_its_trims():
+    physics = lagging(delay=0.03)
+    physics.desired = (0.1, 0.0, 0.0)
+    fly(physics, (HOVER_PWM,) * 4, 0.03)
+    assert attitude(physics)[0] == 0.0
+    fly(physics, (HOVER_PWM,) * 4, STEP)
+    assert attitude(physics)[0] > 0.0
+    physics = lagging(roll_trim=0.02, pitch_trim=-0.03)
+    assert attitude(physics)[:2] == pytest.approx((-0.02, 0.03), abs=1e-6)
+
+
+@pytest.mark.parametrize("controller", [1, 2])
+def test_a_virtual_vehicle_with_lags_goes_where_it_is_sent(tmp_path, controller):
+    path = tmp_path / "mine.yaml"
+    path.write_text("type: cf21\nlag: {roll: 0.08, pitch: 0.08, yaw: 0.1}\ndelay: 0.01\n")
+    bench = Bench(model=str(path), observer_port=0, init_yaw=1.0)
+    bench.firmware.stabilizer.controller = controller
+    bench.take_off()
+    bench.stream(generic(7, "ffff", 0.5, -0.3, 1.0, 1.5 * 57.3), 6.0)
+    assert bench.physics.position == pytest.approx((0.5, -0.3, 1.0), abs=0.1)
+    assert attitude(bench.physics)[2] == pytest.approx(1.5, abs=0.1)

@@ -4,15 +4,15 @@ It is the model that `crazyflie_identification` fits to a recorded flight: witho
 whose effect the lags describe. With small angles, which a controller keeps, it is quick and smooth.
 
 State, 11 components: position (3) in m and velocity (3) in m/s in the fixed frame, roll, pitch and
-yaw in rad, yaw rate in rad/s, root of the thrust over the mass, which follows its command as the
-speed of the rotors does.
+yaw in rad (Z-Y-X, so that the tilt is in the heading frame), yaw rate in rad/s, root of the thrust
+over the mass, which follows its command as the speed of the rotors does.
 """
 
 from collections.abc import Sequence
 
 from typing_extensions import override
 
-from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
+from crazyflie_model.angles import Quaternion, Triple, quaternion_from_zyx
 from crazyflie_model.dynamics import Dynamics, coupled_acceleration
 from crazyflie_model.elementwise import Number, Vector, functions, where
 from crazyflie_model.inner_loops import HEADING, TILT
@@ -83,4 +83,4 @@ class FirstOrderQuadrotor(Dynamics):
 
     @override
     def pose(self, x: Sequence[float], u: Sequence[float]) -> tuple[Triple, Quaternion]:
-        return (x[0], x[1], x[2]), quaternion_from_rpy(x[6], x[7], x[8])
+        return (x[0], x[1], x[2]), quaternion_from_zyx(x[6], x[7], x[8])

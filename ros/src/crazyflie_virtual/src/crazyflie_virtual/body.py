@@ -3,6 +3,7 @@
 import bisect
 import math
 import random
+from collections import deque
 from typing import NamedTuple
 
 from crazyflie_model.angles import (
@@ -13,7 +14,9 @@ from crazyflie_model.angles import (
     rotate_back,
     zyx_from_quaternion,
 )
+from crazyflie_model.dynamics import rk4_step
 from crazyflie_model.elementwise import Vector
+from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
 from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe, QuadrotorParameters
 from crazyflie_model.units import GRAVITY
@@ -158,10 +161,50 @@ class Hand:
         return [*position, *velocity, *attitude, 0.0, 0.0, turning, *x[13:17]]
 
 
+class _Lags:
+    """Motion of a model with lags, in place of the effect of its rotors and inner loops."""
+
+    def __init__(self, model: QuadrotorParameters):
+        self._model = model
+        self._dynamics = FirstOrderQuadrotor(model)
+        late = round(model.delay / STEP)
+        # Controls that are on their way; the first one acts.
+        self._controls: deque[Vector[float]] = deque([[0.0] * 4] * (late + 1), maxlen=late + 1)
+        self._yaw_dot = self._root = 0.0
+
+    def step(self, x: Vector[float], desired: Triple, speed: float) -> Vector[float]:
+        """Return the state after a step, 17 components.
+
+        ``desired`` is that of `Physics`, ``speed`` the commanded one of each rotor (rad/s).
+        """
+        model = self._model
+        roll, pitch, yaw_dot = desired
+        lift = 4.0 * model.thrust_constant / model.mass
+        thrust = lift * speed * speed
+        self._controls.append([roll - model.roll_trim, pitch - model.pitch_trim, yaw_dot, thrust])
+        angles = zyx_from_quaternion(x[6:10])
+        y = [*x[:6], *angles, self._yaw_dot, self._root]
+        y = rk4_step(self._dynamics.rates, 0.0, y, self._controls[0], STEP)
+        y = self._dynamics.apply_ground_contact(y)
+        self._yaw_dot, self._root = y[9], y[10]
+        attitude = quaternion_from_zyx(y[6], y[7], y[8])
+        # Twice the vector part of the rotation of a step, in the body frame, is its angle.
+        a, b, c, d = x[6:10]
+        e, f, g, h = attitude
+        turned = (
+            d * e - a * h - b * g + c * f,
+            d * f + a * g - b * h - c * e,
+            d * g - a * f + b * e - c * h,
+        )
+        rates = [math.copysign(2.0, a * e + b * f + c * g + d * h) / STEP * t for t in turned]
+        return [*y[:6], *attitude, *rates, *[y[10] / math.sqrt(lift)] * 4]
+
+
 class Physics:
     """Rigid body, four motors, ground; it begins at a position (m) and heading (rad).
 
     The errors are how much more mass and thrust the vehicle has than its ``model``, as a fraction.
+    A model with the lag of roll follows the ``desired`` attitude with its lags, trims and delay.
     """
 
     def __init__(
@@ -173,7 +216,11 @@ class Physics:
         model: QuadrotorParameters = CRAZYFLIE,
     ):
         self._model = model
-        self._airframe = Airframe(model.with_errors(mass_error, thrust_error))
+        true = model.with_errors(mass_error, thrust_error)
+        self._airframe = Airframe(true)
+        self._lags = None if model.roll_lag is None else _Lags(true)
+        #: Roll and pitch (rad, nose down) and yaw rate (rad/s) that the controllers ask for.
+        self.desired: Triple = (0.0, 0.0, 0.0)
         x = self._airframe.initial_state([float(part) for part in position])
         x[6:10] = [0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)]
         x[13:17] = [0.0] * 4
@@ -184,6 +231,11 @@ class Physics:
         self.world: World | None = None
         self.hand = Hand()
         self.is_overturned = False  #: Came down on its back: lies there until `put_upright`.
+
+    @property
+    def has_lags(self) -> bool:
+        """Whether it follows `desired`, and not its rotors."""
+        return self._lags is not None
 
     @property
     def position(self) -> Triple:
@@ -228,10 +280,14 @@ class Physics:
             return
         if self.is_overturned:
             commands = OFF
-        speeds = [min(top, self._model.rotor_speed(command)) for command in commands]
-        after = self._airframe.step(0.0, before, speeds, STILL_AIR, STEP)
-        if after[2] <= 0.0:
-            after = tip(self._airframe, before, after, STEP)
+        if self._lags is not None:
+            speed = min(top, self._model.rotor_speed(sum(commands) / 4.0))
+            after = self._lags.step(before, self.desired, speed)
+        else:
+            speeds = [min(top, self._model.rotor_speed(command)) for command in commands]
+            after = self._airframe.step(0.0, before, speeds, STILL_AIR, STEP)
+            if after[2] <= 0.0:
+                after = tip(self._airframe, before, after, STEP)
         self._x = after
         if after[2] <= 0.0 and not self.is_overturned:
             up = 1.0 - 2.0 * (before[6] ** 2 + before[7] ** 2)

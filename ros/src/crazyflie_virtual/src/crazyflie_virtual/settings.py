@@ -75,7 +75,7 @@ class VehicleSettings(Parameters):
     seed: int = parameter(Integer(0, 2**31 - 1), "of the noise, and of which packets are lost", 0)
     model: str = parameter(
         VEHICLE_MODEL,
-        "type of the vehicle, or model file; link and firmware have their own delay and lags",
+        "type of the vehicle, or model file; with `lag/roll`, its lags replace the attitude loops",
         "cf21",
     )
     mass_error: float = parameter(

@@ -184,6 +184,7 @@ class VirtualVehicle:
         if self.board is not None:
             try:
                 commands = self.board.firmware.step(self.battery.voltage)
+                self.physics.desired = self.board.firmware.stabilizer.desired
                 datagrams = [packet.encode() for packet in self.board.unsolicited()]
             except Exception as error:
                 failure = f"{type(error).__name__} in a step: {error}"

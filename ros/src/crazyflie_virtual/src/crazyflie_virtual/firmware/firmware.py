@@ -54,7 +54,8 @@ class Firmware:
         self.commander = Commander(self.planner)
         self.attitude_decoder = AttitudeDecoder()
         self.supervisor = Supervisor(self.console.write_line, settings.auto_arm)
-        self.stabilizer = Stabilizer(0 if settings.auto_arm else IDLE_THRUST)
+        idle_thrust = 0 if settings.auto_arm else IDLE_THRUST
+        self.stabilizer = Stabilizer(idle_thrust, has_attitude_loops=not physics.has_lags)
         self.power = PowerMonitor()
         self.health = Health(faults)
         self.link_statistics = LinkStatistics()

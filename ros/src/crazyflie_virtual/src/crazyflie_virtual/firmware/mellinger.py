@@ -35,6 +35,7 @@ class MellingerController:
         self.kR_xy, self.kw_xy, self.ki_m_xy, self.i_range_m_xy = 70000.0, 20000.0, 0.0, 1.0
         self.kR_z, self.kw_z, self.ki_m_z, self.i_range_m_z = 60000.0, 12000.0, 500.0, 1500.0
         self.kd_omega_rp = 200.0
+        self.attitude: Triple = (0.0, 0.0, 0.0)  #: Desired roll, pitch and yaw (deg).
         self._last_slip: Triple | None = None
         self.reset()
 
@@ -57,6 +58,12 @@ class MellingerController:
             wanted = _manual_axes(setpoint, _heading(setpoint, estimate))
         else:
             wanted = _axes_along(force, math.radians(estimate.yaw))
+        (cp_cy, cp_sy, minus_sp), left, up = wanted
+        self.attitude = (
+            math.degrees(math.atan2(left[2], up[2])),
+            math.degrees(math.asin(constrain(minus_sp, -1.0, 1.0))),
+            math.degrees(math.atan2(cp_sy, cp_cy)),
+        )
         outputs = self._torques(_attitude_error(body, wanted), setpoint, sensors)
         if not thrust > 0.0:
             self.reset()

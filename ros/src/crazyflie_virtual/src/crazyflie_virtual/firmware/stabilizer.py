@@ -2,7 +2,7 @@
 
 import math
 
-from crazyflie_model.angles import zyx_from_quaternion
+from crazyflie_model.angles import Triple, zyx_from_quaternion
 from crazyflie_model.inner_loops import PERIOD, limit, mix
 from crazyflie_virtual.body import OFF, MotorCommands, Sensors
 from crazyflie_virtual.firmware.controllers import (
@@ -42,15 +42,19 @@ class MotorOverride:
 class Stabilizer:
     """The controllers of one vehicle."""
 
-    def __init__(self, idle_thrust: int = 0) -> None:
+    def __init__(self, idle_thrust: int = 0, has_attitude_loops: bool = True) -> None:
         self.controller = PID  #: `DEFAULT`, `PID` or `MELLINGER`.
         self.attitude = AttitudeController()
         self.position = PositionController()
         self.mellinger = MellingerController()
         self.override = MotorOverride()
+        self._has_attitude_loops = has_attitude_loops
         self.idle_thrust = idle_thrust  #: Least command of an armed motor, PWM.
         self.roll = self.pitch = self.yaw = 0.0  #: Desired attitude, deg.
         self.roll_rate = self.pitch_rate = self.yaw_rate = 0.0  #: Desired body rates, deg/s.
+        #: Desired roll and pitch (rad, nose down) and yaw rate (rad/s): what a body follows that
+        #: has lags in place of attitude loops.
+        self.desired: Triple = (0.0, 0.0, 0.0)
         #: Inputs of the mixer, PWM.
         self.thrust = self.command_roll = self.command_pitch = self.command_yaw = 0.0
         self.requested = self.commands = OFF  #: Before and after their limits.
@@ -76,10 +80,16 @@ class Stabilizer:
             self._idle(estimate)
         if self.controller == MELLINGER:
             outputs = self.mellinger.update(setpoint, estimate, sensors)
+            self.roll, self.pitch, self.yaw = self.mellinger.attitude
+            self.yaw_rate = self.attitude.desired_rates(estimate, 0.0, 0.0, self.yaw)[2]
             self.thrust, self.command_roll, about_left, self.command_yaw = outputs
             self.command_pitch = -about_left
         else:
             self._run_pid(setpoint, estimate, sensors, with_position)
+        turn = setpoint.yaw_rate if setpoint.mode.yaw == VELOCITY else self.yaw_rate
+        self.desired = math.radians(self.roll), -math.radians(self.pitch), math.radians(turn)
+        if not self._has_attitude_loops:
+            self.command_roll = self.command_pitch = self.command_yaw = 0.0
         # The mixer's pitch is positive nose down.
         inputs = (self.thrust, self.command_roll, -self.command_pitch, self.command_yaw)
         self.requested = MotorCommands(*mix(*inputs)) if self.thrust > 0.0 else OFF

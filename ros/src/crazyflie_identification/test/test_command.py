@@ -1,5 +1,7 @@
 """The command identify, on bags."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import rosbag
@@ -9,8 +11,9 @@ from geometry_msgs.msg import TransformStamped, Twist, Vector3
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_identification.command import main
+from crazyflie_identification.recording import of_bag
 from crazyflie_lqr.linear_feedback_node import Gains
-from crazyflie_model.angles import quaternion_from_rpy
+from crazyflie_model.angles import quaternion_from_zyx
 from crazyflie_utils.parameters import vehicle_model
 
 from test_fit import DEFAULT  # isort: skip
@@ -33,7 +36,7 @@ def write(path, recording, late=0.004):
             pose.header.frame_id, pose.header.stamp = "world", rospy.Time.from_sec(BEGIN + time)
             pose.transform.translation = Vector3(x, y, z)
             q = pose.transform.rotation
-            q.x, q.y, q.z, q.w = quaternion_from_rpy(*rpy)
+            q.x, q.y, q.z, q.w = quaternion_from_zyx(*rpy)
             bag.write("/tf", TFMessage([pose]), rospy.Time.from_sec(BEGIN + time + late))
 
 
@@ -43,12 +46,35 @@ def vehicle():
     return drawn(7)
 
 
+def turned(recording, yaw):
+    """Return the same flight with another heading."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    poses = recording.poses.copy()
+    poses[:, :2] = recording.poses[:, :2] @ np.array([[c, s], [-s, c]])
+    poses[:, 5] += yaw
+    return dataclasses.replace(recording, poses=poses)
+
+
 @pytest.fixture(scope="module")
-def bag(tmp_path_factory, vehicle):
-    """Return the bag of an excited flight of it."""
+def recording(vehicle):
+    """Return an excited flight of it, with any heading."""
+    return turned(fly(vehicle, DEFAULT, duration=22.0)[0], 2.0)
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory, recording):
+    """Return the bag of the flight."""
     path = tmp_path_factory.mktemp("bags") / "flight.bag"
-    write(path, fly(vehicle, DEFAULT, duration=22.0)[0])
+    write(path, recording)
     return path
+
+
+def test_roll_and_pitch_are_those_in_the_heading_frame(bag, recording):
+    found = of_bag(bag, KIND)
+    times = recording.pose_times + BEGIN
+    for k in (3, 4, 5):
+        expected = np.interp(found.pose_times, times, recording.poses[:, k])
+        np.testing.assert_allclose(found.poses[:, k], expected, atol=1e-4)
 
 
 def test_a_bag_becomes_a_model_that_can_be_flown(bag, vehicle, tmp_path, capsys):

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from excited_flights import KIND, PERIOD, drawn, fly
+from excited_flights import KIND, PERIOD, Simulated, Virtual, drawn, fly
 
 from crazyflie_identification.fit import (
     NAMES,
@@ -42,15 +42,16 @@ def truth(vehicle):
     )
 
 
-def identified(seed, duration):
+def identified(seed, duration, kind):
     vehicle = drawn(seed)
-    recording, _ = fly(vehicle, DEFAULT, duration=duration, seed=seed)
+    recording, _ = fly(vehicle, DEFAULT, duration=duration, seed=seed, kind=kind)
     return vehicle, identify(recording, KIND)
 
 
+@pytest.mark.parametrize("kind", [Simulated, Virtual])
 @pytest.mark.parametrize("seed", [1001, 1002])
-def test_a_vehicle_is_found(seed):
-    vehicle, found = identified(seed, 20.0)
+def test_a_vehicle_is_found(seed, kind):
+    vehicle, found = identified(seed, 20.0, kind)
     errors = found.values - truth(vehicle)
     assert (np.abs(errors) < 4.0 * found.errors).all()
     assert abs(errors[0]) < 0.02 * vehicle.mass
@@ -63,10 +64,10 @@ def test_a_vehicle_is_found(seed):
 
 # The quick one is test_a_vehicle_is_found.
 @pytest.mark.long
-def test_of_fifty_vehicles_95_percent_of_the_figures_are_in_their_intervals():
+def test_of_fifty_virtual_vehicles_95_percent_of_the_figures_are_in_their_intervals():
     inside, count = 0, 0
     for seed in range(50):
-        vehicle, found = identified(seed, 40.0)
+        vehicle, found = identified(seed, 40.0, Virtual)
         errors = np.abs(found.values - truth(vehicle))
         inside += int((errors < LEVEL * found.errors).sum())
         count += len(NAMES)

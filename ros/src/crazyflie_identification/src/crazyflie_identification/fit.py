@@ -73,7 +73,7 @@ class Recording:
     #: Roll and pitch (rad), yaw rate (rad/s, counter-clockwise), thrust (PWM), shape (n, 4).
     commands: Array
     pose_times: Array  #: When poses were measured, shape (m,).
-    #: x, y, z (m), roll, pitch, yaw (rad, X-Y-Z), shape (m, 6).
+    #: x, y, z (m), roll, pitch, yaw (rad, Z-Y-X), shape (m, 6).
     poses: Array
 
     def between(self, start: float, end: float) -> "Recording":

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from crazyflie_identification.fit import LEAST_TIME, IdentificationError, Recording
+from crazyflie_model.angles import quaternion_from_rpy, zyx_from_quaternion
 from crazyflie_model.quadrotor import QuadrotorParameters
 from crazyflie_model.units import pwm_from_thrust
 from crazyflie_reports import bag_log
@@ -62,5 +63,7 @@ def _recording(path, vehicle, kind):
     offsets = stamps[:, 0] - stamps[:, 1]
     has_clock = len(stamps) == len(poses) and abs(float(np.median(offsets))) < OTHER_CLOCK
     times = stamps[:, 1] if has_clock else poses[:, 0]
+    attitudes = zyx_from_quaternion(quaternion_from_rpy(*poses[:, 4:].T))
+    poses = np.column_stack([poses[:, :4], *attitudes])
     finite = np.isfinite(poses).all(axis=1) & np.r_[True, np.diff(times) > 1e-4]
     return Recording(rows[:, 0], commands, times[finite], poses[finite, 1:])

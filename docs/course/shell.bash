@@ -6,7 +6,7 @@ page=$(printf '%s/%02d_*.md' "$COURSE" "$LESSON")
 page=$(compgen -G "$page")
 [ -z "${DISPLAY:-}" ] || QUICK=
 
-[ ! -d "$COURSE/skeletons/$LESSON" ] || exercise "$LESSON" >~/course.log || tail -5 ~/course.log
+[ ! -d "$COURSE/skeletons/$LESSON" ] || exercise "$LESSON" >~/exercise.log || tail -5 ~/exercise.log
 
 # The first command of the page that is awaited and launches something.
 launch=$(awk '/^<!-- run: until \//{awaited=1} awaited && /^roslaunch/{print; exit} /^```$/{awaited=0}' "$page")

@@ -151,8 +151,10 @@ class FakeTransport(Transport):
         return "process 1 on elsewhere" if lives else None
 
     def log(self, level: str, text: str) -> None:
-        """Keep the record."""
+        """Keep the record; pytest shows errors below a test that fails."""
         self.log_records.append((level, text))
+        if level in ("error", "fatal"):
+            print(f"[{level.upper()}] {text}")
 
     def clock_was_set(self, stamp: genpy.Time) -> None:
         """Do nothing."""

@@ -9,15 +9,16 @@ from hypothesis import strategies as st
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
 from crazyflie_takeoff.limits import (
     MEMORY,
+    NO_BOX,
     Box,
     Callers,
     ClimbLimit,
     Limits,
     RunGaps,
     Walls,
-    in_range,
 )
 from crazyflie_takeoff.motion import Delay, Motion
+from crazyflie_takeoff.relay import Relay
 from crazyflie_takeoff.safe_control import MAX_BRAKING, MAX_SUBSTITUTE, Setpoint
 
 G = 9.81
@@ -26,11 +27,28 @@ ANY = st.floats(allow_nan=False, allow_infinity=False)
 
 @given(ANY, ANY, ANY, ANY, st.sampled_from([0.0, MIN_THRUST]))
 def test_any_control_ends_in_range(roll, pitch, yaw_dot, thrust, lowest):
-    result = in_range(Setpoint(roll, pitch, yaw_dot, thrust), lowest)
+    limits = Limits(NO_BOX, 0.5, -0.5, 3.0, 10.0)
+    result = limits.in_range(Setpoint(roll, pitch, yaw_dot, thrust), lowest)
     assert max(abs(result.roll), abs(result.pitch)) <= MAX_TILT
     assert abs(result.yaw_dot) <= MAX_YAW_RATE
     assert lowest <= result.thrust <= MAX_THRUST
-    assert in_range(result, lowest) == result
+    assert limits.in_range(result, lowest) == result
+
+
+def test_a_model_may_have_closer_limits():
+    limits = Limits(NO_BOX, 0.5, -0.5, 3.0, 10.0, 0.1, 1.0, 12.0)
+    relay = Relay(limits, 0.1)
+    beyond = (
+        Setpoint(0.11, 0.0, 0.0, 10.0),
+        Setpoint(0.0, -0.11, 0.0, 10.0),
+        Setpoint(0.0, 0.0, 1.1, 10.0),
+        Setpoint(0.0, 0.0, 0.0, 12.1),
+    )
+    for control in beyond:
+        assert not relay.pass_unchanged(0.0, control)
+        result = limits.in_range(control, MIN_THRUST)
+        assert result != control
+        assert relay.pass_unchanged(0.0, result)
 
 
 def test_a_control_within_limits_is_passed_on_by_a_filter_that_runs():

@@ -24,11 +24,11 @@ from crazyflie_takeoff.transition_table import FlightState
 from crazyflie_utils.testing import FakeProcess
 
 
-def launch():
+def launch(**parameters):
     """Return a process with a filter in it that has just started."""
     process = FakeProcess()
     process.transport.unpublished.add("/in_flight_flight_status")
-    assert process.launch(TakeoffControlFilterNode(), "/filter", FILTER)
+    assert process.launch(TakeoffControlFilterNode(), "/filter", {**FILTER, **parameters})
     return process
 
 
@@ -91,6 +91,18 @@ def test_messages_are_passed_on_as_they_are(process):
     assert process.published("/control/final") == [message]
 
 
+def test_controls_are_limited_to_the_limits_of_the_model(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("limits: {tilt: 0.2, yaw_rate: 1.0, thrust: 13.0}\n")
+    process = launch(model=str(path))
+    process.advance(LISTENING_TIME)
+    message = control(15.0)
+    message.control.roll, message.control.pitch, message.control.yaw_dot = 0.25, -0.25, 2.0
+    process.publish("/control/lqr", message)
+    last = process.published("/control/final")[-1].control
+    assert (last.roll, last.pitch, last.yaw_dot, last.thrust) == (0.2, -0.2, 1.0, 13.0)
+
+
 @pytest.mark.parametrize("field", ["roll", "pitch", "yaw_dot", "thrust"])
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_controls_that_are_not_finite_are_never_passed_on(process, field, bad):
@@ -100,9 +112,9 @@ def test_controls_that_are_not_finite_are_never_passed_on(process, field, bad):
             setattr(message.control, field, bad)
             process.publish(topic, message)
     assert thrusts(process) == []
-    # Throttled, one for each topic.
-    assert len(process.logged("warn")) == 2
-    assert "/control/takeoff" in process.logged("warn")[0]
+    takeoff, lqr = dict.fromkeys(process.logged("warn"))
+    assert "/control/takeoff" in takeoff
+    assert "/control/lqr" in lqr
 
 
 def test_a_takeoff_control_that_is_not_finite_does_not_keep_the_controller_out(process):

@@ -119,6 +119,7 @@ def parameters(
                 "state": STATE,
             },
             "srv": {"emergency": "emergency", "emergency_reset": "emergency_reset"},
+            "model": model,
         },
     }
     if model != "cf21":

@@ -17,7 +17,13 @@ from functools import cached_property
 from crazyflie_model.angles import Triple
 from crazyflie_model.dynamics import rk4_step
 from crazyflie_model.elementwise import Number, Vector, clip, functions, where
-from crazyflie_model.limits import FULL_PWM, MAX_SETPOINT_PWM
+from crazyflie_model.limits import (
+    FULL_PWM,
+    MAX_SETPOINT_PWM,
+    MAX_THRUST,
+    MAX_TILT,
+    MAX_YAW_RATE,
+)
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 
 BODY_DIM = 17  #: Components of the airframe's state.
@@ -71,6 +77,11 @@ class QuadrotorParameters:
     #: roll_trim, pitch_trim: Added to a command, so that the vehicle does not drift, rad.
     roll_trim: float = 0.0
     pitch_trim: float = 0.0
+    #: tilt_limit, yaw_rate_limit, thrust_limit: Largest roll and pitch (rad), yaw rate (rad/s) and
+    #: thrust over the mass (m/s^2) that are commanded.
+    tilt_limit: float = MAX_TILT
+    yaw_rate_limit: float = MAX_YAW_RATE
+    thrust_limit: float = MAX_THRUST
 
     @cached_property
     def hover_speed(self) -> float:

@@ -71,6 +71,21 @@ class Limits:
     floor: float  # Lowest z (m, fixed frame).
     climb: float  # Largest z_dot that controls may reach (m/s).
     height: float  # Largest height above the ground that controls may reach (m).
+    tilt: float = MAX_TILT  # Largest roll and pitch of controls (rad).
+    yaw_rate: float = MAX_YAW_RATE  # Largest yaw rate of controls (rad/s).
+    thrust: float = MAX_THRUST  # Largest thrust of controls (m/s^2).
+
+    def in_range(self, control: Setpoint, lowest: float) -> Setpoint:
+        """Return a finite control with roll, pitch, yaw rate and thrust limited to their ranges.
+
+        ``lowest`` is the least thrust, m/s^2: `MIN_THRUST` in flight.
+        """
+        return Setpoint(
+            limited(control.roll, self.tilt),
+            limited(control.pitch, self.tilt),
+            limited(control.yaw_dot, self.yaw_rate),
+            min(max(control.thrust, lowest), self.thrust),
+        )
 
 
 class Walls:
@@ -119,19 +134,6 @@ class Debounce:
         """Advance by ``step`` (s); return the complaint if it has lasted, else an empty text."""
         self._lasted = self._lasted + step if complaint else 0.0
         return complaint if self._lasted > self._duration else ""
-
-
-def in_range(control: Setpoint, lowest: float) -> Setpoint:
-    """Return a finite control with roll, pitch, yaw rate and thrust limited to their ranges.
-
-    ``lowest`` is the least thrust, m/s^2: `MIN_THRUST` in flight.
-    """
-    return Setpoint(
-        limited(control.roll, MAX_TILT),
-        limited(control.pitch, MAX_TILT),
-        limited(control.yaw_dot, MAX_YAW_RATE),
-        min(max(control.thrust, lowest), MAX_THRUST),
-    )
 
 
 class ClimbLimit:

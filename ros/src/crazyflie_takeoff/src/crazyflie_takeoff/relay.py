@@ -3,7 +3,7 @@
 import math
 from typing import Any, TypeVar
 
-from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
+from crazyflie_model.limits import MIN_THRUST
 from crazyflie_takeoff.limits import (
     Callers,
     ClimbLimit,
@@ -12,7 +12,6 @@ from crazyflie_takeoff.limits import (
     Limits,
     RunGaps,
     Walls,
-    in_range,
 )
 from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Ground, Measurement, Motion
 from crazyflie_takeoff.safe_control import MOTORS_OFF, HoverThrust, Setpoint
@@ -40,6 +39,7 @@ class Relay:
         # The server is silent in flight: another one at once is a second one.
         self.takeoff_callers = Callers("takeoff controls", 0)
         self.commanded_callers = Callers("commanded controls", HANDOVER)
+        self._limits = limits
         self._hold = hold
         self._hover = HoverThrust()
         self._climb = ClimbLimit(limits.climb)
@@ -124,11 +124,12 @@ class Relay:
         ``control`` has the fields of a `Setpoint`.
         """
         roll, pitch, thrust = control.roll, control.pitch, control.thrust
+        limits = self._limits
         if not (
-            -MAX_TILT <= roll <= MAX_TILT
-            and -MAX_TILT <= pitch <= MAX_TILT
-            and MIN_THRUST <= thrust <= MAX_THRUST
-            and -MAX_YAW_RATE <= control.yaw_dot <= MAX_YAW_RATE
+            -limits.tilt <= roll <= limits.tilt
+            and -limits.tilt <= pitch <= limits.tilt
+            and MIN_THRUST <= thrust <= limits.thrust
+            and -limits.yaw_rate <= control.yaw_dot <= limits.yaw_rate
         ):
             return False
         step, self._time = time - self._time, time
@@ -206,7 +207,7 @@ class Relay:
 
     def _allowed(self, setpoint, lowest, lands, is_ramp=False):
         motion, hover = self.measured.fresh, self.hover
-        control = in_range(setpoint, lowest)
+        control = self._limits.in_range(setpoint, lowest)
         highest = self.walls.highest(self.ground.z)
         thrust = self._climb.apply(control.thrust, hover, motion, highest, lands)
         speed = 0.0 if motion is None else motion.velocity[2]

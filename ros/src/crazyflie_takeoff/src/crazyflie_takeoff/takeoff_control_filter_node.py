@@ -23,7 +23,9 @@ from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import Setpoint
 from crazyflie_takeoff.transition_table import FlightState, flight_state
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
+from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
+from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import stamped
 
@@ -98,6 +100,12 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
         "limits/height",
     )
 
+    model: str = parameter(
+        VEHICLE_MODEL,
+        "type of the vehicle, or model file: controls are limited to its `limits`",
+        "cf21",
+    )
+
     tilted_topic = derived_topic("own_tilted_topic", "state_topic", "_tilted")
 
     def timeouts(self) -> LossTimeouts:
@@ -107,7 +115,9 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
     def limits(self) -> Limits:
         """Return the limits of a flight."""
         box = self.box.without_floor()
-        return Limits(box, self.outside, self.floor, self.climb, self.height)
+        model = vehicle_model.load(self.model)
+        ranges = model.tilt_limit, model.yaw_rate_limit, model.thrust_limit
+        return Limits(box, self.outside, self.floor, self.climb, self.height, *ranges)
 
 
 class FilterStatusPublisher:

@@ -7,6 +7,7 @@ from typing import Any
 import yaml
 from typing_extensions import override
 
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE
 from crazyflie_model.quadrotor import TYPES, QuadrotorParameters
 from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
@@ -63,6 +64,24 @@ class ModelParameters(Parameters):
         _TRIM, "added to a command, so that the vehicle does not drift", None, "trim/roll"
     )
     pitch_trim: float | None = parameter(_TRIM, "the same of pitch", None, "trim/pitch")
+    tilt_limit: float | None = parameter(
+        Number("rad", minimum=0.15, maximum=MAX_TILT),
+        "largest roll and pitch that the takeoff filter passes on",
+        None,
+        "limits/tilt",
+    )
+    yaw_rate_limit: float | None = parameter(
+        Number("rad/s", minimum=0.1, maximum=MAX_YAW_RATE),
+        "the same of the yaw rate",
+        None,
+        "limits/yaw_rate",
+    )
+    thrust_limit: float | None = parameter(
+        Number("m/s^2", minimum=12.5, maximum=MAX_THRUST),
+        "the same of the thrust over the mass",
+        None,
+        "limits/thrust",
+    )
 
     @override
     def complaints(self) -> list[str]:

@@ -11,9 +11,17 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_tutorial_msgs.srv import VelocityAtResponse
 from crazyflie_utils.testing import FakeProcess
 from my_sweep.oscillator_node import OscillatorNode
 from my_sweep.sweep_node import SweepNode
+
+
+def answered(response):
+    """Return the future of a call that has been answered."""
+    reply = Future()
+    reply.set_result(response)
+    return reply
 
 
 @pytest.fixture
@@ -24,9 +32,7 @@ def process():
 
     def land(_):
         fake.landings.append(True)
-        reply = Future()
-        reply.set_result(EmptyResponse())
-        return reply
+        return answered(EmptyResponse())
 
     fake.transport.services["/land"] = land
     assert fake.launch(OscillatorNode(), "/oscillator")
@@ -68,8 +74,12 @@ def test_the_reference_says_how_fast_it_moves(process):
     assert math.hypot(state.x_dot, state.y_dot) > 0.1
 
 
-def test_hovers_without_the_service():
+@pytest.mark.parametrize(("velocity", "reason"), [(None, "/my_oscillator"), (math.nan, "nan")])
+def test_hovers_without_a_velocity(velocity, reason):
     process = FakeProcess()
+    if velocity is not None:
+        response = VelocityAtResponse(velocity)
+        process.transport.services["/my_oscillator"] = lambda _: answered(response)
     assert process.launch(SweepNode(), "/sweep")
     process.publish(
         "/state", PositionVelocityYawStateStamped(state=PositionVelocityYawState(x=0.3))
@@ -77,4 +87,4 @@ def test_hovers_without_the_service():
     process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
     process.advance(5.0)
     assert references(process)[-1] == pytest.approx((0.3, 0.0, 1.0))
-    assert "/my_oscillator" in process.logged("warn")[0]
+    assert reason in process.logged("warn")[0]

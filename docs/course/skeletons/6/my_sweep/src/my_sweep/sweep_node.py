@@ -80,8 +80,10 @@ class SweepNode(Node):
             return
         # Step 4: move self._way on by what self._speed makes in TIME_STEP; publish where the path
         # is there, with its velocity. At the end call /land (std_srvs/Empty), otherwise call
-        # /my_oscillator, and have the answer handed to self._on_velocity.
+        # /my_oscillator for the x of the path there, and have the answer handed to
+        # self._on_velocity.
 
     def _on_velocity(self, answer):
-        # Step 5: set self._speed, from SLOWEST to FASTEST; 0 if answer.exception() is not None.
+        # Step 5: set self._speed, from SLOWEST to FASTEST; 0 if answer.exception() is not None, or
+        # if the velocity is not finite.
         raise NotImplementedError("step 5")

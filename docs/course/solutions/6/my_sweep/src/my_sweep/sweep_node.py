@@ -93,8 +93,11 @@ class SweepNode(Node):
         answer.add_done_callback(self._on_velocity)
 
     def _on_velocity(self, answer):
-        if answer.exception() is not None:
+        fault = answer.exception()
+        if fault is None and not math.isfinite(answer.result().vel):
+            fault = f"the velocity is {answer.result().vel}; expected a finite number"
+        if fault is not None:
             self._speed = 0.0
-            self._handle.warn(f"hovering: {answer.exception()}", throttle=1.0)
+            self._handle.warn(f"hovering: {fault}", throttle=1.0)
             return
         self._speed = min(max(answer.result().vel * SCALE, SLOWEST), FASTEST)

@@ -50,6 +50,17 @@ def test_turns_red_when_the_vehicle_is_near(process):
     assert marker.color == RED
 
 
+def test_the_marker_stands_where_the_pole_does():
+    process = FakeProcess()
+    place = {"x": 2.0, "y": -1.0, "radius": 0.1, "height": 1.2}
+    assert process.launch(PoleNode(), "/pole", place)
+    marker, _ = see_at(process, 0.0)
+    position, scale = marker.pose.position, marker.scale
+    assert (position.x, position.y, position.z) == pytest.approx((2.0, -1.0, 0.6))
+    assert (scale.x, scale.y, scale.z) == pytest.approx((0.2, 0.2, 1.2))
+    assert marker.pose.orientation.w == 1.0
+
+
 def test_says_when_it_sees_no_vehicle(process):
     process.advance(0.1)
     assert process.published("/pole/marker") == []

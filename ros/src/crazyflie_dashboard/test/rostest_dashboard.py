@@ -133,6 +133,8 @@ def test_a_trajectory_is_rehearsed_flown_and_stopped(dashboard, operator):
 def test_fields_of_topics_are_plotted(dashboard, page):
     dashboard.add_field(page, "/cf2/state/state/z").result(LIMIT)
     wait_until(lambda: any(s.times for s in dashboard.plots(page) if "cf2" in s.name), limit=LIMIT)
+    # Where it is seen: before those of the vehicle.
+    assert dashboard.plots(page)[0].name == "/cf2/state/state/z"
     with pytest.raises(RefusalError, match="there is no 'zz' in crazyflie_msgs"):
         dashboard.add_field(page, "/cf2/state/state/zz").result(LIMIT)
 

@@ -8,11 +8,15 @@ import pytest
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import Imu
 
+from crazyflie_dashboard.page.plots_panel import chart
+from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.plots import Ring, VehiclePlots, expect_field, number_in, split_path
 from crazyflie_dashboard.snapshot import VehicleSnapshot
 from crazyflie_driver.msg import GenericLogData
 from crazyflie_utils.refusal import RefusalError
 
+EMPTY = Series("/cf1/ref/state/z", "", (), ())
+SERIES = (EMPTY, Series("/cf1/state/state/z", "", (-1.0, 0.0), (0.5, 0.6)))
 TOPICS = {"/cf1": "a/B", "/cf1/pose": "geometry_msgs/PoseStamped", "/cf1/imu": "sensor_msgs/Imu"}
 
 
@@ -110,3 +114,9 @@ def test_plots_are_read_while_numbers_come():
     finally:
         is_over.set()
         source.join()
+
+
+def test_a_field_without_a_message_says_so():
+    (title,) = chart(SERIES, can_be_measured=False)["title"]
+    assert "/cf1/ref/state/z: no message yet" in title["text"]
+    assert "/cf1/state/state/z}" in title["text"]

@@ -1,10 +1,12 @@
 #!/usr/bin/env python
 """Eight vehicles fly figures of eight side by side, every other one the other way round.
 
-Usage: figure_eights.py [NAME ...], the vehicles; by default cf1 ... cf8. They must stand 1.8 m
-apart along x and 1.2 m along y.
+Usage: figure_eights.py [NAME ...], the vehicles; by default cf1 ... cf8. Where two of them stand
+less than 1.2 m apart, all fly the same way round.
 """
 
+import itertools
+import math
 import sys
 
 from crazyflie_demo.figure8 import figure8
@@ -12,6 +14,8 @@ from crazyflie_mission_api import Fleet, Limits
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.trajectory import Pieces
+
+SPACING = 1.2  #: Distance at which eights that are flown both ways round keep clear (m).
 
 LIMITS = Limits(speed=1.0, acceleration=1.5)
 
@@ -27,8 +31,10 @@ def mirrored(pieces: Pieces) -> list[PolynomialPiece]:
 def mission(fleet: VehicleGroup) -> None:
     """Fly it."""
     fleet.takeoff(1.0)
-    ways = (figure8(), mirrored(figure8()))
-    fleet.follow({name: ways[k % 2] for k, name in enumerate(fleet.names)}, relative=True)
+    places = map(fleet.position, fleet.names)
+    is_dense = any(math.dist(*pair) < SPACING for pair in itertools.combinations(places, 2))
+    ways = itertools.cycle([figure8()] if is_dense else [figure8(), mirrored(figure8())])
+    fleet.follow(dict(zip(fleet.names, ways, strict=False)), relative=True)
     fleet.land()
 
 

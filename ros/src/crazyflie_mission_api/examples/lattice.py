@@ -1,8 +1,8 @@
 #!/usr/bin/env python
 """Many vehicles rise from a square on the floor into a lattice, turn it into a ring, and come back.
 
-Usage: lattice.py [N], the number of vehicles; by default 100: cf1, cf2, ... as in sw_swarm.launch.
-With the word "dry_run" after it nothing flies, and no ROS is needed.
+Usage: lattice.py [N | NAME ...], the number of vehicles, cf1, cf2, ... as in sw_swarm.launch, by
+default 100; or their names. With a number and the word "dry_run" after it nothing flies, and no ROS is needed.
 """
 
 import math
@@ -51,15 +51,15 @@ def square(n: int) -> Array:
 
 
 if __name__ == "__main__":
-    number = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    names = [f"cf{k}" for k in range(1, number + 1)]
+    names = sys.argv[1:]
+    if not names or names[0].isdecimal():
+        names = [f"cf{k + 1}" for k in range(int(names[0]) if names else 100)]
     # The word of earlier versions was "rehearse".
     if sys.argv[2:] in (["dry_run"], ["rehearse"]):
-        dry_run = DryRun(
-            dict(zip(names, map(tuple, square(number).tolist()), strict=True)), Rules(LIMITS)
-        )
+        places = map(tuple, square(len(names)).tolist())
+        dry_run = DryRun(dict(zip(names, places, strict=True)), Rules(LIMITS))
         mission(dry_run)
-        print(f"{number} vehicles, {dry_run.time():.0f} s, nobody meets")
+        print(f"{len(names)} vehicles, {dry_run.time():.0f} s, nobody meets")
     else:
         with crazyflie_mission_api.Fleet(names, limits=LIMITS) as group:
             group.fly(mission)

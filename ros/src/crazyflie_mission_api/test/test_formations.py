@@ -1,6 +1,8 @@
 """Formations, and the lattice of a hundred, flown by the model under its controller."""
 
 import runpy
+import subprocess
+import sys
 
 import model_flight
 import numpy as np
@@ -60,6 +62,25 @@ def test_the_lattice_of_any_number(n):
     example["mission"](group)
     assert group.flying == []
     assert {tuple(np.round(group.position(name), 6)) for name in starts} == set(starts.values())
+
+
+@pytest.mark.parametrize("example", ["lattice", "figure_eights"])
+@pytest.mark.parametrize("spacing", [1.0, 1.8])
+def test_the_examples_fly_in_a_fleet_as_it_is_launched(example, spacing):
+    """A grid of sw_swarm.launch, with its spacing and with more."""
+    example = runpy.run_path(f"{EXAMPLES}/{example}.py")
+    places = [(spacing * (k // 2), spacing * (k % 2), 0.0) for k in range(3)]
+    starts = {f"cf{k + 1}": place for k, place in enumerate(places)}
+    group = DryRun(starts, Rules(example["LIMITS"]))
+    example["mission"](group)
+    assert group.flying == []
+
+
+def test_the_lattice_takes_names():
+    """The dashboard's page gives those of the chosen vehicles."""
+    command = [sys.executable, f"{EXAMPLES}/lattice.py", "cf3", "dry_run"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout[:10]) == (0, "2 vehicles")
 
 
 # In both, vehicles are as near to each other as anywhere in the lattice, on every side.

@@ -66,7 +66,7 @@ def test_a_dry_run_has_a_path_and_moves_no_vehicle(run, vehicle):
     status, output, _ = run("dry_run", "fleet.fly(mission)", "print('flown')")
     found = result(output)
     assert (status, found["passed"]) == (0, True)
-    assert found["text"].startswith("passed: cf1 fly for ")
+    assert found["text"].startswith("cf1 fly for ")
     assert found["paths"]["cf1"][0] == [0.0, 0.0, 0.0]
     assert [0.5, 0.0, 1.2] in found["paths"]["cf1"]
     # From one point to the next 0.2 s, in steps of 0.05 s.

@@ -104,12 +104,12 @@ class Dashboard:
         self._submit(do)
 
     def plots(self, page: int) -> tuple[Series, ...]:
-        """Return the last minute of the chosen vehicle and of the page's own fields."""
+        """Return the last minute of the page's own fields, and of the chosen vehicle."""
         state = self._open.get(page)
         if state is None:
             return ()
         plots = self._model.plots.get(state.vehicle or "")
-        return (plots.series() if plots is not None else ()) + state.series()
+        return state.series() + (plots.series() if plots is not None else ())
 
     def add_field(self, page: int, path: str) -> "Future[None]":
         """Plot a number of any topic, as in /topic/field/other[0], too."""

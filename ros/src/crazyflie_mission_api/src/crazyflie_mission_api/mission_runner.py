@@ -68,7 +68,7 @@ class _DryRunReport(MissionObserver):
 
     @override
     def passed(self, vehicles: list[str], duration: float) -> None:
-        text = f"passed: {', '.join(vehicles)} fly for {duration:.0f} s"
+        text = f"{', '.join(vehicles)} fly for {duration:.0f} s"
         _print_result(True, text, duration, self._paths)
         raise Done
 

@@ -47,7 +47,7 @@ class VehicleGroup(LandingGroup):
             if height < z + _MIN_CLIMB:
                 raise MissionError(
                     f"{name}: takeoff: the height is {height:g} m, and it is at {z:.2f} m; "
-                    f"expected at least {_MIN_CLIMB:g} m more"
+                    f"expected at least {_MIN_CLIMB:g} m more, or the vehicle on the ground"
                 )
             goal = (x, y, height)
             self.fence(name).check(np.array(goal), f"{name}: takeoff to {text(goal)}")

@@ -177,7 +177,10 @@ def _plot(series: Series) -> tuple[str, str]:
 
 def _title(group: list[Series], top: int) -> dict[str, Any]:
     """Return the names of a plot's lines, each in the color of its line, and their unit."""
-    names = (f"{{c{i % len(COLORS)}|{each.name}}}" for i, each in enumerate(group))
+    names = (
+        f"{{c{i % len(COLORS)}|{each.name}{'' if len(each.times) else ': no message yet'}}}"
+        for i, each in enumerate(group)
+    )
     style = {**DIM, "fontSize": 11, "fontWeight": "normal", "rich": NAME_STYLES}
     text = f"{'  '.join(names)}   {group[0].unit}"
     return {"text": text, "top": top - 20, "left": 40, "textStyle": style}

@@ -28,7 +28,7 @@ LOADING_TIME = 2.0  #: Longest time until the first scene (s).
 
 
 class View:
-    """A page: bar, scene, and and panels. It is built when a browser asks for the page."""
+    """A page: bar, scene, and panels. It is built when a browser asks for the page."""
 
     def __init__(self, dashboard: Dashboard):
         self._dashboard = dashboard

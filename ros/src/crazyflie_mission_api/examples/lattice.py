@@ -2,7 +2,8 @@
 """Many vehicles rise from a square on the floor into a lattice, turn it into a ring, and come back.
 
 Usage: lattice.py [N | NAME ...], the number of vehicles, cf1, cf2, ... as in sw_swarm.launch, by
-default 100; or their names. With a number and the word "dry_run" after it nothing flies, and no ROS is needed.
+default 100; or their names. With a number and the word "dry_run" after it nothing flies, and no ROS
+is needed.
 """
 
 import math

@@ -61,5 +61,6 @@ class PoleNode(Node):
         marker.header.frame_id = self._parameters.fixed_frame
         # The time 0: drawn where the frame is now.
         marker.header.stamp = genpy.Time()
-        # Step 3: pose and scale; the origin of a cylinder is its middle.
+        # Step 3: pose and scale. The origin of a cylinder is its middle; an orientation without a
+        # rotation has w = 1.
         return marker

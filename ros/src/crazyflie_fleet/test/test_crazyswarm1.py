@@ -81,7 +81,7 @@ def test_without_that_file_types_have_no_effect(load, from_text):
         (VEHICLES.replace("80", "x"), TYPES, ":7: crazyflies.1./channel is 'x'; expected an integ"),
         (VEHICLES.replace("single", "none"), TYPES, "type is 'none'; expected one of default, sin"),
         ("crazyflies: {}", TYPES, "crazyflies is {}; expected a list"),
-        ("crazyflies: []", TYPES, "has no vehicle that is enabled"),
+        ("crazyflies: []", TYPES, "has no enabled vehicle"),
         (VEHICLES, TYPES.replace("3.8", "much"), "Types.yaml:4. is 'much'; expected a finite num"),
         (VEHICLES, TYPES.replace("3.8", "3.5"), "crazyflieTypes.yaml:5: battery/voltage_critical"),
     ],

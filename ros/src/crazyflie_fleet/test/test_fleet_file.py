@@ -127,7 +127,7 @@ def test_what_a_type_and_all_say_counts_for_their_vehicles(load):
 
 def test_a_text_in_place_of_a_file():
     assert fleet_file.parse(TWO).names == ("cf1", "cf2")
-    with pytest.raises(ParameterError, match="crazyflies.yaml:1: the file has no robots, as cra"):
+    with pytest.raises(ParameterError, match="crazyflies.yaml:1: the file has neither robots"):
         fleet_file.parse("a: 1")
     with pytest.raises(ParameterError, match="lab.yaml: is empty; expected a mapping"):
         fleet_file.parse("", "lab.yaml")
@@ -214,7 +214,7 @@ def test_simulated_vehicles_need_no_address(load):
         ),
         (
             "robots: {a: {enabled: false, initial_position: [0, 0, 0]}}\n",
-            ":1: robots has no vehicle that is enabled",
+            ":1: robots has no enabled vehicle",
         ),
         (
             TWO + "all: {battery: {voltage_critical: 3.5}}\n",
@@ -227,7 +227,7 @@ def test_simulated_vehicles_need_no_address(load):
         (TWO + "    machine: far\n", ":8: robots/cf2/machine is 'far'; expected one of local"),
         (
             "cf1: {}\n",
-            ":1: the file has no robots, as crazyswarm2's, and no crazyflies, as Crazyswarm 1's; "
+            ":1: the file has neither robots (crazyswarm2) nor crazyflies (Crazyswarm 1); "
             "it has cf1",
         ),
     ],

@@ -188,7 +188,7 @@ def test_a_file_that_cannot_be_written_is_named(tmp_path, capsys):
 def test_gains_that_bear_too_little_delay_are_refused_unless_forced(tmp_path, capsys):
     out = tmp_path / "K.txt"
     assert main(arguments(out=out, force=None)) == 1
-    assert "bear 6.9 ms of delay; expected at least 20 ms" in capsys.readouterr().err
+    assert "tolerate 6.9 ms of delay; expected at least 20 ms" in capsys.readouterr().err
     assert not out.exists()
     assert main(arguments(out=out)) == 0
     assert "--force\n" in out.read_text()

@@ -32,7 +32,7 @@ def test_a_vehicle_that_answers_later_is_flown_more_slowly():
 def test_where_no_gains_bear_enough_it_says_so(monkeypatch):
     monkeypatch.setattr(vehicle_gains, "LEAST_MODULUS", 0.999)
     with pytest.raises(
-        DesignError, match="no gains bear a delay of 0 ms and lags of 100, 100, 100"
+        DesignError, match="no gains tolerate a delay of 0 ms and lags of 100, 100, 100"
     ):
         design(vehicle(0.0, 0.1))
 

@@ -98,9 +98,9 @@ FLEETS = [
         "crazyflies.0. has no id; it has initialPosition",
     ),
     (PAIR.replace("id: 2", "id: 1"), "id is that of cf1 in line 3; expected another"),
-    ("vehicles: {a: 1}", "has no robots, .* and no crazyflies"),
+    ("vehicles: {a: 1}", "has neither robots .* nor crazyflies"),
     ("crazyflies: [", "is no YAML"),
-    ("crazyflies: []", "has no vehicle that is enabled"),
+    ("crazyflies: []", "has no enabled vehicle"),
     (
         "robots: {cf1: {uri: usb, initial_position: [0, 0, 0]}}",
         "cf1/uri .* is 'usb'; expected radio",

@@ -124,7 +124,9 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out/bench.json"), help="JSON file")
     parser.add_argument("--beside", type=Path, help="another workspace, measured in turns with it")
     parser.add_argument("--rounds", type=int, default=1, help="how often each is measured (1)")
-    parser.add_argument("row", nargs="*", help="beginnings of rows' names, such as cpu; all")
+    parser.add_argument(
+        "row", nargs="*", help="rows whose names begin so, such as cpu (default: all)"
+    )
     options = parser.parse_args()
     for word in options.row:
         if not any(row.name.startswith(word) for row in ROWS):

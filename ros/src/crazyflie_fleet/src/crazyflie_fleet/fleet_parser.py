@@ -115,7 +115,7 @@ class FleetParser:
         """Return the fleet, or raise `ParameterError`."""
         if "robots" not in self._parts:
             raise self._top.error(
-                "has no robots, as crazyswarm2's, and no crazyflies, as Crazyswarm 1's; it has "
+                "has neither robots (crazyswarm2) nor crazyflies (Crazyswarm 1); it has "
                 f"{shortened(', '.join(self._parts)) or 'nothing'}"
             )
         self._check_keys(self._parts, _TOP)
@@ -148,9 +148,7 @@ class FleetParser:
         self._raise_errors()
         disabled = [vehicle.name for vehicle in vehicles if not vehicle.settings.enabled]
         if not enabled:
-            raise self._parts["robots"].error(
-                "has no vehicle that is enabled; expected one at least"
-            )
+            raise self._parts["robots"].error("has no enabled vehicle; expected at least one")
         unplaced = self._unplaced(enabled)
         return FleetConfig(
             tuple(enabled), tuple(disabled), machines, self.remarks.texts(), broadcasts, unplaced

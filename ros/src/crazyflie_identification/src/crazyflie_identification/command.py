@@ -51,7 +51,7 @@ def _parser():
         "--type",
         choices=sorted(TYPES),
         default="cf21",
-        help="type of the vehicle: its thrust curve, with which the mass is told (%(default)s)",
+        help="type of the vehicle, whose thrust curve gives the mass (%(default)s)",
     )
     parser.add_argument("--vehicle", default="", help="name of one, if the bag has several")
     parser.add_argument(

@@ -106,7 +106,7 @@ def _check_delay(loops, options):
     least = min(margins.delay for margins in loops)
     if least < LEAST_DELAY and not options.force:
         raise DesignError(
-            f"flown, these gains bear {1e3 * least:.1f} ms of delay; expected at least "
+            f"flown, these gains tolerate {1e3 * least:.1f} ms of delay; expected at least "
             f"{1e3 * LEAST_DELAY:g} ms: raise R or lower Q, or add --force"
         )
 
@@ -137,7 +137,7 @@ def _parser():
     parser.add_argument(
         "--force",
         action="store_true",
-        help=f"accept gains that bear less than {1e3 * LEAST_DELAY:g} ms of delay",
+        help=f"accept gains that tolerate less than {1e3 * LEAST_DELAY:g} ms of delay",
     )
     parser.add_argument("--out", metavar="FILE", help="write the gains to a file")
     parser.add_argument("--plot", metavar="FILE", help="draw step responses and Bode diagrams")

@@ -61,7 +61,7 @@ def design(model: QuadrotorParameters) -> tuple[Design, list[Margins]]:
             return found, loops
         pace *= _SLOWER
     raise DesignError(
-        f"no gains bear a delay of {1e3 * model.delay:g} ms and lags of "
+        f"no gains tolerate a delay of {1e3 * model.delay:g} ms and lags of "
         f"{', '.join(f'{1e3 * each:.0f}' for each in lags(model))} ms"
     )
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from crazyflie_model.supervisor import watchdog_control
+from crazyflie_model.dynamics import watchdog_control
 
 U = [0.1, -0.2, 0.3, 9.0]
 LEVEL, OFF = [0.0, 0.0, 0.0, 9.0], [0.0, 0.0, 0.0, 0.0]

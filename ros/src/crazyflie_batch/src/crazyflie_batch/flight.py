@@ -17,9 +17,8 @@ from typing import Any
 from crazyflie_batch.estimators import Estimator
 from crazyflie_lqr import control_law
 from crazyflie_model import inner_loops
-from crazyflie_model.dynamics import STEP, Dynamics
+from crazyflie_model.dynamics import STEP, Dynamics, watchdog_control
 from crazyflie_model.elementwise import Number, Vector, functions, where
-from crazyflie_model.supervisor import watchdog_control
 
 _SMALLEST_COSINE = 1e-6  #: Cosine of the pitch below which roll and yaw are not distinct.
 

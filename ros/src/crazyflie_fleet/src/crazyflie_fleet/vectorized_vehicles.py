@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from crazyflie_model.dynamics import STEP, SevenDimensional
-from crazyflie_model.supervisor import watchdog_control
+from crazyflie_model.dynamics import STEP, SevenDimensional, watchdog_control
 
 _NEVER = np.iinfo(np.int64).max
 

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
 from crazyflie_model.elementwise import Number, Vector, functions, join, nowhere, split, where
+from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 from crazyflie_model.units import GRAVITY
 
 Rates = Callable[[float, Vector[Number], Vector[Number]], Vector[Number]]
@@ -45,6 +47,20 @@ STEP = 0.001  #: Integration step of every model (s).
 #: Friction coefficient of a 7-dimensional vehicle on the ground: dry plastic on a hard floor, for
 #: which tables have 0.3 to 0.6.
 GROUND_FRICTION = 0.5
+
+_LEVEL_STEPS, _OFF_STEPS = round(LEVEL_AGE / STEP), round(OFF_AGE / STEP)
+
+
+def watchdog_control(u: Vector[Any], age: Any) -> Vector[Any]:
+    """Return the effective control for a control (see `Dynamics`) that is ``age`` steps old.
+
+    From `LEVEL_AGE` on it is level and keeps its thrust, from `OFF_AGE` on its motors are off.
+    """
+    if nowhere(age >= _LEVEL_STEPS):
+        return [*u]
+    *attitude, thrust = u
+    level = [where(age < _LEVEL_STEPS, each, 0.0) for each in attitude]
+    return [*level, where(age < _OFF_STEPS, thrust, 0.0)]
 
 
 class Dynamics(ABC):

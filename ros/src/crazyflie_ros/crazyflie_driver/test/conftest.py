@@ -11,8 +11,8 @@ from crazyflie_utils.testing.fixtures import own_cache  # noqa: F401
 from crazyflie_virtual.testing import READ_ONLY, FakeVehicle
 
 LIMIT = 60.0
-"""The longest that a test waits for the driver, s; how soon it gives up by itself is in Limits of
-crazyflie_link."""
+"""The longest that a test waits for the driver, s; how soon it gives up by itself is in
+crazyflie_link.link_monitor.LinkTimeouts."""
 
 LOG = {
     "acc.x": ("f", 0.5),

@@ -13,7 +13,7 @@ from crazyflie_driver.setpoint_gate import (
     REASONS,
     TRANSITIONS,
     Block,
-    Event,
+    GateEvent,
     SetpointGate,
 )
 
@@ -30,9 +30,9 @@ def lost():
     """Return a gate whose link was lost and is back at 2 s, while a node streams."""
     gate = SetpointGate()
     assert stream(gate, 0.0, 1.0) == (0, "")
-    gate.handle(Event.LINK_LOST)
+    gate.handle(GateEvent.LINK_LOST)
     assert stream(gate, 1.0, 2.0) == (50, "the link is lost")
-    gate.handle(Event.LINK_BACK)
+    gate.handle(GateEvent.LINK_BACK)
     return gate
 
 
@@ -44,7 +44,7 @@ def test_what_was_streamed_before_a_loss_stays_blocked(lost):
     assert not lost.is_blocking(62.0)
 
 
-@pytest.mark.parametrize("event", [Event.FLIGHT_REPORTED, Event.FLIGHT_CALLED])
+@pytest.mark.parametrize("event", [GateEvent.FLIGHT_REPORTED, GateEvent.FLIGHT_CALLED])
 def test_a_flight_that_goes_on_and_a_call_open_it(lost, event):
     lost.handle(event)
     assert stream(lost, 2.0, 3.0) == (0, "")
@@ -55,13 +55,13 @@ def standing():
     """Return a gate whose vehicle has not lifted off at 2 s, while a node streams."""
     gate = SetpointGate()
     assert stream(gate, 0.0, 2.0) == (0, "")
-    gate.handle(Event.NOT_LIFTED)
+    gate.handle(GateEvent.NOT_LIFTED)
     return gate
 
 
 def test_what_was_streamed_while_a_vehicle_did_not_lift_off_stays_blocked(standing):
     # Its motors have run: for 2 s more it says that it flies.
-    standing.handle(Event.FLIGHT_REPORTED)
+    standing.handle(GateEvent.FLIGHT_REPORTED)
     count, why = stream(standing, 2.0, 60.0)
     assert count == 2900
     assert why.startswith("the vehicle was commanded to fly and did not lift off")
@@ -69,11 +69,11 @@ def test_what_was_streamed_while_a_vehicle_did_not_lift_off_stays_blocked(standi
 
 def test_a_new_stream_zero_thrust_and_a_call_are_new_attempts(standing):
     assert stream(standing, 2.0 + PAUSE + 0.1, 4.0) == (0, "")
-    standing.handle(Event.NOT_LIFTED)
+    standing.handle(GateEvent.NOT_LIFTED)
     assert standing.refusal(4.0, True) == ""
     assert stream(standing, 4.02, 5.0) == (0, "")
-    standing.handle(Event.NOT_LIFTED)
-    standing.handle(Event.FLIGHT_CALLED)
+    standing.handle(GateEvent.NOT_LIFTED)
+    standing.handle(GateEvent.FLIGHT_CALLED)
     assert stream(standing, 5.0, 6.0) == (0, "")
 
 
@@ -85,8 +85,8 @@ def test_a_pause_opens_it(lost):
 def test_a_pause_during_the_loss_opens_it():
     gate = SetpointGate()
     stream(gate, 0.0, 1.0)
-    gate.handle(Event.LINK_LOST)
-    gate.handle(Event.LINK_BACK)
+    gate.handle(GateEvent.LINK_LOST)
+    gate.handle(GateEvent.LINK_BACK)
     assert stream(gate, 3.0, 4.0) == (0, "")
 
 
@@ -97,11 +97,11 @@ def test_zero_thrust_opens_it(lost):
 
 def test_nothing_opens_it_without_a_link():
     gate = SetpointGate()
-    gate.handle(Event.LINK_LOST)
-    gate.handle(Event.FLIGHT_CALLED)
+    gate.handle(GateEvent.LINK_LOST)
+    gate.handle(GateEvent.FLIGHT_CALLED)
     assert gate.refusal(0.0, True) == "the link is lost"
     assert gate.refusal(5.0, False) == "the link is lost"
-    gate.handle(Event.LINK_BACK)
+    gate.handle(GateEvent.LINK_BACK)
     assert gate.refusal(5.1, False)
 
 
@@ -122,10 +122,10 @@ def test_a_setpoint_under_way_does_not_follow_the_end_of_a_stream(end, event):
 
 
 def test_an_emergency_and_a_removal_are_for_good(lost):
-    lost.handle(Event.REMOVAL)
-    lost.handle(Event.FLIGHT_CALLED)
+    lost.handle(GateEvent.REMOVAL)
+    lost.handle(GateEvent.FLIGHT_CALLED)
     assert lost.refusal(9.0, True) == "the vehicle is being removed"
-    lost.handle(Event.EMERGENCY_STOP)
+    lost.handle(GateEvent.EMERGENCY_STOP)
     assert lost.refusal(19.0, True) == "emergency stop"
 
 
@@ -148,11 +148,11 @@ class Moment(float):
 def test_a_link_that_is_lost_while_a_setpoint_is_decided_about_blocks_the_stream():
     gate = SetpointGate()
     stream(gate, 0.0, 1.0)
-    moment = Moment(1.0, partial(gate.handle, Event.LINK_LOST))
+    moment = Moment(1.0, partial(gate.handle, GateEvent.LINK_LOST))
     assert gate.refusal(moment, False) == ""
     moment.thread.join()
     assert gate.refusal(1.02, False) == "the link is lost"
-    gate.handle(Event.LINK_BACK)
+    gate.handle(GateEvent.LINK_BACK)
     assert stream(gate, 1.04, 2.0)[1].startswith("the link was lost")
 
 
@@ -180,21 +180,21 @@ def test_a_command_that_fails_lets_setpoints_pass_but_not_after_another_one():
 
 
 def test_every_event_has_a_transition_and_every_block_a_reason():
-    assert set(TRANSITIONS) == set(Event)
+    assert set(TRANSITIONS) == set(GateEvent)
     assert list(REASONS) == list(Block)
 
 
-@given(st.lists(st.sampled_from(Event), max_size=30))
+@given(st.lists(st.sampled_from(GateEvent), max_size=30))
 def test_after_an_emergency_or_a_removal_nothing_passes(events):
     """And without a link; whatever comes in whatever order."""
     gate = SetpointGate()
     for event in events:
         gate.handle(event)
-    latched = {Event.EMERGENCY_STOP, Event.REMOVAL} & set(events)
-    link = [event for event in events if event in (Event.LINK_LOST, Event.LINK_BACK)]
-    is_down = bool(link) and link[-1] is Event.LINK_LOST
-    battery = [e for e in events if e in (Event.BATTERY_CRITICAL, Event.BATTERY_RECOVERED)]
-    is_empty = bool(battery) and battery[-1] is Event.BATTERY_CRITICAL
+    latched = {GateEvent.EMERGENCY_STOP, GateEvent.REMOVAL} & set(events)
+    link = [event for event in events if event in (GateEvent.LINK_LOST, GateEvent.LINK_BACK)]
+    is_down = bool(link) and link[-1] is GateEvent.LINK_LOST
+    battery = [e for e in events if e in (GateEvent.BATTERY_CRITICAL, GateEvent.BATTERY_RECOVERED)]
+    is_empty = bool(battery) and battery[-1] is GateEvent.BATTERY_CRITICAL
     for time, is_zero in ((0.0, False), (0.1, True), (5.0, False)):
         assert bool(gate.refusal(time, is_zero)) is bool(latched or is_down or is_empty)
 
@@ -203,11 +203,11 @@ def test_a_stream_that_was_landed_for_its_battery_has_to_pause():
     """The voltage comes back by itself as soon as the motors rest."""
     gate = SetpointGate()
     assert stream(gate, 0.0, 1.0) == (0, "")
-    gate.handle(Event.BATTERY_CRITICAL)
+    gate.handle(GateEvent.BATTERY_CRITICAL)
     assert stream(gate, 1.0, 2.0) == (50, "the battery is critical")
     # A pause alone does not do.
     assert stream(gate, 4.0, 5.0) == (50, "the battery is critical")
-    gate.handle(Event.BATTERY_RECOVERED)
+    gate.handle(GateEvent.BATTERY_RECOVERED)
     count, why = stream(gate, 5.0, 10.0)
     assert count == 250
     assert why.startswith("the vehicle was landed for its battery: pause the stream")
@@ -216,5 +216,5 @@ def test_a_stream_that_was_landed_for_its_battery_has_to_pause():
 
 def test_a_battery_that_was_never_critical_blocks_nothing():
     gate = SetpointGate()
-    gate.handle(Event.BATTERY_RECOVERED)
+    gate.handle(GateEvent.BATTERY_RECOVERED)
     assert stream(gate, 0.0, 1.0) == (0, "")

@@ -17,11 +17,11 @@ from crazyflie_link.errors import (
     UnknownNameError,
     ValueRangeError,
 )
-from crazyflie_link.link_monitor import Limits
+from crazyflie_link.link_monitor import LinkTimeouts
 from crazyflie_link.log import LogBlock
 
 LIMIT = 60.0
-QUICK = Limits(first_answer=0.4)
+QUICK = LinkTimeouts(first_answer=0.4)
 
 
 def test_all_tables_are_there_once_connected(link):
@@ -97,7 +97,7 @@ def test_a_set_up_that_is_stuck_says_where(make_vehicle, make_link):
         vehicle = make_vehicle()
         vehicle.deaf.add(deaf)
         with pytest.raises(SetupError) as caught:
-            make_link(vehicle.uri, limits=Limits(stall=1.0)).connect()
+            make_link(vehicle.uri, limits=LinkTimeouts(stall=1.0)).connect()
         return str(caught.value)
 
     with ThreadPoolExecutor(len(STUCK)) as pool:
@@ -108,7 +108,7 @@ def test_a_set_up_that_is_stuck_says_where(make_vehicle, make_link):
 def test_a_set_up_that_takes_too_long(make_vehicle, make_link):
     vehicle = make_vehicle()
     vehicle.lose = lambda count: count % 2 == 0
-    limits = Limits(stall=5.0, total=1.0)
+    limits = LinkTimeouts(stall=5.0, total=1.0)
     with pytest.raises(SetupError, match="not connected after 1 s"):
         make_link(vehicle.uri, limits=limits).connect()
 
@@ -124,7 +124,7 @@ def test_a_stuck_vehicle_stops_no_other(make_vehicle, make_link):
     stuck.deaf.add((4, 0, b""))
     good = [make_vehicle() for _ in range(4)]
     with ThreadPoolExecutor() as pool:
-        stuck_link = make_link(stuck.uri, limits=Limits(stall=LIMIT))
+        stuck_link = make_link(stuck.uri, limits=LinkTimeouts(stall=LIMIT))
         connecting_stuck = pool.submit(stuck_link.connect)
         links = [make_link(vehicle.uri) for vehicle in good]
         for connecting in [pool.submit(link.connect) for link in links]:
@@ -137,7 +137,7 @@ def test_a_stuck_vehicle_stops_no_other(make_vehicle, make_link):
 def test_closing_while_connecting(make_vehicle, make_link):
     vehicle = make_vehicle()
     vehicle.deaf.add((4, 0, b""))
-    link = make_link(vehicle.uri, limits=Limits(stall=LIMIT))
+    link = make_link(vehicle.uri, limits=LinkTimeouts(stall=LIMIT))
     with ThreadPoolExecutor() as pool:
         connecting = pool.submit(link.connect)
         vehicle.wait_for_packets(4, 0)

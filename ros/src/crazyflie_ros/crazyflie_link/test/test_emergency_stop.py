@@ -7,7 +7,7 @@ import pytest
 
 from crazyflie_link.crazyflie import LinkState
 from crazyflie_link.errors import CrazyflieError
-from crazyflie_link.link_monitor import Limits
+from crazyflie_link.link_monitor import LinkTimeouts
 from crazyflie_link.supervisor import EmergencyStop
 from crazyflie_utils.testing.waiting import wait_until
 
@@ -17,7 +17,7 @@ STOP, OLD_STOP = b"\x03", b"\x03"
 
 READY, LOCKED = b"\x8c\x0a\x00", b"\x8c\x42\x00"
 
-PATIENT = Limits(first_answer=LIMIT, stall=LIMIT, total=LIMIT)
+PATIENT = LinkTimeouts(first_answer=LIMIT, stall=LIMIT, total=LIMIT)
 
 pytestmark = pytest.mark.filterwarnings("ignore:The supervisor subsystem:UserWarning")
 

@@ -6,7 +6,7 @@ import pytest
 
 from crazyflie_link import link_monitor
 from crazyflie_link.errors import NoAnswerError, SetupError
-from crazyflie_link.link_monitor import Limits, LinkSetup
+from crazyflie_link.link_monitor import LinkSetup, LinkTimeouts
 
 PACKETS = [
     ((15, 0, b""), "waiting for the first answer"),
@@ -37,7 +37,7 @@ def clock(monkeypatch):
 
 @pytest.mark.parametrize("count", range(1, len(PACKETS) + 1))
 def test_each_step_is_progress_and_is_named_where_it_ends(clock, count):
-    setup = LinkSetup("udp://here", Limits())
+    setup = LinkSetup("udp://here", LinkTimeouts())
     for packet, _ in PACKETS[:count]:
         clock.now += 1.4
         setup.receive(*packet)
@@ -53,7 +53,7 @@ def test_each_step_is_progress_and_is_named_where_it_ends(clock, count):
 
 
 def test_progress_ends_after_the_whole_time(clock):
-    setup = LinkSetup("udp://here", Limits())
+    setup = LinkSetup("udp://here", LinkTimeouts())
     for number in range(30):
         clock.now += 1.0
         setup.receive(2, 1, bytes([number, 0]))
@@ -64,7 +64,7 @@ def test_progress_ends_after_the_whole_time(clock):
 
 
 def test_the_first_answer_has_a_limit_of_its_own(clock):
-    setup = LinkSetup("udp://here", Limits())
+    setup = LinkSetup("udp://here", LinkTimeouts())
     clock.now += 1.9
     setup.check(-1)
     clock.now += 0.2
@@ -76,7 +76,7 @@ def test_the_first_answer_has_a_limit_of_its_own(clock):
 
 @pytest.mark.parametrize("protocol", [0, 3])
 def test_firmware_that_is_too_old_is_refused_at_once(clock, protocol):
-    setup = LinkSetup("udp://here", Limits())
+    setup = LinkSetup("udp://here", LinkTimeouts())
     setup.check(4)
     with pytest.raises(SetupError, match=f"protocol {protocol}, at least 4 is needed"):
         setup.check(protocol)

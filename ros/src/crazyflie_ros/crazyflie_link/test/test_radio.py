@@ -19,7 +19,7 @@ from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.discovery import MODES, reboot
 from crazyflie_link.errors import AddressError, LinkLostError, NoAnswerError, NoDongleError
 from crazyflie_link.link import Link
-from crazyflie_link.link_monitor import Limits, LinkHealth, LinkMonitor
+from crazyflie_link.link_monitor import LinkHealth, LinkMonitor, LinkTimeouts
 from crazyflie_link.safe_crazyflie import packet
 
 # cflib warns of one of its own attributes when a mock takes stock of them.
@@ -67,7 +67,7 @@ def test_a_driver_that_gives_up_ends_the_attempt(mock, text, error):
 
 def test_a_dongle_that_hangs_does_not_hang_us(mock):
     release = threading.Event()
-    link = Link(Address.parse(URI), Limits(first_answer=0.3), backend=mock)
+    link = Link(Address.parse(URI), LinkTimeouts(first_answer=0.3), backend=mock)
     mock.cflib.open_link.side_effect = lambda uri: release.wait(60.0)
     with pytest.raises(NoAnswerError):
         link.open()
@@ -81,7 +81,7 @@ def test_a_dongle_that_hangs_does_not_hang_us(mock):
 
 
 def test_the_first_request_is_repeated(mock):
-    link = Link(Address.parse(URI), Limits(first_answer=1.0), backend=mock)
+    link = Link(Address.parse(URI), LinkTimeouts(first_answer=1.0), backend=mock)
     with pytest.raises(NoAnswerError):
         link.open()
     assert mock.cflib.request_source.call_count >= 2
@@ -93,7 +93,7 @@ def test_the_first_request_is_not_repeated_at_once_or_after_its_answer(
 ):
     times = itertools.count(100.0, period)
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: next(times)))
-    link = Link(Address.parse(URI), Limits(first_answer=0.2), backend=mock)
+    link = Link(Address.parse(URI), LinkTimeouts(first_answer=0.2), backend=mock)
     mock.cflib.platform.get_protocol_version.return_value = protocol
     with pytest.raises(NoAnswerError):
         link.open()

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_model.angles import Quaternion, Triple
-from crazyflie_model.dynamics import STEP, Dynamics
+from crazyflie_model.dynamics import STEP, Dynamics, watchdog_control
 from crazyflie_model.elementwise import Vector
-from crazyflie_model.supervisor import watchdog_control
 
 _OFF: Vector[float] = [0.0, 0.0, 0.0, 0.0]
 

@@ -13,7 +13,7 @@ from crazyflie_driver.flight_state import REPORT_LAG, FlightState
 from crazyflie_driver.jobs import Job
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import Charge, Touchdown
-from crazyflie_driver.setpoint_gate import Event
+from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_link.broadcast import SharedCommand
 from crazyflie_link.errors import AlreadyLandingError, CrazyflieError, LinkLostError, NoReplyError
@@ -342,7 +342,7 @@ class FlightCommands:
         if command.ends_flight:
             self._flight.end_accepted(command.duration)
         else:
-            gate.handle(Event.FLIGHT_CALLED)
+            gate.handle(GateEvent.FLIGHT_CALLED)
             self._feeds_watchdog = True
 
     def _prepare_sending(self, command, job):

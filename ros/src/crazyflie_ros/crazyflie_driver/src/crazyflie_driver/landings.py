@@ -8,7 +8,7 @@ from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.flight_commands import LAND, STOP, Command, FlightCommands
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import STEP, STEP_TIME, Charge, Next, landing_duration
-from crazyflie_driver.setpoint_gate import Event
+from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.setpoint_topics import Control, SetpointTopics
 from crazyflie_model.supervisor import SupervisorState
 
@@ -106,11 +106,11 @@ class Landings:
         elif not is_active and self._is_logged():
             self._reason = self._sent = None
             if not is_critical:
-                self._context.gate.handle(Event.BATTERY_RECOVERED)
+                self._context.gate.handle(GateEvent.BATTERY_RECOVERED)
         self._commands.refusal = self._refusal()
         is_accepted = self._sent is not None and _is_accepted(self._sent)
         if is_accepted and self._reason is Reason.BATTERY:
-            self._context.gate.handle(Event.BATTERY_CRITICAL)
+            self._context.gate.handle(GateEvent.BATTERY_CRITICAL)
         touchdown = self._commands.touchdown
         if touchdown is not None and (is_accepted or self._sent is None):
             self._descend(touchdown, is_active)

@@ -4,6 +4,8 @@ import enum
 import threading
 from typing import NamedTuple
 
+from crazyflie_model.limits import LEVEL_AGE
+
 
 class Charge(enum.IntEnum):
     """Charge of a battery; the numbers are those of crazyflie_msgs/VehicleStatus."""
@@ -122,7 +124,6 @@ LIFT_LIMIT = 2.0  #: Time in which a vehicle has to lift off, s.
 MIN_CLIMB = 0.15  #: Setpoints that are lower above the ground do not ask for a flight, m.
 MAX_RISE = 0.05  #: A vehicle on the ground estimates no more above it, m.
 MAX_TURN = 10.0  #: Largest turn from the heading on the ground to the commanded one, degrees.
-MAX_GAP = 0.5  #: Setpoints older than this are levelled out by the firmware, s.
 STREAM_PAUSE = 1.0  #: After a pause of this length, s, setpoints are a new attempt.
 
 MAX_REST_SPEED = 0.1  #: A vehicle on the ground estimates no more, m/s.
@@ -191,7 +192,7 @@ class LiftWatch:
             self._is_on_ground, self._begin = False, None
         if self._begin is None or self._latest is None or self._is_reported:
             return None
-        if now - self._begin < LIFT_LIMIT or now - self._latest > MAX_GAP:
+        if now - self._begin < LIFT_LIMIT or now - self._latest > LEVEL_AGE:
             return None
         self._is_reported = True
         return NoLift(self._height, height is not None and speed is not None)

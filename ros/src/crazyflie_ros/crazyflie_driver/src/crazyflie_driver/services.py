@@ -16,7 +16,7 @@ from crazyflie_driver.flight_commands import SERVICE_TYPES, FlightCommands, requ
 from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.jobs import Job
 from crazyflie_driver.parameter_mirror import ParameterMirror, parsed_name
-from crazyflie_driver.setpoint_gate import Event
+from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
@@ -132,7 +132,7 @@ class VehicleServices:
                     context.refuse_after_emergency()
                 context.crazyflie.supervisor.arm(request.data)
                 if request.data:
-                    context.gate.handle(Event.FLIGHT_CALLED)
+                    context.gate.handle(GateEvent.FLIGHT_CALLED)
             except (CrazyflieError, ServiceError) as error:
                 return SetBoolResponse(False, str(error))
             return SetBoolResponse(True, "armed" if request.data else "disarmed")

@@ -25,7 +25,7 @@ class Block(enum.Flag):
     NOT_LIFTED = enum.auto()
 
 
-class Event(enum.Enum):
+class GateEvent(enum.Enum):
     """An event that changes the blocks."""
 
     EMERGENCY_STOP = enum.auto()
@@ -45,23 +45,23 @@ _ON_TRIAL = Block.UNCONFIRMED | Block.LANDED | Block.NOT_LIFTED
 
 #: Event -> (blocks that have to hold, blocks that begin, blocks that end).
 TRANSITIONS = {
-    Event.EMERGENCY_STOP: (_NONE, Block.EMERGENCY, _NONE),
-    Event.REMOVAL: (_NONE, Block.REMOVAL, _NONE),
+    GateEvent.EMERGENCY_STOP: (_NONE, Block.EMERGENCY, _NONE),
+    GateEvent.REMOVAL: (_NONE, Block.REMOVAL, _NONE),
     # The vehicle lands.
-    Event.BATTERY_CRITICAL: (_NONE, Block.BATTERY, _NONE),
+    GateEvent.BATTERY_CRITICAL: (_NONE, Block.BATTERY, _NONE),
     # On the ground, where the voltage comes back by itself: the old stream has it fly no more.
-    Event.BATTERY_RECOVERED: (Block.BATTERY, Block.LANDED, Block.BATTERY),
-    Event.LINK_LOST: (_NONE, Block.LINK_LOST, Block.UNCONFIRMED),
+    GateEvent.BATTERY_RECOVERED: (Block.BATTERY, Block.LANDED, Block.BATTERY),
+    GateEvent.LINK_LOST: (_NONE, Block.LINK_LOST, Block.UNCONFIRMED),
     # The vehicle may have been restarted, or its battery been changed, and be in a hand.
-    Event.LINK_BACK: (Block.LINK_LOST, Block.UNCONFIRMED, Block.LINK_LOST),
+    GateEvent.LINK_BACK: (Block.LINK_LOST, Block.UNCONFIRMED, Block.LINK_LOST),
     # The vehicle reports a flight, as it does with thrust on the ground, too.
-    Event.FLIGHT_REPORTED: (_NONE, _NONE, Block.UNCONFIRMED),
+    GateEvent.FLIGHT_REPORTED: (_NONE, _NONE, Block.UNCONFIRMED),
     # A call has the vehicle fly.
-    Event.FLIGHT_CALLED: (_NONE, _NONE, _ON_TRIAL),
+    GateEvent.FLIGHT_CALLED: (_NONE, _NONE, _ON_TRIAL),
     # Setpoints were to have it fly, and it has not lifted off.
-    Event.NOT_LIFTED: (_NONE, Block.NOT_LIFTED, _NONE),
+    GateEvent.NOT_LIFTED: (_NONE, Block.NOT_LIFTED, _NONE),
     # After a pause, or with zero thrust.
-    Event.STREAM_BEGUN: (_NONE, _NONE, _ON_TRIAL),
+    GateEvent.STREAM_BEGUN: (_NONE, _NONE, _ON_TRIAL),
 }
 
 _ADVICE = f"pause the stream for {PAUSE:g} s, send zero thrust or call a service"
@@ -99,7 +99,7 @@ class SetpointGate:
         """Whether there was an emergency stop."""
         return Block.EMERGENCY in self._blocks
 
-    def handle(self, event: Event) -> None:
+    def handle(self, event: GateEvent) -> None:
         """Change the blocks as an event does."""
         needed, begun, ended = TRANSITIONS[event]
         with self._lock:
@@ -144,7 +144,7 @@ class SetpointGate:
             before, self._latest = self._latest, now
             if is_zero or before is None or now - before > PAUSE:
                 if not self._blocks & ~_ON_TRIAL:
-                    self.handle(Event.STREAM_BEGUN)
+                    self.handle(GateEvent.STREAM_BEGUN)
             for block, reason in REASONS.items():
                 if block in self._blocks:
                     return reason

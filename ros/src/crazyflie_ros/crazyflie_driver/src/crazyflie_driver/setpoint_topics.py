@@ -16,7 +16,7 @@ from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import LIFT_LIMIT, MAX_TURN, LiftWatch
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
-from crazyflie_driver.setpoint_gate import Event
+from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_model.limits import MAX_SETPOINT_PWM
@@ -221,7 +221,7 @@ class SetpointTopics:
             command += f", yaw {self._commanded_yaw:.0f} degrees"
         advice = "is it free, do all propellers turn, and is its own yaw commanded?"
         if finding.is_certain:
-            self._context.gate.handle(Event.NOT_LIFTED)
+            self._context.gate.handle(GateEvent.NOT_LIFTED)
             # Without a link, which its state shows, the firmware stops the motors.
             with contextlib.suppress(CrazyflieError):
                 self.notify_setpoints_stop()

@@ -16,7 +16,7 @@ from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.positioning import MOCAP, SOURCES
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_driver.services import VehicleServices
-from crazyflie_driver.setpoint_gate import Event, SetpointGate
+from crazyflie_driver.setpoint_gate import GateEvent, SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import StatusPublisher
 from crazyflie_driver.vehicle_parameters import POSITIONING_PARAMETER, VehicleParameters
@@ -119,7 +119,7 @@ class DriverVehicle:
 
         Raises `LinkLostError` if the vehicle is not heard; the stop is repeated until it arrives.
         """
-        self.gate.handle(Event.EMERGENCY_STOP)
+        self.gate.handle(GateEvent.EMERGENCY_STOP)
         self.crazyflie.supervisor.emergency_stop()
         self.jobs.supersede("the emergency stop")
         self.status.publish()
@@ -134,7 +134,7 @@ class DriverVehicle:
         """
         self.connection.handle(ConnectionEvent.REMOVAL)
         self.status.publish_connected(False)
-        self.gate.handle(Event.REMOVAL)
+        self.gate.handle(GateEvent.REMOVAL)
         self.jobs.supersede("the removal")
         done: Future[str] = Future()
         name = f"{self.parameters.name}-close"
@@ -278,10 +278,10 @@ class DriverVehicle:
         connection.text = text
         if state is LinkState.LOST:
             self.log.forget_state()
-            self.gate.handle(Event.LINK_LOST)
+            self.gate.handle(GateEvent.LINK_LOST)
             connection.handle(ConnectionEvent.LINK_LOST)
         elif state is LinkState.CONNECTED:
-            self.gate.handle(Event.LINK_BACK)
+            self.gate.handle(GateEvent.LINK_BACK)
             is_known = self.crazyflie.connection_count == self._connection_count
             connection.handle(
                 ConnectionEvent.LINK_HEARD if is_known else ConnectionEvent.LINK_RENEWED
@@ -314,6 +314,6 @@ class DriverVehicle:
     def _on_log(self):
         self.landings.follow()
         if self.log.is_flying and self.crazyflie.state is LinkState.CONNECTED:
-            self.gate.handle(Event.FLIGHT_REPORTED)
+            self.gate.handle(GateEvent.FLIGHT_REPORTED)
         self.setpoints.check_lift()
         self.status.publish()

@@ -21,7 +21,7 @@ from crazyflie_link.errors import (
 from crazyflie_link.high_level import HighLevel
 from crazyflie_link.lighthouse import Lighthouse
 from crazyflie_link.link import LOG_DATA, Link, OnPacket
-from crazyflie_link.link_monitor import Limits, LinkHealth
+from crazyflie_link.link_monitor import LinkHealth, LinkTimeouts
 from crazyflie_link.localization import Localization
 from crazyflie_link.log import Log, LogBlock
 from crazyflie_link.parameters import FirmwareParameters
@@ -96,7 +96,7 @@ class Crazyflie:
         ``on_packet(port, channel, data)`` for every packet that arrives.
     cache : str, optional
         Folder for log and parameter tables; by default in the user's cache.
-    limits : Limits, optional
+    limits : LinkTimeouts, optional
         Time limits.
     """
 
@@ -108,7 +108,7 @@ class Crazyflie:
         on_console: Callable[[str], None] | None = None,
         on_packet: OnPacket | None = None,
         cache: str | None = None,
-        limits: Limits | None = None,
+        limits: LinkTimeouts | None = None,
     ):
         self.address = Address.parse(uri)
         self.state = LinkState.DISCONNECTED  #: State of the link.

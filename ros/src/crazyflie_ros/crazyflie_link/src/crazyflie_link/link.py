@@ -19,7 +19,7 @@ from crazyflie_link.errors import (
     ValueRangeError,
     explain,
 )
-from crazyflie_link.link_monitor import Limits, LinkHealth, LinkMonitor, LinkSetup
+from crazyflie_link.link_monitor import LinkHealth, LinkMonitor, LinkSetup, LinkTimeouts
 from crazyflie_link.safe_crazyflie import SafeCrazyflie, init_drivers, packet
 from crazyflie_link.transmission import Request, RequestReply, Send, TransmitQueue
 
@@ -44,13 +44,13 @@ class Link:
     def __init__(
         self,
         address: Address,
-        limits: Limits | None = None,
+        limits: LinkTimeouts | None = None,
         cache: str | None = None,
         on_packet: OnPacket | None = None,
         backend: Callable[[str | None, Callable[[str], None]], SafeCrazyflie] = SafeCrazyflie,
     ):
         self.address = address
-        self._limits = limits or Limits()
+        self._limits = limits or LinkTimeouts()
         self._on_packet = on_packet
         self._setup = LinkSetup(address.uri, self._limits)
         self._monitor: LinkMonitor | None = None

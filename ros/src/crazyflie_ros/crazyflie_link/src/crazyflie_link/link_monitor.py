@@ -131,7 +131,7 @@ _TABLES = {CRTPPort.LOGGING: "log table", CRTPPort.PARAM: "parameter table"}
 
 
 @dataclass(frozen=True)
-class Limits:
+class LinkTimeouts:
     """Time limits of a connection, s.
 
     The first answer is the time from opening the link to the first packet; stall that without
@@ -148,7 +148,7 @@ class Limits:
 class LinkSetup:
     """The present step of a connection's set-up, by the packets that arrive."""
 
-    def __init__(self, uri: str, limits: Limits):
+    def __init__(self, uri: str, limits: LinkTimeouts):
         self._uri = uri
         self._limits = limits
         self._step = "waiting for the first answer"

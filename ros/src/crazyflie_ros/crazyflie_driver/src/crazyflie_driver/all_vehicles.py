@@ -8,7 +8,7 @@ from concurrent.futures import Future, wait
 from functools import partial
 from typing import Any
 
-from crazyflie_driver.flight_commands import SERVICE_TYPES, Command, Need, requested
+from crazyflie_driver.commands import SERVICE_TYPES, Command, Need, requested
 from crazyflie_driver.server_parameters import BroadcastParameters
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_link.address import Address

@@ -1,113 +1,25 @@
-"""High-level commands to one vehicle, and the precautions against dropping it."""
+"""High-level commands to one vehicle, and its landings, until it stands."""
 
 import enum
 import time
-from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import TypeVar
 
-from crazyflie_driver import srv
+from crazyflie_driver.commands import LAND, STOP, TAKEOFF, Command, Need
 from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.flight_state import REPORT_LAG, FlightState
 from crazyflie_driver.jobs import Job
 from crazyflie_driver.log_topics import LogTopics
-from crazyflie_driver.monitors import Charge, Touchdown
+from crazyflie_driver.monitors import STEP, STEP_TIME, Charge, Next, Touchdown, landing_duration
 from crazyflie_driver.setpoint_gate import GateEvent
-from crazyflie_driver.setpoint_topics import SetpointTopics
-from crazyflie_link.broadcast import SharedCommand
+from crazyflie_driver.setpoint_topics import Control, SetpointTopics
 from crazyflie_link.errors import AlreadyLandingError, CrazyflieError, LinkLostError, NoReplyError
-from crazyflie_link.high_level import ALL_GROUPS, HighLevel
+from crazyflie_link.high_level import HighLevel
 from crazyflie_link.supervisor import Supervisor
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import ServiceError
 from crazyflie_utils.timers import Timer
-
-#: Commands that differ from the others, which move a vehicle in the air.
-TAKEOFF, LAND, STOP = "takeoff", "land", "stop"
-
-#: High-level command -> type of its service.
-SERVICE_TYPES = {
-    "takeoff": srv.Takeoff,
-    "land": srv.Land,
-    "stop": srv.Stop,
-    "go_to": srv.GoTo,
-    "start_trajectory": srv.StartTrajectory,
-    "go_to_linear": srv.GoTo,
-    "spiral": srv.Spiral,
-}
-
-#: High-level command -> function that sends a request of it.
-_SENDERS: dict[str, Callable[[HighLevel, Any], None]] = {
-    "takeoff": lambda high_level, r: high_level.take_off(
-        r.height, r.duration.to_sec(), r.groupMask
-    ),
-    "land": lambda high_level, r: high_level.land(r.height, r.duration.to_sec(), r.groupMask),
-    "stop": lambda high_level, r: high_level.stop(r.groupMask),
-    "go_to": lambda high_level, r: high_level.go_to(
-        (r.goal.x, r.goal.y, r.goal.z), r.yaw, r.duration.to_sec(), r.relative, r.groupMask
-    ),
-    "start_trajectory": lambda high_level, r: high_level.start_trajectory(
-        r.trajectoryId, r.timescale, r.relative, r.reversed, r.groupMask
-    ),
-    "go_to_linear": lambda high_level, r: high_level.go_to(
-        (r.goal.x, r.goal.y, r.goal.z),
-        r.yaw,
-        r.duration.to_sec(),
-        r.relative,
-        r.groupMask,
-        linear=True,
-    ),
-    "spiral": lambda high_level, r: high_level.spiral(
-        r.angle,
-        (r.initialRadius, r.finalRadius),
-        r.ascent,
-        r.duration.to_sec(),
-        r.sideways,
-        r.clockwise,
-        r.groupMask,
-    ),
-}
-
-
-@dataclass(frozen=True)
-class Command:
-    """A high-level command: ``send(high_level)`` blocks until the vehicle has replied.
-
-    The name is that of its service, the duration that of the motion, s. A landing has a height (m),
-    unless it only goes on with the one under way.
-    """
-
-    name: str
-    send: Callable[[HighLevel], None]
-    duration: float = 0.0
-    group_mask: int = ALL_GROUPS
-    height: float | None = None
-
-    def by(self, shared: SharedCommand | None) -> "Command":
-        """Return the command, sent with those to other vehicles; with None the same command."""
-        if shared is None:
-            return self
-        return replace(self, send=lambda high_level: self.send(high_level.broadcast(shared)))
-
-    @property
-    def ends_flight(self) -> bool:
-        """Whether the vehicle is on the ground afterwards, and it goes before all others."""
-        return self.name in (LAND, STOP)
-
-
-def requested(name: str, request: Any) -> Command:
-    """Return the command that a service with this name is asked for."""
-    duration = request.duration.to_sec() if hasattr(request, "duration") else 0.0
-    sender = _SENDERS[name]
-    return Command(
-        name,
-        lambda high_level: sender(high_level, request),
-        duration,
-        request.groupMask,
-        request.height if name == LAND else None,
-    )
-
 
 Result = TypeVar("Result")
 
@@ -123,19 +35,37 @@ _REARMING = 0.5
 #: again within 1 s, or gets a new link.
 _LOOK_UP_LIMIT, _LOOK_UP_PERIOD = 1.5, 0.05
 
+_MARGIN = 1.0  #: A vehicle that is active this long after its landing, s, lands again.
+_LOG_DELAY = 0.5  #: Time after which the log shows the effect of a command, s.
 
-class Need(enum.Enum):
-    """Packets that a vehicle has to be sent for a command."""
 
-    COMMAND = enum.auto()
-    SETPOINTS_STOP = enum.auto()  #: The notice that setpoints stop, right before the command.
-    ON_GROUND = enum.auto()  #: None: a landing would start the motors of a vehicle that stands.
-    NOT_ADDRESSED = enum.auto()  #: None: the command is for other groups.
+class Reason(enum.Enum):
+    """Why the driver lands a vehicle: in words, and the longest duration of the landing, s."""
+
+    #: At 3.0 V under the load of hover a cell of 250 mAh has some 4 % left, which is 15 s; 5 s of
+    #: them have gone by before the charge is critical.
+    BATTERY = "the battery is critical", 5.0
+    #: A process waits 10 s for a flight, and the last metre takes its time.
+    POSITIONING = "the vehicle's positioning is lost", 7.0
+    SHUTDOWN = "the driver is to end", 7.0
+    REMOVAL = "the vehicle is being removed", 7.0
+    #: Its caller believes that it failed.
+    NO_ANSWER = "a command that was refused as not answered is carried out", 7.0
+
+    @property
+    def words(self) -> str:
+        """The reason, for messages."""
+        return self.value[0]
+
+    @property
+    def limit(self) -> float:
+        """The longest duration of the landing, s."""
+        return self.value[1]
 
 
 @dataclass(eq=False)
 class FlightCommands:
-    """Send a vehicle high-level commands.
+    """Send a vehicle high-level commands; land it, and follow it to the ground.
 
     In flight the firmware stops its motors at the notice that setpoints stop, unless a command
     follows at once: so the notice is sent together with the command, which was checked before.
@@ -143,6 +73,10 @@ class FlightCommands:
     A command that has a vehicle move and is not answered is looked up: the vehicle's state decides
     whether it is a success. If the vehicle is not heard, it is a failure, and the vehicle is landed
     should it obey when it is heard again.
+
+    No command may replace a landing of the driver's own. The firmware lands at a height and stops
+    the motors there, also without a link. With a link the vehicle sinks further until it stands:
+    see `Touchdown`. So it does in landings of the service.
     """
 
     _context: VehicleContext
@@ -153,12 +87,17 @@ class FlightCommands:
     _pending_notify: int | None = None
     _notify_timer: Timer | None = None
     _feeds_watchdog: bool = False
-    refusal: str = ""  #: Why no command may move the vehicle; empty if it may.
-    #: The landing under way, to be followed to the ground; None after any other command.
-    touchdown: Touchdown | None = None
+    # The landing under way, to be followed to the ground; None after any other command.
+    _touchdown: Touchdown | None = None
     # A command that was not answered and was refused to its caller; it may still be carried out.
     _unanswered: Command | None = None
     _look_up: Future[bool] | None = None
+    # Of a landing of the driver's own: why, its latest command, when that was sent and when it
+    # should have been carried out, s.
+    _reason: Reason | None = None
+    _landing: Future[None] | None = None
+    _begin: float = 0.0
+    _end: float = 0.0
 
     @property
     def is_high_level_flight_active(self) -> bool:
@@ -192,7 +131,7 @@ class FlightCommands:
             command.name, work, is_flight=True, urgent=command.ends_flight
         )
 
-    def check(self, command: Command) -> Future["Need"]:
+    def check(self, command: Command) -> Future[Need]:
         """Do all that `send` does before it sends anything; a takeoff arms the vehicle.
 
         The future fails where that of `send` would.
@@ -203,21 +142,6 @@ class FlightCommands:
 
         what = f"checking {command.name}"
         return self._context.jobs.submit(what, work, is_flight=True, urgent=command.ends_flight)
-
-    def check_unanswered(self) -> bool:
-        """Return whether a vehicle carries out a command that was refused as not answered, once.
-
-        To be called whenever the vehicle has logged its state; the look-up is a job.
-        """
-        look_up = self._look_up
-        if look_up is None:
-            if self._unanswered is not None:
-                self._look_up = self._context.jobs.submit("looking up a command", self._obeys)
-            return False
-        if not look_up.done():
-            return False
-        self._look_up = None
-        return look_up.exception() is None and look_up.result()
 
     def notify(self, remain_valid_ms: int) -> None:
         """Announce that setpoints stop: at once on the ground, in flight with the next command."""
@@ -231,6 +155,61 @@ class FlightCommands:
         if self._notify_timer is not None:
             self._notify_timer.stop()
         self._notify_timer = self._context.handle.timer(NOTIFY_WINDOW, self._end_notify_window)
+
+    def land(self, reason: Reason) -> Future[None]:
+        """Land; the result of the future is None once the vehicle has accepted it.
+
+        Called again while the vehicle is active, it lands again if that has failed, or if the
+        vehicle should be down.
+        """
+        if self._reason is None:
+            detail = self._log.battery.words() if reason is Reason.BATTERY else reason.words
+            self._context.handle.error(f"{self._context.name}: {detail}: landing")
+        if self._reason is not Reason.BATTERY:
+            self._reason = reason
+        landing = self._landing
+        if landing is None or not self._is_under_way(landing):
+            height = self._log.height
+            # Beside a table it may be below 0: it never climbs.
+            ground = 0.0 if height is None else min(0.0, height)
+            duration = landing_duration(
+                height, self._context.server.landing_duration, self._reason.limit
+            )
+            landing = self._landing = self._send_landing(
+                Command(LAND, lambda h: h.land(ground, duration), duration, height=ground)
+            )
+        return landing
+
+    def follow(self) -> None:
+        """Take the next step of a landing; to be called after each log of the vehicle.
+
+        A critical battery ends a flight by high-level commands, or on setpoints with a reference
+        (a stream of thrust is landed by the node that sends it).
+        """
+        state = self._log.supervisor
+        if state is None:
+            return
+        is_critical = self._log.battery.charge is Charge.CRITICAL
+        is_active = self._is_active(state)
+        obeys_late = self._check_unanswered()
+        if is_active and is_critical:
+            self.land(Reason.BATTERY)
+        elif is_active and self._is_position_lost():
+            self.land(Reason.POSITIONING)
+        elif obeys_late:
+            self.land(Reason.NO_ANSWER)
+        elif is_active and self._reason is not None:
+            self.land(self._reason)
+        elif not is_active and self._is_logged():
+            self._reason = self._landing = None
+            if not is_critical:
+                self._context.gate.handle(GateEvent.BATTERY_RECOVERED)
+        is_accepted = self._landing is not None and _is_accepted(self._landing)
+        if is_accepted and self._reason is Reason.BATTERY:
+            self._context.gate.handle(GateEvent.BATTERY_CRITICAL)
+        touchdown = self._touchdown
+        if touchdown is not None and (is_accepted or self._landing is None):
+            self._descend(touchdown, is_active)
 
     def _end_notify_window(self):
         if self._notify_timer is not None:
@@ -274,10 +253,16 @@ class FlightCommands:
                 )
                 return False
         elif command.name != STOP:
-            if self.refusal:
-                raise ServiceError(f"no {command.name}: {self.refusal}")
+            if refusal := self._refusal():
+                raise ServiceError(f"no {command.name}: {refusal}")
             self._check_leaving_stream()
         return True
+
+    def _refusal(self):
+        # Why no command may move the vehicle; empty if it may.
+        if self._log.battery.charge is Charge.CRITICAL:
+            return self._log.battery.words()
+        return "" if self._reason is None else self._reason.words
 
     def _check_leaving_stream(self):
         state = self._log.supervisor
@@ -326,7 +311,7 @@ class FlightCommands:
         begin = handle.time()
         number = gate.high_level(begin)
         if command.name != LAND:
-            self.touchdown = None
+            self._touchdown = None
         try:
             is_accepted = self._send_and_look_up(command, job)
         except CrazyflieError:
@@ -337,8 +322,8 @@ class FlightCommands:
         is_refused = job.done.cancelled() and not command.ends_flight
         self._unanswered = command if is_refused else None
         self._setpoints.high_level_until(handle.time() + command.duration)
-        if command.height is not None and (is_accepted or self.touchdown is None):
-            self.touchdown = Touchdown(begin, command.height, command.duration)
+        if command.height is not None and (is_accepted or self._touchdown is None):
+            self._touchdown = Touchdown(begin, command.height, command.duration)
         if command.ends_flight:
             self._flight.end_accepted(command.duration)
         else:
@@ -425,6 +410,65 @@ class FlightCommands:
         self._unanswered = None
         return self._shows(state, command, True)
 
+    def _check_unanswered(self):
+        # Whether the vehicle carries out a command that was refused as not answered, once.
+        look_up = self._look_up
+        if look_up is None:
+            if self._unanswered is not None:
+                self._look_up = self._context.jobs.submit("looking up a command", self._obeys)
+            return False
+        if not look_up.done():
+            return False
+        self._look_up = None
+        return look_up.exception() is None and look_up.result()
+
+    # Landings.
+
+    def _is_active(self, state):
+        if self.is_high_level_flight_active:
+            return True
+        is_flying = SupervisorState.FLYING in state
+        return is_flying and self._setpoints.control is Control.REFERENCE
+
+    def _is_position_lost(self):
+        positioning = self._log.positioning
+        return positioning is not None and positioning.is_lost(self._context.handle.time())
+
+    def _is_logged(self):
+        # Whether the log shows what was sent.
+        is_sent = self._landing is None or self._landing.done()
+        return is_sent and self._context.handle.time() >= self._begin + _LOG_DELAY
+
+    def _is_under_way(self, landing):
+        if not landing.done():
+            return True
+        is_going_on = _is_accepted(landing) and not self._setpoints.is_streaming
+        return is_going_on and self._context.handle.time() < self._end
+
+    def _descend(self, touchdown, is_active):
+        log, now, height = self._log, self._context.handle.time(), self._log.height
+        is_over = not is_active and now >= touchdown.begin + _LOG_DELAY
+        if is_over or self._setpoints.last_time > touchdown.begin:
+            # The vehicle is down, or setpoints have taken the landing's place.
+            self._touchdown = None
+        if not is_active or self._touchdown is None:
+            return
+        step = touchdown.sample(now, height, log.vertical_speed, log.target_height)
+        if step is Next.STOP:
+            self._touchdown = None
+            self._landing = self._send_landing(Command(STOP, lambda h: h.stop()))
+        elif step is Next.DESCENT and height is not None:
+            touchdown.descend(now)
+            lower = height - STEP
+            self._landing = self._send_landing(
+                Command(LAND, lambda h: h.land_lower(lower, STEP_TIME), STEP_TIME)
+            )
+
+    def _send_landing(self, command):
+        self._begin = self._context.handle.time()
+        self._end = self._begin + command.duration + _MARGIN
+        return self.send(command, None)
+
     def _feed(self):
         # Also when the reply to the first command was lost.
         self._feeds_watchdog = self._feeds_watchdog or self.is_high_level_flight_active
@@ -444,3 +488,7 @@ def _send(command: Command, high_level: HighLevel) -> bool:
     except AlreadyLandingError:
         return False
     return True
+
+
+def _is_accepted(sent):
+    return sent.done() and sent.exception() is None

@@ -10,7 +10,7 @@ from std_srvs import srv as std_srvs
 from typing_extensions import override
 
 from crazyflie_driver.all_vehicles import AllVehicles, Channel
-from crazyflie_driver.landings import Reason
+from crazyflie_driver.flight_commands import Reason
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_driver.srv import (
     AddCrazyflie,
@@ -86,7 +86,7 @@ class CrazyflieServerNode(Node):
             self._inhibit_shutdown(self._in_flight)
         if self._is_shutting_down:
             for each in flying:
-                each.landings.begin(Reason.SHUTDOWN)
+                each.commands.land(Reason.SHUTDOWN)
 
     def _on_add(self, request):
         requested = VehicleParameters.from_request(request)

@@ -11,8 +11,9 @@ from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
 from typing_extensions import override
 
 from crazyflie_driver import srv
+from crazyflie_driver.commands import SERVICE_TYPES, requested
 from crazyflie_driver.context import VehicleContext
-from crazyflie_driver.flight_commands import SERVICE_TYPES, FlightCommands, requested
+from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.jobs import Job
 from crazyflie_driver.parameter_mirror import ParameterMirror, parsed_name

@@ -7,10 +7,9 @@ from collections.abc import Callable
 from concurrent.futures import Future
 
 from crazyflie_driver.context import Connection, ConnectionEvent, ConnectionState, VehicleContext
-from crazyflie_driver.flight_commands import FlightCommands
+from crazyflie_driver.flight_commands import FlightCommands, Reason
 from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.jobs import Delivery, Job, Jobs
-from crazyflie_driver.landings import Landings, Reason
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.positioning import MOCAP, SOURCES
@@ -95,7 +94,6 @@ class DriverVehicle:
         self.flight = FlightState(context, self.log, self.setpoints)
         self.status = StatusPublisher(context, self.log, self.setpoints)
         self.commands = FlightCommands(context, self.log, self.setpoints, self.flight)
-        self.landings = Landings(context, self.log, self.setpoints, self.commands)
         self._mirror = ParameterMirror(own, parameters.prefix, self.crazyflie)
         self._services = VehicleServices(
             context, self.flight, self.commands, self._mirror, self.latch_emergency
@@ -247,7 +245,7 @@ class DriverVehicle:
         on_setpoints = is_flying and setpoints.runs_motors and setpoints.can_land_autonomously()
         if self.flight.is_high_level(state) or on_setpoints:
             end = time.monotonic() + limit
-            self.landings.begin(Reason.REMOVAL).result(REPLY_LIMIT + limit)
+            self.commands.land(Reason.REMOVAL).result(REPLY_LIMIT + limit)
             if not self._has_landed(end):
                 return
         elif is_flying and not setpoints.is_streaming:
@@ -312,7 +310,7 @@ class DriverVehicle:
                 self.jobs.submit("taking up the link again", self._resume)
 
     def _on_log(self):
-        self.landings.follow()
+        self.commands.follow()
         if self.log.is_flying and self.crazyflie.state is LinkState.CONNECTED:
             self.gate.handle(GateEvent.FLIGHT_REPORTED)
         self.setpoints.check_lift()

@@ -11,6 +11,7 @@ from crazyflie_driver.srv import GoToRequest
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.high_level_node import HighLevelNode
 from crazyflie_fleet.references_node import ReferencesNode
+from crazyflie_model.polynomials import at_rest
 from crazyflie_msgs.msg import (
     FlightStatus,
     PositionVelocityState,
@@ -39,6 +40,7 @@ class Flight:
             vectorized,
         )
         assert self.process.launch(node, "/fleet/references")
+        self.vehicles = node.vehicles
         for vehicle in node.vehicles:
             name = f"/{vehicle.name}/high_level"
             assert self.process.launch(HighLevelNode(vehicle), name, {"reference/yaw": has_yaw})
@@ -220,6 +222,19 @@ def test_go_to(flight):
     end = flight.followed("cf1")[-1].state
     assert (end.y, end.y_dot) == (pytest.approx(0.5), 0.0)
     assert len(flight.followed("cf1")) == pytest.approx(101, abs=1)
+
+
+def test_a_move_goes_on_where_its_references_come_late(flight):
+    # As when two threads work: /cf1/ref is received after the next reference was published.
+    def move_and_follow():
+        flight.go_to(goal=(0.0, 0.5, 1.0), seconds=2.0)
+        vehicle = flight.vehicles[0]
+        for height in (1.01, 1.02):
+            vehicle.follow(at_rest((0.0, 0.0, height)))
+
+    flight.process.executor.submit(move_and_follow)
+    flight.process.advance(2.1)
+    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.5)
 
 
 def test_a_way_in_a_move_begins_as_the_move_is(flight):

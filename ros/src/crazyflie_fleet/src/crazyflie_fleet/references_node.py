@@ -207,7 +207,8 @@ class TrackedVehicle:
         self._states = states
         self._commanded: Goal[float] | None = None
         self._heading: float | None = None  # Commanded in this flight (rad).
-        self._own: PositionVelocityStateStamped | None = None
+        # Own references that this node has not received yet, by their identity.
+        self._own: dict[int, PositionVelocityStateStamped] = {}
 
     def register(self, handle: NodeHandle, frame: str) -> None:
         """Create the publishers and the subscriber; ``frame`` is the fixed frame."""
@@ -233,9 +234,10 @@ class TrackedVehicle:
         self._heading = goal.yaw
         self._command(goal, header)
         if self._public.has_subscribers(excluding=1):
-            self._own = reference_message(goal, has_yaw=False)
-            self._own.header = header
-            self._public.publish(self._own)
+            message = reference_message(goal, has_yaw=False)
+            message.header = header
+            self._own[id(message)] = message
+            self._public.publish(message)
 
     def timer(self, period: float, callback: Callable[[], None]) -> "TimerShare":
         """Call ``callback()`` every ``period`` seconds, by one timer of all vehicles."""
@@ -283,7 +285,9 @@ class TrackedVehicle:
         self._heading = None
 
     def _on_reference(self, message):
-        if message is self._own or (self.is_to_land and self.is_flying()):
+        # It may come after later ones were published.
+        is_own = self._own.pop(id(message), None) is not None
+        if is_own or (self.is_to_land and self.is_flying()):
             return
         self.on_interruption()
         x, y, z, *rates = to_tuple(message.state)

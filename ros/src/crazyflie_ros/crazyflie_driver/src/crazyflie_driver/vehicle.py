@@ -55,7 +55,7 @@ def connect_within(
         sleep(PAUSE)
 
 
-class DriverVehicle:
+class DriverVehicle(VehicleContext):
     """A vehicle that is being connected, is connected, or has lost its link.
 
     Calls that take time are jobs of the vehicle, so that no vehicle blocks another. Raises
@@ -65,38 +65,33 @@ class DriverVehicle:
     def __init__(
         self, handle: NodeHandle, parameters: VehicleParameters, server: CrazyflieServerParameters
     ):
-        # Of the server: messages go out through it after the vehicle's own is closed, too.
-        self._handle = handle
-        self.parameters = parameters
-        self.crazyflie = Crazyflie(
-            parameters.uri,
-            reconnect=True,
-            on_state=self._on_link_state,
-            on_console=self._on_console,
-            on_packet=self._on_packet,
-        )
+        # Messages go out through it after the vehicle's own is closed, too.
+        self._server_handle = handle
         name, own = parameters.name, handle.child()
-        self.gate = SetpointGate()
-        self.jobs = Jobs(name, self._on_failed_job)
-        self.connection = Connection(f"connecting to {parameters.uri}")
-        self._context = context = VehicleContext(
+        super().__init__(
             own,
             parameters,
             server,
-            self.crazyflie,
-            self.gate,
-            self.jobs,
+            Crazyflie(
+                parameters.uri,
+                reconnect=True,
+                on_state=self._on_link_state,
+                on_console=self._on_console,
+                on_packet=self._on_packet,
+            ),
+            SetpointGate(),
+            Jobs(name, self._on_failed_job),
             Delivery(own, name),
-            self.connection,
+            Connection(f"connecting to {parameters.uri}"),
         )
-        self.log = LogTopics(context, self._on_log)
-        self.setpoints = SetpointTopics(context, self.log)
-        self.flight = FlightState(context, self.log, self.setpoints)
-        self.status = StatusPublisher(context, self.log, self.setpoints)
-        self.commands = FlightCommands(context, self.log, self.setpoints, self.flight)
-        self._mirror = ParameterMirror(own, parameters.prefix, self.crazyflie)
+        self.log = LogTopics(self, self._on_log)
+        self.setpoints = SetpointTopics(self, self.log)
+        self.flight = FlightState(self, self.log, self.setpoints)
+        self.status = StatusPublisher(self, self.log, self.setpoints)
+        self.commands = FlightCommands(self, self.log, self.setpoints, self.flight)
+        self._mirror = ParameterMirror(own, self.prefix, self.crazyflie)
         self._services = VehicleServices(
-            context, self.flight, self.commands, self._mirror, self.latch_emergency
+            self, self.flight, self.commands, self._mirror, self.latch_emergency
         )
         # Held while topics and services are announced, or taken down.
         self._announcing = threading.Lock()
@@ -135,14 +130,14 @@ class DriverVehicle:
         self.gate.handle(GateEvent.REMOVAL)
         self.jobs.supersede("the removal")
         done: Future[str] = Future()
-        name = f"{self.parameters.name}-close"
+        name = f"{self.name}-close"
         threading.Thread(target=self._remove, args=(limit, done), name=name, daemon=True).start()
         return done
 
     # Connecting and the end, in threads that may block.
 
     def _connect(self, _: Job) -> None:
-        limit = self._context.server.connect_limit
+        limit = self.server.connect_limit
         try:
             connect_within(limit, self.crazyflie.connect, self.connection.is_closing)
             self.connection.handle(ConnectionEvent.LINK_OPENED)
@@ -158,17 +153,16 @@ class DriverVehicle:
             self.connection.handle(ConnectionEvent.REMOVAL)
             self._end()
             raise
-        self._context.delivery.submit(self.status.publish)
-        self._handle.info(f"{self.parameters.name}: connected to {self.parameters.uri}")
+        self.delivery.submit(self.status.publish)
+        self._server_handle.info(f"{self.name}: connected to {self.parameters.uri}")
 
     def _choose_positioning(self):
-        name = f"{self.parameters.prefix}/{POSITIONING_PARAMETER}"
+        name = f"{self.prefix}/{POSITIONING_PARAMETER}"
         try:
-            source = self._context.handle.get_param(name, Text(SOURCES), MOCAP)
+            source = self.handle.get_param(name, Text(SOURCES), MOCAP)
         except ParameterError as error:
             raise ServiceError(str(error)) from None
-        chosen = dataclasses.replace(self.parameters, positioning=source)
-        self.parameters = self._context.parameters = chosen
+        self.parameters = dataclasses.replace(self.parameters, positioning=source)
 
     def _announce(self):
         self.log.start()
@@ -188,7 +182,7 @@ class DriverVehicle:
                 return
             self._connection_count = count
             for problem in self._mirror.reapply_parameters():
-                self._context.warn(f"not written again: {problem}")
+                self.warn(f"not written again: {problem}")
             if self.parameters.enable_parameters:
                 self._mirror.publish()
             self.setpoints.open_thrust_lock(self.flight.read())
@@ -208,8 +202,8 @@ class DriverVehicle:
         # First the link: its end ends the wait for answers in `_connect`.
         self.crazyflie.close()
         with self._announcing:
-            self._context.handle.close()
-        self._context.delivery.close()
+            self.handle.close()
+        self.delivery.close()
         self.jobs.close()
         self.connection.handle(ConnectionEvent.REMOVED)
 
@@ -230,13 +224,11 @@ class DriverVehicle:
                 else:
                     # Raises if the link has been lost meanwhile.
                     self.crazyflie.link()
-                    self._context.warn(
-                        "it is not known whether the vehicle flies: it is left as it is"
-                    )
+                    self.warn("it is not known whether the vehicle flies: it is left as it is")
         except (CrazyflieError, ServiceError, TimeoutError) as error:
             problem = f"its motors could not be stopped: {error}"
         if problem:
-            self._context.warn(problem)
+            self.warn(problem)
         return problem
 
     def _leave(self, state, limit):
@@ -285,27 +277,27 @@ class DriverVehicle:
                 ConnectionEvent.LINK_HEARD if is_known else ConnectionEvent.LINK_RENEWED
             )
         if not connection.is_closing():
-            self._context.delivery.submit(self._report, state, text)
+            self.delivery.submit(self._report, state, text)
 
     def _on_packet(self, port, channel, data):
         if not self.connection.is_closing():
             self.log.publish_packet(port, channel, data)
 
     def _on_console(self, line):
-        self._handle.info(f"{self.parameters.name}: {line}")
+        self._server_handle.info(f"{self.name}: {line}")
 
     def _on_failed_job(self, text):
-        self._handle.error(f"{self.parameters.name}: {text}")
+        self._server_handle.error(f"{self.name}: {text}")
 
     # In turn with the callbacks of the node.
 
     def _report(self, state, text):
         self.status.publish()
-        name = self.parameters.name
+        name = self.name
         if state is LinkState.LOST:
-            self._handle.error(f"{name}: {text}; trying to connect again")
+            self._server_handle.error(f"{name}: {text}; trying to connect again")
         elif state is LinkState.CONNECTED and self.connection.is_ready():
-            self._handle.warn(f"{name}: {text}")
+            self._server_handle.warn(f"{name}: {text}")
             if self.connection.state is ConnectionState.RESUMING:
                 self.jobs.submit("taking up the link again", self._resume)
 

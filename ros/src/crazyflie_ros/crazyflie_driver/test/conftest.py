@@ -12,7 +12,7 @@ from crazyflie_virtual.testing import READ_ONLY, FakeVehicle
 
 LIMIT = 60.0
 """The longest that a test waits for the driver, s; how soon it gives up by itself is in
-crazyflie_link.link_monitor.LinkTimeouts."""
+crazyflie_link.link.LinkTimeouts."""
 
 LOG = {
     "acc.x": ("f", 0.5),

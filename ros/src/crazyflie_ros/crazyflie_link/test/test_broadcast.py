@@ -10,9 +10,9 @@ from cflib.utils.encoding import decompress_quaternion
 from crazyflie_link import cflib_internals
 from crazyflie_link.address import Address
 from crazyflie_link.broadcast import REPEATS, Broadcaster, SharedCommand
+from crazyflie_link.cflib_internals import packet
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.localization import PackedPoses, pack
-from crazyflie_link.safe_crazyflie import packet
 from crazyflie_link.supervisor import BROADCAST_STOP
 from crazyflie_link.testing import PLACES
 from crazyflie_utils.testing.waiting import wait_until

@@ -7,10 +7,10 @@ import pytest
 from cflib.crtp.radiodriver import RadioManager
 
 from crazyflie_link.address import Address
+from crazyflie_link.cflib_internals import SafeCrazyflie
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import LinkLostError
 from crazyflie_link.link import Link
-from crazyflie_link.safe_crazyflie import SafeCrazyflie
 from crazyflie_utils.testing.waiting import wait_until
 
 URI = "udp://127.0.0.1:1"

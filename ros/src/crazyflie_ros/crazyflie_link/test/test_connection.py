@@ -17,7 +17,7 @@ from crazyflie_link.errors import (
     UnknownNameError,
     ValueRangeError,
 )
-from crazyflie_link.link_monitor import LinkTimeouts
+from crazyflie_link.link import LinkTimeouts
 from crazyflie_link.log import LogBlock
 
 LIMIT = 60.0

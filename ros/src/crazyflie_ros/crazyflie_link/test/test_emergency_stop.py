@@ -7,7 +7,7 @@ import pytest
 
 from crazyflie_link.crazyflie import LinkState
 from crazyflie_link.errors import CrazyflieError
-from crazyflie_link.link_monitor import LinkTimeouts
+from crazyflie_link.link import LinkTimeouts
 from crazyflie_link.supervisor import EmergencyStop
 from crazyflie_utils.testing.waiting import wait_until
 

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from crazyflie_link import link_monitor
+from crazyflie_link import link as module
 from crazyflie_link.errors import NoAnswerError, SetupError
-from crazyflie_link.link_monitor import LinkSetup, LinkTimeouts
+from crazyflie_link.link import LinkSetup, LinkTimeouts
 
 PACKETS = [
     ((15, 0, b""), "waiting for the first answer"),
@@ -31,7 +31,7 @@ OTHERS = [
 @pytest.fixture
 def clock(monkeypatch):
     clock = SimpleNamespace(now=100.0)
-    monkeypatch.setattr(link_monitor, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: clock.now))
     return clock
 
 

@@ -9,11 +9,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from crazyflie_link.address import Address
+from crazyflie_link.cflib_internals import packet
 from crazyflie_link.crazyflie import LinkState
 from crazyflie_link.errors import LinkLostError, RefusedError
 from crazyflie_link.link import Link
 from crazyflie_link.log import LogBlock
-from crazyflie_link.safe_crazyflie import packet
 
 LIMIT = 60.0
 

@@ -15,12 +15,12 @@ from cflib.utils.power_switch import PowerSwitch
 from crazyflie_link import link as module
 from crazyflie_link import scan
 from crazyflie_link.address import Address
+from crazyflie_link.cflib_internals import packet
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.discovery import MODES, reboot
 from crazyflie_link.errors import AddressError, LinkLostError, NoAnswerError, NoDongleError
-from crazyflie_link.link import Link
-from crazyflie_link.link_monitor import LinkHealth, LinkMonitor, LinkTimeouts
-from crazyflie_link.safe_crazyflie import packet
+from crazyflie_link.link import Link, LinkTimeouts
+from crazyflie_link.link_monitor import LinkHealth, LinkMonitor
 
 # cflib warns of one of its own attributes when a mock takes stock of them.
 pytestmark = pytest.mark.filterwarnings("ignore:link_quality_updated:DeprecationWarning")
@@ -87,13 +87,13 @@ def test_the_first_request_is_repeated(mock):
     assert mock.cflib.request_source.call_count >= 2
 
 
-@pytest.mark.parametrize(("protocol", "period"), [(-1, 0.0), (12, 0.2)])
+@pytest.mark.parametrize(("protocol", "period", "limit"), [(-1, 0.01, 0.05), (12, 0.2, 5.0)])
 def test_the_first_request_is_not_repeated_at_once_or_after_its_answer(
-    mock, monkeypatch, protocol, period
+    mock, monkeypatch, protocol, period, limit
 ):
     times = itertools.count(100.0, period)
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: next(times)))
-    link = Link(Address.parse(URI), LinkTimeouts(first_answer=0.2), backend=mock)
+    link = Link(Address.parse(URI), LinkTimeouts(first_answer=limit), backend=mock)
     mock.cflib.platform.get_protocol_version.return_value = protocol
     with pytest.raises(NoAnswerError):
         link.open()

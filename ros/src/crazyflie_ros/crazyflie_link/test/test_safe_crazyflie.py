@@ -9,8 +9,8 @@ import pytest
 from cflib.crtp.crtpstack import CRTPPacket
 from cflib.crtp.udpdriver import UdpDriver
 
-from crazyflie_link import safe_crazyflie
-from crazyflie_link.safe_crazyflie import SafeCrazyflie, init_drivers, table_cache
+from crazyflie_link import cflib_internals
+from crazyflie_link.cflib_internals import SafeCrazyflie, init_drivers, table_cache
 from crazyflie_utils.testing.waiting import wait_until
 
 LIMIT = 10.0
@@ -50,7 +50,7 @@ def driver():
 @pytest.fixture
 def crazyflie(driver, monkeypatch):
     """Return cflib's Crazyflie on that driver, as it is after its link was opened."""
-    monkeypatch.setattr(safe_crazyflie, "_JOIN_LIMIT", 5.0)
+    monkeypatch.setattr(cflib_internals, "_JOIN_LIMIT", 5.0)
     crazyflie = SafeCrazyflie(None, lambda text: None)
     crazyflie.link = driver
     crazyflie.incoming.start()

@@ -332,7 +332,7 @@ class FlightCommands:
 
     def _prepare_sending(self, command, job):
         # In the thread that sends: what is sent next is the command itself.
-        if not job.is_valid or self._context.gate.is_emergency:
+        if not job.may_send() or self._context.gate.is_emergency:
             return False
         if self._setpoints.is_streaming:
             try:

@@ -24,7 +24,7 @@ MAX_WAITING = 1000
 class Job:
     """A call ``work(job)``, which takes time; an urgent job supersedes one that is for a flight.
 
-    A caller that waits no longer cancels `done`: the job is not begun, or is no longer valid.
+    A caller that waits no longer cancels `done`: the job is not begun, or may send nothing more.
     """
 
     work: Callable[["Job"], Any]
@@ -32,18 +32,13 @@ class Job:
     superseded_by: str = ""
     done: Future[Any] = field(default_factory=Future)
 
-    @property
-    def is_valid(self) -> bool:
-        """Whether nothing has superseded it, and its result is awaited."""
+    def may_send(self) -> bool:
+        """Return whether nothing has superseded it, and its result is awaited."""
         return not (self.superseded_by or self.done.cancelled())
 
-    def may_send(self) -> bool:
-        """Return `is_valid`, for `Subsystem.guarded`."""
-        return self.is_valid
-
     def check(self) -> None:
-        """Raise `ServiceError` if it is not valid."""
-        if not self.is_valid:
+        """Raise `ServiceError` unless it may send."""
+        if not self.may_send():
             reason = self.superseded_by or "its caller, who waits no longer"
             raise ServiceError(f"given up for {reason}")
 

@@ -10,9 +10,8 @@ from functools import partial
 from cflib.crtp.crtpstack import CRTPPacket
 
 from crazyflie_link.address import Address
-from crazyflie_link.cflib_internals import RadioBroadcast
+from crazyflie_link.cflib_internals import RadioBroadcast, packet
 from crazyflie_link.link import Link
-from crazyflie_link.safe_crazyflie import packet
 from crazyflie_link.transmission import TransmitQueue
 
 #: Number of times that a command is sent, and the period (s): a vehicle that receives only the last

@@ -10,6 +10,7 @@ from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.address import Address
 from crazyflie_link.broadcast import is_broadcast
+from crazyflie_link.cflib_internals import CLOSE_LIMIT, table_cache
 from crazyflie_link.discovery import check_is_radio, reboot
 from crazyflie_link.errors import (
     CrazyflieError,
@@ -20,12 +21,11 @@ from crazyflie_link.errors import (
 )
 from crazyflie_link.high_level import HighLevel
 from crazyflie_link.lighthouse import Lighthouse
-from crazyflie_link.link import LOG_DATA, Link, OnPacket
-from crazyflie_link.link_monitor import LinkHealth, LinkTimeouts
+from crazyflie_link.link import LOG_DATA, Link, LinkTimeouts, OnPacket
+from crazyflie_link.link_monitor import LinkHealth
 from crazyflie_link.localization import Localization
 from crazyflie_link.log import Log, LogBlock
 from crazyflie_link.parameters import FirmwareParameters
-from crazyflie_link.safe_crazyflie import CLOSE_LIMIT, table_cache
 from crazyflie_link.setpoints import Setpoints
 from crazyflie_link.supervisor import EmergencyStop, Supervisor
 from crazyflie_link.trajectory import Trajectories

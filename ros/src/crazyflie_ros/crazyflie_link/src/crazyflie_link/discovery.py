@@ -8,8 +8,8 @@ from cflib.crtp.radiodriver import DEFAULT_ADDR
 from cflib.utils.power_switch import PowerSwitch
 
 from crazyflie_link.address import Address
+from crazyflie_link.cflib_internals import init_drivers
 from crazyflie_link.errors import AddressError, CrazyflieError, RefusedError, explain
-from crazyflie_link.safe_crazyflie import init_drivers
 
 DEFAULT_ADDRESS = f"{DEFAULT_ADDR:X}"  #: Radio address that vehicles have when they are new.
 

@@ -10,9 +10,9 @@ from cflib.crtp.crtpstack import CRTPPacket, CRTPPort
 from cflib.utils.encoding import compress_quaternion
 
 from crazyflie_link.broadcast import Broadcaster
+from crazyflie_link.cflib_internals import packet
 from crazyflie_link.errors import ValueRangeError
 from crazyflie_link.link import Link
-from crazyflie_link.safe_crazyflie import packet
 from crazyflie_link.subsystem import Subsystem, check_finite
 
 #: Time for which the poses of one frame of the motion capture are collected, s.

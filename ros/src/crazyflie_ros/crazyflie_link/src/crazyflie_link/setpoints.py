@@ -14,8 +14,8 @@ from cflib.crazyflie.commander import (
 )
 from cflib.crtp.crtpstack import CRTPPort
 
+from crazyflie_link.cflib_internals import packet
 from crazyflie_link.errors import ValueRangeError
-from crazyflie_link.safe_crazyflie import packet
 from crazyflie_link.subsystem import Subsystem, check_finite
 from crazyflie_model.limits import FULL_PWM
 

@@ -16,9 +16,9 @@ from cflib.crazyflie.supervisor import (
 )
 from cflib.crtp.crtpstack import CRTPPort
 
+from crazyflie_link.cflib_internals import packet
 from crazyflie_link.errors import LinkLostError, RefusedError
 from crazyflie_link.link import Link
-from crazyflie_link.safe_crazyflie import packet
 from crazyflie_link.subsystem import Subsystem
 from crazyflie_link.transmission import Request
 from crazyflie_model.supervisor import SupervisorState

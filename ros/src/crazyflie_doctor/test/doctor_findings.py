@@ -1,4 +1,4 @@
-"""What the doctor's checks have found, for their tests."""
+"""Findings of the doctor's checks, for their tests."""
 
 
 def found(findings):

@@ -83,7 +83,7 @@ def test_services_whose_types_differ():
 
 def test_a_subscriber_that_is_not_connected():
     broken = but(connections=WELL.connections - {("/lqr", "/control/lqr", "/filter")})
-    text = "/filter cannot hear /lqr on /control/lqr"
+    text = "/filter is not connected to /lqr on /control/lqr"
     assert the_only(graph.check_connections(broken)) == ("error", text)
 
 
@@ -267,7 +267,7 @@ def test_gains_and_delay(tmp_path, used, levels):
     file.write_text(SOFT)
     margin, _ = timing.delay_margin(str(file), near_hover())
     parameters = {**PARAMETERS, "/lqr_controller/K_file": str(file)}
-    # Each control is held for a period: half of it counts.
+    # Each control is held for a period: half of it is added to the delay.
     period = 0.01
     late = used * margin - 0.5 * period
     stamps = [k * period for k in range(100)]

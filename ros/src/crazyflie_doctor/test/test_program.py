@@ -24,7 +24,7 @@ def test_doctor_without_a_master():
     status, out, err = run_doctor()
     assert err == ""
     assert "no ROS master at http://127.0.0.1:1, the graph was not checked" in out
-    # Of this computer, on which the tests pass.
+    # Version of this computer's Python, on which the tests pass.
     assert status == 0, out
 
 

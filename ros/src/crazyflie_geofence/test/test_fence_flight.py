@@ -82,7 +82,7 @@ def test_a_box_that_is_enlarged_in_flight_is_enlarged_for_all(flight):
     flight.graph.advance(15.0)
     assert flight.position[0] == pytest.approx(5.0, abs=0.1)
     assert flight.flies
-    # A filter that is started anew there is told of the present box.
+    # A filter that is restarted there receives the present box.
     flight.graph.kill(FILTER)
     flight.graph.advance(0.3)
     flight.start(FILTER)
@@ -112,7 +112,7 @@ def test_a_box_that_leaves_the_vehicle_outside_brings_it_back_in(flight):
     flight.graph.advance(15.0)
     assert flight.flies
     assert -3.0 < flight.position[0] < -1.0
-    # From then on it is a wall as any.
+    # From then on the wall acts like any other.
     flight.graph.kill("/control_merger")
     flight.graph.kill(FENCE)
     flight.graph.advance(0.05)

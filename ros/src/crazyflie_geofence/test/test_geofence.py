@@ -73,7 +73,7 @@ def test_the_fence_alone_brings_the_stopping_point_back_exponentially(axis, sign
         excess = FENCE.excess(position, velocity)
         return [x[1], FENCE.acceleration(velocity, excess)[axis]]
 
-    # From a stopping point on the wall.
+    # The stopping point begins on the wall.
     braking = VERTICAL if axis == 2 else HORIZONTAL
     distance = speed * braking.reaction_time + speed**2 / (2.0 * braking.deceleration)
     start = [wall - sign * distance, sign * speed]

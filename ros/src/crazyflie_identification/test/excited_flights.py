@@ -23,7 +23,7 @@ from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
 
 KIND = TYPES["cf21_markers"]
-PERIOD = 0.01  #: Of poses and controls, s.
+PERIOD = 0.01  #: Period of poses and controls (s).
 HEIGHT = 4.0  #: A vehicle that is heavier than it is taken for sinks at first, m.
 SETTLING = 8.0  #: Time until the integrator has found its weight, s.
 

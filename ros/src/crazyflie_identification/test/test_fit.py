@@ -57,7 +57,7 @@ def test_a_vehicle_is_found(seed, kind):
     assert abs(errors[0]) < 0.02 * vehicle.mass
     assert abs(errors[NAMES.index("delay")]) < 0.005
     assert found.model.pwm(9.81) == pytest.approx(vehicle.pwm(9.81), rel=1e-3)
-    # What was not used is predicted as well as motion capture measures it.
+    # The part that was not used is predicted as well as motion capture measures it.
     rest = residuals(found.values, KIND, found.thrust, found.unused).std(axis=0)
     assert (rest < [0.0003] * 3 + [0.0015] * 3).all()
 
@@ -113,8 +113,8 @@ def test_a_flight_without_motion_tells_no_drag_and_no_lag():
     with pytest.raises(IdentificationError) as error:
         identify(still(17.0), KIND)
     text = str(error.value)
-    assert "nothing in this bag tells drag; fly to and fro at 0.4 m/s" in text
-    assert "nothing in this bag tells roll lag; move left and right" in text
+    assert "this bag does not determine drag; fly to and fro at 0.4 m/s" in text
+    assert "this bag does not determine roll lag; move left and right" in text
     assert "excite:=true" in text
 
 

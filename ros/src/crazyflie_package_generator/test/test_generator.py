@@ -127,7 +127,7 @@ def test_lints(overlay, linters, tmp_path_factory, name):
     run(linters / "ruff", "check", "--no-cache", ".", folder=folder)
     run(linters / "ruff", "format", "--no-cache", "--check", ".", folder=folder)
     environment = {**os.environ, "MYPYPATH": ""}
-    # Of what both packages import.
+    # Modules that both packages import.
     cache = tmp_path_factory.getbasetemp() / "mypy_cache"
     run(linters / "mypy", f"--cache-dir={cache}", folder=folder, env=environment)
     run("catkin_lint", "--strict", folder, folder=folder)
@@ -165,7 +165,7 @@ def test_names_of_packages(name):
 def test_no_names(tmp_path, capsys, name, what):
     names = {"package": "wall_follower", "node": "follower", what: name}
     assert make(tmp_path, names["package"], names["node"], False) == 1
-    assert f"{name!r} is no name of a {what}; expected" in capsys.readouterr().err
+    assert f"{name!r} is not a valid name of a {what}; expected" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
@@ -174,8 +174,8 @@ def test_no_names(tmp_path, capsys, name, what):
     [
         (Package("string", "follower"), "'string' is a module of Python itself"),
         (Package("wall", "follower_node"), "expected it without _node"),
-        (Package("wall", "follower", email="<x>"), "'<x>' is no email"),
-        (Package("wall", "follower", maintainer=" "), "' ' is no maintainer"),
+        (Package("wall", "follower", email="<x>"), "'<x>' is not a valid email"),
+        (Package("wall", "follower", maintainer=" "), "' ' is not a valid maintainer"),
     ],
 )
 def test_other_refusals(package, reason):

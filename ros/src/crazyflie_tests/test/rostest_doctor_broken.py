@@ -70,7 +70,7 @@ def _loop(now):
         ("nodes", "/dead does not answer ([Errno 111] Connection refused)"),
         ("types", "publishes /control/lqr as crazyflie_msgs/ControlStamped with MD5 000000"),
         ("types", "/ref has publishers of crazyflie_msgs/ControlStamped, crazyflie_msgs/Pos"),
-        ("connections", "/composed cannot hear /doctor_broken"),
+        ("connections", "/composed is not connected to /doctor_broken"),
         ("publishers", "/control/takeof has no publisher, /composed waits for it"),
         ("publishers", "/control/lqr comes from /composed, /doctor_broken"),
         ("publishers", "the reference /ref comes from /dead, /doctor_broken"),

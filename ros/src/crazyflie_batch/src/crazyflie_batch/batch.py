@@ -43,16 +43,18 @@ class Flights:
     """Outcomes of n flights."""
 
     x: NDArray[np.float64]  #: Shape (n, x_dim). States of the model at the end.
-    has_crashed: NDArray[np.bool_]  #: Shape (n,). Or its state has overflowed.
+    #: Shape (n,). Whether the vehicle has crashed, or its state has overflowed.
+    has_crashed: NDArray[np.bool_]
     #: largest_error, rms_error: Shape (n,). Distance from the goal after they had time to settle,
     #: at the ticks, m.
     largest_error: NDArray[np.float64]
     rms_error: NDArray[np.float64]
-    #: Shape (n,). From upright, rad, of the whole flight, at the ticks.
+    #: Shape (n,). Largest tilt from upright in the whole flight, at the ticks (rad).
     largest_tilt: NDArray[np.float64]
-    largest_speed: NDArray[np.float64]  #: Shape (n,); m/s, of the whole flight, at the ticks.
-    #: Shape (ticks, n, x_dim). States of the model at every tick; of no tick, if they were not to
-    #: be recorded.
+    #: Shape (n,). Largest speed in the whole flight, at the ticks (m/s).
+    largest_speed: NDArray[np.float64]
+    #: Shape (ticks, n, x_dim). States of the model at every tick; no ticks if the states were not
+    #: recorded.
     states: NDArray[np.float64]
     #: Shape (ticks, n, 4). The control that was in force from every tick on.
     controls: NDArray[np.float64]

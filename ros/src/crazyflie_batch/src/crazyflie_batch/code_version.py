@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-#: Their modules decide about a flight; the others only read settings.
+#: Packages whose modules affect a flight; the others only read settings.
 FLOWN_PACKAGES = (
     "crazyflie_batch",
     "crazyflie_lqr",
@@ -19,14 +19,14 @@ FLOWN_PACKAGES = (
 
 
 class OtherFlightsError(Exception):
-    """Flights of other settings, or of another version of the code."""
+    """The folder has flights with other settings, or of another version of the code."""
 
 
 @lru_cache(maxsize=1)
 def code_version(module: str = "crazyflie_batch.monte_carlo") -> str:
     """Return a hash of the source of a module, and of all that it imports of `FLOWN_PACKAGES`.
 
-    So is numpy's version, since its random numbers may differ between versions.
+    The hash includes numpy's version, since random numbers may differ between versions.
     """
     digest = hashlib.sha256(np.__version__.encode())
     for name, source in sorted(sources(module).items()):

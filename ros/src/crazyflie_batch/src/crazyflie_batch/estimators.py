@@ -1,6 +1,6 @@
 """The filters of `crazyflie_state_estimator`, by components: for floats or a batch.
 
-What a filter remembers is a list of components, as states are; nothing is changed in place.
+The memory of a filter is a list of components, as states are; nothing is changed in place.
 """
 
 from abc import ABC, abstractmethod
@@ -101,7 +101,7 @@ class Kalman(Estimator):
 
 
 def _first_variances():
-    """Return those of rate and acceleration in a filter that has seen one sample."""
+    """Return the variances of rate and acceleration in a filter that has seen one sample."""
     filter_ = kalman.ConstantAccelerationFilter(1.0, 1.0)
     filter_.start([0.0])
     return np.diag(filter_.covariance)[1:].tolist()

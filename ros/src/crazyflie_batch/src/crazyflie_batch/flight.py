@@ -74,7 +74,7 @@ Components = dict[str, Vector[Any]]
 
 
 def components(rows: Iterable[Any], dims: Mapping[str, int]) -> Components:
-    """Return rows by name; ``dims`` are the numbers of rows that follow each other."""
+    """Return rows by name; ``dims`` are the numbers of consecutive rows."""
     rest = iter(rows)
     return {name: list(islice(rest, dim)) for name, dim in dims.items()}
 

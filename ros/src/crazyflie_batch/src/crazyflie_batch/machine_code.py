@@ -23,7 +23,7 @@ class MachineCode:
         self.lanes, self._machine, vector_functions = _machine()
         module = ir.Module()
         _Writer(plan, module, self.lanes, vector_functions).write()
-        # Kept, since the code lives as long as it does.
+        # The machine code lives as long as its engine.
         self._engine = binding.create_mcjit_compiler(
             binding.parse_assembly(str(module)), self._machine
         )
@@ -170,7 +170,7 @@ class _Writer:
 
     @contextmanager
     def _loop(self, count: ir.Value) -> Iterator[ir.Value]:
-        """Write a loop around the instructions of the with block; the value counts from 0."""
+        """Write a loop around the instructions of the with block; the value is its index."""
         builder = self._builder
         before = builder.block
         body = builder.append_basic_block()

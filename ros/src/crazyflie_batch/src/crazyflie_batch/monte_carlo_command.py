@@ -50,7 +50,7 @@ def main(arguments: list[str] | None = None) -> int:
         text = table(found)
         (folder / "report.txt").write_text(text + "\n", encoding="utf-8")
         write_csv(found, folder / "flights.csv")
-        # Here, since importing matplotlib takes long: errors are reported before.
+        # Imported here, since importing matplotlib takes long: errors are reported first.
         from crazyflie_batch.figure import save_figure
 
         save_figure(found, folder / "figure.png")
@@ -71,7 +71,8 @@ def _parser():
     parser.add_argument(
         "--out",
         metavar="FOLDER",
-        help="of the results; an interrupted run continues there (default: the settings' name)",
+        help="folder of the results; an interrupted run continues there (default: the settings' "
+        "name)",
     )
     parser.add_argument(
         "--restart", action="store_true", help="delete the flights that are in the folder"
@@ -79,7 +80,8 @@ def _parser():
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="of dask.distributed, such as tcp://10.0.0.1:8786; its workers run in a sourced "
+        help="scheduler of dask.distributed, such as tcp://10.0.0.1:8786; its workers run in a "
+        "sourced "
         "workspace (default: the processors of this machine)",
     )
     return parser
@@ -99,13 +101,13 @@ def _executor(address: str | None) -> Iterator[Executor]:
         with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as threads:
             yield threads
         return
-    # Here, since it takes as long to import as all the rest.
+    # Imported here, since it takes as long to import as all the rest.
     from distributed import Client
 
     try:
-        # A client of something that is no address reports another error when the process ends.
+        # A client with an invalid address reports another error when the process ends.
         if ":" not in address:
-            raise ValueError("that is no address")
+            raise ValueError("that is not an address")
         client = Client(address, timeout=SCHEDULER_LIMIT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise SchedulerError(

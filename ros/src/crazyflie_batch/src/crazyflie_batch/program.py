@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from crazyflie_batch import flight
 from crazyflie_batch.flight import Plan
 
-#: Modules in which a formula ends that does what it must not.
+#: Modules in which an unsupported formula raises its error.
 _CALCULATES = ("crazyflie_batch.symbols", "crazyflie_model.elementwise", "numpy")
 
 
@@ -72,7 +72,7 @@ class ArrayProgram:
         state = flight.components(memory.copy(), dims)
         delay, lanes = values["delay"][0], np.arange(self.lanes)
         transit = np.zeros((slots, flight.POSE_DIM, self.lanes))
-        # States may overflow, and what `where` does not choose may be divided by zero.
+        # States may overflow, and the branch that `where` does not choose may divide by zero.
         with naming_the_formula(), np.errstate(all="ignore"):
             for tick, noise in enumerate(noise_samples):
                 state = flight.update_metrics(plan, state, values, tick)

@@ -27,7 +27,7 @@ class Findings:
 
     @property
     def worst(self) -> int:
-        """Number of the worst flight: of those that have crashed, if any has."""
+        """Number of the worst flight; a crashed one, if any has crashed."""
         crashed = self.outcomes["has_crashed"]
         return int(np.lexsort((_finite(self.outcomes["largest_error"]), crashed))[-1])
 

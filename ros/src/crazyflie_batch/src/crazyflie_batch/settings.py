@@ -1,4 +1,4 @@
-"""Settings of a Monte-Carlo run: a YAML file, checked before anything flies."""
+"""Settings of a Monte-Carlo run: a YAML file, checked before the first flight."""
 
 import os
 from dataclasses import dataclass
@@ -66,20 +66,22 @@ class RunParameters(Parameters):
     """Parameters of all flights: the other keys."""
 
     flights: int = parameter(Integer(1, 10**7), "how many")
-    seed: int = parameter(Integer(0, 2**32 - 1), "of everything random", 0)
+    seed: int = parameter(Integer(0, 2**32 - 1), "seed of all random numbers", 0)
     model: str = parameter(Text(MODELS), "see crazyflie_simulator", "quadrotor")
-    duration: float = parameter(Number("s", above=0.0, maximum=600.0), "of a flight", 20.0)
+    duration: float = parameter(Number("s", above=0.0, maximum=600.0), "duration of a flight", 20.0)
     period: float = parameter(
         Number("s", above=0.0, maximum=1.0),
-        "of motion capture, estimator and controller; a whole number of 0.002 s",
+        "period of motion capture, estimator and controller; a multiple of 0.002 s",
         0.01,
     )
-    settle_time: float = parameter(DURATION, "errors count from then on", 10.0)
+    settle_time: float = parameter(DURATION, "errors are evaluated from this time on", 10.0)
     estimator: str = parameter(
         Text(ESTIMATORS), "how velocities are found; see crazyflie_state_estimator", ESTIMATORS[0]
     )
     filter_noise: float = parameter(
-        Number("m", above=0.0), "that the Kalman filter expects", kalman.POSITION_NOISE
+        Number("m", above=0.0),
+        "position noise that the Kalman filter expects",
+        kalman.POSITION_NOISE,
     )
     filter_walk: float = parameter(
         Number("m/s^2/sqrt(s)", above=0.0),
@@ -98,16 +100,16 @@ class RunParameters(Parameters):
     start_x: float = parameter(METRES, "where flights begin, at rest", 0.0, "start/x")
     start_y: float = parameter(METRES, "where flights begin, at rest", 0.0, "start/y")
     start_z: float = parameter(METRES, "where flights begin; the ground is 0", 1.0, "start/z")
-    goal_x: float = parameter(METRES, "where they go", 0.0, "goal/x")
-    goal_y: float = parameter(METRES, "where they go", 0.0, "goal/y")
-    goal_z: float = parameter(METRES, "where they go", 1.0, "goal/z")
-    goal_yaw: float = parameter(Number("rad"), "where they head", 0.0, "goal/yaw")
+    goal_x: float = parameter(METRES, "goal of flights", 0.0, "goal/x")
+    goal_y: float = parameter(METRES, "goal of flights", 0.0, "goal/y")
+    goal_z: float = parameter(METRES, "goal of flights", 1.0, "goal/z")
+    goal_yaw: float = parameter(Number("rad"), "heading at the goal", 0.0, "goal/yaw")
     largest_error: float = parameter(
-        Number("m", above=0.0), "distance from the goal", 0.1, "limits/error"
+        Number("m", above=0.0), "largest distance from the goal after settling", 0.1, "limits/error"
     )
     largest_tilt: float = parameter(
         Number("rad", above=0.0),
-        "from upright, also before it has settled",
+        "largest tilt from upright, also before the vehicle has settled",
         CRASH_TILT,
         "limits/tilt",
     )
@@ -137,7 +139,7 @@ class Sweep:
     high: float
 
     def quantiles(self, fractions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values below which these fractions, in [0, 1), of the flights are."""
+        """Return the quantiles of the distribution at these fractions, in [0, 1)."""
         if self.kind == VALUES:
             index = (fractions * len(self.numbers)).astype(int)
             return np.sort(self.numbers)[index]
@@ -177,8 +179,8 @@ def read_settings(path: str | Path) -> Settings:
     for sweep in sweeps:
         if "vehicle" in file and sweep.name in file["vehicle"]:
             raise file["sweep"][sweep.name].error(
-                f"is in line {file['vehicle'][sweep.name].line} under vehicle, too; expected one "
-                "of them"
+                f"is also in line {file['vehicle'][sweep.name].line} under vehicle; expected "
+                "only one of them"
             )
         if run.model != "quadrotor" and sweep.name in model_only:
             raise file["sweep"][sweep.name].error(f"makes no difference to the model {run.model}")
@@ -191,7 +193,7 @@ def read_settings(path: str | Path) -> Settings:
 
 def _gain_file(settings: Path, name: str) -> Path:
     local = settings.parent / name
-    # Unlike pathlib's, this takes a name that is too long for one.
+    # Unlike pathlib's, this accepts a name that is too long for a file.
     if os.path.exists(local):
         return local
     try:
@@ -204,7 +206,7 @@ def _gain_file(settings: Path, name: str) -> Path:
 def _sweep(entry: Entry, name: str) -> Sweep:
     declarations = {each.name: each for each in FlightParameters.declarations()}
     if name not in declarations:
-        raise entry.error(f"is no parameter; expected one of {', '.join(declarations)}")
+        raise entry.error(f"is not a parameter; expected one of {', '.join(declarations)}")
     declaration = declarations[name]
     kinds = entry.entries()
     if len(kinds) != 1 or next(iter(kinds)) not in (UNIFORM, NORMAL, VALUES):

@@ -19,7 +19,7 @@ from crazyflie_model.limits import CRASH_TILT
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import GRAVITY
 
-HOVER = (0.0, 0.0, 0.0, GRAVITY)  #: Control at the reference.
+HOVER = (0.0, 0.0, 0.0, GRAVITY)  #: Feedforward control at the reference.
 _ROUNDING = 1e-6  #: Tolerance of a whole number of periods, as a fraction of a period.
 
 
@@ -150,7 +150,8 @@ def simulate(
     period : float
         Of motion capture, estimator and controller, s; a whole number of 2 ms.
     settle_time : float
-        Errors count from then on, s; at most the time of the last tick, ``duration - period``.
+        Errors are evaluated from this time on, s; at most the time of the last tick, ``duration -
+        period``.
     measurement : Measurement, optional
         By default without errors.
     seed : int

@@ -17,8 +17,8 @@ from llvmlite import ir
 
 DOUBLE = ir.DoubleType()
 
-#: By the number of lanes: how the C library calls its functions of vectors (x86-64 vector function
-#: ABI), with AVX-512, AVX2 and SSE.
+#: Number of lanes -> prefix of the names of the C library's vector functions (x86-64 vector
+#: function ABI), with AVX-512, AVX2 and SSE.
 _VECTOR_LETTERS = {8: "e", 4: "d", 2: "b"}
 
 #: Functions of the C library.
@@ -33,7 +33,7 @@ _FUNCTIONS = {
 
 #: Intrinsics of LLVM: one instruction on most processors.
 _INTRINSICS = {np.sqrt: "llvm.sqrt", np.floor: "llvm.floor", np.absolute: "llvm.fabs"}
-#: Arrive as functions where numpy's own numbers are on the left.
+#: Operators that numpy passes as functions when one of its own numbers is on the left.
 _OPERATORS = {np.add: "fadd", np.subtract: "fsub", np.multiply: "fmul", np.divide: "fdiv"}
 
 
@@ -76,7 +76,7 @@ class Emitter:
             name = f"{_INTRINSICS[function]}.v{self.lanes}f64"
             return self.symbol(self.builder.call(self._declare(name, self.type, 1), values))
         if function not in _FUNCTIONS:
-            raise TypeError(f"a batch does not know {function}")
+            raise TypeError(f"{function} is not supported in a batch")
         name = _FUNCTIONS[function]
         if self._vector_functions:
             parameters = "v" * len(values)
@@ -150,7 +150,7 @@ def _arithmetic(instruction: str) -> tuple[Callable[..., "Symbol"], Callable[...
 
 
 class Symbol:
-    """A number that is known when the program runs; see the module."""
+    """A number whose value is known when the program runs; see the module."""
 
     def __init__(self, emitter: Emitter, value: ir.Value):
         self.value = value

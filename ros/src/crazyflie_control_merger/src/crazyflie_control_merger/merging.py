@@ -1,4 +1,4 @@
-"""Least-restrictive control: a second controller takes over as far as it must.
+"""Least-restrictive control: a second controller overrides the first only as far as necessary.
 
 Controls are u = (roll, pitch, yaw_dot, thrust) in rad, rad/s and m/s^2.
 """
@@ -11,7 +11,8 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 MERGE = "MERGE"
 LQR = "LQR"
 PRIORITIZED = "PRIORITIZED"
-MODES = (MERGE, LQR, PRIORITIZED)  #: How much of the prioritised control: its priority, none, all.
+#: Share of the prioritised control in the result: its priority, 0, 1.
+MODES = (MERGE, LQR, PRIORITIZED)
 
 ALL_ENTRIES = (0, 1, 2, 3)
 NO_YAW_ENTRIES = (0, 1, 3)  #: Entries of the control that the prioritised controller decides on.
@@ -20,8 +21,8 @@ NO_YAW_ENTRIES = (0, 1, 3)  #: Entries of the control that the prioritised contr
 class Merger:
     """Mix the latest prioritised control into regular ones.
 
-    A prioritised control counts for `crazyflie_utils.last_valid.HOLD_LIMIT`. Without
-    one the regular control is left as it is, in every mode.
+    A prioritised control is valid for `crazyflie_utils.last_valid.HOLD_LIMIT`. Without one the
+    regular control is left as it is, in every mode.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ class Merger:
         return merged
 
     def _weight(self, time):
-        # Time that has stepped back is that of another run.
+        # A time that has stepped back belongs to another run.
         if self._time is None or not 0.0 <= time - self._time < HOLD_LIMIT:
             return 0.0
         return {MERGE: self._priority, LQR: 0.0, PRIORITIZED: 1.0}[self.mode]

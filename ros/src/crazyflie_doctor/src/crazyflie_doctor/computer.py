@@ -92,14 +92,14 @@ def python_packages(entries: Iterable[str]) -> tuple[dict[str, str], dict[str, s
         if requirement.marker is None or requirement.marker.evaluate():
             exact = [s.version for s in requirement.specifier if s.operator == "=="]
             required[requirement.name] = exact[0] if exact else ""
-            # What is missing is what is required and not installed.
+            # A package is missing if it is required and not installed.
             with contextlib.suppress(importlib.metadata.PackageNotFoundError):
                 installed[requirement.name] = importlib.metadata.version(requirement.name)
     return required, installed
 
 
 def network() -> Network:
-    """Return what decides how nodes of this shell find each other."""
+    """Return the network settings by which nodes of this shell find each other."""
     return Network(os.environ, socket.gethostname(), _resolve, _is_own)
 
 
@@ -139,7 +139,7 @@ def radio(root: Path = Path("/")) -> Radio:
     """Return the Crazyradios of this computer, and whether this user may use them."""
     dongles = {}
     for device in (root / "sys/bus/usb/devices").glob("*"):
-        # Not everything there is a device with an identity, and any may be unplugged meanwhile.
+        # Some entries have no vendor and product, and a device may be unplugged meanwhile.
         with contextlib.suppress(OSError, ValueError):
             identity = tuple(_text(device / f"id{key}") for key in ("Vendor", "Product"))
             if identity == _RADIO_ID:

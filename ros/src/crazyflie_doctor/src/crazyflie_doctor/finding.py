@@ -10,7 +10,7 @@ OK, WARN, ERROR = "ok", "warn", "error"
 class Finding:
     """A fault and its remedy."""
 
-    level: str  #: `WARN`, or `ERROR` for what keeps a vehicle from flying as it should.
+    level: str  #: `WARN`, or `ERROR` for a fault that keeps a vehicle from flying correctly.
     text: str
     remedy: str
 
@@ -21,7 +21,7 @@ class Check:
 
     name: str
     fine: str  #: Text for a check without findings.
-    findings: Iterable[Finding]  #: Often a generator, which makes the check when it is iterated.
+    findings: Iterable[Finding]  #: Often a generator, which runs the check when it is iterated.
 
 
 def warn(text: str, remedy: str) -> Finding:
@@ -30,12 +30,12 @@ def warn(text: str, remedy: str) -> Finding:
 
 
 def error(text: str, remedy: str) -> Finding:
-    """Return a finding that keeps a vehicle from flying as it should."""
+    """Return a finding that keeps a vehicle from flying correctly."""
     return Finding(ERROR, text, remedy)
 
 
 def lines(check: Check) -> Iterator[tuple[str, str]]:
-    """Make a check; yield level and line of each finding, or of its being fine."""
+    """Run a check; yield level and line of each finding, or one line that says that all is well."""
     findings = list(check.findings)
     if not findings:
         yield OK, f"ok     {check.name}: {check.fine}"

@@ -23,7 +23,7 @@ STATES_AND_REFERENCES = {
     "crazyflie_msgs/PositionVelocityYawStateStamped",
 }
 
-#: Inputs, by the ends of their parameters' names, without which a node does its work.
+#: Optional inputs of nodes, by the ends of their parameters' names.
 _OPTIONAL = {"prioritized_control"}
 
 _BUILD = "build the workspace again (./run build), source it in every shell, and restart the nodes"
@@ -130,7 +130,7 @@ def check_connections(graph: Graph) -> Iterator[Finding]:
             }
             if missing:
                 yield error(
-                    f"{listed(missing)} cannot hear {publisher} on {topic}",
+                    f"{listed(missing)} is not connected to {publisher} on {topic}",
                     "message types differ, or one cannot reach the other's ROS_IP: see its log; "
                     + _BUILD,
                 )
@@ -144,7 +144,7 @@ def check_publishers(graph: Graph) -> Iterator[Finding]:
             is_optional = {name.rpartition("/")[2] for name in parameters} <= _OPTIONAL
             yield (warn if is_optional else error)(
                 f"{topic} has no publisher, {listed(listeners)} waits for it",
-                f"launch what publishes it, or mend {listed(parameters)}",
+                f"launch the node that publishes it, or correct {listed(parameters)}",
             )
     if graph.subscribers.get("/tf") and not graph.publishers.get("/tf"):
         yield error("no node publishes /tf", "start the simulator or mocap_optitrack")
@@ -164,7 +164,7 @@ def _doubled(graph):
         if topic in references:
             servers = publishers & _takeoff_servers(graph, topic)
             others = publishers - servers
-            # A takeoff server leaves the vehicle to one other between takeoff and landing.
+            # A takeoff server hands the vehicle to one other node between takeoff and landing.
             doubled = others if len(servers) == 1 else publishers
             if len(doubled) > 1:
                 yield warn(
@@ -174,7 +174,7 @@ def _doubled(graph):
         elif by_topic.get(topic) in CONTROLS | STATES_AND_REFERENCES:
             yield error(
                 f"{topic} comes from {listed(publishers)}",
-                "end all but one: each undoes what the other does",
+                "end all but one: each overrides the other",
             )
 
 
@@ -189,7 +189,7 @@ def _takeoff_servers(graph, reference):
 
 
 def check_drivers(graph: Graph, reported: Mapping[str, set[str]]) -> Iterator[Finding]:
-    """Find vehicles that several drivers, or several launches, are to fly.
+    """Find vehicles that several drivers, or several launches, have been told to fly.
 
     ``reported`` is address of a vehicle -> nodes whose diagnostics have it.
     """

@@ -88,7 +88,7 @@ def _check_own_name(network, master, master_address):
     variables = network.variables
     given = [name for name in ("ROS_HOSTNAME", "ROS_IP") if variables.get(name)]
     if len(given) == 2:
-        yield warn("both ROS_HOSTNAME and ROS_IP are set: ROS_HOSTNAME counts", "unset one")
+        yield warn("both ROS_HOSTNAME and ROS_IP are set: ROS_HOSTNAME is used", "unset one")
     variable = given[0] if given else "hostname"
     name = variables[variable] if given else network.hostname
     address = network.resolve(name)

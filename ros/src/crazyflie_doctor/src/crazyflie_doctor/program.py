@@ -23,7 +23,7 @@ class DoctorParameters(Parameters):
     duration: float = parameter(_SECONDS, "how long to record tf, controls and diagnostics", 3.0)
     vehicle: str = parameter(
         Text(may_be_empty=True),
-        "address of a vehicle that stands on the ground: it alone is checked, for 10 s",
+        "address of a vehicle on the ground: only this vehicle is checked, for 10 s",
         "",
     )
     motors: bool = parameter(
@@ -39,8 +39,9 @@ def doctor(arguments: list[str] | None = None) -> int:
         DoctorParameters,
         [each for each in given if ":=" not in each],
         "doctor",
-        "Check this computer and the graph that runs, print a line for each finding and what to do "
-        "about it. It publishes nothing, and connects to no vehicle but one that is given. Exit "
+        "Check this computer and the running graph; print a line for each finding and what to do "
+        "about it. The command publishes nothing, and connects only to a vehicle that is given. "
+        "Exit "
         "status: 0 without errors, 1 with errors, 2 wrong usage.",
     )
     watchdog = threading.Timer(options.timeout, _give_up, [options.timeout])
@@ -72,14 +73,16 @@ def _checks(duration: float) -> Iterator[Check]:
     if not running_graph.is_master_online():
         missing = warn(
             f"no ROS master at {rosgraph.get_master_uri()}, the graph was not checked",
-            "start one with roslaunch or roscore, or mend ROS_MASTER_URI",
+            "start one with roslaunch or roscore, or correct ROS_MASTER_URI",
         )
         yield Check("master", "", [missing])
         yield _radio([])
         return
     running = running_graph.graph()
     if not set(running.publishers.get("/rosout", ())) - {"/rosout"}:
-        yield Check("master", "", [warn("no node runs", "roslaunch what is to be checked")])
+        yield Check(
+            "master", "", [warn("no node is running", "roslaunch the nodes that are to be checked")]
+        )
     yield Check("nodes", "all answer", graph.check_nodes(running))
     yield Check("types", "all are ours", graph.check_types(running, running_graph.own_md5))
     yield Check("connections", "complete", _connections(running))
@@ -111,7 +114,7 @@ def _debian_packages():
     sections = computer.package_sections("debian.txt")
     installed = computer.debian_packages()
     yield _packages("Debian", dict.fromkeys(sections.pop("demo", []), ""), installed)
-    # ./run installs these when they are first used.
+    # ./run installs these sections when they are first needed.
     absent = [name for name, packages in sections.items() if not installed.keys() >= set(packages)]
     if absent:
         fine = f"not installed: {', '.join(absent)}; ./run install {' '.join(absent)}"
@@ -131,6 +134,7 @@ def _radio(uris: list[str]) -> Check:
 
 
 def _connections(running: graph.Graph) -> Iterator[Finding]:
-    # A subscriber may just have been connecting: what is missing has to be missing twice.
+    # A subscriber may just have been connecting: only a connection that is missing twice is
+    # reported.
     if list(graph.check_connections(running)):
         yield from graph.check_connections(running_graph.graph())

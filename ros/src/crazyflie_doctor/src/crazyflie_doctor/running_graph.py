@@ -48,7 +48,7 @@ def is_master_online() -> bool:
             # Nodes answer what `rosgraph.is_master_online` asks, too.
             rosgraph.Master(_NAME).getUri()
         except Exception:
-            # No answer, one that no master gives, or an invalid URI.
+            # No answer, an answer that is not a master's, or an invalid URI.
             return False
         return True
 
@@ -122,13 +122,13 @@ def _ask(node: str) -> tuple[str, list[Any]] | str:
         answer: Any = ServerProxy(uri).getBusInfo(_NAME)
         return uri, answer[2]
     except Exception as error:
-        # Anything that listens on the port of a node that is no more.
+        # Another program may listen on the port of a node that has ended.
         return str(error) or type(error).__name__
 
 
 def _offer(uri: str, topic: str) -> Type | None:
     """Return the type that a publisher offers; None if it cannot be asked."""
-    # Anything may listen on that port. Publishers that do not answer are found by `_ask`.
+    # Another program may listen on that port. `_ask` finds publishers that do not answer.
     with contextlib.suppress(Exception):
         answer: Any = ServerProxy(uri).requestTopic(_NAME, topic, [["TCPROS"]])
         _, host, port = answer[2]

@@ -54,7 +54,7 @@ class Recording:
     delays: dict[str, list[float]] = field(default_factory=dict)
     #: Topic of controls -> stamps, s.
     control_stamps: dict[str, list[float]] = field(default_factory=dict)
-    #: Address of a vehicle -> nodes whose diagnostics speak of it.
+    #: Address of a vehicle -> nodes whose diagnostics report it.
     reported: dict[str, set[str]] = field(default_factory=dict)
 
 
@@ -108,7 +108,7 @@ def check_tf_tree(_: Graph, recording: Recording) -> Iterator[Finding]:
                 f"the {kind} of {child} comes from {listed(sources[child])}", "end all but one"
             )
     for loop in _loops(parents):
-        yield error(f"tf has a loop: {' -> '.join(loop)}", "turn one of these transforms round")
+        yield error(f"tf has a loop: {' -> '.join(loop)}", "invert one of these transforms")
 
 
 def _loops(parents):
@@ -135,13 +135,13 @@ def check_frames(graph: Graph, recording: Recording) -> Iterator[Finding]:
             hint = f"did you mean {near[0]}?" if near else f"there are {listed(known) or 'none'}"
             yield error(
                 f"no node publishes the frame {frame} that {node} needs ({hint})",
-                "mend its parameter or the child_frame_id of the rigid body; does motion capture "
-                "see it?",
+                "correct its parameter or the child_frame_id of the rigid body; does motion "
+                "capture see it?",
             )
         if not missing and _chain(recording, fixed, robot) is None:
             yield error(
                 f"tf does not connect {fixed} and {robot}, which {node} needs",
-                "publish what is missing between them",
+                "publish the missing transform between them",
             )
 
 
@@ -153,7 +153,7 @@ def frames_of(graph: Graph) -> dict[str, tuple[str, str]]:
         for name, value in graph.parameters.items():
             node = name.removesuffix(f"/{robot_name}")
             fixed = graph.parameters.get(f"{node}/{fixed_name}")
-            # What an ended launch has left needs nothing.
+            # Parameters that an ended launch has left need no frames.
             if node != name and isinstance(fixed, str) and isinstance(value, str):
                 found[node] = (fixed.strip("/"), value.strip("/"))
     return found
@@ -175,8 +175,8 @@ def check_tf_rate(graph: Graph, recording: Recording) -> Iterator[Finding]:
     streams = defaultdict(list)
     for t in recording.transforms:
         streams[t.child].append(t)
-    # Of the links between vehicle and fixed frame the quickest is the pose; others may be
-    # constant, as tf's static_transform_publisher repeats them ten times a second.
+    # The fastest transform between vehicle and fixed frame is the pose; the others may be constant:
+    # tf's static_transform_publisher repeats them ten times a second.
     poses = {
         max(chain[:-1], key=lambda child: _rate(streams[child]))
         for fixed, robot in frames_of(graph).values()
@@ -202,7 +202,7 @@ def _check_stream(child, transforms):
     rate = _rate(transforms)
     if rate < LEAST_RATE:
         level = error if rate < 1.0 / LONGEST_PAUSE else warn
-        yield level(f"{what} comes at {rate:.1f} Hz, needed are {LEAST_RATE:g}", mend)
+        yield level(f"{what} comes at {rate:.1f} Hz, expected {LEAST_RATE:g} or more", mend)
     elif max(pauses) > LONGEST_PAUSE:
         yield warn(f"{what} pauses for {max(pauses):.2f} s", mend)
     age = statistics.median(t.arrival - t.stamp for t in transforms)
@@ -218,8 +218,8 @@ def _check_stream(child, transforms):
 def check_gains(graph: Graph, recording: Recording) -> Iterator[Finding]:
     """Compare the delay from pose to control with what the gains in use tolerate.
 
-    The loop's delay is what was measured from the pose's stamp, and half a period for
-    which each control is held.
+    The loop's delay is the measured time from the pose's stamp, plus half of the period for which
+    each control is held.
     """
     for node, path, x_dim, topic in _controllers(graph):
         model = {7: near_hover, 12: full_state}.get(x_dim)
@@ -238,8 +238,8 @@ def check_gains(graph: Graph, recording: Recording) -> Iterator[Finding]:
             yield (error if delay > margin else warn)(
                 f"{node} acts {delay * 1e3:.1f} ms after the pose; with {path} {loop} is unstable "
                 f"at {margin * 1e3:.1f} ms",
-                "design gains for this delay (rosrun crazyflie_lqr design_gains --help) or take "
-                "softer ones; a busy computer, too, makes controls late",
+                "design gains for this delay (rosrun crazyflie_lqr design_gains --help) or use "
+                "softer ones; a busy computer also makes controls late",
             )
 
 

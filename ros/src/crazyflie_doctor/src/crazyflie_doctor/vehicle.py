@@ -14,7 +14,8 @@ from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.log import LogBlock
 
-MIN_VOLTAGE, FULL_VOLTAGE = 3.7, 4.25  #: For a flight of some minutes, and the most of one cell, V.
+#: Lowest voltage for a flight of some minutes, and highest voltage of one cell (V).
+MIN_VOLTAGE, FULL_VOLTAGE = 3.7, 4.25
 MIN_QUALITY = 0.95  #: Share of answered pings.
 MAX_LATENCY = 0.02  #: 95th percentile of the round-trip time, s.
 #: Deviation of the estimated velocity, m/s, and its change while the vehicle is watched.
@@ -39,17 +40,18 @@ class VehicleFacts:
     latency: float = math.nan  # s.
     decks: tuple[str, ...] = ()  # Such as bcFlow2.
     firmware: str = ""  # Release.
-    deviations: tuple[float, ...] = ()  # Of the estimated velocity along each axis, m/s.
-    changes: tuple[float, ...] = ()  # Of these while it was watched, m/s.
+    # Standard deviations of the estimated velocity along each axis (m/s).
+    deviations: tuple[float, ...] = ()
+    changes: tuple[float, ...] = ()  # Changes of these while the vehicle was watched (m/s).
     motors: int | None = None  # Bit mask of those that have passed their test; None: not tested.
     battery_passed: bool | None = None  # None: not tested.
-    failure: str = ""  # Why nothing is known.
+    failure: str = ""  # Reason why nothing is known.
 
 
 def checks(facts: VehicleFacts) -> Iterator[Check]:
     """Yield the checks of a vehicle."""
     if facts.failure:
-        yield Check("vehicle", "", [error(facts.failure, "mend this first")])
+        yield Check("vehicle", "", [error(facts.failure, "correct this first")])
         return
     yield Check("battery", f"{facts.voltage:.2f} V", _battery(facts))
     yield Check(
@@ -125,7 +127,8 @@ def _motors(facts: VehicleFacts) -> Iterator[Finding]:
         failed = [str(i + 1) for i in range(4) if not facts.motors >> i & 1]
         yield error(
             f"motor {', '.join(failed)} fails its self test; normal is that all four pass",
-            "look for hair and bent propellers, push the motor home, change propeller or motor",
+            "look for hair and bent propellers, push the motor fully into its mount, change "
+            "propeller or motor",
         )
 
 

@@ -1,7 +1,7 @@
 """A box that a vehicle does not leave: least-restrictive control by stopping distance.
 
-Where a vehicle would come to rest, if it began to brake now, decides. For each
-axis, with position x and velocity v, that is the stopping point
+The criterion is the point where a vehicle would come to rest if it began to brake now. For each
+axis, with position x and velocity v, this stopping point is
 
     X = x + v T + v |v| / (2 b)
 
@@ -34,7 +34,7 @@ from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 
-#: Horizontal acceleration that the fence asks for at most, m/s^2.
+#: Largest horizontal acceleration that the fence asks for (m/s^2).
 MAX_HORIZONTAL = GRAVITY * math.tan(MAX_TILT)
 #: The share of an axis when both brake, in a corner of the box (m/s^2).
 MAX_HORIZONTAL_BRAKING = MAX_HORIZONTAL / math.sqrt(2.0)
@@ -92,7 +92,7 @@ class Geofence:
         return position + velocity * (self._reaction_time + braking_time / 2.0)
 
     def excess(self, position: Vector, velocity: Vector) -> Vector:
-        """Return by how much the stopping point is outside the inner box, m, shape (3,), signed."""
+        """Return the signed distance of the stopping point from the inner box, m, shape (3,)."""
         stop = self.stopping_point(position, velocity)
         return stop - np.clip(stop, self._inner_lower, self._inner_upper)
 
@@ -102,7 +102,7 @@ class Geofence:
         return x * x * (3.0 - 2.0 * x)
 
     def acceleration(self, velocity: Vector, excess: Vector) -> Vector:
-        """Return what brings the stopping point back, m/s^2, shape (3,), fixed frame.
+        """Return the acceleration (3,) that brings the stopping point back, m/s^2, fixed frame.
 
         Horizontally at most `MAX_HORIZONTAL`, in the right direction.
         """

@@ -78,7 +78,7 @@ class GeofenceParameters(Parameters):
     )
     horizontal_reaction_time: float = parameter(
         _REACTION_TIME,
-        "T along x and y: estimator, attitude loop, motors",
+        "reaction time T along x and y: estimator, attitude loop, motors",
         0.4,
         "reaction_time/horizontal",
         live=True,

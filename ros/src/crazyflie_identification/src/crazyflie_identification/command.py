@@ -53,7 +53,7 @@ def _parser():
         default="cf21",
         help="type of the vehicle, whose thrust curve gives the mass (%(default)s)",
     )
-    parser.add_argument("--vehicle", default="", help="name of one, if the bag has several")
+    parser.add_argument("--vehicle", default="", help="name of the vehicle, if the bag has several")
     parser.add_argument(
         "--out", type=Path, default=Path("model.yaml"), help="model file (%(default)s)"
     )

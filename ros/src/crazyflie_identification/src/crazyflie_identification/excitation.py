@@ -1,4 +1,4 @@
-"""Small sines around hover that tell all figures of a model."""
+"""Small sines around hover that identify all parameters of a model."""
 
 import math
 
@@ -9,14 +9,15 @@ _FREQUENCIES = {
     "yaw_dot": (0.53, 1.37, 2.89),
     "thrust": (0.61, 1.73, 3.31),
 }
-#: Amplitude of each sine: rad, rad, rad/s, m/s^2. All together they stay below 5 degrees, 60
-#: degrees/s and 1.2 m/s^2.
+#: Amplitude of each sine (rad, rad, rad/s, m/s^2). Their sums stay below 5 degrees, 60 degrees/s
+#: and 1.2 m/s^2.
 AMPLITUDES = {"roll": 0.028, "pitch": 0.028, "yaw_dot": 0.35, "thrust": 0.4}
 
-#: Amplitudes (m) and periods (s) along x, y and z of the reference, whose speed tells the drag.
+#: Amplitudes (m) and periods (s) along x, y and z of the reference, whose speed identifies the
+#: drag.
 SWAY = ((0.4, 6.1), (0.4, 7.3), (0.15, 5.3))
 
-RAMP = 2.0  #: Time in which the sines grow, s.
+RAMP = 2.0  #: Time over which the sines grow to their amplitude (s).
 
 
 def controls(t: float) -> tuple[float, float, float, float]:

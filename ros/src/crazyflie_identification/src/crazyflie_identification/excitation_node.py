@@ -1,4 +1,4 @@
-"""Adds the excitation to the controls of a flight, for a bag that tells a model."""
+"""Adds the excitation to the controls of a flight, for a bag from which a model is identified."""
 
 import math
 
@@ -19,9 +19,9 @@ from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TOPIC, Number
 
 SETTLED = 3.0  #: Time in flight after which the excitation begins, s.
-PERIOD = 0.05  #: Between two references, s.
+PERIOD = 0.05  #: Period of the references (s).
 MAX_DISTANCE = 0.9  #: Distance from the middle at which the excitation is ended, m.
-MAX_SPEED = 1.2  #: Speed at which it is ended, m/s.
+MAX_SPEED = 1.2  #: Speed at which the excitation is ended (m/s).
 
 
 class ExcitationParameters(Parameters):
@@ -29,12 +29,12 @@ class ExcitationParameters(Parameters):
 
     control_topic: str = parameter(TOPIC, "controls of the controller", name="topics/control")
     excited_topic: str = parameter(
-        TOPIC, "where they go, with the excitation, to the takeoff filter", name="topics/excited"
+        TOPIC, "where controls with the excitation go: to the takeoff filter", name="topics/excited"
     )
     reference_topic: str = parameter(TOPIC, "where references go", name="topics/reference")
     state_topic: str = parameter(TOPIC, "where states come from", name="topics/state")
     flight_status_topic: str = parameter(
-        TOPIC, "of the takeoff server", name="topics/flight_status"
+        TOPIC, "flight status of the takeoff server", name="topics/flight_status"
     )
     duration: float = parameter(
         Number("s", minimum=5.0, maximum=120.0), "length of the excitation", 45.0
@@ -44,9 +44,9 @@ class ExcitationParameters(Parameters):
 class ExcitationNode(Node):
     """Passes controls on, and adds small sines while a vehicle hovers after its takeoff.
 
-    They begin 3 s after the takeoff, once in a flight, and end after the duration; at once where
-    the vehicle is further from the middle, or faster, than they lead. The takeoff filter limits the
-    sum as it limits every control.
+    The sines begin 3 s after the takeoff, once in a flight, and end after the duration. They end at
+    once if the vehicle is further from the middle, or faster, than they can move it. The takeoff
+    filter limits the sum as it limits every control.
     """
 
     needed_in_flight = True

@@ -35,7 +35,7 @@ NAMES = (
 )  # fmt: skip
 UNITS = ("kg", "", "s", "s", "s", "s", "s", "1/s", "rad", "rad", "rad", "rad")
 
-_MAX_EVALUATIONS = 40  #: Of a fit; flights that tell enough need about ten.
+_MAX_EVALUATIONS = 40  #: Largest number of iterations of a fit; informative flights need about ten.
 
 #: Typical sizes, by which the fit scales them: units of `UNITS`.
 _SCALES = np.array([0.03, 0.1, 0.02, 0.1, 0.1, 0.1, 0.05, 0.1, 0.02, 0.02, 0.02, 0.02])
@@ -59,7 +59,7 @@ _TELLS = {
 
 
 class IdentificationError(Exception):
-    """A flight does not tell what the model asks for; the text says what is missing."""
+    """A flight is not informative enough for the model; the text says what is missing."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Fit:
     """A fitted model."""
 
     model: QuadrotorParameters
-    values: Array  #: Of `NAMES`, shape (12,).
+    values: Array  #: Values of `NAMES`, shape (12,).
     errors: Array  #: Their standard errors, shape (12,).
     used: Recording  #: The part of the flight that was used.
     unused: Recording  #: The rest.
@@ -107,7 +107,8 @@ def predict(values: Array, kind: QuadrotorParameters, thrust: float, part: Recor
     """Return the predicted poses of a part, shape (m, 6), from rest at 0 with the heading 0.
 
     ``values`` are those of `NAMES`, ``kind`` the type of the vehicle, ``thrust`` the mean command
-    as a fraction. To positions and headings those of the beginning have to be added, see `fitted`.
+    as a fraction. The initial position and heading must be added to positions and headings, see
+    `fitted`.
     """
     mass, slope, delay, roll_lag, pitch_lag, yaw_lag, motor, drag, roll_trim, pitch_trim = values[
         :10
@@ -145,7 +146,7 @@ def _held(part, times):
     edges = part.command_times
     areas = np.zeros((len(edges), 4))
     areas[1:] = np.cumsum(part.commands[:-1] * np.diff(edges)[:, None], axis=0)
-    # Before the first command it, after the last one the last counts.
+    # The first command also holds before its time, the last one also after.
     ends = np.append(times, times[-1] + STEP)
     late = np.maximum(ends - edges[-1], 0.0)
     early = np.minimum(ends - edges[0], 0.0)
@@ -228,7 +229,7 @@ def identify(recording: Recording, kind: QuadrotorParameters) -> Fit:
 
     `IdentificationError`: the flight is too short, or does not tell one of the figures.
     """
-    # Times of day have no digits left for the small changes by which the fit goes.
+    # Times of day would leave too few digits for the small changes of the fit.
     origin = recording.pose_times[0] if len(recording.pose_times) else 0.0
     recording = replace(
         recording,
@@ -251,7 +252,7 @@ def identify(recording: Recording, kind: QuadrotorParameters) -> Fit:
     lag = 0.08 if kind.roll_lag is None else kind.roll_lag
     first = np.array([force / GRAVITY, 0.0, 0.02, lag, lag, min(lag, TILT_LAG)] + [0.0] * 6)
     first[6:8] = kind.motor_time_constant, kind.drag_rates[0]
-    # Attitudes first: with wrong lags, positions lead astray.
+    # Attitudes are fitted first: with wrong lags, positions would mislead the fit.
     sigma = np.array([0.3] * 3 + [5e-3] * 3)
     # The noise of each channel is known after a first fit only.
     for _ in range(3):
@@ -263,7 +264,7 @@ def identify(recording: Recording, kind: QuadrotorParameters) -> Fit:
         )
         first = solution.x * _SCALES
         sigma = _noise(residuals(first, kind, thrust, used))
-    # Where nothing changes a residual, its figure is not told.
+    # A parameter that changes no residual is not identifiable.
     jacobian = solution.jac
     curvature = jacobian.T @ jacobian
     covariance = np.linalg.pinv(curvature + 1e-12 * np.eye(len(NAMES)) * np.trace(curvature))
@@ -275,7 +276,7 @@ def identify(recording: Recording, kind: QuadrotorParameters) -> Fit:
 def _noise(errors):
     """Return standard deviations of the channels, larger where their errors are correlated.
 
-    Errors that follow each other tell less than independent ones, by 1 + 2 sum of the
+    Correlated errors carry less information than independent ones, by the factor 1 + 2 sum of the
     autocorrelation.
     """
     sigma = np.maximum(errors.std(axis=0), 1e-7)
@@ -295,7 +296,7 @@ def _check(values, errors):
         k = NAMES.index(name)
         error = errors[k] / values[k] if name == "mass" else errors[k]
         if not error <= most:
-            missing.append(f"nothing in this bag tells {name}; {flight}")
+            missing.append(f"this bag does not determine {name}; {flight}")
     if missing:
         raise IdentificationError("\n".join(missing) + "\n(excite:=true flies all of this)")
 

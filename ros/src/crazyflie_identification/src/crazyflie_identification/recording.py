@@ -58,7 +58,7 @@ def _recording(path, vehicle, kind):
     commands = rows[:, 1:].copy()
     is_driven = len(vehicle.command) > 0
     commands[:, 3] = pwm_from_thrust(rows[:, 4]) if is_driven else kind.pwm(rows[:, 4])
-    # A pose is of its stamp, if that is of the same clock.
+    # The time of a pose is its stamp, if the stamp is of the same clock.
     stamps = vehicle.pose_stamps
     offsets = stamps[:, 0] - stamps[:, 1]
     has_clock = len(stamps) == len(poses) and abs(float(np.median(offsets))) < OTHER_CLOCK

@@ -35,9 +35,9 @@ def check_name(what: str, name: str) -> None:
     """
     if not _NAME.fullmatch(name) or keyword.iskeyword(name):
         raise GeneratorError(
-            f"{name!r} is no name of a {what}; expected at least two lower case letters, digits "
-            "and single underscores, the first a letter, the last no underscore, no word of Python "
-            "(REP 144), such as wall_follower"
+            f"{name!r} is not a valid name of a {what}; expected at least two lower case "
+            "letters, digits and single underscores, the first a letter, the last not an "
+            "underscore, not a keyword of Python (REP 144), such as wall_follower"
         )
     if name in sys.stdlib_module_names:
         raise GeneratorError(
@@ -63,11 +63,14 @@ class Package:
         check_name("node", self.node)
         if self.node.endswith("_node"):
             raise GeneratorError(
-                f"{self.node!r} is no name of a node; expected it without _node, which is added"
+                f"{self.node!r} is not a valid name of a node; expected it without _node, which "
+                "is added"
             )
         for what, text in (("maintainer", self.maintainer), ("email", self.email)):
             if not text.strip() or set(text) & set("<>&@\"'" if what == "maintainer" else "<>&\"'"):
-                raise GeneratorError(f"{text!r} is no {what}; expected a text without <, > and &")
+                raise GeneratorError(
+                    f"{text!r} is not a valid {what}; expected a text without <, > and &"
+                )
 
     def files(self) -> Iterator[tuple[Path, str]]:
         """Yield the relative path and the text of every file."""
@@ -100,7 +103,7 @@ class Package:
 
 
 def _in_order(imports):
-    # Where a package's imports stand among the workspace's depends on its name.
+    # The order of imports depends on the package's name.
     lines = sorted(imports[0].splitlines(keepends=True), key=lambda line: line.split()[1])
     return "".join(lines)
 
@@ -118,7 +121,7 @@ def create(package: Package, folder: Path) -> Path:
         )
     target = folder / package.name
     if target.exists() or target.is_symlink():
-        raise GeneratorError(f"there is {target} already; expected the name of a new package")
+        raise GeneratorError(f"{target} exists already; expected the name of a new package")
     unfinished = None
     try:
         # In the same folder, so that it appears at its place at once and complete.
@@ -145,11 +148,18 @@ def main(arguments: list[str] | None = None) -> int:
         prog="create_package",
         description="Make a package with one node that builds, passes its tests and lints.",
     )
-    parser.add_argument("name", metavar="NAME", help="of the package, such as wall_follower")
-    parser.add_argument("--node", required=True, metavar="NAME", help="of its node, without _node")
-    parser.add_argument("--messages", action="store_true", help="with a message of its own")
+    parser.add_argument("name", metavar="NAME", help="name of the package, such as wall_follower")
     parser.add_argument(
-        "--folder", type=Path, default=Path(), help="where it is made (default: the present one)"
+        "--node", required=True, metavar="NAME", help="name of its node, without _node"
+    )
+    parser.add_argument(
+        "--messages", action="store_true", help="give the package a message of its own"
+    )
+    parser.add_argument(
+        "--folder",
+        type=Path,
+        default=Path(),
+        help="folder in which the package is made (default: the current one)",
     )
     parser.add_argument("--maintainer", default=Package.maintainer, help="for package.xml")
     parser.add_argument("--email", default=Package.email, help="for package.xml")

@@ -32,7 +32,7 @@ from crazyflie_utils.main import begin_script
 from crazyflie_utils.testing.programs import free_port, running
 
 NAMES = ("cf1", "cf2", "cf3")
-#: Keeps when Escape was pressed for the last time, s of the machine's clock.
+#: Stores the time at which Escape was last pressed (s of the machine's clock).
 PRESSED = """addEventListener("keydown", (event) => {
   if (event.key === "Escape") window.pressed = Date.now() / 1000;
 }, true)"""
@@ -53,7 +53,7 @@ class Bench:
         self.process.start()
         self.server = Server(self.dashboard)
         self.browser = Browser(driver, self.server.url)
-        # Of the vehicles, as an operator who has another page.
+        # Handlers of the vehicles, like those of an operator with another page.
         self.page = self.dashboard.pages.open(str)
 
     def _note(self, name, message):
@@ -63,7 +63,7 @@ class Bench:
             self.stopped.pop(name, None)
 
     def fly(self) -> None:
-        """Have all vehicles in the air, whatever has been before."""
+        """Bring all vehicles into the air, whatever the state before."""
         self.dashboard.pages.take_over(self.page)
         for action in (Action.RESET, Action.TAKEOFF):
             wait_for(lambda action=action: self._is_done(action), action.value)
@@ -85,7 +85,7 @@ class Bench:
         prepare()
         self.browser.driver.execute_script(PRESSED)
         self.browser.type(Keys.ESCAPE, Keys.ESCAPE)
-        wait_for(lambda: len(self.stopped) == len(NAMES), "motors that are off")
+        wait_for(lambda: len(self.stopped) == len(NAMES), "motors off")
         return max(self.stopped.values()) - self.browser.driver.execute_script("return pressed")
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Print what a page costs that shows many vehicles for a while: it may not grow or slow down.
+"""Print the load of a page that shows many vehicles for a while: it must not grow or slow down.
 
 Usage: many_vehicles.py [VEHICLES [MINUTES]]
 """

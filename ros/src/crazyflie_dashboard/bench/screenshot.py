@@ -23,12 +23,12 @@ sys.path.insert(0, str(HERE.parents[1] / "test"))
 from pages import Browser, chromium, wait_for  # noqa: E402  Helpers of the tests.
 
 IMAGES = HERE.parents[4] / "docs" / "images"
-FRAME = (720, 449)  #: Of the moving picture, pixels.
-PERIOD = 0.4  #: Between two frames, s.
+FRAME = (720, 449)  #: Width of the moving picture (pixels).
+PERIOD = 0.4  #: Period of frames (s).
 
 
 class Film:
-    """Frames of what a driver shows, at most one each `PERIOD`."""
+    """Frames of the window that a driver shows, at most one each `PERIOD`."""
 
     def __init__(self, driver) -> None:
         self._driver = driver
@@ -36,7 +36,7 @@ class Film:
         self._times: list[float] = []
 
     def take(self) -> bool:
-        """Take a frame if it is time for one; return False, as a condition that does not hold."""
+        """Take a frame if one is due; return False, like a condition that does not hold."""
         if not self._times or time.monotonic() - self._times[-1] >= PERIOD:
             self._times.append(time.monotonic())
             screen = Image.open(io.BytesIO(self._driver.get_screenshot_as_png()))
@@ -63,7 +63,7 @@ class Film:
 
 
 def draw(port: int, folder: Path) -> None:
-    """Fly from the page on a port, and write what it shows."""
+    """Fly from the page on a port, and write pictures of the page."""
     with chromium() as driver:
         driver.set_window_size(1440, 1040)
         browser = Browser(driver, f"http://127.0.0.1:{port}/")
@@ -83,7 +83,7 @@ def draw(port: int, folder: Path) -> None:
         browser.click_floor(0.9, -1.0)
         film.take()
         browser.press("Go")
-        # Long enough for a trail that is seen; there is nothing to wait for.
+        # Long enough for a visible trail; there is no condition to wait for.
         begin = time.monotonic()
         film.until(lambda: time.monotonic() - begin > 2.0, "a trail")
         driver.save_screenshot(str(folder / "dashboard.png"))

@@ -46,7 +46,7 @@ def test_both_are_told_of_a_takeover(told):
     told.control.take_over(two)
     with pytest.raises(ControlError):
         told.control.expect_control(one)
-    assert told.texts[one] == [f"page {two} has taken over control: this page only looks now"]
+    assert told.texts[one] == [f"page {two} has taken over control: this page can only watch now"]
     assert told.texts[two][-1] == f"this page has taken over control from page {one}"
     assert told.texts[three][-1] == f"page {two} has control"
 

@@ -101,13 +101,13 @@ def test_one_mission_flies_at_a_time_until_it_is_stopped(missions, script):
     end = missions.fly(mission, ("cf1",), {})
     assert missions.running[0].startswith("waits.py")
     wait_until(lambda: missions.running == ("waits.py takeoff: cf1",))
-    with pytest.raises(RefusalError, match=r"waits.py flies; expected it to have ended"):
+    with pytest.raises(RefusalError, match=r"waits.py is still flying; wait for its end"):
         missions.fly(mission, ("cf1",), {})
     missions.stop()
     open(mission.path + ".ground", "w").close()
     assert end.result(LIMIT) == ""
     assert missions.running == ()
-    with pytest.raises(RefusalError, match="no mission flies"):
+    with pytest.raises(RefusalError, match="no mission that a dashboard has started is flying"):
         missions.stop()
 
 
@@ -117,7 +117,11 @@ def test_a_second_stop_does_not_interrupt_the_landing(missions, script):
     end = missions.fly(mission, ("cf1",), {})
     wait_until(lambda: missions.running == ("waits.py takeoff: cf1",))
     missions.stop()
-    with pytest.raises(RefusalError, match=r"waits.py was stopped before, and its vehicles land"):
+    with pytest.raises(
+        RefusalError,
+        match=r"waits.py was stopped before, and its vehicles are "
+        "landing",
+    ):
         missions.stop()
     Path(mission.path + ".ground").touch()
     assert end.result(LIMIT) == ""
@@ -147,7 +151,7 @@ def test_a_mission_outlives_its_dashboard_and_the_next_one_stops_it(script, miss
         first.kill()
     second = Missions(*map(Path, arguments[:2]))
     wait_until(lambda: second.running == ("waits.py takeoff: cf1",), limit=LIMIT)
-    with pytest.raises(RefusalError, match=r"waits.py flies"):
+    with pytest.raises(RefusalError, match=r"waits.py is still flying"):
         second.fly(mission, ("cf1",), {})
     second.stop()
     third = Missions(*map(Path, arguments[:2]))
@@ -167,7 +171,7 @@ def test_a_process_that_has_the_number_of_a_mission_now_is_not_stopped(missions,
         (tmp_path / "flights" / f"{other.pid}.json").write_text(json.dumps(record))
         found = Missions("python", tmp_path / "flights")
         assert found.running == ()
-        with pytest.raises(RefusalError, match="no mission flies"):
+        with pytest.raises(RefusalError, match="no mission that a dashboard has started is flying"):
             found.stop()
         assert other.poll() is None
         other.communicate(b"\n")

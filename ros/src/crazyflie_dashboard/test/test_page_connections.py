@@ -24,7 +24,7 @@ def test_two_pages_and_control(browser, server, driver):
         second.open()
         second.choose("cf1")
         second.press("Take off")
-        second.has("this page only looks")
+        second.has("this page can only watch")
         assert server.dashboard.commands == []
         second.press("Take control")
         second.has("Take over")
@@ -33,7 +33,7 @@ def test_two_pages_and_control(browser, server, driver):
         second.press("Take off")
         second.has("hovering", second.card("cf1"))
         driver.switch_to.window(first)
-        browser.has("has taken over control: this page only looks now")
+        browser.has("has taken over control: this page can only watch now")
         # The first page's emergency works all the same.
         browser.press("Emergency")
         browser.has("emergency", browser.card("cf1") + " .state")
@@ -53,7 +53,7 @@ def test_a_page_that_is_loaded_again_in_flight_moves_nothing_and_has_no_control(
     browser.has("no page has control", ".control")
     browser.choose("cf1")
     browser.press("Land")
-    browser.has("this page only looks")
+    browser.has("this page can only watch")
     assert server.actions() == [(Action.TAKEOFF, ("cf1",))]
 
 
@@ -97,7 +97,7 @@ def test_a_connection_that_is_lost_and_comes_back_moves_nothing_and_has_no_contr
     # What is clicked without a connection is sent when there is one again.
     land = browser.button("Land")
     driver.execute_script("window.socket.io.engine.close(); arguments[0].click()", land)
-    browser.has("this page only looks: no page has control")
+    browser.has("this page can only watch: no page has control")
     browser.has("no page has control", ".control")
     assert browser.text(".control").split()[1] != before
     assert server.actions() == [(Action.TAKEOFF, ("cf1",))]

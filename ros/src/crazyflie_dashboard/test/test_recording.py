@@ -43,13 +43,13 @@ def recording(tmp_path):
 def test_a_recording_becomes_a_report(recording, tmp_path):
     recording.start()
     assert recording.text == "recording"
-    with pytest.raises(RefusalError, match="record: recording; expected it to have ended"):
+    with pytest.raises(RefusalError, match="record: recording; end it first"):
         recording.start()
     made = tmp_path / "flights" / "2026-11-24"
     subprocess.run(["sh", "-c", f"until [ -d {made} ]; do :; done"], timeout=LIMIT, check=True)
     report = recording.stop().result(LIMIT)
     assert report == str(made / "report" / "report.html") == str(recording.report)
-    with pytest.raises(RefusalError, match="no recording runs"):
+    with pytest.raises(RefusalError, match="this dashboard has not started a recording"):
         recording.stop()
 
 

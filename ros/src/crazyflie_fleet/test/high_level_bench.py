@@ -55,7 +55,7 @@ class Bench:
         return self.call("go_to", srv.GoTo, 0, relative, Point(*goal), yaw, SECONDS(duration))
 
     def fly(self, duration):
-        """Let a vehicle that follows its references fly, and return these."""
+        """Fly a vehicle along its references, and return them."""
         for _ in range(round(duration / 0.1)):
             self.process.advance(0.1)
             if self.references():

@@ -43,7 +43,7 @@ class Swarm:
         return answer
 
     def advance_until(self, is_so, seconds):
-        """Let time pass until a condition holds, for so long at most."""
+        """Advance the time until a condition holds, or a limit is reached."""
         end = self.process.clock.time() + seconds
         while not is_so() and self.process.clock.time() < end:
             self.process.advance(min(0.5, end - self.process.clock.time()))

@@ -102,7 +102,7 @@ def test_who_is_not_there_is_named_and_the_others_are_added():
     assert process.exit_status == 1
     assert list(driver.updated) == ["cf2"]
     assert process.logged("error")[-1] == (
-        "/fleet_add: not all vehicles are there: cf1; to try again: rosrun crazyflie_fleet "
+        "/fleet_add: vehicles are not connected: cf1; to try again: rosrun crazyflie_fleet "
         "fleet_add_node __name:=fleet_add _vehicles:='[cf1]'"
     )
 
@@ -116,7 +116,7 @@ def test_vehicles_that_were_missing_are_added_without_the_others():
 def test_a_vehicle_that_is_not_in_the_file_is_named():
     process, _, launched = add(vehicles=["cf9"])
     assert not launched
-    assert "parameter vehicles has cf9; expected some of cf1, cf2" in process.logged("error")[0]
+    assert "parameter vehicles has cf9; expected names among cf1, cf2" in process.logged("error")[0]
 
 
 def test_virtual_vehicles_have_ports_for_addresses():
@@ -129,7 +129,7 @@ def test_an_address_is_needed(tmp_path):
     file.write_text("robots: {a: {initial_position: [0, 0, 0]}}\n")
     process, driver, launched = add(**{"fleet/file": str(file)})
     assert not launched
-    assert "no uri of a; expected one" in process.logged("error")[0]
+    assert "a has no uri; expected one" in process.logged("error")[0]
     assert driver.added == {}
 
 

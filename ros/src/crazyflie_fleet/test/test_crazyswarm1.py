@@ -76,7 +76,11 @@ def test_without_that_file_types_have_no_effect(load, from_text):
 @pytest.mark.parametrize(
     ("vehicles", "types", "text"),
     [
-        (VEHICLES.replace("26", "1"), TYPES, "yaml:6: crazyflies.1./id is that of cf1 in line 2"),
+        (
+            VEHICLES.replace("26", "1"),
+            TYPES,
+            "crazyflies.1./id is also that of cf1 in line 2",
+        ),
         (VEHICLES.replace("26", "256"), TYPES, "crazyflies.1./id is 256; expected an integer fro"),
         (VEHICLES.replace("80", "x"), TYPES, ":7: crazyflies.1./channel is 'x'; expected an integ"),
         (VEHICLES.replace("single", "none"), TYPES, "type is 'none'; expected one of default, sin"),

@@ -83,7 +83,8 @@ def test_what_has_no_effect_is_remarked_once_a_key(load):
     logging = "all:\n  broadcasts: {num_repeats: 15}\n  firmware_logging:\n    default_topics:\n"
     text = TWO + logging + "      odom: {frequency: 10}\n      status: {frequency: 1}\n"
     assert remarks_of(load, text.replace("[0, 1, 0]", "[0, 1, 0]\n    big_quad: false")) == [
-        ":13: all/firmware_logging/default_topics/odom is not offered by the driver, and left out",
+        ":13: all/firmware_logging/default_topics/odom is not offered by the driver, and is "
+        "ignored",
         ": frequency of a default topic (line 14) has no effect here",
         ": big_quad (line 8) has no effect here",
     ]
@@ -96,7 +97,7 @@ def test_private_keys_are_passed_over_with_one_remark(load):
     text += "    group: {of: [mine]}\nrelative: false\nall: {role: none, battery: {cells: 1}}\n"
     (remark,) = remarks_of(load, text)
     assert remark == (
-        ": passed over, as not known here: relative (line 11); role (line 12, 8); "
+        ": ignored, since they are not known here: relative (line 11); role (line 12, 8); "
         "cells (line 12); colour (line 9); group (line 10)"
     )
 
@@ -107,7 +108,7 @@ def test_start_points_that_are_close_are_remarked(load):
     (warning,) = fleet.warnings
     assert warning.endswith(
         "fleet.yaml: the start points of cf1 and cf2 are 0.2 m apart, and their collision buffers "
-        "need 0.3 m; neither takes off until they are seen that far apart"
+        "need 0.3 m; neither takes off until they are measured that far apart"
     )
     assert load(TWO).unplaced == ()
 
@@ -153,7 +154,7 @@ def test_simulated_vehicles_need_no_address(load):
             TWO.replace("radio://0/80/2M/E7E7E7E701", "udp://a:1").replace(
                 "radio://0/80/2M/E7E7E7E702", "udp://a:1"
             ),
-            ":6: robots/cf2/uri is udp://a:1, as that of cf1 in line 3; expected an address ",
+            ":6: robots/cf2/uri is udp://a:1, which is also that of cf1 in line 3; expected an ",
         ),
         (
             TWO + "all: {motion_capture: {frame: body}}\n",
@@ -301,7 +302,7 @@ def test_disabled_vehicles_may_be_anywhere(load):
 def test_two_spellings_of_one_address_are_one_vehicle(load, first, second):
     text = TWO.replace("radio://0/80/2M/E7E7E7E701", first)
     (found,) = complaints_of(load, text.replace("radio://0/80/2M/E7E7E7E702", second))
-    assert found.startswith(f":6: robots/cf2/uri is {second}, as that of cf1 in line 3")
+    assert found.startswith(f":6: robots/cf2/uri is {second}, which is also that of cf1 in line 3")
 
 
 @pytest.mark.parametrize(

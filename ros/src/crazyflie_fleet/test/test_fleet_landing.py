@@ -15,7 +15,7 @@ from crazyflie_utils import ServiceError
 
 
 class Tower(Swarm):
-    """Vehicles above each other, with one beside them."""
+    """Vehicles above each other, with one next to them."""
 
     def __init__(self, heights=(1.0, 2.0, 3.0)):
         super().__init__(fleet={"n": 4, "spacing": 1.0})
@@ -153,8 +153,8 @@ def test_vehicles_of_a_mission_that_has_died_are_landed():
     assert tower.states() == down
     assert tower.nearest() > 0.3
     assert tower.process.logged("error") == [
-        "/fleet: no message of the mission that flew cf1, cf2, cf3 for 5 s: it has ended; landing "
-        "them"
+        "/fleet: no message from the mission that flew cf1, cf2, cf3 for 5 s: it has ended; "
+        "landing these vehicles"
     ]
 
 

@@ -19,7 +19,7 @@ from crazyflie_utils.topics import Publisher
 
 
 class Waver(Node):
-    """Something beside what flies a vehicle."""
+    """A node in addition to those that fly a vehicle."""
 
     def load_parameters(self, handle):
         self.frames = [handle.get_param(f"~frames/{each}", FRAME) for each in ("fixed", "robot")]
@@ -41,7 +41,7 @@ def test_all_take_off_go_and_land(together):
     swarm.call("/all/go_to", go_to(0.2, relative=True))
     swarm.process.advance(2.5)
     assert swarm.position("cf1") == pytest.approx((-0.2, -0.5, 1.2), abs=0.1)
-    with pytest.raises(ServiceError, match="refused: all vehicles fly already"):
+    with pytest.raises(ServiceError, match="refused: all vehicles are flying already"):
         swarm.call("/takeoff_all")
     swarm.call("/cf2/land", seconds=6.0)
     assert swarm.position("cf2")[2] == pytest.approx(0.0, abs=0.02)

@@ -110,7 +110,7 @@ def test_nothing_is_published_by_vehicles_that_do_not_move(swarm):
 
 
 def status(process, name, refusal):
-    """Have a vehicle on the ground say why it would not take off."""
+    """Make a vehicle on the ground report why it would not take off."""
     message = FlightStatus(state=FlightStatus.ON_GROUND, takeoff_refusal=refusal)
     process.publish(f"/{name}/in_flight_flight_status", message)
 
@@ -171,5 +171,5 @@ def test_a_second_call_takes_the_rest(swarm):
     assert swarm.heights() == pytest.approx([1.0, 1.0, 1.0], abs=0.2)
     said = swarm.process.logged("info")
     assert any(t.endswith("flying already: cf2; taking off: cf1, cf3") for t in said)
-    with pytest.raises(ServiceError, match="refused: all vehicles fly already"):
+    with pytest.raises(ServiceError, match="refused: all vehicles are flying already"):
         swarm.call("/takeoff_all")

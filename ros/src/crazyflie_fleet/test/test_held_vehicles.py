@@ -6,7 +6,7 @@ import pytest
 from crazyflie_fleet.separation import Separation
 
 STILL = np.zeros((2, 3))
-#: Far from the origin, 0.2 m apart in y and z; 0.1 m in z as it counts.
+#: Far from the origin, 0.2 m apart in y and z; in z only half of it is counted.
 FIRST = np.array([5.0, -3.0, 2.0])
 SECOND = FIRST + [0.0, 0.2, 0.2]
 
@@ -39,7 +39,7 @@ def test_vehicles_that_stay_where_they_are_are_not_held():
         ([0.0, 0.1, -0.5], False),
         ([0.0, -0.1, 0.3], False),
         ([0.0, -0.1, 0.5], True),
-        # At right angles, as it counts.
+        # At right angles, in scaled coordinates.
         ([0.3, 0.0, 0.0], False),
     ],
 )

@@ -76,7 +76,7 @@ def test_a_move_of_a_vehicle_that_was_moved_elsewhere_begins_with_its_velocity(b
 
 
 def test_a_move_after_setpoints_begins_where_they_were(bench):
-    # What was flown before them does not count, near as it is.
+    # The path flown before them is ignored, although it is near.
     bench.go_to((0.0, 0.0, 1.0), duration=0.1)
     bench.fly(0.2)
     goal = Goal((0.3, 0.0, 1.0), (0.5, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0)
@@ -210,7 +210,7 @@ def test_ends_at_rest(bench):
 REFUSED = {
     "no state has come on /cf1/state": lambda b: (b.process.advance(1.0), b.go_to((1, 0, 1))),
     "yaw is 0.5 rad, and the controller keeps the heading 0": lambda b: b.go_to((1, 0, 1), 0.5),
-    "nan is among the numbers": lambda b: b.go_to((math.nan, 0, 1)),
+    "one of the numbers is nan": lambda b: b.go_to((math.nan, 0, 1)),
     "the duration is 0 s; expected more": lambda b: b.go_to((1, 0, 1), duration=0.0),
     "no trajectory 7 was uploaded": lambda b: b.call(
         "start_trajectory", srv.StartTrajectory, 0, 7, 1.0, False, False

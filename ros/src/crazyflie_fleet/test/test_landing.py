@@ -146,7 +146,7 @@ def test_moves_are_reachable_if_no_vehicle_comes_near(seed):
 
 
 def test_a_place_behind_another_vehicle_is_the_last_resort():
-    # In a corridor along x: a vehicle above one on the ground, and one that hovers beside it.
+    # In a corridor along x: a vehicle above one on the ground, and one that hovers next to it.
     places = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.33, 0.0, 1.0)])
     flags = np.array([True, False, False])
     box = np.array([[-2.0, -0.02]] * 3), np.array([[2.0, 0.02]] * 3)

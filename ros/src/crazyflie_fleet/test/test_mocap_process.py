@@ -123,7 +123,7 @@ def test_they_are_flown_with_the_kalman_filter(tmp_path):
 @pytest.mark.parametrize("frame", ["world", "cf1"])
 def test_a_frame_of_motion_capture_is_not_the_fixed_one(tmp_path, frame):
     path = write(tmp_path / "fleet.yaml", ["frame: world" if frame == "world" else ""])
-    with pytest.raises(ParameterError, match=f"cf1 has the .*{frame}, as the fixed frame has"):
+    with pytest.raises(ParameterError, match=f"cf1 has the .*{frame}, which is the fixed frame"):
         told_of(path, **{"frames/fixed": frame})
 
 

@@ -47,7 +47,7 @@ def test_takeoffs_are_refused_until_the_vehicles_are_seen_apart():
     assert scene.refusal("a") == scene.refusal("b") == ""
     with pytest.raises(KeyError, match="no publisher of /c/takeoff_inhibition"):
         scene.refusal("c")
-    # Once is enough: they may land beside each other.
+    # One check is enough: they may land next to each other.
     scene.see(a=(0.0, 0.0), b=(0.2, 0.0))
     assert scene.refusal("b") == ""
 

@@ -311,7 +311,7 @@ def test_a_landing_ends_a_way(flight):
 def test_go_to_is_refused(flight):
     with pytest.raises(ServiceError, match=r"/cf1/go_to refused: 0.50 m in 0.1 s; expected a dur"):
         flight.go_to(seconds=0.1)
-    with pytest.raises(ServiceError, match="/cf1/go_to refused: nan is among the numbers"):
+    with pytest.raises(ServiceError, match="/cf1/go_to refused: one of the numbers is nan"):
         flight.go_to(goal=(math.nan, 0.0, 1.0))
     flight.silence("cf1")
     flight.process.advance(0.6)

@@ -1,4 +1,4 @@
-"""Descents of single vehicles beside those beneath them, by figures calculated by hand."""
+"""Descents of single vehicles next to those beneath them, by figures calculated by hand."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_a_vehicle_that_flies_aside_counts_at_its_landing_place(descents):
     above[2, :2] = place
     landing = np.array([True, False, True])
     assert descents.begin(2, 9.4, above, landing) >= 0.3
-    # Once its references have ended, it counts where it is.
+    # When its references have ended, its own position is used.
     assert descents.begin(2, 20.0, above, landing) == 0.0
 
 

@@ -56,7 +56,7 @@ def test_the_driver_warns_outside_its_limits(made):
     assert (broadcast.repeats, broadcast.repeat_period, broadcast.poses) == (15, 0.002, 5)
     remarks = [text.partition("server.yaml: ")[2] for text in process.logged("warn")]
     assert remarks == [
-        "passed over, as not known here: colour (line 14)",
+        "ignored, since they are not known here: colour (line 14)",
         "warnings/frequency (line 4) has no effect here",
         "warnings/communication/publish_stats (line 11) has no effect here",
         "firmware_params (line 12) has no effect here",

@@ -1,4 +1,4 @@
-"""Which requests the page answers: its own pages', and with a token those of other computers."""
+"""Selects the requests that the page answers: from its own pages, or with a token."""
 
 import contextlib
 import hmac
@@ -28,7 +28,7 @@ class Access:
     Parameters
     ----------
     host : str
-        Address or name that is listened on.
+        Address or name on which the page listens.
     port : int
     token : str, optional
         Needed unless ``host`` is this computer's own.
@@ -36,24 +36,25 @@ class Access:
     Raises
     ------
     AccessError
-        The address needs a token, and there is none or a short one.
+        The address needs a token, and the token is missing or too short.
     """
 
     def __init__(self, host: str, port: int, token: str = ""):
         self.host, self.port, self.token = host, port, token
-        #: Name of the cookie with the token: a browser sends those of all ports of a computer.
+        #: Name of the cookie with the token; it contains the port, since a browser sends the
+        #: cookies of all ports of a computer.
         self.cookie = f"dashboard_token_{port}"
         if token and len(token) < MIN_TOKEN_LENGTH:
             raise AccessError(
                 f"the token has {len(token)} characters; expected at least {MIN_TOKEN_LENGTH}"
             )
         if not token and not is_loopback(host):
-            raise AccessError(f"host is {host}, which other computers reach; expected a token")
+            raise AccessError(f"host is {host}, which other computers can reach; expected a token")
 
     @property
     def url(self) -> str:
         """Address of the page, with its token."""
-        # Not an address that a browser can open.
+        # A browser cannot open this address.
         host = socket.gethostname() if self.host in ("0.0.0.0", "::", "") else self.host
         host = f"[{host}]" if ":" in host else host
         return f"http://{host}:{self.port}/" + (f"?token={self.token}" if self.token else "")
@@ -64,9 +65,9 @@ class Access:
         Parameters
         ----------
         headers : dict
-            Of the HTTP request, also of one that opens a websocket.
+            Headers of the HTTP request, also of one that opens a websocket.
         token : str
-            Of its address; without one that of its cookie counts.
+            Token of its address; without one, that of its cookie is used.
         """
         fields = {name.lower(): value for name, value in headers.items()}
         host, origin = fields.get("host", ""), fields.get("origin")
@@ -93,7 +94,7 @@ class Access:
         return ""
 
     def _cookies(self, text):
-        # Others may hold anything, which http.cookies stops at.
+        # Other cookies may contain anything, and http.cookies stops at invalid ones.
         pairs = (each.strip().partition("=") for each in text.split(";"))
         return [value.strip('"') for name, _, value in pairs if name == self.cookie]
 
@@ -105,7 +106,7 @@ class Access:
             return False
         if port != self.port:
             return False
-        # From elsewhere the computer may have any name, and the token decides.
+        # Other computers may know this one by any name, so the token decides.
         return bool(name) and (not is_loopback(self.host) or is_loopback(name))
 
 
@@ -120,7 +121,7 @@ def is_loopback(host: str) -> bool:
 
 
 def token_in(path: Path) -> str:
-    """Return the token in a file, which is made if it is not there; only its user may read it.
+    """Return the token in a file, which is created if it is missing; only its user may read it.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Commands of the operator become calls of services."""
+"""Turns commands of the operator into service calls."""
 
 import math
 import subprocess
@@ -26,24 +26,25 @@ from crazyflie_takeoff.limits import Box
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.refusal import RefusalError
 
-_FLIGHT_TIMEOUT = 60.0  #: Limit for services that answer when the vehicle flies or has landed (s).
-_TIMEOUT = 10.0  #: Limit for the others (s).
+_FLIGHT_TIMEOUT = 60.0  #: Timeout of services that answer when the vehicle flies or has landed (s).
+_TIMEOUT = 10.0  #: Timeout of the other services (s).
 _CLIMB_SPEED = 0.5  #: Mean speed of a takeoff (m/s).
 _UNKNOWN_HEIGHT = 1.0  #: Assumed height of a landing vehicle without a position (m).
 _MIN_DURATION = 1.0  #: Shortest duration of a move (s).
-_MAX_SPEED = 2.0  #: Highest speed of a go to (m/s).
+_MAX_SPEED = 2.0  #: Highest speed of a go-to command (m/s).
 HEIGHTS = 0.1, 5.0  #: Lowest and highest takeoff (m).
 
-_HOLD_DURATION = 1.0  #: Duration of a move to where a vehicle is (s).
+_HOLD_DURATION = 1.0  #: Duration of a move to a vehicle's own position (s).
 #: The firmware's parameter for lights, its value for all lights, and how long they are on (s).
 _LIGHTS, _ALL_LIGHTS, _LIGHT_TIME = "led/bitmask", 255, 5.0
 
-#: Refused in flight: the motors would stop.
+#: Actions that are refused in flight: the motors would stop.
 _GROUND_ONLY = (Action.DISARM, Action.REBOOT)
 
 _STAYS = "not all of them can go"
 
-#: Parameters of the nodes that carry out a go to: whether headings can change; the goals' frame.
+#: Parameters of the nodes that carry out a go-to command: whether headings can change; the frame of
+#: goals.
 _YAW, _FIXED = "reference/yaw", "frames/fixed"
 
 _YAW_REFERENCE = "crazyflie_msgs/PositionVelocityYawStateStamped"
@@ -60,7 +61,7 @@ _TYPES = {
 
 @dataclass(frozen=True)
 class Target:
-    """A vehicle that is commanded, and what is known of it now."""
+    """A vehicle that is commanded, and its latest snapshot."""
 
     vehicle: Vehicle
     now: VehicleSnapshot
@@ -77,7 +78,7 @@ class Actions:
         Its threads may wait for the master.
     master : Master
     frames : Frames
-        Those in which the page shows vehicles.
+        Frames in which the page shows vehicles.
     time : callable
         time.monotonic.
     """
@@ -98,14 +99,14 @@ class Actions:
     def carry_out(
         self, command: Command, targets: Mapping[str, Target], graph: Graph, fixed: str
     ) -> "Future[tuple[Outcome, ...]]":
-        """Call the services that a command needs; the outcomes come when all have answered.
+        """Call the services that a command needs; return a future of all outcomes.
 
         ``fixed`` is the frame of the command's goal.
 
         Raises
         ------
         RefusalError
-            The command is too old, or makes no sense.
+            The command is too old or invalid.
         """
         expect_fresh(command.action.value, self._time() - command.clicked)
         _check(command)
@@ -167,7 +168,7 @@ class Actions:
         return answers[0] if len(answers) == 1 else any_of(answers)
 
     def _call(self, command: Command, service: Service, request: Any) -> "Future[Any]":
-        """Call a service unless the command grows too old before it is reached."""
+        """Call a service unless the command becomes too old before the service is reached."""
         age = self._time() - command.clicked
         try:
             expect_fresh(command.action.value, age)
@@ -175,7 +176,8 @@ class Actions:
             return failed(str(error))
         limit = _FLIGHT_TIMEOUT if command.action in (Action.TAKEOFF, Action.LAND) else _TIMEOUT
         outcome: Future[Any] = Future()
-        # What is not reached is withdrawn: it must not be carried out when the node goes on.
+        # A call that does not reach its node is withdrawn: a frozen node must not carry it out
+        # later.
         answer = self._handle.call_service(
             service.name, _TYPES[service.request], request, limit, MAX_COMMAND_AGE - age
         )
@@ -183,7 +185,7 @@ class Actions:
         return outcome
 
     def _light(self, driver, command):
-        """Switch all lights of a vehicle on for `_LIGHT_TIME`, by its firmware."""
+        """Switch on all lights of a vehicle for `_LIGHT_TIME`, by its firmware."""
         service = Service(f"{driver}/update_params", Request.UPDATE_PARAMS)
         request = srv.UpdateParamsRequest([_LIGHTS])
         outcome: Future[Any] = Future()
@@ -208,10 +210,10 @@ class Actions:
         timer = self._handle.timer(_LIGHT_TIME, off, steady=True)
         return outcome
 
-    # Several vehicles that go somewhere.
+    # Go-to commands for several vehicles.
 
     def _go_to(self, command, targets, graph, fixed):
-        """Send vehicles to where their middle is at the goal: all of them, or none."""
+        """Send vehicles so that their centre comes to the goal: all of them, or none."""
         refusals = {}
         for name in command.vehicles:
             if text := self._why_it_stays(name, targets.get(name), graph):
@@ -240,7 +242,7 @@ class Actions:
         def end(outcomes):
             gone = [each for each in outcomes if not each.text]
             if 0 < len(gone) < len(outcomes):
-                # The ways were checked for all of them.
+                # The paths were checked for all vehicles together.
                 self._handle.submit(self._hold, [targets[each.vehicle] for each in gone])
                 outcomes = tuple(
                     each if each.text else Outcome(each.vehicle, f"is held: {_STAYS}")
@@ -265,7 +267,7 @@ class Actions:
         return ""
 
     def _prepared(self, command, chosen, targets, moving, graph, fixed, now):
-        """Return moves, and service with request, of vehicles; it waits for the master."""
+        """Return moves, and services with requests, of vehicles; waits for the master."""
         services = {name: _services(target, Action.GO_TO)[0] for name, target in chosen.items()}
         spaces = {name: _namespace(service, graph) for name, service in services.items()}
         wanted = {name: f"{each.vehicle.namespace}/{BUFFER}" for name, each in targets.items()}
@@ -329,13 +331,13 @@ class Actions:
         has_yaw = graph.types.get(f"{vehicle.namespace}/ref") == _YAW_REFERENCE
         self._handle.set_param_later(f"{name}/reference/yaw", has_yaw)
         (program,) = roslib.packages.find_node("crazyflie_mission_api", "high_level_node")[:1]
-        # A process of its own, so that the vehicle keeps it when this one ends.
+        # A process of its own, so that it continues when this one ends.
         arguments = [program, f"__ns:={vehicle.namespace or '/'}", "__name:=high_level"]
         self._commanders[name] = subprocess.Popen(arguments, start_new_session=True)
 
 
 def expect_fresh(what: str, age: float) -> None:
-    """Raise `RefusalError` for a command whose click is too old, s, or not yet."""
+    """Raise `RefusalError` for a command whose click is too old (s), or in the future."""
     if not -0.1 <= age <= MAX_COMMAND_AGE:
         raise RefusalError(
             f"{what}: the command is {age:.1f} s old; expected at most {MAX_COMMAND_AGE:g} s; "
@@ -357,7 +359,7 @@ def _check(command: Command) -> None:
     if command.action != Action.GO_TO:
         return
     if command.goal is None:
-        raise RefusalError("go to: there is no goal; expected x, y and z")
+        raise RefusalError("go to: no goal is set; expected x, y and z")
     if not 0.0 < command.speed <= _MAX_SPEED:
         raise RefusalError(
             f"go to: the speed is {command.speed:g} m/s; expected more than 0 and at most "
@@ -377,7 +379,7 @@ def _why_no_service(action: Action, target: Target | None) -> str:
 
 
 def _namespace(service: Service, graph: Graph) -> str:
-    """Return where the node that offers a service has its parameters."""
+    """Return the namespace of the parameters of the node that offers a service."""
     space, _, _ = service.name.rpartition("/")
     return space if space.endswith("/high_level") else graph.services.get(service.name, space)
 

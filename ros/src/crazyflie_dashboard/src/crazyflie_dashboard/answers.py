@@ -1,4 +1,4 @@
-"""Answers of services, and what they say in words."""
+"""Answers of services, and their texts."""
 
 import contextlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,7 +10,7 @@ from crazyflie_dashboard.page_data import Outcome
 from crazyflie_utils import ServiceError
 from crazyflie_utils.refusal import RefusalError
 
-_MAX_NAMES = 8  #: Names of vehicles in one text.
+_MAX_NAMES = 8  #: Largest number of vehicle names in one text.
 
 
 def settle(done: "Future[Any]", outcome: "Future[Any]") -> None:
@@ -25,7 +25,7 @@ def settle(done: "Future[Any]", outcome: "Future[Any]") -> None:
 
 
 def words(error: BaseException) -> str:
-    """Return what a service has answered; `NodeHandle.call_service` leaves out rospy's words."""
+    """Return the text of an answer; `NodeHandle.call_service` has removed rospy's words."""
     return str(error) or repr(error)
 
 
@@ -37,7 +37,7 @@ def failed(text: str) -> "Future[Any]":
 
 
 def any_of(answers: "list[Future[Any]]") -> "Future[Any]":
-    """Return the first answer that is no refusal; the refusals if there is none."""
+    """Return the first answer that is not a refusal; otherwise the refusals."""
     outcome: Future[Any] = Future()
     texts: list[str] = []
 
@@ -73,7 +73,7 @@ def gathered(answers: "Mapping[str, Future[Any]]") -> "Future[tuple[Outcome, ...
 
 
 def summary(outcomes: Iterable[Outcome]) -> list[str]:
-    """Return what has been refused, each text once with its vehicles."""
+    """Return the refusals, each text once with its vehicles."""
     names: dict[str, list[str]] = {}
     for each in outcomes:
         if each.text:
@@ -82,5 +82,5 @@ def summary(outcomes: Iterable[Outcome]) -> list[str]:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return names as a text; of many their number."""
+    """Return names as a text; for many vehicles only their number."""
     return ", ".join(names) if len(names) <= _MAX_NAMES else f"{len(names)} vehicles"

@@ -1,4 +1,4 @@
-"""Which of the pages that are open may command vehicles: one at a time."""
+"""Control of the vehicles, which one open page has at a time."""
 
 import itertools
 import threading
@@ -15,12 +15,12 @@ class PageControl:
     """Pages that are open, and the one that has control. For any thread.
 
     A page that is loaded again, or has lost its connection, is a new page and has no control until
-    it takes it. That a page goes changes nothing else.
+    it takes it. Nothing else changes when a page closes.
     """
 
     def __init__(self) -> None:
-        #: on_first, on_close, on_empty: ``on_first()`` is called when the first page has come,
-        #: ``on_close(page)`` when one has gone, and then ``on_empty()`` if it was the last.
+        #: on_first, on_close, on_empty: ``on_first()`` is called when the first page has opened,
+        #: ``on_close(page)`` when one has closed, and then ``on_empty()`` if it was the last.
         self.on_first: Callable[[], None] = lambda: None
         self.on_close: Callable[[int], None] = lambda page: None
         self.on_empty: Callable[[], None] = lambda: None
@@ -61,13 +61,13 @@ class PageControl:
         Raises
         ------
         ControlError
-            Another page has it: the operator is to confirm `take_over`.
+            Another page has control: the operator must confirm `take_over`.
         """
         with self._lock:
             self._expect_open(page)
             if self._controller not in (None, page):
                 raise ControlError(
-                    f"page {self._controller} has control; taking over is possible, and both pages "
+                    f"page {self._controller} has control; you can take it over, and both pages "
                     "will say so"
                 )
             is_new, self._controller = self._controller is None, page
@@ -75,14 +75,14 @@ class PageControl:
             self._tell_others(page, f"page {page} has control")
 
     def take_over(self, page: int) -> None:
-        """Give a page control, whichever has it; both, and all others, are told."""
+        """Give a page control, even if another one has it; all pages are notified."""
         with self._lock:
             self._expect_open(page)
             before, self._controller = self._controller, page
         if before == page:
             return
         if before is not None:
-            self._say(before, f"page {page} has taken over control: this page only looks now")
+            self._say(before, f"page {page} has taken over control: this page can only watch now")
             self._say(page, f"this page has taken over control from page {before}")
         self._tell_others(page, f"page {page} has control", excluding=before)
 
@@ -100,7 +100,7 @@ class PageControl:
             self._expect_open(page)
             if self._controller != page:
                 has = "no page" if self._controller is None else f"page {self._controller}"
-                raise ControlError(f"this page only looks: {has} has control; take it first")
+                raise ControlError(f"this page can only watch: {has} has control; take it first")
 
     @property
     def controller(self) -> int | None:
@@ -124,7 +124,7 @@ class PageControl:
                 self._say(other, text)
 
     def _say(self, page, text):
-        # The page may have gone meanwhile.
+        # The page may have closed meanwhile.
         tell = self._tell.get(page)
         if tell is not None:
             tell(text)

@@ -32,11 +32,11 @@ from crazyflie_utils.refusal import RefusalError
 
 
 class Dashboard:
-    """The graph, as pages see and command it: what they ask for is done in the node's turn.
+    """The graph, as pages see and command it; requests are carried out in the node's turn.
 
-    Every method may be called from any thread, and does not wait. What takes time returns a
-    future, which fails with `RefusalError`, whose text is for the operator; where a service has
-    refused, it is the service's own.
+    Every method may be called from any thread, and does not wait. Lengthy methods return a future,
+    which fails with `RefusalError`, whose text is for the operator; if a service has refused, it is
+    the service's text.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ class Dashboard:
     lane : EmergencyLane
         It is closed with the dashboard.
     folders : list of str
-        With missions and trajectories.
+        Folders with missions and trajectories.
     clock : callable
-        time.monotonic, by which commands grow old.
+        time.monotonic, for the age of commands.
     workers : concurrent.futures.Executor, optional
         Its threads may wait.
     """
@@ -61,12 +61,12 @@ class Dashboard:
         clock: Callable[[], float] = time.monotonic,
         workers: Executor | None = None,
     ):
-        #: Every page is opened and closed there; a method's ``page`` is its number.
+        #: Opens and closes every page; a method's ``page`` is its number.
         self.pages = PageControl()
         self._handle, self._folders, self._clock = handle, folders, clock
         self._workers = workers or ThreadPoolExecutor(8, "dashboard")
-        # Who submits work to the node while it is free does what is queued: that is this thread,
-        # and not the one that serves all pages.
+        # A thread that submits work to an idle node also carries out the queue: this thread does
+        # so, not the one that serves all pages.
         self._turns = workers or ThreadPoolExecutor(1, "dashboard_turns")
         self._model = GraphModel(handle, self._workers, master.graph, clock)
         self._actions = Actions(handle, self._workers, master, self._model.frames, clock)
@@ -83,7 +83,7 @@ class Dashboard:
         self.pages.on_empty = lambda: self._submit(self._model.end)
 
     def close(self) -> None:
-        """End what was begun here and flies nothing."""
+        """End all activities that were started here, except flights."""
         self._actions.close()
         self._lane.close()
         self._recording.close()
@@ -116,11 +116,11 @@ class Dashboard:
         return self._do(lambda: self._page(page).add_field(path, self._model.graph.topics))
 
     def remove_field(self, page: int, path: str) -> None:
-        """Plot it no longer."""
+        """Remove the plot of a field."""
         self._submit(lambda: self._page(page).remove_field(path))
 
     def command(self, page: int, command: Command) -> "Future[tuple[Outcome, ...]]":
-        """Carry out a command of the page that has control; each vehicle has its outcome."""
+        """Carry out a command of the page that has control; return an outcome for each vehicle."""
 
         def do():
             self.pages.expect_control(page)
@@ -138,10 +138,10 @@ class Dashboard:
     def emergency(
         self, vehicles: tuple[str, ...] | None, age: float
     ) -> "Future[tuple[Outcome, ...]]":
-        """Stop motors, of all vehicles if ``vehicles`` is None; no page needs control for it.
+        """Stop motors, of all vehicles if ``vehicles`` is None; the page does not need control.
 
-        It waits for no other command and for no turn. ``age`` (s) is that of the click. Each
-        service has its outcome, after `MAX_EMERGENCY_AGE` at the latest.
+        The call waits for no other command and for no turn. ``age`` (s) is that of the click. The
+        future has an outcome for each service, after `MAX_EMERGENCY_AGE` at the latest.
         """
         if vehicles is None:
             return self._lane.stop(None, age)
@@ -153,7 +153,7 @@ class Dashboard:
         return self._lane.stop(services, age)
 
     def parameter_owners(self) -> tuple[str, ...]:
-        """Return nodes with live parameters, and vehicles with those of firmware."""
+        """Return nodes with live parameters, and vehicles with firmware parameters."""
         return self._parameters.owners()
 
     def parameters(self, owner: str | None = None) -> "Future[tuple[ParameterInfo, ...]]":
@@ -166,7 +166,7 @@ class Dashboard:
     def set_parameter(
         self, page: int, parameter: ParameterInfo, text: str
     ) -> "Future[ParameterInfo]":
-        """Set a parameter to what was typed; the result has the value that came back."""
+        """Set a parameter to the typed value; the result has the value that came back."""
 
         def do():
             self.pages.expect_control(page)
@@ -176,7 +176,7 @@ class Dashboard:
         return self._do(do, what=what)
 
     def mission_files(self) -> tuple[MissionFile, ...]:
-        """Return what can be flown."""
+        """Return the missions and trajectories that can be flown."""
         return missions.listed(self._folders)
 
     def dry_run(
@@ -219,7 +219,7 @@ class Dashboard:
         return self._do(do, what=f"page {page}: stop the mission")
 
     def record(self, page: int, is_on: bool) -> "Future[str | None]":
-        """Begin to record, or end it; then the future is done when there is a report."""
+        """Start or end a recording; at the end the future is done when the report exists."""
 
         def do():
             self.pages.expect_control(page)
@@ -232,7 +232,7 @@ class Dashboard:
         return self._recording.report
 
     def examine(self) -> "Future[None]":
-        """Run the doctor on the graph: its sentences are in the scene 10 s later."""
+        """Run the doctor on the graph: its findings are in the scene 10 s later."""
 
         def show(sentences):
             self._model.sentences = sentences
@@ -256,12 +256,12 @@ class Dashboard:
         with contextlib.suppress(RuntimeError):
             self._turns.submit(self._handle.submit, work, *arguments)
 
-    # In the node's turn.
+    # Called in the node's turn.
 
     def _do(self, work: Callable[..., Any], *arguments: Any, what: str = "") -> "Future[Any]":
         """Do work in the node's turn; the future has its result, or that of its future.
 
-        With ``what`` is logged that it was asked for, and what has become of it.
+        With ``what`` the request and its outcome are logged.
         """
         outcome: Future[Any] = Future()
 

@@ -23,16 +23,16 @@ class DashboardParameters(Parameters):
     """Parameters of `DashboardNode`."""
 
     host: str = parameter(Text(), "address that the page listens on", "127.0.0.1")
-    port: int = parameter(Integer(1, 65535), "of the page", 8642)
+    port: int = parameter(Integer(1, 65535), "port of the page", 8642)
     token_file: str = parameter(
         Text(may_be_empty=True),
-        "file with what a page has to know; without one it is `crazyflie_dashboard_token` in ROS's "
-        "folder, if `host` is not this computer's own. It is made if it is not there",
+        "file with the token that a page must present; by default `crazyflie_dashboard_token` in "
+        "ROS's folder, if `host` is not this computer's own. It is created if it is missing",
         "",
     )
     folders: str = parameter(
         Text(may_be_empty=True),
-        "with missions and trajectories (CSV), one colon between two; empty for the examples",
+        "folders with missions and trajectories (CSV), separated by colons; empty for the examples",
         "",
     )
 
@@ -41,7 +41,7 @@ class DashboardNode(Node):
     """Show vehicles in a browser, and command them."""
 
     def __init__(self) -> None:
-        # Closes what has been opened, also if the page cannot be.
+        # Closes what has been opened, also if the page cannot be opened.
         self._open = contextlib.ExitStack()
 
     @override
@@ -68,12 +68,13 @@ class DashboardNode(Node):
             folders or example_folders(),
         )
         self._open.callback(dashboard.close)
-        # NiceGUI takes a second to import: not for what only reads the parameters' declaration.
+        # NiceGUI takes a second to import, which programs that only read the parameters'
+        # declaration do not need.
         from crazyflie_dashboard.page import open_page
 
         page = open_page(dashboard, self._access, self._parameters.host, self._parameters.port)
         self._open.callback(page.close)
-        # Not into the log: the token is for those who see this terminal.
+        # Printed and not logged: only those who see this terminal may have the token.
         print(f"the dashboard is at {self._access.url}", flush=True)
 
     @override
@@ -82,13 +83,13 @@ class DashboardNode(Node):
 
 
 def new_lane(handle: NodeHandle) -> EmergencyLane:
-    """Return the lane for emergencies of the running graph; what becomes of them is logged."""
+    """Return the lane for emergencies of the running graph; their outcomes are logged."""
     master = Master(handle.name)
     return EmergencyLane(handle.name, master.services, master.lookup, handle.warn)
 
 
 def example_folders() -> list[str]:
-    """Return the folders of what this workspace has to fly, as far as it is installed."""
+    """Return the folders of this workspace's missions and trajectories that are installed."""
     packages = rospkg.RosPack()
     folders = []
     for package, folder in (("crazyflie_mission_api", "examples"), ("crazyflie_demo", "data")):

@@ -1,4 +1,4 @@
-"""Which vehicles there are on a graph, by topics and services, and what they can be told."""
+"""Finds the vehicles of a graph by topics and services, and the commands that they accept."""
 
 import re
 from collections import defaultdict
@@ -17,12 +17,12 @@ _STATUS = {
     "vehicle_status": (r"vehicle_status", "crazyflie_msgs/VehicleStatus"),
 }
 
-#: Last names of namespaces with services of vehicles that are no vehicles.
+#: Last names of namespaces that have services of vehicles but are not vehicles.
 _NO_VEHICLES = {"all", "high_level"}
 
 
 class Request(Enum):
-    """How a service is called; the value is its type."""
+    """Ways to call a service; the value is its type."""
 
     EMPTY = "std_srvs/Empty"
     SET_BOOL = "std_srvs/SetBool"
@@ -36,7 +36,7 @@ class Request(Enum):
 class Service:
     """A service that carries out an action.
 
-    With ``needs_commander`` the vehicle has none for it yet: its `HighLevelNode` is to be started.
+    With ``needs_commander`` the vehicle has no `HighLevelNode` for it yet, which must be started.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Service:
 class Graph:
     """Topics and services of the graph, by the master.
 
-    ``topics`` and ``types`` are topic -> type, of those that are published and of all; ``services``
+    ``topics`` and ``types`` are topic -> type, of published topics and of all topics; ``services``
     service -> its node.
     """
 
@@ -62,11 +62,11 @@ class Vehicle:
     """A vehicle on the graph."""
 
     namespace: str  #: Absolute, without a slash at its end: "" or /cf1.
-    driver: str = ""  #: That of its driver, which is another one in the hardware example.
+    driver: str = ""  #: Namespace of its driver, which differs in the hardware example.
     topics: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: Role -> topic and type.
-    #: `Action` -> services that are called for it, all of them.
+    #: `Action` -> services, all of which are called for it.
     services: Mapping[Action, tuple[Service, ...]] = field(default_factory=dict)
-    has_driver: bool = False  #: A driver connects it.
+    has_driver: bool = False  #: Whether a driver connects it.
 
     @property
     def name(self) -> str:
@@ -140,7 +140,7 @@ def _vehicle(top, driver, topics, services, has_driver):
 def _candidates(
     top: str, driver: str, services: Mapping[str, str]
 ) -> Iterator[tuple[Action, Iterable[Service]]]:
-    """Yield what may carry out an action, the best first; each of a row is called."""
+    """Yield groups of services that carry out an action, the best first; all of one are called."""
     commander = f"{top}/high_level"
     flights = [commander]
     node = services.get(f"{driver}/upload_trajectory")

@@ -23,15 +23,15 @@ from std_srvs.srv import Empty
 
 from crazyflie_dashboard.page_data import Outcome
 
-#: Age after which a click is refused, and longest time for an answer (s).
+#: Largest age of a click, and longest time for an answer (s).
 MAX_EMERGENCY_AGE = 5.0
-#: These are called first.
+#: Services that are called first.
 ALL = ("/all/emergency", "/crazyflie_server/all/emergency")
 
 _CONNECT_LIMIT = 2.0  #: Longest time for a connection in advance (s).
 _PERIOD = 1.0  #: Shortest period of requests to the master (s).
-_SHARE = 0.02  #: Largest share of time that they take.
-_EMPTY = struct.pack("<I", 0)  #: A request of std_srvs/Empty: the length of nothing.
+_SHARE = 0.02  #: Largest fraction of time that requests to the master take.
+_EMPTY = struct.pack("<I", 0)  #: A serialized request of std_srvs/Empty: a length of zero.
 
 
 class _CallError(Exception):
@@ -54,7 +54,7 @@ class EmergencyLane:
         ``lookup(service)`` returns the address of a service, as in rosrpc://host:port, within some
         seconds. Both raise OSError when the master does not answer.
     report : callable
-        ``report(text)`` is told of each emergency and of what has become of it.
+        ``report(text)`` is called for each emergency and its outcome.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class EmergencyLane:
         if not wanted:
             self._end(what, result, {"emergency": f"no service has been found: {self._trouble}"})
             return result
-        # What is open is told at once, in order; nothing here waits.
+        # Open connections send the request at once, in order; nothing here waits.
         sent = {name for name, connection in taken.items() if _send(connection)}
         texts: dict[str, str] = {}
 
@@ -153,7 +153,7 @@ class EmergencyLane:
         self._report(f"emergency for {what}: {failures or 'all services have answered'}")
 
     def _answer(self, name, connection, deadline):
-        """Return why a call has failed, or ""; what has answered stays open."""
+        """Return why a call has failed, or ""; a connection that has answered stays open."""
         try:
             connection.settimeout(max(deadline - time.monotonic(), 0.001))
             is_done, length = struct.unpack("<BI", _receive(connection, 5))
@@ -200,7 +200,8 @@ class EmergencyLane:
                 "persistent": "1",
             }
             write_ros_handshake_header(connection, header)
-            # The answer shows that the process runs: the kernel accepts for one that is stopped.
+            # Only an answer shows that the process runs: the kernel accepts connections for a
+            # stopped one.
             answer = read_ros_handshake_header(connection, io.BytesIO(), 4096)
             if "error" in answer:
                 raise _CallError(answer["error"])
@@ -224,7 +225,7 @@ class EmergencyLane:
                 self._update({n: node for n, node in self._services().items() if is_emergency(n)})
                 self._trouble = "no node on the graph offers it"
             except Exception as error:
-                # Whatever it is: the next look may succeed, and what is known stays.
+                # Any error is ignored: the next request may succeed, and known services stay.
                 self._trouble = str(error)
             with self._lock:
                 ended = [n for n, connection in self._open.items() if _has_ended(connection)]
@@ -247,7 +248,7 @@ class EmergencyLane:
 
 
 def is_emergency(service: str) -> bool:
-    """Tell whether a service stops motors, by its name; one of high_level only calls another."""
+    """Return whether a service stops motors, by its name; those of high_level only call another."""
     return service.endswith("/emergency") and not service.endswith("/high_level/emergency")
 
 

@@ -1,4 +1,4 @@
-"""Poses of all frames of /tf, decoded as often as they are shown and not as often as they come."""
+"""Poses of all frames of /tf, decoded as often as they are shown, not as often as they arrive."""
 
 import struct
 from collections import Counter
@@ -11,7 +11,7 @@ from crazyflie_utils.tf.frame_tree import FrameTree
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose, entries
 
 _MAX_FRAMES = 1000
-_FORGET_AFTER = 30.0  #: A frame that moves, and has had no pose for so long, s, is not shown.
+_FORGET_AFTER = 30.0  #: Time without a pose after which a moving frame is not shown (s).
 
 
 @dataclass
@@ -31,7 +31,7 @@ class Pose:
 
 
 class Frames:
-    """The frames of /tf and /tf_static, as nodes take them.
+    """The frames of /tf and /tf_static, by the rules that nodes follow.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ class Frames:
     nanoseconds : callable
         ROS time, ns.
     ahead : float
-        How far a stamp may be ahead of now, s.
+        Longest time by which a stamp may be ahead of now, s.
     """
 
     def __init__(self, time: Callable[[], float], nanoseconds: Callable[[], int], ahead: float):
         self.poses: dict[str, Pose] = {}
-        #: Frames whose newest pose was not taken -> why.
+        #: Frame whose newest pose was rejected -> reason.
         self.rejected: dict[str, str] = {}
         self._time, self._nanoseconds, self._ahead = time, nanoseconds, ahead
         self._codec = PoseCodec()
@@ -61,23 +61,23 @@ class Frames:
         self._tree = FrameTree(self._codec, self._on_rejected, self._ahead, self._on_new)
 
     def read(self, raw: bytes) -> None:
-        """Take a serialized tf2_msgs/TFMessage."""
+        """Store a serialized tf2_msgs/TFMessage."""
         try:
             for child, start, end in entries(raw):
                 if child in self._latest or len(self._latest) < _MAX_FRAMES:
                     self._latest[child] = raw, start, end
                     self._counts[child] += 1
         except (struct.error, ValueError):
-            # The doctor says so; a display has nothing to do about it.
+            # The doctor reports that; a display cannot correct it.
             return
 
     def read_static(self, pose: StampedPose) -> None:
-        """Take a pose that holds for ever."""
+        """Store a static pose."""
         self._tree.take_static(pose, self._nanoseconds())
         self.poses[pose.child] = Pose(pose, self._time(), 0.0, is_static=True)
 
     def update(self) -> None:
-        """Decode what has come since the last time."""
+        """Decode the messages that have come since the last call."""
         now = self._time()
         elapsed = now - self._counted_since
         for child, (raw, start, end) in self._latest.items():
@@ -98,7 +98,7 @@ class Frames:
                 self.rejected.pop(name, None)
 
     def age(self, name: str) -> float:
-        """Return how old the pose of a frame is, s."""
+        """Return the age of the pose of a frame, s."""
         pose = self.poses[name]
         return pose.delay + self._time() - pose.arrival
 

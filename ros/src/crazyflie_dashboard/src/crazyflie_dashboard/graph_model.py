@@ -38,9 +38,10 @@ from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIM
 
 SCENE_PERIOD = 0.05  #: Period of scenes (s).
 _POLL_PERIOD = 2.0  #: Shortest period of requests to the master (s).
-_POLL_SHARE = 0.02  #: Largest share of time that they take.
+_POLL_SHARE = 0.02  #: Largest fraction of time that requests to the master take.
 _FORGET_AFTER = 30.0  #: Time for which a vehicle is shown after its topics have gone (s).
-_FEW = 10  #: With more vehicles, references and controls are received of watched ones only.
+#: With more vehicles than this, references and controls are received from watched ones only.
+_FEW = 10
 #: Time for which subscriptions are kept after the last page has gone (s): a page that is loaded
 #: again shows vehicles also without a master.
 _LINGER_TIME = 10.0
@@ -52,7 +53,7 @@ _REMEDIES = {"is stamped in the future": f"{_OLDER}; {_CLOCKS}"}
 
 
 class GraphModel:
-    """The running graph. Not for several threads at once, except ``scene`` and ``graph``.
+    """The running graph. Not thread-safe, except ``scene`` and ``graph``.
 
     Parameters
     ----------
@@ -93,10 +94,10 @@ class GraphModel:
         self._end_at = math.inf
         self._known_frames = 0
         self._is_polling = False
-        self._trouble = ""  #: Why there is no newer graph.
+        self._trouble = ""  #: Reason why there is no newer graph.
 
     def begin(self) -> None:
-        """Begin to look at the graph: a page is open."""
+        """Start to observe the graph: a page is open."""
         self._end_at = math.inf
         if self._handle is not None:
             return
@@ -111,7 +112,7 @@ class GraphModel:
         handle.timer(SCENE_PERIOD, self._on_timer, steady=True)
 
     def end(self) -> None:
-        """Look at the graph for a little longer: no page is open, or one is loaded again."""
+        """Observe the graph for a little longer: no page is open, or one is being reloaded."""
         self._end_at = self._clock() + _LINGER_TIME
 
     def _forget(self):
@@ -125,7 +126,7 @@ class GraphModel:
         self.scene, self.graph = Scene(), Graph()
 
     def watch(self, names: set[str]) -> None:
-        """Receive what comes often for these vehicles only."""
+        """Receive frequent messages for these vehicles only."""
         for name in self.plots.keys() - names:
             del self.plots[name]
         for name in self.models.keys() & names - self.plots.keys():
@@ -137,7 +138,7 @@ class GraphModel:
         return self._surroundings.box(vehicle.namespace)
 
     def _receive(self):
-        """Receive of each vehicle what is shown of it."""
+        """Subscribe to the topics that are shown for each vehicle."""
         is_few = len(self.models) <= _FEW
         for name, model in self.models.items():
             model.frame = frame_of(model.vehicle, self.frames, len(self.models) == 1)
@@ -165,7 +166,7 @@ class GraphModel:
         self._poll_at = now + max(_POLL_PERIOD, (now - began) / _POLL_SHARE)
         if self._handle is None:
             return
-        # Without a master what is known is shown, and grows old.
+        # Without a master, the last known data are shown, with their growing age.
         if done.exception() is not None:
             self._trouble = f"no graph: {done.exception()}"
             self._parent.warn(self._trouble, throttle=60.0)
@@ -246,7 +247,7 @@ class GraphModel:
         )
 
     def _snapshot(self, name, fixed):
-        """Return what is known of a vehicle; one that cannot be drawn holds up no other."""
+        """Return the snapshot of a vehicle; one that cannot be drawn must not stop the others."""
         try:
             now = self.models[name].snapshot(self.frames, fixed)
             return replace(now, is_held=True) if name in self._surroundings.held else now

@@ -1,15 +1,15 @@
-"""Pictures of cameras as a browser shows them."""
+"""Converts pictures of cameras to formats that a browser shows."""
 
 from typing import Any
 
 import cv2
 import numpy as np
 
-_MAX_WIDTH = 640  #: Larger pictures are made smaller, pixels.
+_MAX_WIDTH = 640  #: Largest picture; larger ones are reduced (pixels).
 _QUALITY = 80  #: Quality of JPEG (%).
 
-#: Encoding of sensor_msgs/Image -> type of a number, and where blue, green and red are; one channel
-#: of more than a byte is shown from its least to its largest number.
+#: Encoding of sensor_msgs/Image -> type of a number, and indices of blue, green and red; a single
+#: channel of more than a byte is scaled to its range.
 _ENCODINGS: dict[str, tuple[str, list[int]]] = {
     "bgr8": ("u1", [0, 1, 2]),
     "bgra8": ("u1", [0, 1, 2, 3]),
@@ -32,7 +32,7 @@ def encoded(message: Any) -> bytes:
     """
     if not hasattr(message, "encoding"):
         data = bytes(message.data)
-        # What a browser shows as it is; nothing else reaches a page.
+        # Only formats that a browser shows directly reach a page.
         if not data.startswith((b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n")):
             raise ValueError(f"its format is {message.format}; expected JPEG or PNG")
         return data

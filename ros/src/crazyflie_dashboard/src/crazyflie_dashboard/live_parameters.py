@@ -1,4 +1,4 @@
-"""Parameters of the running graph: of nodes by dynamic_reconfigure, of firmware by the driver."""
+"""Live parameters: of nodes by dynamic_reconfigure, of the firmware by the driver."""
 
 from concurrent.futures import Executor, Future
 from dataclasses import replace
@@ -58,7 +58,7 @@ class LiveParameters:
         return self._of_nodes(nodes)
 
     def set(self, parameter: ParameterInfo, text: str) -> "Future[ParameterInfo]":
-        """Set a parameter to what was typed; the result has the value that came back."""
+        """Set a parameter to the typed value; the result has the value that came back."""
         value = parsed(parameter, text)
         outcome: Future[ParameterInfo] = Future()
         if parameter.is_firmware:
@@ -98,7 +98,7 @@ class LiveParameters:
         def read(done):
             refusal = done.exception()
             if refusal is not None:
-                # As the firmware has it, and not as it was typed.
+                # The firmware's value, which may differ from the typed one.
                 self._handle.set_param(f"{top}/{name}", parameter.value)
                 raise RefusalError(words(refusal))
             value = self._handle.get_param(f"{top}/{name}", _Raw())

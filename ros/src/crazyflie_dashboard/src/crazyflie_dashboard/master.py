@@ -1,4 +1,4 @@
-"""Questions to the ROS master, each with a limit of time; they are for threads that may wait."""
+"""Requests to the ROS master, each with a timeout; for threads that may wait."""
 
 import http.client
 import xmlrpc.client
@@ -13,7 +13,7 @@ _LIMIT = 2.0  #: Longest time for an answer of the master (s).
 
 
 class MasterError(OSError):
-    """The master does not answer, or not what was asked for."""
+    """The master does not answer, or its answer is an error."""
 
 
 class Master:

@@ -12,7 +12,7 @@ from crazyflie_dashboard.discovery import Vehicle
 from crazyflie_dashboard.snapshot import Kind, LogLine, Sentence
 
 _MAX_AGE = 10.0  #: Age after which a diagnostic is dropped (s).
-_DOCTOR_TIMEOUT = 60.0  #: s; the doctor gives up after 40.
+_DOCTOR_TIMEOUT = 60.0  #: Longest run of the doctor (s); it gives up after 40 s itself.
 
 _LEVELS = {
     Log.DEBUG: "debug",
@@ -50,7 +50,7 @@ class Diagnostics:
             self._status[status.name] = self._time(), status
 
     def sentences(self) -> tuple[Sentence, ...]:
-        """Return what is not as it should be, errors first."""
+        """Return all diagnostics that are not OK, errors first."""
         since = self._time() - _MAX_AGE
         fresh = [status for at, status in self._status.values() if at >= since]
         wrong = sorted(
@@ -65,7 +65,7 @@ class Diagnostics:
         )
 
     def kind(self, vehicle: Vehicle) -> Kind:
-        """Return what a vehicle is, by the address that its driver has for it."""
+        """Return the kind of a vehicle, by the address that its driver has for it."""
         if not vehicle.has_driver:
             return Kind.SIMULATED
         name = vehicle.driver.strip("/")
@@ -77,11 +77,16 @@ class Diagnostics:
 
 
 def examine() -> tuple[Sentence, ...]:
-    """Run the doctor, with low priority; return what it has found, errors first. It takes 10 s."""
+    """Run the doctor, with low priority; return its findings, errors first. It takes 10 s."""
     found = roslib.packages.find_node("crazyflie_doctor", "doctor")
     if not found:
         return (
-            Sentence("error", "doctor", "there is no doctor", "build the workspace (./run build)"),
+            Sentence(
+                "error",
+                "doctor",
+                "the doctor is not installed",
+                "build the workspace (./run build)",
+            ),
         )
     try:
         done = subprocess.run(

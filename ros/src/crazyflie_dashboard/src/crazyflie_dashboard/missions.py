@@ -21,14 +21,14 @@ from crazyflie_dashboard.page_data import DryRunResult, MissionFile
 from crazyflie_dashboard.snapshot import Triple
 from crazyflie_utils.refusal import RefusalError
 
-#: Flies missions, and makes dry runs; how the line with the result of a dry run begins, and what
-#: a line about a command is.
+#: Program that flies missions and dry runs; the beginning of the line with a dry run's result, and
+#: the pattern of a line about a command.
 _RUNNER = ("-m", "crazyflie_mission_api.mission_runner")
 _RESULT = '{"dry_run": '
 _COMMAND = re.compile(r" *[0-9.]+ s  (\w+: .+)")
 _DRY_RUN_TIMEOUT = 60.0  #: s.
 _LAND_TIMEOUT = 60.0  #: Time from the stop of a mission until its process is killed (s).
-_MAX_OUTPUT = 2000  #: Length of the text of a failure (characters).
+_MAX_OUTPUT = 2000  #: Largest length of the text of a failure (characters).
 
 _POLL = 0.2  #: Period in which the output of a mission is read (s).
 _MAX_DISTANCE = 0.2  #: Distance that vehicles may have moved since the dry run (m).
@@ -55,13 +55,13 @@ def listed(folders: Iterable[str | Path]) -> tuple[MissionFile, ...]:
 class Flight:
     """A mission in a process of its own, which goes on without this one.
 
-    Its output is a file. The file ``record`` says which process it is: a process number
-    alone may be another's by now.
+    Its output is a file. The file ``record`` identifies the process: its number alone may belong to
+    another one by now.
 
     Raises
     ------
     OSError, ValueError, KeyError
-        It does not fly any more, or is not of this master.
+        It does not fly any more, or belongs to another master.
     """
 
     def __init__(self, record: Path):
@@ -71,7 +71,7 @@ class Flight:
         self.is_stopped: bool = known["is_stopped"]
         self.said = ""  #: The end of its output.
         self._record, self._known, self._pid = record, known, known["pid"]
-        # From here on no other process has this number for what is done by it.
+        # From here on the process number cannot be reused.
         self._process = os.pidfd_open(self._pid)
         if known["began"] != _began(self._pid) or known["master"] != _master():
             os.close(self._process)
@@ -96,7 +96,7 @@ class Flight:
         return Flight(record), process
 
     def wait(self, process: "subprocess.Popen[Any] | None" = None) -> int:
-        """Follow it to its end; return its exit status, 0 if it was begun by another process."""
+        """Wait for its end; return its exit status, or 0 if another process started it."""
         with self._record.with_suffix(".out").open(errors="replace") as output:
             has_ended = False
             while not has_ended:
@@ -110,15 +110,17 @@ class Flight:
         return status
 
     def stop(self) -> None:
-        """Land its vehicles; kill it if it does not end. Only the first call counts.
+        """Land its vehicles; kill it if it does not end.
 
         Raises
         ------
         RefusalError
-            It lands already: a second signal would interrupt that.
+            It is landing already: a second signal would interrupt that.
         """
         if self.is_stopped:
-            raise RefusalError(f"stop: {self.title} was stopped before, and its vehicles land")
+            raise RefusalError(
+                f"stop: {self.title} was stopped before, and its vehicles are landing"
+            )
         self.is_stopped = self._known["is_stopped"] = True
         self._record.write_text(json.dumps(self._known))
         with contextlib.suppress(ProcessLookupError):
@@ -126,10 +128,10 @@ class Flight:
         self.limit()
 
     def limit(self) -> None:
-        """Kill it if it has not ended after a while."""
+        """Kill it if it does not end in time."""
 
         def kill():
-            # As long as it lives, the group has its number.
+            # While the process lives, its number is that of the group.
             if not self._has_ended(0.0):
                 _kill(self._pid)
 
@@ -144,14 +146,14 @@ class Flight:
 
 
 class Missions:
-    """Missions that fly, those included that an earlier dashboard began, and dry runs.
+    """Running missions, including those that an earlier dashboard started, and dry runs.
 
     Parameters
     ----------
     python : str, optional
         Interpreter.
     folder : Path, optional
-        Of records and outputs; by default in ROS's own.
+        Folder of records and outputs; by default in ROS's own.
     """
 
     def __init__(self, python: str = sys.executable, folder: Path | None = None):
@@ -171,7 +173,7 @@ class Missions:
 
     @property
     def running(self) -> tuple[str, ...]:
-        """Titles of what flies, each with its last command if that is known."""
+        """Titles of running missions, each with its last command if that is known."""
         with self._lock:
             return tuple(f"{each.title} {each.command}".strip() for each in self._flights)
 
@@ -199,13 +201,13 @@ class Missions:
     def fly(
         self, mission: MissionFile, vehicles: tuple[str, ...], places: Mapping[str, Triple]
     ) -> "Future[str]":
-        """Fly a mission; the future has "" at its end, or fails with what it has said.
+        """Fly a mission; the future has "" at its end, or fails with its last output.
 
         Raises
         ------
         RefusalError
             Its dry run has not passed with these vehicles, they have moved, its files have changed
-            since, or one flies.
+            since, or another mission flies.
         """
         end: Future[str] = Future()
         command = [self._python, *_RUNNER, "fly", mission.path, *vehicles]
@@ -214,7 +216,7 @@ class Missions:
         with self._lock:
             if self._flights:
                 title = self._flights[0].title
-                raise RefusalError(f"{title} flies; expected it to have ended, or stop it")
+                raise RefusalError(f"{title} is still flying; wait for its end, or stop it")
             before = self._passed.get(_key(mission, vehicles))
             if before is None:
                 raise RefusalError(f"{mission.title}: expected a dry run of it that has passed")
@@ -227,7 +229,7 @@ class Missions:
         flight, process = Flight.begin(self._folder, mission.title, command, _environment(vehicles))
 
         def finish(status):
-            # Stopped while Python itself still started: nothing has flown.
+            # Stopped while Python itself was starting: nothing has flown.
             is_early = flight.said.startswith("Fatal Python error: init_import_site")
             if is_early or status in (0, 130, 143, -signal.SIGINT):
                 end.set_result("")
@@ -238,17 +240,17 @@ class Missions:
         return end
 
     def stop(self) -> None:
-        """End the missions that fly; they land their vehicles.
+        """End the running missions; they land their vehicles.
 
         Raises
         ------
         RefusalError
-            None flies, or all of them land already.
+            No mission flies, or all of them are landing already.
         """
         with self._lock:
             flights = [each for each in self._flights if not each.is_stopped] or self._flights[:1]
         if not flights:
-            raise RefusalError("stop: no mission flies that was begun by a dashboard")
+            raise RefusalError("stop: no mission that a dashboard has started is flying")
         for flight in flights:
             flight.stop()
 
@@ -271,7 +273,7 @@ class Missions:
 
 
 def _began(pid: int) -> int:
-    """Return when a process began, in ticks since the computer did."""
+    """Return the start time of a process, in ticks since the computer's start."""
     return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19])
 
 
@@ -297,7 +299,7 @@ def _run(command: list[str], environment: Mapping[str, str], limit: float) -> Dr
 
 
 def _environment(vehicles):
-    """Return what a script of Crazyswarm's API cannot get around by options of its own."""
+    """Return options that a script of Crazyswarm's API cannot override."""
     return {"CRAZYFLIE_PY_VEHICLES": ":".join(vehicles)}
 
 
@@ -321,7 +323,7 @@ def _kill(group):
 
 
 def _last(output: str, status: int) -> str:
-    """Return what a program has said last, which is why it has ended."""
+    """Return the last output of a program, which is the reason why it has ended."""
     return output.strip()[-_MAX_OUTPUT:] or f"it has ended with status {status}"
 
 

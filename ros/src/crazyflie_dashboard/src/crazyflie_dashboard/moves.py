@@ -1,4 +1,4 @@
-"""Go to: the places of a formation, and whether vehicles come too near to others on their ways."""
+"""Go-to commands: the goals of a formation, and a check of the distances between vehicles."""
 
 import math
 from collections.abc import Mapping
@@ -14,11 +14,13 @@ from crazyflie_model.trajectory import minimum_jerk
 from crazyflie_utils.refusal import RefusalError
 
 SEPARATION = 0.3  #: Distance between two vehicles, as that of missions by default (m).
-FAR = 0.5  #: A vehicle further from its move has been commanded otherwise (m).
+#: Distance from its planned move beyond which a vehicle has received another command (m).
+FAR = 0.5
 
 _STEP = 0.05  #: Distance between two checked places of the fastest vehicle (m).
 _MAX_STEPS = 400
-_APPROACH = 0.02  #: Two vehicles that are too near already may come nearer by this (m).
+#: Distance by which two vehicles that are too near already may still approach (m).
+_APPROACH = 0.02
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Move:
 
 
 def formation(places: Mapping[str, Triple], goal: Triple) -> dict[str, Triple]:
-    """Return where vehicles go, m, so that their middle comes to the goal."""
+    """Return the goals of vehicles, m, so that their centre comes to the goal."""
     x, y, z = (goal[k] - sum(p[k] for p in places.values()) / len(places) for k in range(3))
     return {name: (p[0] + x, p[1] + y, p[2] + z) for name, p in places.items()}
 
@@ -43,7 +45,7 @@ def in_frame(point: Triple, yaw: float, frame: tuple[Triple, Rotation]) -> tuple
     Raises
     ------
     ValueError
-        The rotation is no quaternion.
+        The rotation is not a quaternion.
     """
     (a, b, c), rotation = frame
     x, y, z = rotate_back(rotation, (point[0] - a, point[1] - b, point[2] - c))
@@ -57,23 +59,23 @@ def expect_apart(
     buffers: Mapping[str, float],
     now: float,
 ) -> None:
-    """Refuse moves on which two vehicles come nearer than missions let them.
+    """Refuse moves on which two vehicles come nearer than missions allow.
 
     Parameters
     ----------
     moves : dict
-        That are to begin ``now``, s, by vehicle.
+        Moves that are to begin ``now``, s, by vehicle.
     places : dict
-        Where all vehicles are, m; those that do not move stay there.
+        Positions of all vehicles, m; those that do not move stay there.
     known : dict
-        Moves that began before; each counts while its vehicle is on it.
+        Moves that began before; each is considered while its vehicle follows it.
     buffers : dict
         Collision buffers of vehicles that have one, m.
 
     Raises
     ------
     RefusalError
-        It names the first two.
+        The text names the first two.
     """
     names = list(places)
     radii = [max(SEPARATION / 2.0, RELEASE_RATIO * buffers.get(name, 0.0)) for name in names]
@@ -93,12 +95,12 @@ def expect_apart(
             if moves.keys() & {one, two} and distance < apart - _APPROACH:
                 raise RefusalError(
                     f"go to: {one} and {two} would be {distance:.2f} m apart, {time - now:.1f} s "
-                    f"from now; expected at least {limit:.2f} m, heights counting half"
+                    f"from now; expected at least {limit:.2f} m, with vertical distances halved"
                 )
 
 
 def _places(moves, time):
-    """Return where moves are at a time, s, shape (n, 3), m."""
+    """Return the positions of moves at a time, s, shape (n, 3), m."""
     begins, durations = (np.array([getattr(m, a) for m in moves]) for a in ("begin", "duration"))
     value, _ = minimum_jerk(np.clip((time - begins) / durations, 0.0, 1.0)[:, None])
     start = np.array([move.start for move in moves])

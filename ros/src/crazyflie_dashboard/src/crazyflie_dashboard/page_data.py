@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from crazyflie_dashboard.snapshot import Action, Triple
 
-#: An older command has waited in a browser or a network, and is not carried out (s).
+#: Largest age of a command (s): an older one was delayed in a browser or a network, and is not
+#: carried out.
 MAX_COMMAND_AGE = 1.0
 
 
@@ -15,10 +16,10 @@ class Command:
     action: Action
     vehicles: tuple[str, ...]  #: Names.
     clicked: float  #: Time of the click, by time.monotonic() of this computer (s).
-    goal: Triple | None = None  #: Goal of a go to: x, y, z (m).
-    yaw: float | None = None  #: Heading of a go to; None keeps it (rad).
+    goal: Triple | None = None  #: Goal of a go-to command: x, y, z (m).
+    yaw: float | None = None  #: Heading of a go-to command; None keeps it (rad).
     height: float = 1.0  #: Height of a takeoff (m).
-    speed: float = 0.5  #: Speed of a go to (m/s).
+    speed: float = 0.5  #: Speed of a go-to command (m/s).
 
     @property
     def words(self) -> str:
@@ -33,7 +34,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a command: ``text`` is the refusal, "" if there is none."""
+    """The outcome of a command: ``text`` is the refusal, or ""."""
 
     vehicle: str
     text: str = ""
@@ -44,14 +45,14 @@ class ParameterInfo:
     """A parameter that can be changed."""
 
     owner: str  #: Node, or the vehicle of a firmware parameter.
-    name: str  #: As in topics/state, or group.name of a firmware parameter.
+    name: str  #: Name such as topics/state, or group.name of a firmware parameter.
     kind: str  #: "bool", "int", "float" or "str".
     value: bool | int | float | str
     unit: str = ""
     help: str = ""
     minimum: float | None = None
     maximum: float | None = None
-    choices: tuple[str, ...] = ()  #: Values of a text; any if empty.
+    choices: tuple[str, ...] = ()  #: Allowed values of a text; any if empty.
     is_firmware: bool = False
 
 

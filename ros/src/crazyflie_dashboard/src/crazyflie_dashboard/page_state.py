@@ -22,15 +22,15 @@ class PageState:
     """The vehicle, the fields and the camera that a page shows in addition to the scene."""
 
     def __init__(self, handle: NodeHandle, workers: Executor, clock: Callable[[], float]) -> None:
-        self.vehicle: str | None = None  #: The one whose plots it shows.
-        #: The camera's newest picture, or why it cannot be shown.
+        self.vehicle: str | None = None  #: The vehicle whose plots the page shows.
+        #: The camera's newest picture, or the reason why it cannot be shown.
         self.image: bytes | str | None = None
         self._handle, self._workers, self._clock = handle, workers, clock
         self._fields: dict[str, tuple[NodeHandle, Ring]] = {}
         self._camera: NodeHandle | None = None
         self._image_at = 0.0
         self._is_encoding = False
-        self._waiting: Any = None  # The newest message that came meanwhile.
+        self._waiting: Any = None  # The newest message that came during a conversion.
 
     def series(self) -> tuple[Series, ...]:
         """Return the plots of fields."""
@@ -42,12 +42,14 @@ class PageState:
         if path in self._fields:
             return
         if len(self._fields) >= _MAX_FIELDS:
-            raise RefusalError(f"{path}: there are {_MAX_FIELDS} plots; expected no more")
+            raise RefusalError(
+                f"{path}: there are {_MAX_FIELDS} plots already, which is the maximum"
+            )
         topic, fields = split_path(path, topics)
         message_type = roslib.message.get_message_class(topics[topic])
         if message_type is None:
             raise RefusalError(f"{path}: {topics[topic]} is unknown here; source its workspace")
-        # What cannot be a field of this type is refused now, and not when a message comes.
+        # A field that the type does not have is refused now, not when a message comes.
         expect_field(path, message_type, fields)
         handle, ring = self._handle.child(), Ring("")
         handle.subscribe(
@@ -58,13 +60,13 @@ class PageState:
         self._fields[path] = handle, ring
 
     def remove_field(self, path: str) -> None:
-        """Plot it no longer."""
+        """Remove the plot of a field."""
         if path in self._fields:
             handle, _ = self._fields.pop(path)
             handle.close()
 
     def watch_image(self, topic: str | None, topics: Mapping[str, str]) -> None:
-        """Show a camera, or none; `RefusalError` for what is no camera."""
+        """Show a camera, or none; `RefusalError` if the topic is not a camera."""
         if self._camera is not None:
             self._camera.close()
         self._camera = self._waiting = self.image = None
@@ -78,7 +80,7 @@ class PageState:
         self._camera.subscribe(topic, roslib.message.get_message_class(kind), self._on_image)
 
     def close(self) -> None:
-        """Receive nothing any more."""
+        """End all subscriptions."""
         self.watch_image(None, {})
         for path in list(self._fields):
             self.remove_field(path)
@@ -93,7 +95,7 @@ class PageState:
     def _encode(self, message):
         self._is_encoding, self._image_at = True, self._clock()
         camera = self._camera
-        # Not here: a large picture takes tens of milliseconds.
+        # In another thread: a large picture takes tens of milliseconds.
         self._workers.submit(images.encoded, message).add_done_callback(
             lambda done: self._handle.submit(self._show, camera, done)
         )

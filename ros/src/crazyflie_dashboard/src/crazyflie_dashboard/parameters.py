@@ -30,7 +30,7 @@ def described(node: str, description: ConfigDescription, config: Config) -> Iter
                 continue
             is_number = kind in ("float", "int")
             text, _, unit = each.description.rpartition(", ") if is_number else ("", "", "")
-            # The unit is behind the last comma, if there is one: a short word.
+            # The unit, if any, is a short word behind the last comma.
             has_unit = bool(text) and len(unit) <= 10 and " " not in unit.strip()
             yield ParameterInfo(
                 owner=node,
@@ -46,9 +46,9 @@ def described(node: str, description: ConfigDescription, config: Config) -> Iter
 
 
 def of_firmware(vehicle: str, tree: Mapping[str, Any]) -> Iterator[ParameterInfo]:
-    """Yield the firmware's parameters of what is below a vehicle on the parameter server.
+    """Yield the firmware parameters among those below a vehicle on the parameter server.
 
-    The driver mirrors them as GROUP/NAME. A node there has texts or namespaces, too.
+    The driver mirrors them as GROUP/NAME. Nodes there also have texts or namespaces.
     """
     for group, parameters in sorted(tree.items()):
         if not isinstance(parameters, dict):
@@ -61,12 +61,12 @@ def of_firmware(vehicle: str, tree: Mapping[str, Any]) -> Iterator[ParameterInfo
 
 
 def parsed(parameter: ParameterInfo, text: str) -> bool | int | float | str:
-    """Return the value that was typed.
+    """Return the typed value.
 
     Raises
     ------
     RefusalError
-        It is none of this kind, out of range, or no choice.
+        It is not of this kind, out of range, or not one of the choices.
     """
     where = f"{parameter.owner}: {parameter.name} is {text!r}; expected"
     word = text.strip()

@@ -23,7 +23,8 @@ _NUMBERS = {"bool", "byte", "char", "time", "duration", "float32", "float64"} | 
 
 _UNITS = ["m", "m/s", "deg", "m/s^2", "V"]  #: Order of the plots by unit; others come last.
 
-_MAX_SERIES = 100  #: Series of one vehicle: a log topic may have any number of values.
+#: Largest number of series of one vehicle: a log topic may have any number of values.
+_MAX_SERIES = 100
 
 
 class Ring:
@@ -34,7 +35,7 @@ class Ring:
         self._points: deque[tuple[float, float]] = deque(maxlen=round(DURATION / _PERIOD))
 
     def add(self, time: float, value: float) -> None:
-        """Take a number, unless the one before is as good as it."""
+        """Store a number, unless the last one is recent enough."""
         if not self._points or time - self._points[-1][0] >= 0.9 * _PERIOD:
             self._points.append((time, value))
 
@@ -60,7 +61,7 @@ class VehiclePlots:
         self._reference: tuple[float, ...] | None = None
 
     def take(self, role: str, row: Any) -> None:
-        """Take a row of a topic, by its role in `bag_topics.ROLES`."""
+        """Store a row of a topic, by its role in `bag_topics.ROLES`."""
         if role == "reference":
             self._reference = row
             self._add("reference position z", "m", row[2])
@@ -84,7 +85,7 @@ class VehiclePlots:
                 self._add(f"{name}[{index}]" if len(row) > 1 else name, "", value)
 
     def take_pose(self, now: VehicleSnapshot, has_state: bool) -> None:
-        """Take attitude, and without a topic of states position and velocity, of a snapshot."""
+        """Store a snapshot's attitude; without a topic of states also position and velocity."""
         if now.position is None:
             return
         angles = rpy_from_quaternion(*now.rotation)
@@ -115,12 +116,12 @@ def split_path(path: str, topics: Mapping[str, str]) -> tuple[str, list[str | in
     path : str
         As in /cf1/state/state.x or /cf1/log/values[0].
     topics : dict
-        Topic -> type, of those that there are.
+        Topic -> type, of all topics.
 
     Raises
     ------
     RefusalError
-        There is no such topic, or no field is named.
+        The topic does not exist, or no field is named.
     """
     parts = path.strip().rstrip("/").split("/")
     for count in range(len(parts), 1, -1):
@@ -133,7 +134,8 @@ def split_path(path: str, topics: Mapping[str, str]) -> tuple[str, list[str | in
     fields = re.findall(r"[A-Za-z_]\w*|\[\d+\]", rest)
     if not fields or "".join(fields) != re.sub(r"[./]", "", rest):
         raise RefusalError(
-            f"{path}: {rest!r} names no field of {topics[topic]}; expected such as field/other[0]"
+            f"{path}: {rest!r} is not a field of {topics[topic]}; expected for example "
+            "field/other[0]"
         )
     return topic, [int(each[1:-1]) if each[0] == "[" else each for each in fields]
 
@@ -144,7 +146,7 @@ def expect_field(path: str, message_type: Any, fields: list[str | int]) -> None:
     Raises
     ------
     RefusalError
-        There is no such field, or it is no number.
+        The field does not exist, or is not a number.
     """
     kind = message_type._type
     for field in fields:

@@ -1,4 +1,4 @@
-"""A recording of the flight that goes on, and its report."""
+"""A recording of the present flight, and its report."""
 
 import subprocess
 import threading
@@ -14,23 +14,22 @@ from crazyflie_utils.refusal import RefusalError
 
 _END_LIMIT = 30.0  #: Longest time for the end of the recorder (s).
 _REPORT_LIMIT = 600.0  #: Longest time for the report (s).
-_NICE = ("nice", "-n", "10")  #: Flights have priority.
+_NICE = ("nice", "-n", "10")  #: The report has low priority: flights come first.
 
 
 class Recording:
-    """Starts and ends the recorder, and has the report made.
+    """Starts and ends the recorder, and starts the report.
 
     Parameters
     ----------
-    folder : Path, optional
-        Where folders with the date are made; by default that of other recordings.
-    programs : callable, optional
+    folder : Path, optional Folder for the recordings, each in a folder with the date; by default
+    that of other recordings. programs : callable, optional
         ``programs(name)`` returns the path of a program of crazyflie_reports.
     """
 
     def __init__(self, folder: Path | None = None, programs: Any = None):
         self.text = ""  #: State in words, for the page.
-        self.report: Path | None = None  #: The last one, HTML.
+        self.report: Path | None = None  #: The last report, HTML.
         self._folder = folder or Path(rospkg.get_ros_home(), "flights")
         self._programs = programs or _program
         self._recorder: subprocess.Popen[bytes] | None = None
@@ -41,10 +40,10 @@ class Recording:
         Raises
         ------
         RefusalError
-            A recording goes on.
+            A recording is running.
         """
         if self.text:
-            raise RefusalError(f"record: {self.text}; expected it to have ended")
+            raise RefusalError(f"record: {self.text}; end it first")
         self._folder.mkdir(parents=True, exist_ok=True)
         self._before = {*self._folder.iterdir()}
         command = [*_NICE, self._programs("record_flight"), f"--folder={self._folder}"]
@@ -58,13 +57,11 @@ class Recording:
         Raises
         ------
         RefusalError
-            There is none.
+            No recording is running.
         """
         recorder, self._recorder = self._recorder, None
         if recorder is None:
-            raise RefusalError(
-                "stop recording: no recording runs; expected one that was begun here"
-            )
+            raise RefusalError("stop recording: this dashboard has not started a recording")
         self.text = "the report is made"
         outcome: Future[str] = Future()
 
@@ -107,5 +104,5 @@ class Recording:
 def _program(name):
     found = roslib.packages.find_node("crazyflie_reports", name)
     if not found:
-        raise RefusalError(f"crazyflie_reports has no {name}; expected a workspace that is built")
+        raise RefusalError(f"crazyflie_reports has no {name}; build the workspace")
     return found[0]

@@ -44,7 +44,7 @@ class Action(Enum):
 
 @dataclass(frozen=True)
 class Reference:
-    """Where a vehicle is to be: position (m), velocity (m/s), yaw (rad; NaN if it has none)."""
+    """Desired state of a vehicle: position (m), velocity (m/s), yaw (rad; NaN if unknown)."""
 
     position: Triple
     velocity: Triple
@@ -63,18 +63,18 @@ class VehicleSnapshot:
     rotation: Rotation = (0.0, 0.0, 0.0, 1.0)
     velocity: Triple | None = None  #: m/s.
     pose_age: float | None = None  #: s.
-    is_stale: bool = True  #: The pose is older than `STALE_AGE`, or there is none.
-    #: Known of all vehicles if there are few, otherwise of watched ones.
+    #: Whether the pose is older than `STALE_AGE`, or missing. Known for all vehicles if there are
+    #: few, otherwise for watched ones.
+    is_stale: bool = True
     reference: Reference | None = None
     control_age: float | None = None  #: s; as references.
-    #: state, reason: State of the flight in words, and why it is what it is; "" for an ordinary
-    #: one.
+    #: state, reason: State of the flight in words, and its reason; "" for an ordinary one.
     state: str = "not known"
     reason: str = ""
-    takeoff_refusal: str = ""  #: Why a takeoff would be refused.
+    takeoff_refusal: str = ""  #: Reason for which a takeoff would be refused.
     is_in_flight: bool = False
     is_emergency: bool = False
-    is_held: bool = False  #: A fleet holds it: it is too near to another vehicle.
+    is_held: bool = False  #: Whether a fleet holds it: it is too near to another vehicle.
     battery: float | None = None  #: V.
     is_battery_low: bool = False
     link_quality: float | None = None  #: 0 to 1.
@@ -119,7 +119,7 @@ class Fence(NamedTuple):
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame of /tf that is no vehicle, such as a rigid body of motion capture."""
+    """A frame of /tf that is not a vehicle, such as a rigid body of motion capture."""
 
     name: str
     position: Triple
@@ -128,10 +128,9 @@ class Frame:
 
 @dataclass(frozen=True)
 class Sentence:
-    """Something that is not as it should be, and what to do about it.
+    """A problem and its remedy.
 
-    ``level`` is "ok", "warn" or "error"; ``source`` is what has said so, "doctor" or the name of a
-    diagnostic.
+    ``level`` is "ok", "warn" or "error"; ``source`` is "doctor" or the name of a diagnostic.
     """
 
     level: str
@@ -157,7 +156,7 @@ class LogLine:
 
 @dataclass(frozen=True)
 class Scene:
-    """All that there is at one moment."""
+    """Everything that a page shows at one moment."""
 
     #: Time at which it was made, by time.monotonic(); inf before the first one (s).
     made: float = math.inf
@@ -171,8 +170,8 @@ class Scene:
     paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)
     sentences: tuple[
         Sentence, ...
-    ] = ()  #: Sentences of the doctor and of /diagnostics, errors first.
+    ] = ()  #: Findings of the doctor and of /diagnostics, errors first.
     log: tuple[LogLine, ...] = ()  #: The newest ones, oldest first.
     images: tuple[str, ...] = ()  #: Topics of cameras.
-    missions: tuple[str, ...] = ()  #: Missions that run, as `missions.Run.text`.
+    missions: tuple[str, ...] = ()  #: Running missions, as `missions.Run.text`.
     recording: str = ""  #: State of a recording that was begun here.

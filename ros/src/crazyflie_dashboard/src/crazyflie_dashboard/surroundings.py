@@ -23,9 +23,10 @@ _FENCES = "geofence/parameter_updates"  #: Last name of a geofence's live parame
 _PATH = "nav_msgs/Path"
 _HELD = "fleet/waiting"  #: Last name of the topic with vehicles that a fleet holds apart.
 
-_FAR = 14.0  #: Distance of walls that a fence does not have: the end of the floor (m).
-_MAX_POINTS = 1000  #: Points of a path.
-#: Markers of one topic that are drawn, and points of lists.
+_FAR = 14.0  #: Distance at which missing walls of a fence are drawn: the end of the floor (m).
+#: Largest number of points of a path. Largest numbers of drawn markers of one topic, and of points
+#: of lists.
+_MAX_POINTS = 1000
 MAX_PARTS = 100_000
 
 _SHAPES = {Marker.CUBE: "box", Marker.CYLINDER: "cylinder", Marker.SPHERE: "ball"}
@@ -38,7 +39,7 @@ _LISTS = {
 
 
 class Surroundings:
-    """Follows topics until its handle is closed; what a topic has said is shown while it is there.
+    """Follows topics until its handle is closed; their content is shown while they exist.
 
     Parameters
     ----------
@@ -48,25 +49,25 @@ class Surroundings:
     def __init__(self, handle: NodeHandle):
         self._handle = handle
         self._topics: set[str] = set()
-        # By topic: what is drawn in which frame, and how many parts there are.
+        # Topic -> drawn solids by frame, and number of parts.
         self._markers: dict[str, tuple[list[tuple[str, Solids]], int]] = {}
         self._paths: dict[str, tuple[str, tuple[Triple, ...]]] = {}
         self._fences: dict[str, Box] = {}
         self._held: dict[str, frozenset[str]] = {}
 
     def follow(self, graph: Graph) -> None:
-        """Subscribe to topics that are new on the graph; forget those that are gone."""
+        """Subscribe to topics that are new on the graph; drop those that have gone."""
         gone = self._topics - graph.topics.keys()
         for known in (self._markers, self._paths, self._fences, self._held):
             for key in [key for key in known if key.partition(" ")[0] in gone]:
                 del known[key]
-        # A subscription outlives its publisher, and says what the next one has latched.
+        # A subscription outlives its publisher, and receives what the next one latches.
         for topic, kind in graph.topics.items():
             if topic not in self._topics:
                 self._subscribe(topic, kind)
 
     def solids(self, frames: Frames, fixed: str) -> tuple[Placed, ...]:
-        """Return what is drawn of markers, in the frame ``fixed``."""
+        """Return the solids of markers, in the frame ``fixed``."""
         return tuple(
             Placed(solids, *place)
             for found, _ in self._markers.values()
@@ -76,7 +77,7 @@ class Surroundings:
 
     @property
     def held(self) -> frozenset[str]:
-        """Names of the vehicles that a fleet holds, since they are too near to others."""
+        """Names of the vehicles that a fleet holds because they are too near to others."""
         return frozenset().union(*self._held.values())
 
     @property
@@ -115,7 +116,7 @@ class Surroundings:
         return tuple(dict.fromkeys(found))
 
     def box(self, namespace: str) -> Box | None:
-        """Return the box of a vehicle's geofence; None if it has none."""
+        """Return the box of a vehicle's geofence, or None."""
         found = (box for topic, box in self._fences.items() if topic.startswith(f"{namespace}/"))
         return next(found, None)
 
@@ -168,7 +169,7 @@ def _moved(point, position, rotation):
 
 
 def grouped(markers: list[Marker]) -> tuple[list[tuple[str, Solids]], int]:
-    """Return what is drawn of markers, with its frame, and how many parts they have.
+    """Return the solids of markers with their frame, and the number of parts.
 
     Markers of one shape, opacity and frame are drawn at once, and so are the points of a list.
     """
@@ -210,7 +211,7 @@ def _listed(shape, marker, most):
 
 
 def _solids(shape, rows, colours, opacity, width=0.0):
-    """Return those of the rows that are finite."""
+    """Return the rows that are finite."""
     are_finite = np.isfinite(rows).all(axis=1) & np.isfinite(colours).all(axis=1)
     size = 10 if shape in _SHAPES.values() else 3
     numbers = np.rint(255.0 * np.clip(colours[are_finite], 0.0, 1.0)).astype(np.uint8)

@@ -20,7 +20,7 @@ from crazyflie_utils import NodeHandle
 from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.vectors import to_tuple
 
-#: Role -> type -> what makes a row of a message.
+#: Role -> type -> function that returns the row of a message.
 _ROWS: dict[str, dict[str, Callable[[Any], Any]]] = defaultdict(dict)
 for _role in ROLES:
     _ROWS[_role.name].update(_role.rows)
@@ -35,7 +35,8 @@ _FILTER_WORDS = {
 }
 _ON_GROUND = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
 
-#: Time after which poses of a vehicle without a frame come from its topics, which cost more (s).
+#: Time after which poses of a vehicle without a frame are taken from its topics, which costs more
+#: (s).
 _FRAME_TIMEOUT = 3.0
 
 #: Types of the driver's log topics, and their numbers.
@@ -44,7 +45,7 @@ _LOGS: dict[str, tuple[Any, Callable[[Any], list[float]]]] = {
     "std_msgs/Float32": (Float32, lambda message: [message.data]),
 }
 
-_LOW_BATTERY = 3.2  #: Low voltage without a driver that reports it; as the fleet's warning (V).
+_LOW_BATTERY = 3.2  #: Voltage that is low if no driver reports it; that of the fleet's warning (V).
 
 
 class VehicleModel:
@@ -89,12 +90,12 @@ class VehicleModel:
             self._subscribe(handle, role)
 
     def receive(self, is_watched: bool, is_one_of_few: bool, topics: Mapping[str, str]) -> None:
-        """Receive what comes often as far as it is shown, and nothing else of it.
+        """Receive frequent messages only as far as they are shown.
 
-        That is states and what the driver logs of a watched vehicle; references and controls of
-        one of few, too. ``topics`` are all that are published -> type.
+        These are states and driver logs of a watched vehicle, and references and controls if
+        vehicles are few. ``topics`` are all published topics -> type.
         """
-        # What is sent to a radio says nothing that the control does not.
+        # Commands to a radio contain no more than the control does.
         control = "final_control" if "final_control" in self.vehicle.topics else "cmd_vel"
         wanted = {"reference", control} if is_watched or is_one_of_few else set()
         if is_watched:
@@ -113,12 +114,12 @@ class VehicleModel:
                 self._subscribe(handle, role)
 
     def close(self) -> None:
-        """Receive nothing any more."""
+        """End all subscriptions."""
         for handle in (*self._received.values(), self._handle):
             handle.close()
 
     def snapshot(self, frames: Frames, fixed: str) -> VehicleSnapshot:
-        """Return what is known now; poses are those in the frame ``fixed``."""
+        """Return the present snapshot; poses are in the frame ``fixed``."""
         self._count_rates()
         position, rotation, velocity, age = self._pose(frames, fixed)
         reference = self._rows.get("reference")
@@ -235,14 +236,14 @@ class VehicleModel:
         return self._driver is not None and bool(self._driver.supervisor & VehicleStatus.FLYING)
 
     def _words(self):
-        """Return state of the flight and why."""
+        """Return the state of the flight and its reason."""
         driver = self._driver
         if self._filter.state in _FILTER_WORDS and self._filter.state != FilterStatus.DOWN:
             return _FILTER_WORDS[self._filter.state], self._filter.reason
         if self._status.state != FlightStatus.UNKNOWN:
             words = WORDS[self._status.state]
             reason = self._status.reason or self._filter.reason
-            # In flight a takeoff is refused as a matter of course.
+            # In flight a takeoff is always refused.
             if not reason and self._status.state == FlightStatus.ON_GROUND:
                 reason = self._status.takeoff_refusal
             return words, reason
@@ -261,13 +262,13 @@ def _known(number: float) -> float | None:
 
 
 def frame_of(vehicle: Vehicle, frames: Frames, is_alone: bool) -> str | None:
-    """Return the frame of a vehicle: one that has its name.
+    """Return the frame of a vehicle: the one that has its name.
 
-    That of a vehicle that is alone may have any: one that is away from its origin, else any.
+    The frame of a single vehicle may have any name: one that is away from its origin is preferred.
     """
     name = vehicle.namespace.rpartition("/")[2] or vehicle.driver.rpartition("/")[2]
     named = [each for each in frames.poses if name and name in each.split("/")]
     moving = [each for each, pose in frames.poses.items() if any(pose.stamped.position)]
     candidates = named or (moving or list(frames.poses) if is_alone else [])
-    # The vehicle's own, and not that of its model.
+    # The vehicle's own limit, not that of its model.
     return min(candidates, key=lambda each: (each.endswith("base_link"), len(each)), default=None)

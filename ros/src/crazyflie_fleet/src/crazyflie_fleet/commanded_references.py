@@ -25,7 +25,7 @@ _WIDTH = 0.01  #: Width of the line (m).
 _POINTS = 20  #: Number of points of a piece of a trajectory.
 _MAX_POINTS = 200  #: Largest number of points of a trajectory.
 
-SETPOINT_TIMEOUT = 0.5  #: Time without a setpoint after which a stream has stopped (s).
+SETPOINT_TIMEOUT = 0.5  #: Time without a setpoint after which a stream has ended (s).
 _HOLD_DURATION = 0.5  #: Duration of the move to the goal of the last setpoint (s).
 
 
@@ -79,7 +79,8 @@ class CommandedReferences:
         self._parameters = parameters
         self.follower = CommandFollower()
         self._is_moving = False
-        self._is_move = False  # Not a trajectory, which other vehicles may fly at the same time.
+        # The command is not a trajectory, which other vehicles may fly at the same time.
+        self._is_move = False
         # When the last setpoint came; None without a stream.
         self._setpoint_time: float | None = None
         self._timer: Timer | TimerShare | None = None
@@ -108,7 +109,7 @@ class CommandedReferences:
             self.follower.take_setpoint(now, goal)
 
     def ahead(self, time: float) -> Triple | None:
-        """Return where the references lead in a time (s), m; None if they do not move."""
+        """Return the position of the references after a time (s), m; None if they do not move."""
         goal = self.follower.goal(self._handle.time() + time)
         return goal.position if goal is not None and self._is_moving else None
 
@@ -159,8 +160,10 @@ class CommandedReferences:
         try:
             self.begin(CommandFollower.go_to, last.position, last.yaw, _HOLD_DURATION)
         except ServiceError as reason:
-            # The last reference has a velocity, and the controller goes on with it.
-            self._handle.warn(f"setpoints have stopped, and {reason}: stays at the last one")
+            # The last reference has a velocity, which the controller continues.
+            self._handle.warn(
+                f"setpoints have stopped, and {reason}: the vehicle stays at the last one"
+            )
             self.publish(at_rest(last.position, last.yaw))
 
     def rest(self) -> None:
@@ -177,7 +180,7 @@ class CommandedReferences:
         self._set_timer()
 
     def publish(self, goal: Goal[float] | None = None) -> None:
-        """Publish a goal as reference, by default that of now."""
+        """Publish a goal as reference, by default the present one."""
         goal = goal or self.follower.goal(self._handle.time())
         if goal is None:
             return

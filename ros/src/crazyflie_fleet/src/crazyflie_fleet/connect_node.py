@@ -87,7 +87,7 @@ class FleetConnectParameters(FleetParameters):
     """Parameters of `FleetConnectNode`."""
 
     vehicles: tuple[str, ...] = parameter(
-        ListOf(TEXT), "only these are added; empty for all of the machine", ()
+        ListOf(TEXT), "names of the vehicles to add; empty for all of the machine", ()
     )
 
     @override
@@ -96,7 +96,8 @@ class FleetConnectParameters(FleetParameters):
         unknown = [name for name in self.vehicles if name not in names]
         if unknown:
             raise ParameterError(
-                f"parameter vehicles has {', '.join(unknown)}; expected some of {', '.join(names)}"
+                f"parameter vehicles has {', '.join(unknown)}; expected names among "
+                f"{', '.join(names)}"
             )
         return self.vehicles or names
 
@@ -117,7 +118,9 @@ class FleetConnectNode(Node):
             handle.set_param(f"/{vehicle.name}/{PLACE}", fleet.names.index(vehicle.name))
         missing = [vehicle.name for vehicle in self._vehicles if vehicle.uri is None]
         if missing:
-            raise ParameterError(f"{parameters.file}: no uri of {', '.join(missing)}; expected one")
+            raise ParameterError(
+                f"{parameters.file}: {', '.join(missing)} has no uri; expected one"
+            )
         self._lighthouse_files = {
             vehicle.name: _lighthouse_file(parameters.file, vehicle)
             for vehicle in self._vehicles
@@ -152,7 +155,7 @@ class FleetConnectNode(Node):
             # Only the Kalman filter uses external positions, and estimates the yaw from them.
             params.setdefault("stabilizer.estimator", 2)
         if vehicle.settings.positioning == FLOW:
-            # It measures no position: the estimate begins where the vehicle stands.
+            # The deck measures no position: the estimate begins at the vehicle's start point.
             x, y, z = vehicle.position
             start = {"kalman.initialX": x, "kalman.initialY": y, "kalman.initialZ": z}
             params = {**start, **params, "kalman.resetEstimation": 1}
@@ -164,7 +167,7 @@ class FleetConnectNode(Node):
             self._handle.set_param_later(f"/{vehicle.name}/{name}", value)
             for name, value in values.items()
         ]
-        # They are set in this order: with the last one all are.
+        # Parameters are set in this order: when the last one is set, all are.
         write_parameters = partial(self._handle.submit, self._on_set, vehicle, [*values], writes)
         writes[-1].add_done_callback(lambda _: write_parameters())
 
@@ -191,7 +194,7 @@ class FleetConnectNode(Node):
             again = command_again(self._handle, "crazyflie_fleet", "fleet_add_node")
             missing = sorted(self._failed)
             self._handle.error(
-                f"not all vehicles are there: {', '.join(missing)}; to try again: {again} "
+                f"vehicles are not connected: {', '.join(missing)}; to try again: {again} "
                 f"_vehicles:='[{', '.join(missing)}]'"
             )
         self._handle.end(1 if self._failed else 0)

@@ -21,8 +21,8 @@ _BACKENDS = {
 
 _LINK = "warnings/communication/"
 _SHARE = Number("", minimum=0.0, maximum=1.0)
-#: Settings without effect here: the driver's diagnostics come once a second, with the figures of
-#: each link; it reads all parameters; a simulation has a launch file of its own.
+#: Settings without effect here, because the driver's diagnostics come once a second, with the
+#: figures of each link; it reads all parameters; and a simulation has a launch file of its own.
 _WITHOUT_EFFECT = (
     "warnings/frequency",
     _LINK + "publish_stats",
@@ -34,8 +34,8 @@ _WITHOUT_EFFECT = (
 class MotionCaptureSettings(Parameters):
     """Type and host of motion capture."""
 
-    type: str = parameter(Text(tuple(_BACKENDS)), "of the system")
-    hostname: str = parameter(TEXT, "of the computer that runs it")
+    type: str = parameter(Text(tuple(_BACKENDS)), "type of the system")
+    hostname: str = parameter(TEXT, "host name of the computer that runs it")
 
 
 def node_parameters(path: str | Path) -> yaml_file.Entry:
@@ -53,10 +53,10 @@ def load_motion_capture(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        About everything that is wrong: file, line, and what was expected.
+        The text names all errors: file, line, and what was expected.
     """
     node = node_parameters(path)
-    # Topics and rigid bodies of theirs follow from the fleet file here.
+    # Here, their topics and rigid bodies follow from the fleet file.
     settings = node.read(MotionCaptureSettings, _CONFIGURATIONS, lambda entry, known: None)
     backend = _BACKENDS[settings.type]
     is_natnet = backend == "natnet"
@@ -70,7 +70,7 @@ class ServerSettings(Parameters):
 
     rate_limits: tuple[float, float] | None = parameter(
         ListOf(Number("Hz", minimum=0.0), 2),
-        "frames of motion capture per second, at least and at most",
+        "lowest and highest rate of motion capture frames",
         None,
         "warnings/motion_capture/warning_if_rate_outside",
     )
@@ -102,7 +102,7 @@ def load_server(path: str | Path) -> ServerFile:
     Raises
     ------
     ParameterError
-        About everything that is wrong: file, line, and what was expected.
+        The text names all errors: file, line, and what was expected.
     """
     node = node_parameters(path)
     remarks = Remarks()

@@ -19,7 +19,7 @@ class DriverFleetParameters(FleetParameters):
 
 
 def make_nodes(handle: NodeHandle) -> dict[str, Node]:
-    """Return the driver, and set the parameters that the files say.
+    """Return the driver, and set the parameters that the files contain.
 
     Raises
     ------

@@ -31,7 +31,7 @@ from crazyflie_utils.parameters.types import (
 from crazyflie_utils.parameters.vehicle_model import load
 from crazyflie_utils.text import number_from_text
 
-#: Help of settings that are read and reported in a remark.
+#: Help of settings that are read and only reported in a remark.
 WITHOUT_EFFECT = "crazyswarm2's; has no effect here"
 #: Tracking of a vehicle: by the motion capture system, or by the vehicle's only marker.
 VENDOR, SINGLE_MARKER = "vendor", "single_marker"
@@ -82,7 +82,7 @@ VEHICLE_NAME = _Pattern(
 
 
 class VehicleUri(ParameterType):
-    """A vehicle's address for `crazyflie_link`; crazyswarm2's ``*`` is any dongle."""
+    """A vehicle's address for `crazyflie_link`; crazyswarm2's ``*`` stands for any dongle."""
 
     label = "string"
 
@@ -124,7 +124,7 @@ class StartPosition(ParameterType):
 
 
 class FirmwareNumber(ParameterType):
-    """The value of a firmware parameter; 1e-3, which YAML takes for a text, is a number too."""
+    """The value of a firmware parameter; 1e-3, which is a text in YAML, is a number here."""
 
     label = "float"
 
@@ -171,8 +171,10 @@ class FleetModel(ParameterType):
 class LogTopicSettings(Parameters):
     """A topic of firmware variables."""
 
-    frequency: float = parameter(Number("Hz", minimum=0.4, maximum=100.0), "messages per second")
-    variables: tuple[str, ...] = parameter(ListOf(TEXT), "such as pm.vbat", name="vars")
+    frequency: float = parameter(Number("Hz", minimum=0.4, maximum=100.0), "rate of the messages")
+    variables: tuple[str, ...] = parameter(
+        ListOf(TEXT), "firmware variables, such as pm.vbat", name="vars"
+    )
 
 
 class DefaultTopicSettings(Parameters):
@@ -191,7 +193,7 @@ class Settings(Parameters):
         "coupled_7d",
     )
     buffer: float = parameter(
-        Number("m", above=0.0), "radius of the space that is the vehicle's own", 0.15
+        Number("m", above=0.0), "radius of the space that is reserved for the vehicle", 0.15
     )
     hover_height: float = parameter(
         Number("m", above=0.0), "where a takeoff ends, above the start point", 1.0
@@ -213,18 +215,20 @@ class Settings(Parameters):
     )
     voltage_warning: float = parameter(
         Number("V", minimum=0.0),
-        "with less there is a warning; and takeoff is refused with `act`, else below 3.2",
+        "below this voltage a warning is logged; takeoff is refused below it with `act`, "
+        "otherwise below 3.2",
         3.2,
         "battery/voltage_warning",
     )
     voltage_critical: float = parameter(
         Number("V", minimum=0.0),
-        "with less there is a warning; and the vehicle is landed with `act`, else below 3",
+        "below this voltage a warning is logged; the vehicle is landed below it with `act`, "
+        "otherwise below 3",
         3.0,
         "battery/voltage_critical",
     )
     voltages_act: bool = parameter(
-        BOOLEAN, "the two voltages count for takeoffs and landings", False, "battery/act"
+        BOOLEAN, "the two voltages decide about takeoffs and landings", False, "battery/act"
     )
     mocap_enabled: bool = parameter(BOOLEAN, WITHOUT_EFFECT, True, "motion_capture/enabled")
     mocap_frame: str | None = parameter(
@@ -234,19 +238,19 @@ class Settings(Parameters):
         Text((VENDOR, SINGLE_MARKER, "librigidbodytracker")),
         "on hardware: `vendor` is a rigid body of motion capture; `single_marker` one marker that "
         "is tracked by fleet_mocap_node, and so is `librigidbodytracker` with the marker "
-        "`default_single_marker`, which is else taken as `vendor`",
+        "`default_single_marker`, which is otherwise treated as `vendor`",
         VENDOR,
         "motion_capture/tracking",
     )
     mocap_marker: str = parameter(
         TEXT,
-        "of mocap_node's `marker_configurations`; see `motion_capture/tracking`",
+        "key in mocap_node's `marker_configurations`; see `motion_capture/tracking`",
         "default",
         "motion_capture/marker",
     )
     mocap_dynamics: str = parameter(
         TEXT,
-        "a single marker's limits of velocity, of mocap_node's `dynamics_configurations`",
+        "a single marker's velocity limits: key in mocap_node's `dynamics_configurations`",
         "default",
         "motion_capture/dynamics",
     )
@@ -276,10 +280,12 @@ class Settings(Parameters):
 class PartialSettings(Settings):
     """Settings in one place, of a vehicle, its type or ``all``, before they are merged."""
 
-    enabled: bool = parameter(BOOLEAN, "whether it takes part", True)
-    uri: str | None = parameter(VehicleUri(), "its address; not needed in simulation", None)
+    enabled: bool = parameter(BOOLEAN, "whether the vehicle takes part", True)
+    uri: str | None = parameter(
+        VehicleUri(), "address of the vehicle; not needed in simulation", None
+    )
     position: tuple[float, float, float] | None = parameter(
-        StartPosition(), "its position before takeoff", None, "initial_position"
+        StartPosition(), "position of the vehicle before takeoff", None, "initial_position"
     )
     type: str | None = parameter(TEXT, "of `robot_types`", None)
 
@@ -288,17 +294,19 @@ class RobotSettings(PartialSettings):
     """Settings of one vehicle below ``robots``."""
 
     position: tuple[float, float, float] = parameter(
-        StartPosition(), "its position before takeoff", name="initial_position"
+        StartPosition(), "position of the vehicle before takeoff", name="initial_position"
     )
 
 
 class BroadcastSettings(Parameters):
     """Broadcasts of commands to all vehicles of a radio."""
 
-    repeats: int = parameter(Integer(1, 100), "of each command", 5, "num_repeats")
+    repeats: int = parameter(
+        Integer(1, 100), "number of repetitions of each command", 5, "num_repeats"
+    )
     period_ms: float = parameter(
         Number("ms", minimum=0.0, maximum=100.0),
-        "from one to the next",
+        "time from one repetition to the next",
         1.0,
         "delay_between_repeats_ms",
     )
@@ -309,7 +317,7 @@ class MachineSettings(Parameters):
 
     address: str = parameter(TEXT, "name or number in the network")
     env_loader: str = parameter(TEXT, "script there that sets ROS's environment")
-    user: str | None = parameter(TEXT, "user that logs in there by ssh", None)
+    user: str | None = parameter(TEXT, "user for the login by ssh", None)
 
 
 #: Vertical distance of two vehicles over their horizontal one: the downwash of the rotors reduces
@@ -334,11 +342,12 @@ class VehicleConfig:
     """One vehicle."""
 
     name: str  # Its namespace and its tf frame.
-    position: tuple[float, float, float]  # Before takeoff (m, fixed frame).
-    settings: RobotSettings  # Merged from the vehicle, its type and ``all``.
-    # "group.name" to value, written after each connection.
+    position: tuple[float, float, float]  # Position before takeoff (m, fixed frame).
+    # Settings merged from the vehicle, its type and ``all``. Firmware parameters, "group.name" to
+    # value, written after each connection.
+    settings: RobotSettings
     firmware_params: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    default_topics: tuple[str, ...] = ("battery",)  # Standard ones that the driver publishes.
+    default_topics: tuple[str, ...] = ("battery",)  # Standard topics that the driver publishes.
     log_topics: tuple[LogTopic, ...] = ()
 
     @property
@@ -375,8 +384,8 @@ class VehicleConfig:
 class FleetConfig:
     """The vehicles that take part."""
 
-    vehicles: tuple[VehicleConfig, ...]  # Those that are enabled, in the order of the file.
-    disabled: tuple[str, ...] = ()  # Names of the others.
+    vehicles: tuple[VehicleConfig, ...]  # Enabled vehicles, in the order of the file.
+    disabled: tuple[str, ...] = ()  # Names of the disabled ones.
     machines: Mapping[str, MachineSettings] = dataclasses.field(default_factory=dict)
     warnings: tuple[str, ...] = ()  # Remarks on the file: line and reason.
     # Parameters of the driver's broadcasts.

@@ -41,7 +41,7 @@ def converted(vehicles: Entry, types: Entry | None) -> Entry:
     Raises
     ------
     ParameterError
-        A vehicle has no id, or another's.
+        A vehicle has no id, or that of another one.
     """
     robots: dict[str, yaml.Node] = {}
     errors: list[str] = []
@@ -50,7 +50,7 @@ def converted(vehicles: Entry, types: Entry | None) -> Entry:
             name, node = _robot(entry, types is not None)
             if name in robots:
                 line = robots[name].start_mark.line + 1
-                raise entry["id"].error(f"is that of {name} in line {line}; expected another")
+                raise entry["id"].error(f"is also that of {name} in line {line}; expected another")
             robots[name] = node
         except ParameterError as error:
             errors += error.complaints
@@ -103,7 +103,7 @@ def _type(entry, types):
 
 
 def _points(types, configuration):
-    """Return the number of points of a marker configuration; 0 if there is none."""
+    """Return the number of points of a marker configuration; 0 without one."""
     entry = types
     for key in ("markerConfigurations", configuration, "points"):
         if key not in entry:
@@ -139,7 +139,7 @@ def load(path: str | Path) -> FleetConfig:
     Raises
     ------
     ParameterError
-        About everything that is wrong: file, line, and what was expected.
+        The text names all errors: file, line, and what was expected.
     """
     types = Path(path).with_name(TYPES_FILE)
     return _fleet(yaml_file.load(path), types if types.exists() else None)
@@ -178,7 +178,7 @@ def grid(n: int, spacing: float = 1.0) -> FleetConfig:
     Raises
     ------
     ParameterError
-        There is no such grid.
+        The grid is not possible.
     """
     if n < 1:
         raise ParameterError(f"a grid of {n} vehicles; expected at least one")

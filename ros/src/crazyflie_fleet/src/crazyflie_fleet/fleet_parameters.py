@@ -43,14 +43,17 @@ class FleetParameters(Parameters):
     """Parameters of the vehicles of a fleet."""
 
     file: str = parameter(
-        Text(may_be_empty=True), "names the vehicles; empty for a grid of `n`", "", "fleet/file"
+        Text(may_be_empty=True),
+        "fleet file, which names the vehicles; empty for a grid of `n`",
+        "",
+        "fleet/file",
     )
-    n: int = parameter(Integer(1, 1000), "vehicles of the grid", 5, "fleet/n")
+    n: int = parameter(Integer(1, 1000), "number of vehicles of the grid", 5, "fleet/n")
     spacing: float = parameter(
-        Number("m", above=0.0), "from one vehicle of the grid to the next", 1.0, "fleet/spacing"
+        Number("m", above=0.0), "distance between neighbours in the grid", 1.0, "fleet/spacing"
     )
     machine: str = parameter(
-        TEXT, "only the vehicles of this machine are flown here; `*` for all", "*", "fleet/machine"
+        TEXT, "machine whose vehicles are flown here; `*` for all", "*", "fleet/machine"
     )
     virtual_port: int = parameter(
         Integer(0, 65535),
@@ -73,7 +76,7 @@ class FleetParameters(Parameters):
         Raises
         ------
         ParameterError
-            About everything that is wrong with the file.
+            The text names all errors of the file.
         """
         fleet = fleet_file.load(self.file) if self.file else fleet_file.grid(self.n, self.spacing)
         if self.positioning:
@@ -82,8 +85,8 @@ class FleetParameters(Parameters):
             for what, frame in (("name", vehicle.name), ("frame", vehicle.mocap_frame)):
                 if frame == self.fixed_frame:
                     raise ParameterError(
-                        f"{self.file}: {vehicle.name} has the {what} {frame}, as the fixed frame "
-                        "has; expected another one"
+                        f"{self.file}: {vehicle.name} has the {what} {frame}, which is the fixed "
+                        "frame; expected another one"
                     )
         return fleet.at_ports(self.virtual_port) if self.virtual_port else fleet
 
@@ -93,7 +96,7 @@ class FleetParameters(Parameters):
         Raises
         ------
         ParameterError
-            There is none.
+            No vehicle is flown here.
         """
         if self.machine == "*":
             return fleet.names
@@ -108,11 +111,11 @@ class FleetParameters(Parameters):
 class FlyParameters(FleetParameters):
     """Parameters of the process that flies vehicles."""
 
-    is_simulated: bool = parameter(BOOLEAN, "simulate the vehicles, too", name="simulated")
+    is_simulated: bool = parameter(BOOLEAN, "also simulate the vehicles", name="simulated")
     is_vectorized: bool = parameter(
         BOOLEAN,
-        "one simulator, estimator and controller for all simulated vehicles of one model of 7 "
-        "states; else each has its own, with all their parameters",
+        "one simulator, estimator and controller for all simulated vehicles of one model with 7 "
+        "states; otherwise each vehicle has its own, with all their parameters",
         True,
         "together",
     )
@@ -120,7 +123,10 @@ class FlyParameters(FleetParameters):
         NodeParameters(), "parameters of every vehicle's nodes, node by node", name="nodes"
     )
     by_model: Mapping[str, Any] | None = parameter(
-        NodeParameters(), "those of vehicles of one model, which override them", None, "models"
+        NodeParameters(),
+        "parameters of vehicles of one model, which override `vehicle`",
+        None,
+        "models",
     )
     extra_nodes: Mapping[str, type[Node]] | None = parameter(
         NodeClasses(), "more nodes of every vehicle, by their names below its own", None, "further"

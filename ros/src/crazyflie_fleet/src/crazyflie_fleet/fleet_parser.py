@@ -68,7 +68,7 @@ class Remarks:
         Raises
         ------
         ParameterError
-            It is a known one, misspelt.
+            The key is a misspelt known one.
         """
         key = entry.name.rpartition("/")[2]
         words = {word for name in known for word in name.split("/")}
@@ -84,7 +84,9 @@ class Remarks:
         """Return all remarks."""
         texts = [*self._texts.values()]
         if self._unknown:
-            texts.append(f"{self._file}: passed over, as not known here: {_listed(self._unknown)}")
+            texts.append(
+                f"{self._file}: ignored, since they are not known here: {_listed(self._unknown)}"
+            )
         texts += [
             f"{self._file}: {_listed({key: lines})} has no effect here"
             for key, lines in self._idle.items()
@@ -232,8 +234,8 @@ class FleetParser:
                 line = (_inner(robots[other], "uri") or robots[other]).line
                 self._error(
                     _inner(robots[vehicle.name], "uri") or robots[vehicle.name],
-                    f"is {vehicle.uri}, as that of {other} in line {line}; expected an address "
-                    "of its own",
+                    f"is {vehicle.uri}, which is also that of {other} in line {line}; expected "
+                    "an address of its own",
                 )
 
     def _check_frames(self, vehicles, robots):
@@ -258,7 +260,7 @@ class FleetParser:
             self.remarks.add(
                 f"{self._top.file}: the start points of {first} and {second} are {distance:.3g} m "
                 f"apart, and their collision buffers need {limit:.3g} m; neither takes off until "
-                "they are seen that far apart"
+                "they are measured that far apart"
             )
         return tuple(pairs)
 
@@ -289,7 +291,7 @@ class FleetParser:
         return dataclasses.replace(settings, model=path)
 
     def _check_voltages(self, merged, settings):
-        # Only here it is known whether each comes from the robot, its type or ``all``.
+        # Only here is it known whether each comes from the robot, its type or ``all``.
         critical, warning = settings.voltage_critical, settings.voltage_warning
         if critical <= warning:
             return
@@ -323,7 +325,7 @@ class FleetParser:
         standard = []
         for key, inner in default_topics.items():
             if DEFAULT_TOPICS.get(key) == "":
-                remark = inner.error("is not offered by the driver, and left out")
+                remark = inner.error("is not offered by the driver, and is ignored")
                 self.remarks.add(str(remark), inner.line)
             elif key in DEFAULT_TOPICS and self._read(inner, DefaultTopicSettings) is not None:
                 standard.append(DEFAULT_TOPICS[key])
@@ -348,7 +350,7 @@ def _entries(parts, key):
 
 
 def _inner(entry, path):
-    """Return the entry at a path, such as motion_capture/marker; None if there is none."""
+    """Return the entry at a path, such as motion_capture/marker, or None."""
     for key in path.split("/"):
         if key not in entry:
             return None

@@ -67,7 +67,7 @@ class _NodeFactory:
             vehicles, others, config.fixed_frame, vectorized, self._unplaced
         )
         buffers = [vehicle.buffer for vehicle in (*vehicles, *others)]
-        # Before the others: these answer the same references of the takeoff servers.
+        # This node comes first, since the others answer the same references of the takeoff servers.
         self.nodes[f"{handle.name}/references"] = references
         for vehicle, tracked in zip(vehicles, references.vehicles, strict=True):
             self._add_high_level(vehicle, tracked)

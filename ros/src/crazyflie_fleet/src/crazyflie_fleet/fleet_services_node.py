@@ -99,14 +99,14 @@ class FleetServicesNode(Node):
         takeoffs, self._takeoffs = self._takeoffs, []
         for takeoff in takeoffs:
             takeoff.answer.set_exception(
-                ServiceError("no vehicle takes off: the node has failed; see the log")
+                ServiceError("no vehicle takes off: the services node has failed; see the log")
             )
 
     # Takeoffs.
 
     def _on_takeoff(self, service, service_type, request):
         if getattr(request, "group_mask", 0):
-            # Only the vehicles know their groups.
+            # Only the nodes of the vehicles know their groups.
             return self._call_all(service, service_type, request)
         takeoff = _Takeoff(service, service_type, request)
         if not self._begin(takeoff):
@@ -148,7 +148,9 @@ class FleetServicesNode(Node):
         if flying and takeoff.service_type is Empty:
             names = tuple(name for name in names if name not in flying)
             if not names:
-                takeoff.answer.set_exception(ServiceError("refused: all vehicles fly already"))
+                takeoff.answer.set_exception(
+                    ServiceError("refused: all vehicles are flying already")
+                )
                 return True
             rest = ", ".join(names)
             self._handle.info(f"flying already: {', '.join(flying)}; taking off: {rest}")
@@ -217,8 +219,8 @@ class FleetServicesNode(Node):
             return
         chosen = [name for name in self._fleet.names if name in flying]
         self._handle.error(
-            f"no message of the mission that flew {', '.join(chosen)} for {MISSION_TIMEOUT:g} s: "
-            "it has ended; landing them"
+            f"no message from the mission that flew {', '.join(chosen)} for {MISSION_TIMEOUT:g} "
+            "s: it has ended; landing these vehicles"
         )
         self._lander.land(chosen).add_done_callback(self._log_refusals)
 

@@ -19,7 +19,7 @@ from crazyflie_utils.refusal import RefusalError
 NEAR = 0.5
 
 
-_MAX_STEP = 0.1  #: Longest time after a setpoint of a velocity in which the goal moves on (s).
+_MAX_STEP = 0.1  #: Longest time after a velocity setpoint for which the goal continues to move (s).
 
 
 class Velocity(NamedTuple):
@@ -55,7 +55,7 @@ class CommandFollower:
     def take_velocity(
         self, time: float, measured: Goal[float], setpoint: Velocity, ground: float
     ) -> None:
-        """Replace any command by a goal that moves on from the present one at a velocity.
+        """Replace any command by a goal that moves at a velocity from the present goal.
 
         ``ground`` is the height (z) of the ground, above which the setpoint's height is given, m.
         """
@@ -169,4 +169,4 @@ class CommandFollower:
 def _check(*numbers):
     for number in numbers:
         if not math.isfinite(number):
-            raise RefusalError(f"{number:g} is among the numbers; expected finite ones")
+            raise RefusalError(f"one of the numbers is {number:g}; expected finite ones")

@@ -87,7 +87,7 @@ class HighLevelNode(Node):
             ("upload_trajectory", srv.UploadTrajectory, self._on_upload),
             ("notify_setpoints_stop", srv.NotifySetpointsStop, self._on_setpoints_stop),
             ("set_group_mask", srv.SetGroupMask, self._groups.on_set_group_mask),
-            # There is no firmware here.
+            # Services that only the firmware could carry out.
             ("update_params", srv.UpdateParams, lambda _: srv.UpdateParamsResponse()),
         ):
             handle.advertise_service(f"~{name}", service_type, callback)
@@ -142,7 +142,7 @@ class HighLevelNode(Node):
         self._begin_next()
 
     def _on_reference(self):
-        # With the hover point the server hands the vehicle over to the controller.
+        # When it sends the hover point, the server hands the vehicle over to the controller.
         takeoff = self._takeoff
         if takeoff is None or takeoff.handover or self._status.state != FlightStatus.TAKING_OFF:
             return
@@ -206,7 +206,7 @@ class HighLevelNode(Node):
         if request.height <= ground:
             raise ServiceError(
                 f"height is {request.height:g} m, and the vehicle is at {ground:.2f} m; expected "
-                "more"
+                "a greater height"
             )
         hover = at_rest((x, y, request.height), start.yaw)
         if self._is_followed() or self._takeoff is not None:
@@ -240,7 +240,7 @@ class HighLevelNode(Node):
         if self._status.state in (FlightStatus.FLYING, FlightStatus.TAKING_OFF):
             raise ServiceError(
                 f"the vehicle is {WORDS[self._status.state]}; expected it to have landed: stop "
-                "would let it fall, which is what emergency is for"
+                "would let it fall; for that, call emergency"
             )
         return srv.StopResponse()
 
@@ -300,7 +300,7 @@ class HighLevelNode(Node):
 
     def _execute(self, command, *arguments):
         if self._vehicle is not None and self._vehicle.is_to_land:
-            raise ServiceError("the fleet lands the vehicle; expected it to fly on")
+            raise ServiceError("the fleet is landing the vehicle; it takes no commands")
         self._go(command, *arguments)
 
     def _go(self, command, *arguments):

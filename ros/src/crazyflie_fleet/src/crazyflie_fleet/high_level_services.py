@@ -110,7 +110,7 @@ class HighLevelParameters(Parameters):
         default=False,
         name="reference/yaw",
     )
-    state_topic: str = parameter(TOPIC, "where the vehicle is", "state", "topics/state")
+    state_topic: str = parameter(TOPIC, "states of the vehicle", "state", "topics/state")
     flight_status_topic: str = parameter(
         TOPIC, "of the takeoff server", "in_flight_flight_status", "topics/flight_status"
     )
@@ -121,17 +121,17 @@ class HighLevelParameters(Parameters):
     land: str = parameter(SERVICE, "the takeoff server's", "land", "srv/land")
     emergency: str = parameter(SERVICE, "stops the motors", "emergency", "srv/emergency")
     start_topic: str = parameter(
-        TOPIC, "names those that begin trajectory 0 at once", START_TOPIC, "topics/start"
+        TOPIC, "names of the nodes that start trajectory 0 at once", START_TOPIC, "topics/start"
     )
     plan_topic: str = parameter(
-        TOPIC, "what is flown until it has ended", "~plan/markers", "topics/plan"
+        TOPIC, "trajectory that is flown, until its end", "~plan/markers", "topics/plan"
     )
     fixed_frame: str = parameter(FRAME, "frame the references are in", "world", "frames/fixed")
-    time_step: float = parameter(TIME_STEP, "from one reference to the next", 0.02)
+    time_step: float = parameter(TIME_STEP, "period of the references", 0.02)
 
     @property
     def reference_type(self) -> type[PositionVelocityStateStamped]:
-        """Message type of references."""
+        """Message type of the references."""
         return PositionVelocityYawStateStamped if self.has_yaw else PositionVelocityStateStamped
 
 
@@ -222,7 +222,7 @@ class SetpointSubscribers:
         self._pass(setpoint, (*velocity, message.zDistance), message.yawrate)
 
     def _yaw_rate(self, clockwise):
-        # The driver's messages have it clockwise, in deg/s.
+        # In the driver's messages the yaw rate is clockwise, in deg/s.
         return -math.radians(clockwise) if self._has_yaw else 0.0
 
     def _on_stop(self, _):

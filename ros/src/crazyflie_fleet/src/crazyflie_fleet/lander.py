@@ -128,7 +128,7 @@ class Lander(LandingSide):
             if self._is_up(name) and np.isfinite(position).all():
                 self._left += [name] * (name not in self._left)
             elif name not in self._calls:
-                # Its takeoff server decides.
+                # Its takeoff server lands it.
                 self._call_land(name)
         self._publish_left()
         return answer

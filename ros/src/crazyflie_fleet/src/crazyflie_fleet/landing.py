@@ -67,7 +67,7 @@ class LandingSide(Protocol):
         """Return whether vehicles descend, or are too fast for a round."""
 
     def situation(self, names: Sequence[str]) -> Situation:
-        """Return where vehicles are; ``names`` are to land."""
+        """Return the positions of all vehicles, of which ``names`` are to land."""
 
     def distance(self, name: str, goal: Place) -> float:
         """Return the distance of a vehicle from a goal (m), m; infinite if it is not known."""
@@ -143,8 +143,8 @@ def next_round(
     -------
     dict of int to tuple
         Number to x, y in m: where the vehicle is, or a free place, to which all of the round can
-        fly straight and at the same time. At least one vehicle, if any is to land. Where no way is
-        free, one vehicle has a place that is; where there is none, its own.
+        fly straight and at the same time. At least one vehicle, if any is to land. If no path is
+        free, one vehicle gets a free place; if no place is free, its own.
     """
     scene = _Scene(places, lands, is_down, np.array(limits, dtype=float), lower, upper)
     straight = np.flatnonzero(scene.is_lowest & ~scene.is_obstructed)
@@ -164,7 +164,7 @@ def next_round(
 
 
 def free_place(i: int, places: Array, is_down: Flags, limits: Array) -> tuple[float, float]:
-    """Return where a vehicle lands that descends already.
+    """Return the landing place of a vehicle that descends already.
 
     Parameters
     ----------
@@ -176,8 +176,8 @@ def free_place(i: int, places: Array, is_down: Flags, limits: Array) -> tuple[fl
     Returns
     -------
     x, y : float
-        m. Where it is, if nothing is beneath, or no free place within `MAX_DETOUR` can be reached
-        straight.
+        m. Its own position if nothing is beneath, or if no free place within `MAX_DETOUR` can be
+        reached on a straight line.
     """
     lands = np.arange(len(places)) == i
     everywhere = np.full((len(places), 2), np.inf)
@@ -232,7 +232,7 @@ class _Scene:
         return grid[is_free]
 
     def are_reachable(self, i, goals, chosen):
-        """Return to which goals, shape (m, 2), vehicle i can fly straight, shape (m,)."""
+        """Return whether vehicle i can fly straight to each goal; shapes (m, 2) and (m,)."""
         others = np.arange(len(self._z)) != i
         ends = self._xy.copy()
         for j, place in chosen.items():
@@ -318,8 +318,8 @@ class SafeDescents:
     def reference(self, number: int, time: float, z: float, z_dot: float) -> list[float] | None:
         """Return x, y, z (m), x_dot, y_dot, z_dot (m/s); None if the vehicle lands where it is.
 
-        The descent straight down, z (m) and z_dot (m/s) at a time (s), takes effect as far as the
-        move sideways is done: at first the vehicle keeps its height.
+        The descent straight down, z (m) and z_dot (m/s) at a time (s), takes effect in proportion
+        to the completed part of the move sideways: at first the vehicle keeps its height.
         """
         descent = self._descents[number]
         descent.last = time

@@ -17,7 +17,7 @@ def launch_text(path: str | Path) -> str:
     Raises
     ------
     ParameterError
-        About everything that is wrong with the file.
+        The text names all errors of the file.
     """
     path = Path(path).absolute()
     fleet = fleet_file.load(path)

@@ -1,4 +1,4 @@
-"""The missions that run, their vehicles, and missions that end while their vehicles fly."""
+"""The running missions, their vehicles, and missions that end while their vehicles fly."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -27,7 +27,7 @@ class Claim(NamedTuple):
 
 
 class MissionWatch:
-    """The missions that run, except ``own``; a mission that has died has no vehicles any more.
+    """The running missions, except ``own``; a mission that has died has no vehicles any more.
 
     ``on_lost(names)`` gets the vehicles that flew by the last message of a mission that has died.
     """
@@ -40,7 +40,8 @@ class MissionWatch:
     ):
         self._on_lost = on_lost
         self._own = own
-        self.claims: dict[str, Claim] = {}  #: Vehicles of the missions that run, by their names.
+        #: Vehicles of the running missions, by the missions' names.
+        self.claims: dict[str, Claim] = {}
         self.heard: set[str] = set()  #: Names of missions, also of those that have ended.
         # Ticks since the last message, so that a suspended computer does not lose missions.
         self._ticks: dict[str, int] = {}

@@ -80,13 +80,13 @@ def _offset(configuration):
     points = list(configuration.get("points", {}).values())
     if len(points) != 1:
         return {}
-    # As in librigidbodytracker: both are added to the marker's position.
+    # Both offsets are added to the marker's position, as in librigidbodytracker.
     offset = configuration.get("offset", [0.0, 0.0, 0.0])
     return {"offset": [a + b for a, b in zip(points[0], offset, strict=True)]}
 
 
 def _check_names(fleet, key, setting, configurations):
-    """Raise `ParameterError` about vehicles whose configuration is not there."""
+    """Raise `ParameterError` about vehicles whose configuration is missing."""
     known = [*configurations, "default"]
     errors = [
         f"robots/{vehicle.name}/motion_capture/{key} is {name!r}; expected one of "

@@ -16,8 +16,8 @@ _PERIOD = 0.2  #: Period of the checks (s).
 class PlacementNode(Node):
     """Refuses takeoffs of vehicles with one start point in the fleet file until they are apart.
 
-    ``names`` are of the vehicles that are flown in this process. Two that have been seen apart are
-    not checked again.
+    ``names`` are of the vehicles that are flown in this process. A pair that has been measured
+    apart is not checked again.
     """
 
     def __init__(self, names: Collection[str], fleet: FleetConfig, states: VehicleStates):

@@ -90,8 +90,8 @@ class VehicleStates:
         return (age >= 0.0) & (age < MAX_POSITION_AGE) & np.isfinite(self.positions).all(axis=1)
 
     def goal(self, number: int) -> Goal[float] | None:
-        """Return position, velocity and heading of one as a goal; None if they are not fresh."""
-        # For one of a hundred vehicles that move, as `are_fresh` for all would take longer.
+        """Return position, velocity and heading of one vehicle as a goal; None if not fresh."""
+        # Checked for one vehicle: among a hundred, `are_fresh` for all would take longer.
         age = self._handle.time() - self._times.item(number)
         x, y, z, *velocity, yaw = self._states[number].tolist()
         if not (0.0 <= age < MAX_POSITION_AGE and math.isfinite(x + y + z)):
@@ -126,7 +126,8 @@ class VehicleStates:
         self.takeoff_refusals[number] = message.takeoff_refusal
 
 
-LANDING_TOPIC = "/fleet/landing"  #: Names of vehicles that only the fleet moves, until they land.
+#: Topic with the names of vehicles that only the fleet moves, until they land.
+LANDING_TOPIC = "/fleet/landing"
 SILENCE_PERIOD = 5.0  #: Period of warnings about a vehicle whose states do not come (s).
 
 
@@ -191,7 +192,7 @@ class TrackedVehicle:
         timers: dict[float, SharedTimer],
     ):
         self.number = number
-        self._timers = timers  # By their periods (s).
+        self._timers = timers  # Timers, by their periods (s).
         self.name = config.name
         self.buffer = config.buffer
         self.is_held = False  #: Whether it is kept at its place, as another one is too near.
@@ -200,13 +201,13 @@ class TrackedVehicle:
         self.on_interruption: Callable[[], None] = lambda: None
         #: Called after the reference of another node.
         self.on_reference: Callable[[], None] = lambda: None
-        #: Returns where its own references lead in a time (s), m; None if they do not move.
+        #: Returns the position of its own references after a time (s), m; None if they do not move.
         self.ahead: Callable[[float], Triple | None] = lambda time: None
         #: End of its takeoffs by the fleet file, if the file has no start point for it (m).
         self.hover_point: Triple | None = None
         self._states = states
         self._commanded: Goal[float] | None = None
-        self._heading: float | None = None  # Commanded in this flight (rad).
+        self._heading: float | None = None  # Heading commanded in this flight (rad).
         # Own references that this node has not received yet, by their identity.
         self._own: dict[int, PositionVelocityStateStamped] = {}
 
@@ -246,9 +247,9 @@ class TrackedVehicle:
         return self._timers[period].add(callback)
 
     def destination(self, time: float) -> Triple | None:
-        """Return where the references lead in a time (s), m; None without any.
+        """Return the position of the references after a time (s), m; None without references.
 
-        Those of other nodes lead to their position: nobody knows whether they go on.
+        Those of other nodes are taken at rest, since their continuation is not known.
         """
         ahead = self.ahead(time)
         if ahead is not None:
@@ -268,7 +269,7 @@ class TrackedVehicle:
         self.is_to_land = is_to_land
 
     def hold(self) -> None:
-        """Keep the vehicle where it is, whatever it is commanded."""
+        """Keep the vehicle at its position and ignore commands."""
         self.is_held = True
         x, y, z = self._states.positions[self.number].tolist()
         self._publish(at_rest((x, y, z), self._present_heading()))
@@ -343,12 +344,12 @@ class ReferencesNode(Node):
     ):
         self._configs = vehicles
         self._fixed_frame = fixed_frame
-        # Own ones first.
+        # The vehicles of this process come first.
         all_vehicles = (*vehicles, *others)
         self.states = VehicleStates(all_vehicles, vectorized or {})
         self._separation = Separation([vehicle.buffer for vehicle in all_vehicles])
         timers: dict[float, SharedTimer] = {}
-        #: The own vehicles.
+        #: The vehicles of this process.
         self.vehicles = [
             TrackedVehicle(number, vehicle, self.states, timers)
             for number, vehicle in enumerate(vehicles)
@@ -395,7 +396,7 @@ class ReferencesNode(Node):
     def _on_watch_timer(self):
         in_flight, fresh = self.states.are_in_flight(), self.states.are_fresh()
         positions = np.where(in_flight[:, None], self.states.positions, np.nan)
-        # An old velocity does not say where a vehicle will be.
+        # An old velocity does not predict a vehicle's position.
         velocities = np.where(fresh[:, None], self.states.velocities, 0.0)
         for number in np.flatnonzero(in_flight & ~fresh).tolist():
             self._warn_of_silence(number)

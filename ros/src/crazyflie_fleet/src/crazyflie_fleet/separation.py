@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from crazyflie_fleet.fleet_config import DOWNWASH, close_pairs
 
-#: Time by which motions are extrapolated (s): the time in which a controller stops a vehicle.
+#: Time over which motions are extrapolated (s): that in which a controller stops a vehicle.
 LOOK_AHEAD = 0.5
 #: Distance at which held vehicles are released, over the sum of their buffers.
 RELEASE_RATIO = 1.1
@@ -51,8 +51,9 @@ class Separation:
         Parameters
         ----------
         positions, velocities, goals : (n, 3) array
-            Those of vehicles and references, m and m/s, fixed frame. A vehicle whose position
-            is NaN is ignored; the goal of one without a reference is its position.
+            Positions and velocities of vehicles, and positions of references, m and m/s, fixed
+            frame. A vehicle whose position is NaN is ignored; the goal of one without a reference
+            is its position.
         """
         known = np.flatnonzero(np.isfinite(positions).all(axis=1))
         buffers = self._buffers[known] * np.where(self._held[known], RELEASE_RATIO, 1.0)

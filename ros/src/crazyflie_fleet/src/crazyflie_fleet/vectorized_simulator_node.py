@@ -112,10 +112,10 @@ class VectorizedSimulatorParameters(Parameters):
     """Parameters of `VectorizedSimulatorNode`, named as those of the nodes that it replaces."""
 
     time_step: float = parameter(
-        TIME_STEP, "from one pose, state and control to the next", name="simulator/time_step"
+        TIME_STEP, "period of poses, states and controls", name="simulator/time_step"
     )
     publishes_clock: bool = parameter(
-        BOOLEAN, "be the source of simulated time", False, "simulator/clock/publish"
+        BOOLEAN, "whether to be the source of simulated time", False, "simulator/clock/publish"
     )
     real_time_factor: float = parameter(
         Number(minimum=0.0),
@@ -132,7 +132,7 @@ class VectorizedSimulatorParameters(Parameters):
     )
     max_jump: float = parameter(
         Number("m", above=0.0),
-        "how far from its vehicle a new reference may be",
+        "largest distance of a new reference from its vehicle",
         3.0,
         "lqr_controller/reference/max_jump",
     )

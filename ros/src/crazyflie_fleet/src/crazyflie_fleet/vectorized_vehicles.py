@@ -27,7 +27,7 @@ class VectorizedVehicles:
         columns = np.array(positions, dtype=float).T
         self._dynamics = dynamics
         self._n = columns.shape[1]
-        # Components are arrays, also those that are alike for all at the beginning.
+        # All components are arrays, also those that are equal for all vehicles at the beginning.
         self._x = [
             np.array(np.broadcast_to(c, self._n)) for c in dynamics.initial_state(list(columns))
         ]

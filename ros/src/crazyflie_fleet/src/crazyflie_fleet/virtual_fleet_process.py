@@ -18,13 +18,15 @@ class VirtualFleetParameters(FleetParameters):
     observer_port: int = parameter(_UDP_PORT, "UDP port of the vehicles' true poses", 19800)
     command_port: int = parameter(_UDP_PORT, "UDP port of motion capture", 1510)
     data_port: int = parameter(_UDP_PORT, "UDP port of its stream", 1511)
-    mass_error: float = parameter(_FRACTION, "how much heavier than nominal they are", 0.05)
-    thrust_error: float = parameter(_FRACTION, "how much more their rotors lift", -0.05)
+    mass_error: float = parameter(_FRACTION, "how much heavier than nominal the vehicles are", 0.05)
+    thrust_error: float = parameter(
+        _FRACTION, "how much more than nominal their rotors lift", -0.05
+    )
     position_noise: float = parameter(Number("m", minimum=0.0), "of motion capture", 0.0002)
     attitude_noise: float = parameter(Number("rad", minimum=0.0), "of motion capture", 0.001)
 
 
-#: Positioning of a vehicle -> of the virtual one, where they have different names.
+#: Positioning of a vehicle -> that of the virtual vehicle, where the names differ.
 DECKS = {name: name for name in (FLOW, LIGHTHOUSE, LOCO)}
 
 
@@ -69,7 +71,7 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
             single_markers.append(str(number + 1))
     seen = bodies(fleet, config.fixed_frame)
     if not seen:
-        # All vehicles fly by their decks.
+        # All vehicles use their decks for positioning.
         return nodes
     ports = {"command_port": config.command_port, "data_port": config.data_port}
     noise = {"position": config.position_noise, "attitude": config.attitude_noise}

@@ -20,7 +20,7 @@ class CamerasPanel:
         self._hint = ui.label().classes("hint")
 
     def refresh(self, scene: Scene) -> None:
-        """Show the newest image, or why there is none."""
+        """Show the newest image, or the reason for its absence."""
         if self._topic.options != list(scene.images):
             self._topic.set_options(list(scene.images))
         page, topic = self._session.page, self._topic.value

@@ -1,4 +1,4 @@
-"""A part of the page that is drawn by a component of this folder from one list."""
+"""A part of the page that a component of this folder draws from one list."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ class Cards(ListView, component="cards.js"):  # type: ignore[call-arg]
 
 
 class Lines(ListView, component="lines.js"):  # type: ignore[call-arg]
-    """Lines: key, look, what has said it, text, and what to do."""
+    """Lines: key, style, source, text, and remedy."""
 
     prop = "lines"
 
@@ -45,7 +45,7 @@ class Camera(Element, component="camera.js"):  # type: ignore[call-arg]
         self._props["address"] = ""
 
     def show(self, address: str) -> None:
-        """Show what is at an address of this server; nothing if it is empty."""
+        """Show the picture at an address of this server; nothing if the address is empty."""
         if self._props["address"] != address:
             self._props["address"] = address
             self.update()

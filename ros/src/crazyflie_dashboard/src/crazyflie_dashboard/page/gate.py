@@ -1,4 +1,4 @@
-"""Lets only requests in that may see the page, and tells browsers what the page may load."""
+"""Admits only requests that may see the page, and tells browsers what the page may load."""
 
 from urllib.parse import parse_qs
 
@@ -8,7 +8,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from crazyflie_dashboard.access import Access
 
 HEADERS = (
-    # Nothing from the internet, no frame around the page (a click could be meant for another one).
+    # Nothing from the internet, and no frame around the page (which could redirect clicks).
     (
         b"content-security-policy",
         b"default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval'; frame-ancestors 'none'; "
@@ -47,7 +47,7 @@ class Gate:
         elif refusal:
             await PlainTextResponse(f"Refused: {refusal}.\n", 403)(scope, receive, send)
         elif given and scope["type"] == "http":
-            # To this page: a path such as //another.example/ would lead away.
+            # Redirect to this page: a path such as //another.example/ would lead to another server.
             answer = RedirectResponse("/", 303)
             answer.set_cookie(self._access.cookie, given, httponly=True, samesite="strict")
             await answer(scope, receive, send)

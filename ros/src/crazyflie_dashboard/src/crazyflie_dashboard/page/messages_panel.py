@@ -14,12 +14,12 @@ MAX_LINES = 200  #: Lines of the log that are shown, the newest first.
 
 
 class MessagesPanel:
-    """Sentences with what to do, and /rosout with the vehicles' consoles by level."""
+    """Findings with remedies, and /rosout with the vehicles' consoles by level."""
 
     def __init__(self, session: Session):
         self._session = session
         with ui.element("div").classes("tools"):
-            ui.label("What is not as it should be").classes("choice")
+            ui.label("Problems").classes("choice")
             self._examine = ui.button("Ask the doctor", on_click=self._ask).props("outline dense")
         self._sentences = Lines("Diagnostics and the doctor report nothing; the log is below.")
         with ui.element("div").classes("tools apart"):
@@ -30,7 +30,7 @@ class MessagesPanel:
         self._log = Lines("No message of this level yet.")
 
     def refresh(self, scene: Scene) -> None:
-        """Show the newest ones."""
+        """Show the newest messages."""
         self._sentences.show(
             [
                 [str(number), each.level, f"{each.level}  {each.source}", each.text, each.remedy]
@@ -42,7 +42,7 @@ class MessagesPanel:
         lines: dict[tuple[str, str, str], list[LogLine]] = {}
         for line in reversed(scene.log):
             if line.level in shown and part in f"{line.node} {line.text}".lower():
-                # Numbers differ where the same is said again and again.
+                # Repeated messages differ only in their numbers.
                 same = re.sub(r"[0-9.]+", "#", line.text)
                 lines.setdefault((line.level, line.node, same), []).append(line)
         self._log.show([_shown(each) for each in [*lines.values()][:MAX_LINES]])
@@ -50,12 +50,12 @@ class MessagesPanel:
     async def _ask(self) -> None:
         self._examine.disable()
         if await self._session.succeeds(self._session.dashboard.examine()):
-            self._session.say("The doctor has looked at everything.", "positive")
+            self._session.say("The doctor has finished.", "positive")
         self._examine.enable()
 
 
 def _shown(lines: list[LogLine]) -> list[object]:
-    """Return the newest of lines that say the same, and how often that has been said."""
+    """Return the newest of lines with the same text, and their number."""
     line, count = lines[0], len(lines)
     often = f", {count} times since {_clock(lines[-1].time)}" if count > 1 else ""
     head = f"{line.level}  {_clock(line.time)}  {line.node}{often}"

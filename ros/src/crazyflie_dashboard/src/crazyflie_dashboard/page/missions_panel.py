@@ -39,7 +39,7 @@ class MissionsPanel:
         self._file.set_options({path: each.title for path, each in self._files.items()})
 
     def refresh(self, scene: Scene) -> None:
-        """Show which vehicles it is for, and whether it may fly."""
+        """Show the vehicles of the mission, and whether it may fly."""
         names = self._session.chosen_names
         self._choice.text = f"For {', '.join(names)}" if names else "For vehicles that are chosen"
         self._fly.set_enabled(self._passed == (self._file.value, names) and bool(names))

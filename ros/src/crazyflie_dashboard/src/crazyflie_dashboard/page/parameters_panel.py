@@ -11,7 +11,7 @@ from crazyflie_dashboard.parameters import range_of
 from crazyflie_dashboard.snapshot import Scene
 from crazyflie_utils.refusal import RefusalError
 
-MAX_ROWS = 30  #: Parameters that are shown at once; a search finds the others.
+MAX_ROWS = 30  #: Number of parameters that are shown at once; a search finds the others.
 
 
 class ParametersPanel:
@@ -26,8 +26,8 @@ class ParametersPanel:
             self._search = ui.input("search", on_change=self._build)
             self._search.props("dense outlined clearable debounce=300").classes("number search")
         self._count = ui.label(
-            "Choose a node or a vehicle to see what can be changed while it runs. A value that is "
-            "typed is sent with Enter."
+            "Choose a node or a vehicle to see the parameters that can be changed while it runs. "
+            "Enter sends a typed value."
         ).classes("hint")
         self._rows = ui.element("div").classes("parameters")
 
@@ -58,7 +58,7 @@ class ParametersPanel:
 
 
 class ParameterRow:
-    """One parameter; what came back, or why it was refused, stands below it."""
+    """One parameter; the value that came back, or the reason of a refusal, is below it."""
 
     def __init__(self, session: Session, parameter: ParameterInfo):
         self._session, self._parameter = session, parameter

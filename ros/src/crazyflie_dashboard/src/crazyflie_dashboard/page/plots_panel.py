@@ -14,18 +14,18 @@ from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.snapshot import Scene
 
 SPAN = 60.0  #: Time that is shown (s).
-MAX_POINTS = 300  #: Points of one line: more than the plot has pixels to show would only be sent.
+MAX_POINTS = 300  #: Largest number of points of a line: the plot has no pixels for more.
 HEIGHT, GAP, TOP = 105, 34, 26  #: Height of a plot, space between two and above the first (px).
 
 COLORS = ["#4ea1ff", "#35c98a", "#ffb545", "#ff6b6b", "#b58cff", "#5fd3e0"]
 
-DIM = {"color": "#93a0b2"}  #: Style of texts.
+DIM = {"color": "#93a0b2"}  #: Style of texts in the plots.
 SPLIT_LINE = {"lineStyle": {"color": "#2a323e"}}
 NAME_STYLES = {f"c{i}": {"color": color, "fontSize": 11} for i, color in enumerate(COLORS)}
 
 
 class PlotsPanel:
-    """One plot for each unit, one below the other, on the same time."""
+    """One plot for each unit, one below the other, with a common time axis."""
 
     def __init__(self, session: Session):
         self._session = session
@@ -64,7 +64,7 @@ class PlotsPanel:
         self._name.text = self._session.watched or "Choose a vehicle to see its plots"
         self._series = self._session.dashboard.plots(self._session.page)
         self._draw()
-        # Only fields are called by the paths of topics; a page that connects again has none.
+        # Only fields have the path of a topic as name; a page that reconnects has none.
         fields = [each.name for each in self._series if each.name.startswith("/")]
         if fields != self._fields:
             self._fields = fields
@@ -171,7 +171,7 @@ def chart(series: Iterable[Series], can_be_measured: bool) -> dict[str, Any]:
 
 
 def _plot(series: Series) -> tuple[str, str]:
-    """Return what lines of one plot have in common: the unit, but each angle has its own."""
+    """Return the key of a line's plot: its unit, or for an angle its name."""
     return series.unit, series.name if series.unit == "deg" else ""
 
 

@@ -1,4 +1,4 @@
-"""The three-dimensional scene: what the browser's part, scene_view.js, is told."""
+"""The three-dimensional scene: the server's part, which sends data to scene_view.js."""
 
 import math
 import time
@@ -17,9 +17,9 @@ from nicegui.element import Element
 from crazyflie_dashboard.snapshot import Rotation, Scene, Solids, Triple, VehicleSnapshot
 
 FOLDER = Path(__file__).parent
-#: With this many unanswered scenes a browser is sent no more, for `ANSWER_LIMIT` at most.
+#: Number of unanswered scenes after which a browser is sent no more, for `ANSWER_LIMIT` at most.
 MAX_UNANSWERED = 3
-ANSWER_LIMIT = 2.0  #: Time after which a scene counts as answered (s).
+ANSWER_LIMIT = 2.0  #: Time after which a scene is treated as answered (s).
 PART_TIME = 1e-5  #: Time between two transmissions of solids, for each of them (s).
 DIGITS = 4  #: Decimal places of positions (m) and quaternions that the browser is sent.
 
@@ -33,7 +33,7 @@ def vehicle_model() -> list[list[Any]]:
     Returns
     -------
     list
-        Of each part the number of its propeller (0 for the body), its shape and size (m), position
+        For each part the number of its propeller (0 for the body), its shape and size (m), position
         (m) and roll, pitch, yaw (rad), and color. A propeller begins with its hub.
     """
     folder = Path(roslib.packages.get_pkg_dir("crazyflie_description"))
@@ -79,7 +79,7 @@ class SceneView(
         self._props["model"] = vehicle_model()
         self._shown: dict[str, Any] = {}
         self._solids: list[Solids] = []
-        self._solids_at = 0.0  # From when on others may be sent, s.
+        self._solids_at = 0.0  # Time from which solids may be sent again (s).
         self._unanswered: deque[float] = deque()
         self.on("ready", self._begin)
 
@@ -89,7 +89,7 @@ class SceneView(
         self._solids, self._solids_at = [], 0.0
 
     async def show(self, scene: Scene, chosen: set[str], extra_paths: Mapping[str, Any]) -> None:
-        """Draw a scene; what has not changed since the last one is not sent."""
+        """Draw a scene; parts that have not changed since the last one are not sent."""
         self._send("setNames", [list(scene.vehicles)])
         solids = [each.what for each in scene.solids]
         if solids != self._solids and time.monotonic() >= self._solids_at:
@@ -107,11 +107,11 @@ class SceneView(
         if self._shown.get("update") != rows and self._may_send():
             self._shown["update"] = rows
             self._unanswered.append(time.monotonic())
-            # As an event: the browser would compile, and keep for long, each call of a method.
+            # Sent as an event: the browser would compile, and keep for long, each call of a method.
             await core.sio.emit("vehicles", rows, room=self.client.id, callback=self._on_answer)
 
     def _may_send(self) -> bool:
-        """Return whether the browser keeps up; what it has not taken yet, it would see too late."""
+        """Return whether the browser keeps up; otherwise it would show scenes too late."""
         while self._unanswered and time.monotonic() - self._unanswered[0] > ANSWER_LIMIT:
             self._unanswered.popleft()
         return len(self._unanswered) < MAX_UNANSWERED
@@ -121,11 +121,11 @@ class SceneView(
             self._unanswered.popleft()
 
     def show_goal(self, goal: dict[str, float | None] | None) -> None:
-        """Draw where a go to leads: x, y, z (m) and yaw (rad, or None)."""
+        """Draw the goal of a go-to command: x, y, z (m) and yaw (rad, or None)."""
         self._send("setGoal", [goal])
 
     def look(self, view: str, name: str | None = None) -> None:
-        """Look from "above", at "all", or "follow" a vehicle."""
+        """Set the view: from "above", on "all", or "follow" a vehicle."""
         self.run_method("look", view, name)
 
     def _send(self, method, arguments):
@@ -148,14 +148,14 @@ def vehicle_rows(scene: Scene, chosen: set[str]) -> list[list[Any]]:
 
 
 def condition(vehicle: VehicleSnapshot) -> int:
-    """Return how a vehicle is drawn: 0 on the ground, 1 in flight, 2 stale, 3 emergency."""
+    """Return the style of a vehicle: 0 on the ground, 1 in flight, 2 stale, 3 emergency."""
     if vehicle.is_emergency:
         return 3
     return 2 if vehicle.is_stale else int(vehicle.is_in_flight)
 
 
 def _packed(solids):
-    """Return solids as the browser takes them: arrays as base64, since they may be long."""
+    """Return solids in the browser's format: arrays as base64, since they may be long."""
     rows, colours = (b64encode(each).decode() for each in (solids.rows, solids.colours))
     return [solids.shape, rows, colours, solids.opacity, solids.width]
 

@@ -32,7 +32,7 @@ CLOSING_TIME = 3.0  #: Longest time for the end of the server (s).
 
 
 async def _emergency(dashboard: Dashboard, request: Request) -> Response:
-    """Stop motors; answer with what has failed, a list of texts."""
+    """Stop motors; answer with the failures, a list of texts."""
     try:
         asked = await request.json()
         age, vehicles = float(asked["age"]), asked["vehicles"]
@@ -57,7 +57,7 @@ async def _report(dashboard: Dashboard, request: Request) -> Response:
     """Answer with the report on the last recording."""
     report = dashboard.report()
     if report is None:
-        return PlainTextResponse("No recording has been ended here.\n", 404)
+        return PlainTextResponse("This dashboard has not completed a recording.\n", 404)
     return FileResponse(report, media_type="text/html")
 
 
@@ -79,7 +79,7 @@ class Page:
         application.get("/camera")(partial(_camera, dashboard))
         application.get("/report")(partial(_report, dashboard))
 
-        # Without a history of messages a page that has lost its connection is loaded again.
+        # Without a history of messages, a page that has lost its connection is reloaded.
         ui.page("/", title="Crazyflie mission control")(lambda: View(dashboard))
         ui.run_with(
             application,
@@ -108,7 +108,7 @@ class Page:
         self._thread.start()
 
     def close(self) -> None:
-        """Serve no longer; pages that are open say that the connection is lost."""
+        """Stop serving; open pages say that the connection is lost."""
         self._server.should_exit = True
         self._thread.join(CLOSING_TIME)
         self._listener.close()

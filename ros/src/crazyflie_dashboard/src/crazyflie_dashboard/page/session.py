@@ -1,4 +1,4 @@
-"""One page that is open: its number, the vehicles chosen in it, and how it asks for things."""
+"""One open page: its number, its chosen vehicles, and its requests."""
 
 import asyncio
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action, VehicleSnapshot
 from crazyflie_utils.refusal import RefusalError
 
-#: Handler in the browser that sends when a click was; see head.html.
+#: Handler in the browser that sends the time of a click; see head.html.
 CLICKED = "(event) => emit(clickTime(event))"
 REFUSAL_TIME = 12000  #: Time for which a refusal is shown, ms.
 
@@ -27,7 +27,7 @@ class Session:
         self.dashboard = dashboard
         #: Its number; 0 while it has no connection. A page that connects again is a new one.
         self.page = 0
-        self.chosen: set[str] = set()  #: Names of the vehicles that its buttons are for.
+        self.chosen: set[str] = set()  #: Names of the vehicles that its buttons command.
         self.watched: str | None = None  #: The vehicle that was chosen last: its plots are shown.
         self._client = client
         client.on_connect(self._connect)
@@ -67,7 +67,7 @@ class Session:
 
     @property
     def vehicles(self) -> dict[str, VehicleSnapshot]:
-        """The vehicles that there are, by name."""
+        """All vehicles, by name."""
         return dict(self.dashboard.scene().vehicles)
 
     @property
@@ -76,7 +76,7 @@ class Session:
         return tuple(name for name in self.vehicles if name in self.chosen)
 
     def choose(self, names: Iterable[str], is_added: bool = False) -> None:
-        """Choose vehicles; with ``is_added`` turn the choice of these and leave the others."""
+        """Choose vehicles; with ``is_added`` toggle the choice of these and leave the others."""
         names = list(names)
         self.chosen = self.chosen ^ set(names) if is_added else set(names)
         if names:
@@ -84,11 +84,11 @@ class Session:
             self.dashboard.watch(self.page, self.watched)
 
     async def result(self, future: "Future[Result]") -> Result | None:
-        """Wait for what was asked for; None after showing why it was refused."""
+        """Wait for a result; return None after showing the reason of a refusal."""
         return future.result() if await self.succeeds(future) else None
 
     async def succeeds(self, future: "Future[Any]") -> bool:
-        """Wait for what was asked for; False after showing why it was refused."""
+        """Wait for success; return False after showing the reason of a refusal."""
         try:
             await asyncio.wrap_future(future)
         except RefusalError as error:
@@ -99,7 +99,7 @@ class Session:
     async def command(
         self, action: Action, names: Iterable[str], clicked: float, **details: Any
     ) -> bool:
-        """Command vehicles, and show each refusal; return whether all of them do it."""
+        """Command vehicles, and show each refusal; return whether all have accepted."""
         names = tuple(names)
         if not names:
             self.say(f"{action.value}: choose a vehicle first", "warning")

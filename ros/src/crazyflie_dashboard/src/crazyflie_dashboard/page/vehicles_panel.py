@@ -1,4 +1,4 @@
-"""Cards of the vehicles, and what the chosen ones can be told."""
+"""Cards of the vehicles, and commands for the chosen ones."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -27,7 +27,7 @@ LOOKS = ("ground", "flight", "stale", "emergency")
 
 
 class VehiclesPanel:
-    """Buttons for the chosen vehicles, where they are to go, and the cards."""
+    """Buttons for the chosen vehicles, their goal, and the cards."""
 
     def __init__(self, session: Session, scene_view: SceneView):
         self._session = session
@@ -58,7 +58,7 @@ class VehiclesPanel:
         self._cards = Cards()
         self._cards.on("choose", self._choose)
         self._cards.on("act", self._act)
-        self._sent: tuple[float, ...] | None = None  # Where the last go to leads, m.
+        self._sent: tuple[float, ...] | None = None  # Goal of the last go-to command, m.
         scene_view.on("choose", self._choose)
         scene_view.on("goal", self._set_goal)
 
@@ -66,10 +66,10 @@ class VehiclesPanel:
         return ui.button(text).props("unelevated").on("click", handler, js_handler=CLICKED)
 
     def refresh(self, scene: Scene) -> None:
-        """Show what has become of the vehicles."""
+        """Show the present state of the vehicles."""
         names = self._session.chosen_names
         self._choice.text = f"{len(names)} of {len(scene.vehicles)} chosen"
-        # None is chosen at first: what a press says then is the hint.
+        # No vehicle is chosen at first: the message after a press is the hint.
         chosen = [scene.vehicles[name] for name in names if name in scene.vehicles]
         self._up.set_enabled(not chosen or any(Action.TAKEOFF in offered(v) for v in chosen))
         self._hide_goal_that_is_reached(chosen)
@@ -119,7 +119,7 @@ class VehiclesPanel:
         self._scene_view.show_goal({"x": x, "y": y, "z": z, "yaw": yaw} if is_set else None)
 
     def _hide_goal_that_is_reached(self, chosen):
-        """Take the goal away when the middle of the vehicles that were sent there has come."""
+        """Remove the goal when the centre of the vehicles that were sent there has arrived."""
         places = [each.position for each in chosen if each.position is not None]
         if not self._sent or not places:
             return
@@ -141,7 +141,7 @@ class VehiclesPanel:
 
 
 def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
-    """Return what cards.js shows of a vehicle; fact: what, value, how it looks."""
+    """Return the data that cards.js shows of a vehicle; a fact is name, value, style."""
     battery = "" if vehicle.battery is None else f"{vehicle.battery:.2f} V"
     link = "" if vehicle.link_quality is None else f"{vehicle.link_quality:.0%}"
     is_weak = vehicle.link_quality is not None and vehicle.link_quality < 0.5
@@ -174,7 +174,7 @@ def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
 
 
 def offered(vehicle: VehicleSnapshot) -> set[Action]:
-    """Return what its card offers: what it can be told as it is now."""
+    """Return the commands on its card: those that it accepts in its present state."""
     shown = set(vehicle.actions) - {Action.GO_TO}
     if vehicle.is_emergency:
         return shown - {Action.TAKEOFF, Action.LAND, Action.ARM, Action.HOLD}
@@ -185,7 +185,7 @@ def offered(vehicle: VehicleSnapshot) -> set[Action]:
 
 
 def _charge(voltage: float) -> float:
-    # In steps: a bar that changes with every millivolt would be sent again all the time.
+    # Rounded: a bar that changes with every millivolt would be sent all the time.
     low, high = CHARGE_RANGE
     return round(min(max((voltage - low) / (high - low), 0.0), 1.0), 2)
 
@@ -199,7 +199,7 @@ def _reason(vehicle):
 
 
 def _age(age: float | None) -> str:
-    # A card that changes with every hundredth of a second would be sent again all the time.
+    # Rounded: a card that changes with every hundredth of a second would be sent all the time.
     if age is None:
         return ""
     return "now" if age < 0.3 else f"{age:.1f} s ago" if age < 10 else f"{age:.0f} s ago"

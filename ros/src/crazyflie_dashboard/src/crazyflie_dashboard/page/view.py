@@ -23,7 +23,7 @@ from crazyflie_dashboard.snapshot import Scene, Sentence, VehicleSnapshot
 
 SCENE_PERIOD = 0.05
 PANEL_PERIOD = 0.5  #: Period of the panels (s).
-MAX_SCENE_AGE = 1.0  #: An older scene is shown as old (s).
+MAX_SCENE_AGE = 1.0  #: Age after which a scene is shown as old (s).
 LOADING_TIME = 2.0  #: Longest time until the first scene (s).
 
 
@@ -61,7 +61,7 @@ class View:
         self._take = ui.button("Take control", on_click=self._take_or_release)
         self._take.props("outline").classes("take")
         emergency = ui.button("Emergency").props("unelevated color=negative icon=dangerous")
-        # No tooltip: it would stay, and cover the tabs.
+        # No tooltip: it would stay and cover the tabs.
         emergency.props('aria-label="Emergency: stop the motors of all vehicles"')
         emergency.classes("emergency-all").on("click", js_handler="(event) => emergency(event)")
         with emergency:
@@ -104,7 +104,7 @@ class View:
         return self._session.watched or next(iter(self._session.vehicles), None)
 
     def _scene(self) -> Scene:
-        """Return the newest scene; of one that is held up all vehicles are stale."""
+        """Return the newest scene; if it is late, with all vehicles stale."""
         scene = self._dashboard.scene()
         is_first = scene.made == math.inf
         age = time.monotonic() - (self._loaded + LOADING_TIME if is_first else scene.made)
@@ -153,7 +153,7 @@ class View:
             f"page {page} · you have control" if has else f"page {page} · {other} has control"
         )
         look = "mine" if has else "none" if controller is None else "other"
-        # In one call: two change the label, and send it, also where nothing is new.
+        # In one call: two calls would change the label, and send it, even if nothing is new.
         self._control.classes(look, remove="mine other none")
         self._take.text = "Give up" if has else "Take control"
 

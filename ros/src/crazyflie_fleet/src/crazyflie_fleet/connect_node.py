@@ -8,6 +8,11 @@ from std_msgs.msg import Float32
 from typing_extensions import override
 
 from crazyflie_driver.add_node import command_again
+from crazyflie_driver.parameters import (
+    POSITIONING_PARAMETER,
+    STANDARD_TOPICS,
+    VehicleParameters,
+)
 from crazyflie_driver.positioning import FLOW
 from crazyflie_driver.srv import (
     AddCrazyflie,
@@ -15,11 +20,6 @@ from crazyflie_driver.srv import (
     UpdateParamsRequest,
     WriteLighthouse,
     WriteLighthouseRequest,
-)
-from crazyflie_driver.vehicle_parameters import (
-    POSITIONING_PARAMETER,
-    STANDARD_TOPICS,
-    VehicleParameters,
 )
 from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters

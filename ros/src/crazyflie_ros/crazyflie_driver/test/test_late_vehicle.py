@@ -5,7 +5,7 @@ from conftest import LIMIT
 from safety_helpers import wait_for_words
 from std_msgs.msg import Bool
 
-from crazyflie_driver.server_parameters import CrazyflieServerParameters
+from crazyflie_driver.parameters import CrazyflieServerParameters
 from crazyflie_driver.vehicle import connect_within
 from crazyflie_link.errors import AddressError, NoAnswerError, NoDongleError, SetupError
 from crazyflie_utils import ServiceError

@@ -4,9 +4,9 @@ from concurrent.futures import Future
 
 from typing_extensions import override
 
+from crazyflie_driver.parameters import POSITIONING_PARAMETER, CrazyflieAddParameters
 from crazyflie_driver.server_node import ADD
 from crazyflie_driver.srv import AddCrazyflie
-from crazyflie_driver.vehicle_parameters import POSITIONING_PARAMETER, CrazyflieAddParameters
 from crazyflie_utils import Node, NodeHandle
 
 _LIMIT = 60.0  #: Time limit of the start of the server and of its connecting, s.

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 from crazyflie_driver.commands import SERVICE_TYPES, Command, Need, requested
-from crazyflie_driver.server_parameters import BroadcastParameters
+from crazyflie_driver.parameters import BroadcastParameters
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_link.address import Address
 from crazyflie_link.broadcast import Broadcaster, SharedCommand

@@ -5,9 +5,8 @@ import threading
 from dataclasses import dataclass
 
 from crazyflie_driver.jobs import Delivery, Jobs
-from crazyflie_driver.server_parameters import CrazyflieServerParameters
+from crazyflie_driver.parameters import CrazyflieServerParameters, VehicleParameters
 from crazyflie_driver.setpoint_gate import SetpointGate
-from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_utils import NodeHandle, ServiceError
 

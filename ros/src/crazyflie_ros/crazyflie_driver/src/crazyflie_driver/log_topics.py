@@ -14,8 +14,8 @@ from std_msgs.msg import Float32, Header, String
 from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.monitors import VARIANCES, VARIANCES_PERIOD_MS, Battery, Variances
 from crazyflie_driver.msg import GenericLogData, crtpPacket
+from crazyflie_driver.parameters import POSITIONING_TOPIC
 from crazyflie_driver.positioning import PERIOD_MS, SYSTEMS, Positioning, check_deck
-from crazyflie_driver.vehicle_parameters import POSITIONING_TOPIC
 from crazyflie_link.log import PERIOD_STEP_MS, LogBlock, quaternion_from_compressed
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_model.units import GRAVITY

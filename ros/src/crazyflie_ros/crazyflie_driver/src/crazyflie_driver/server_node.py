@@ -11,7 +11,7 @@ from typing_extensions import override
 
 from crazyflie_driver.all_vehicles import AllVehicles, Channel
 from crazyflie_driver.flight_commands import Reason
-from crazyflie_driver.server_parameters import CrazyflieServerParameters
+from crazyflie_driver.parameters import CrazyflieServerParameters, VehicleParameters
 from crazyflie_driver.srv import (
     AddCrazyflie,
     AddCrazyflieResponse,
@@ -20,7 +20,6 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_driver.status import diagnostics
 from crazyflie_driver.vehicle import DriverVehicle
-from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_link.address import Address
 from crazyflie_link.errors import AddressError, CrazyflieError
 from crazyflie_link.supervisor import BROADCAST_STOP

@@ -10,9 +10,13 @@ from std_msgs.msg import Bool, Header, String
 from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import Charge, battery_words
-from crazyflie_driver.server_parameters import LinkLimits
+from crazyflie_driver.parameters import (
+    CONNECTED_TOPIC,
+    STATUS_TOPIC,
+    VEHICLE_STATUS_TOPIC,
+    LinkLimits,
+)
 from crazyflie_driver.setpoint_topics import SetpointTopics
-from crazyflie_driver.vehicle_parameters import CONNECTED_TOPIC, STATUS_TOPIC, VEHICLE_STATUS_TOPIC
 from crazyflie_link.broadcast import Broadcaster
 from crazyflie_link.errors import LinkLostError
 from crazyflie_model.supervisor import SupervisorState

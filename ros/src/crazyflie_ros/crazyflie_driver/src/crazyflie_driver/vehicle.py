@@ -12,13 +12,16 @@ from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.jobs import Delivery, Job, Jobs
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.parameter_mirror import ParameterMirror
+from crazyflie_driver.parameters import (
+    POSITIONING_PARAMETER,
+    CrazyflieServerParameters,
+    VehicleParameters,
+)
 from crazyflie_driver.positioning import MOCAP, SOURCES
-from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_gate import GateEvent, SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import StatusPublisher
-from crazyflie_driver.vehicle_parameters import POSITIONING_PARAMETER, VehicleParameters
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import CrazyflieError, NoAnswerError
 from crazyflie_link.transmission import REPLY_LIMIT

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -21,7 +21,7 @@ from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils import NodeHandle, ParameterError, ServiceError
+from crazyflie_utils import ParameterError, ServiceError
 from crazyflie_utils.parameters.types import ParameterType
 
 #: Period and limit of the wait for a controller that has parameters, s.
@@ -38,6 +38,10 @@ class VehicleServices:
 
     What blocks on the vehicle is a job, where landing and stopping supersede what was asked
     before; all else is done at once.
+
+    rosmaster gives a name to the node that registers it last, and callers of the other node get an
+    error about md5 sums. A controller in the vehicle's namespace, such as crazyflie_controller, has
+    services takeoff and land as well.
     """
 
     _context: VehicleContext
@@ -46,20 +50,35 @@ class VehicleServices:
     _mirror: ParameterMirror
     _latch_emergency: Callable[[], None]
 
-    def __post_init__(self) -> None:
-        self._names = ServiceNames(self._context.handle, self._context.prefix)
+    def wait_for_controllers(self) -> None:
+        """Wait for the services of controllers that are about to come; blocks.
 
-    def wait_for_names(self) -> None:
-        """Wait for controllers whose services have these names; see `ServiceNames`."""
-        self._names.wait_for_controllers(self._context.connection.is_closing)
+        Their parameters are set before they start. They may also have been left by controllers that
+        ended long ago: therefore the wait has a limit.
+        """
+        context = self._context
+        names = context.handle.get_param(context.prefix or "/", _Controllers(), frozenset())
+        awaited = {f"{context.prefix}/{name}" for name in names}
+        end = time.monotonic() + CONTROLLER_LIMIT
+        while awaited and not context.connection.is_closing() and time.monotonic() < end:
+            awaited = {node for node in awaited if not self._is_ready(node)}
+            if awaited:
+                time.sleep(CONTROLLER_PERIOD)
+
+    def _is_ready(self, node):
+        offered = {
+            service.rpartition("/")[2]
+            for service, owner in self._context.handle.service_nodes().items()
+            if owner == node
+        }
+        return _SHARED <= offered
 
     def advertise(self) -> None:
-        """Offer all services that the vehicle has."""
-        offered: dict[str, tuple[type, Callable[[Any], Any]]] = {
+        """Offer all services that the vehicle has, below `ASIDE` what is another node's; blocks."""
+        services: dict[str, tuple[type, Callable[[Any], Any]]] = {
             "emergency": (Empty, self._on_emergency),
             "arm": (SetBool, self._on_arm),
-            "update_params": (srv.UpdateParams, self._job("update_params", self._update_params)),
-            "set_group_mask": (srv.SetGroupMask, self._job("set_group_mask", self._set_group_mask)),
+            "recover": (Empty, partial(self._on_job, "recovery", Empty, self._recover)),
             "upload_trajectory": (srv.UploadTrajectory, self._on_upload_trajectory),
             "upload_compressed_trajectory": (
                 srv.UploadCompressedTrajectory,
@@ -67,23 +86,30 @@ class VehicleServices:
             ),
             "notify_setpoints_stop": (srv.NotifySetpointsStop, self._on_notify_setpoints_stop),
             "send_packet": (srv.sendPacket, self._on_send_packet),
-            "recover": (Empty, self._job("recovery", self._recover)),
-            "set_led_color": (srv.SetLedColor, self._job("set_led_color", self._set_led_color)),
-            "store_params": (srv.UpdateParams, self._job("store_params", self._store)),
-            "clear_params": (srv.UpdateParams, self._job("clear_params", self._clear)),
-            "param_state": (srv.ParamState, self._job("param_state", self._state)),
-            "write_lighthouse": (
-                srv.WriteLighthouse,
-                self._job("write_lighthouse", self._write_lighthouse),
-            ),
         }
         for name, service_type in SERVICE_TYPES.items():
-            offered[name] = service_type, partial(self._on_command, name, service_type)
+            services[name] = service_type, partial(self._on_command, name, service_type)
+        jobs: dict[str, tuple[type, Callable[[Any], Any]]] = {
+            "update_params": (srv.UpdateParams, self._update_params),
+            "set_group_mask": (srv.SetGroupMask, self._set_group_mask),
+            "set_led_color": (srv.SetLedColor, self._set_led_color),
+            "store_params": (srv.UpdateParams, self._store),
+            "clear_params": (srv.UpdateParams, self._clear),
+            "param_state": (srv.ParamState, self._state),
+            "write_lighthouse": (srv.WriteLighthouse, self._write_lighthouse),
+        }
         if self._context.crazyflie.address.is_radio:
-            offered["reboot"] = Empty, self._job("reboot", self._reboot)
-        names = self._names.free(offered)
-        for name, (service_type, callback) in offered.items():
-            self._context.handle.advertise_service(names[name], service_type, callback)
+            jobs["reboot"] = Empty, self._reboot
+        for name, (service_type, work) in jobs.items():
+            services[name] = service_type, partial(self._on_job, name, service_type, work)
+        handle, prefix = self._context.handle, self._context.prefix
+        nodes = handle.service_nodes()
+        for name, (service_type, callback) in services.items():
+            free = desired = f"{prefix}/{name}"
+            if desired in nodes:
+                free = f"{prefix}/{ASIDE}/{name}"
+                handle.warn(f"{desired} is a service of {nodes[desired]}: the driver's is {free}")
+            handle.advertise_service(free, service_type, callback)
 
     # At once.
 
@@ -147,45 +173,47 @@ class VehicleServices:
             )
             for piece in request.pieces
         ]
-
-        def work(job):
-            trajectories = self._context.crazyflie.trajectories.guarded(job.may_send)
-            trajectories.upload(request.trajectoryId, request.pieceOffset, pieces, job.check)
-            return srv.UploadTrajectoryResponse()
-
-        return self._context.jobs.submit("upload_trajectory", work, is_flight=True)
+        return self._upload(
+            "upload_trajectory",
+            srv.UploadTrajectoryResponse(),
+            lambda memory, check: memory.upload(
+                request.trajectoryId, request.pieceOffset, pieces, check
+            ),
+        )
 
     def _on_upload_compressed(self, request):
         start = (request.start.x, request.start.y, request.start.z, request.startYaw)
         segments = [
             (each.duration.to_sec(), each.x, each.y, each.z, each.yaw) for each in request.segments
         ]
+        return self._upload(
+            "upload_compressed_trajectory",
+            srv.UploadCompressedTrajectoryResponse(),
+            lambda memory, check: memory.upload_compressed(
+                request.trajectoryId, request.offset, start, segments, check
+            ),
+        )
 
+    def _upload(self, name, response, upload):
         def work(job):
-            trajectories = self._context.crazyflie.trajectories.guarded(job.may_send)
-            trajectories.upload_compressed(
-                request.trajectoryId, request.offset, start, segments, job.check
-            )
-            return srv.UploadCompressedTrajectoryResponse()
+            upload(self._context.crazyflie.trajectories.guarded(job.may_send), job.check)
+            return response
 
-        return self._context.jobs.submit("upload_compressed_trajectory", work, is_flight=True)
+        return self._context.jobs.submit(name, work, is_flight=True)
 
-    def _job(self, name: str, work: Callable[[Any], Any]) -> Callable[[Any], Any]:
-        def callback(request):
-            def run(_: Job) -> Any:
-                try:
-                    return work(request)
-                except ParameterError as error:
-                    raise ServiceError(str(error)) from None
+    def _on_job(self, name, service_type, work, request):
+        def run(_: Job) -> Any:
+            try:
+                response = work(request)
+            except ParameterError as error:
+                raise ServiceError(str(error)) from None
+            return service_type._response_class() if response is None else response
 
-            return self._context.jobs.submit(name, run)
-
-        return callback
+        return self._context.jobs.submit(name, run)
 
     def _recover(self, _):
         self._context.refuse_after_emergency()
         self._context.crazyflie.supervisor.recover()
-        return EmptyResponse()
 
     def _set_led_color(self, request):
         color = request.color
@@ -197,17 +225,14 @@ class VehicleServices:
         for name, value in parts.items():
             self._mirror.set(f"ring.solid{name}", round(255 * value))
         self._mirror.set("ring.effect", _SOLID_COLOR)
-        return srv.SetLedColorResponse()
 
     def _store(self, request):
         for name in map(parsed_name, request.params):
             self._context.crazyflie.parameters.store(name)
-        return srv.UpdateParamsResponse()
 
     def _clear(self, request):
         for name in map(parsed_name, request.params):
             self._context.crazyflie.parameters.clear(name)
-        return srv.UpdateParamsResponse()
 
     def _state(self, request):
         state = self._context.crazyflie.parameters.stored(parsed_name(request.param))
@@ -225,15 +250,12 @@ class VehicleServices:
         self._context.crazyflie.lighthouse.write_file(
             request.file, self._context.crazyflie.parameters
         )
-        return srv.WriteLighthouseResponse()
 
     def _update_params(self, request):
         self._mirror.write(request.params)
-        return srv.UpdateParamsResponse()
 
     def _set_group_mask(self, request):
         self._context.crazyflie.high_level.set_group_mask(request.groupMask)
-        return srv.SetGroupMaskResponse()
 
     def _reboot(self, _):
         try:
@@ -252,55 +274,6 @@ class VehicleServices:
                 f"fall; its state is: {state.words()}"
             )
         self._context.crazyflie.reboot()
-        return EmptyResponse()
-
-
-@dataclass(eq=False)
-class ServiceNames:
-    """Names for a vehicle's services that belong to no other node; all methods block.
-
-    rosmaster gives a name to the node that registers it last, and callers of the other node get an
-    error about md5 sums. A controller in the vehicle's namespace, such as crazyflie_controller, has
-    services takeoff and land as well.
-    """
-
-    _handle: NodeHandle
-    _prefix: str
-
-    def wait_for_controllers(self, is_over: Callable[[], bool]) -> None:
-        """Wait for the services of controllers that are about to come, until ``is_over()``.
-
-        Their parameters are set before they start. They may also have been left by controllers that
-        ended long ago: therefore the wait has a limit.
-        """
-        names = self._handle.get_param(self._prefix or "/", _Controllers(), frozenset())
-        awaited = {f"{self._prefix}/{name}" for name in names}
-        end = time.monotonic() + CONTROLLER_LIMIT
-        while awaited and not is_over() and time.monotonic() < end:
-            awaited = {node for node in awaited if not self._is_ready(node)}
-            if awaited:
-                time.sleep(CONTROLLER_PERIOD)
-
-    def _is_ready(self, node):
-        offered = {
-            service.rpartition("/")[2]
-            for service, owner in self._handle.service_nodes().items()
-            if owner == node
-        }
-        return _SHARED <= offered
-
-    def free(self, names: Iterable[str]) -> dict[str, str]:
-        """Return the name, such as "takeoff", of each service -> a free absolute name."""
-        nodes = self._handle.service_nodes()
-        found = {}
-        for name in names:
-            desired = found[name] = f"{self._prefix}/{name}"
-            if desired in nodes:
-                found[name] = f"{self._prefix}/{ASIDE}/{name}"
-                self._handle.warn(
-                    f"{desired} is a service of {nodes[desired]}: the driver's is {found[name]}"
-                )
-        return found
 
 
 class _Controllers(ParameterType):

@@ -145,7 +145,7 @@ class DriverVehicle(VehicleContext):
             connect_within(limit, self.crazyflie.connect, self.connection.is_closing)
             self.connection.handle(ConnectionEvent.LINK_OPENED)
             self._choose_positioning()
-            self._services.wait_for_names()
+            self._services.wait_for_controllers()
             with self._announcing:
                 if self.connection.is_closing():
                     raise ServiceError("removed while connecting")

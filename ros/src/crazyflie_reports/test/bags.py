@@ -1,6 +1,7 @@
 """Bags of flights that are known in closed form."""
 
 import contextlib
+import math
 
 import numpy as np
 import rosbag
@@ -65,10 +66,12 @@ def steps(gap=()):
             yield number, float(time)
 
 
-def write_flight(bag, name="", gap=(), is_typed=True, tilt=0.0):
+def write_flight(bag, name="", gap=(), is_typed=True, tilt=0.0, drift=0.0, lateness=None):
     """Write the topics of a vehicle that flies (C++ workspace: without FlightStatus).
 
-    Its roll is commanded to +-``tilt`` (rad) in turn.
+    Its roll is commanded to +-``tilt`` (rad) in turn. Its true y differs from the estimate by
+    ``drift`` (m/s) times the time. With ``lateness`` (s) its roll is a sine of 1 Hz, which follows
+    its command that late.
     """
     top = f"/{name}" if name else ""
     for number, time in steps(gap):
@@ -76,8 +79,19 @@ def write_flight(bag, name="", gap=(), is_typed=True, tilt=0.0):
         state = PositionVelocityYawState(z=z, z_dot=speed)
         message = PositionVelocityYawStateStamped(header=header(time, number), state=state)
         bag.write(f"{top}/state", message, stamp(time))
+        if drift:
+            true = PoseStamped(header=header(time, number))
+            true.pose.position.y, true.pose.position.z = drift * time, z
+            true.pose.orientation.w = 1.0
+            bag.write(f"{top}/true_pose", true, stamp(time))
         thrust = 9.81 if TAKEOFF <= time < LANDED else 0.0
         roll = tilt if number % 2 else -tilt
+        if lateness is not None:
+            roll = 0.1 * math.sin(2.0 * math.pi * time)
+            pose = PoseStamped(header=header(time, number))
+            pose.pose.orientation.w = 1.0
+            pose.pose.orientation.x = 0.05 * math.sin(2.0 * math.pi * (time - lateness))
+            bag.write(f"{top}/pose", pose, stamp(time))
         control = ControlStamped(header(time, number), Control(roll=roll, thrust=thrust))
         bag.write(f"{top}/control/final", control, stamp(time + DELAY))
     hover = PositionVelocityStateStamped(header(TAKEOFF), PositionVelocityState(z=1.0))

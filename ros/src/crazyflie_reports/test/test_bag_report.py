@@ -58,6 +58,23 @@ def test_figures(run, compression, is_typed):
     assert phases[1][1] == pytest.approx(bags.FLYING - bags.TAKEOFF, abs=0.01)
 
 
+def test_the_drift_of_an_estimate_is_shown(run):
+    _, _, (flight,) = run(bags.flight_bag(run.folder / "a.bag", drift=0.02))
+    drift = flight["figures"]["drift of the estimate, maximum"]
+    assert drift["value"] == pytest.approx(20.0 * bags.LANDED, abs=1.0)
+
+
+@pytest.mark.parametrize(("lateness", "is_normal"), [(0.15, True), (0.35, False)])
+def test_a_vehicle_that_is_later_than_its_model_is_said_to_be(run, lateness, is_normal):
+    _, _, (flight,) = run(bags.flight_bag(run.folder / "a.bag", lateness=lateness))
+    late = flight["figures"]["roll and pitch behind their commands"]
+    assert late["value"] == pytest.approx(1e3 * (lateness - bags.DELAY), abs=10.0)
+    assert late["normal"] == "≤ 250 ms"
+    with (run.folder / "out" / "figures.csv").open() as file:
+        (row,) = [each for each in csv.DictReader(file) if "behind" in each["figure"]]
+    assert row["is normal"] == str(is_normal)
+
+
 def test_restless_controls_are_not_normal(run):
     bag = bags.flight_bag(run.folder / "a.bag", tilt=0.2618)
     status, printed, (flight,) = run(bag)

@@ -48,6 +48,13 @@ def test_vehicle_answers(launch):
     assert f"udp://127.0.0.1:{address[1]}" in process.logged("info")[0]
 
 
+def test_the_true_pose_is_published(launch):
+    process = launch(VirtualCrazyflieNode(), {**QUIET, "init/x": 2, "topics/true_pose": "/true"})
+    process.advance(0.1)
+    pose = process.published("/true")[-1].pose
+    assert (pose.position.x, pose.orientation.w) == (2.0, 1.0)
+
+
 def test_what_moves_is_where_tf_says(launch, tmp_path):
     file = tmp_path / "room.yaml"
     file.write_text(

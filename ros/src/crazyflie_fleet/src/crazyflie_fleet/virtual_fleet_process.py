@@ -58,6 +58,7 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
                 "mass_error": config.mass_error,
                 "thrust_error": config.thrust_error,
                 "seed": number,
+                "topics": {"true_pose": f"/{vehicle.name}/true_pose"},
                 "positioning": DECKS.get(vehicle.settings.positioning, DECK),
                 "observer": {
                     "port": config.observer_port,

@@ -56,6 +56,7 @@ class Vehicle:
     command: Rows  #: CONTROL_FIELDS as the driver was given them; none without a driver.
     attitude: Rows  #: POSE_FIELDS.
     pose_stamps: Rows  #: Of the poses with an attitude, s; 0 for a pose without.
+    true_pose: Rows  #: POSE_FIELDS, as a virtual vehicle knows it.
     battery: Rows  #: V.
     link: Rows  #: Share of answered pings, and setpoints that were not sent so far.
     toggles: Rows  #: Without fields.
@@ -145,6 +146,7 @@ def _vehicle(namespace, sources, frame, frames, link):
         command=_without_header(cmd_vel),
         attitude=_without_header(pose),
         pose_stamps=pose[:, [_TIME, _STAMP]],
+        true_pose=_without_header(rows("true_pose", len(POSE_FIELDS))),
         battery=_without_header(rows("battery", 1)),
         link=link,
         toggles=_without_header(rows("toggle", 0)),
@@ -214,8 +216,9 @@ class Flight:
     number: int  #: Of the vehicle's flights in the recording, from 1.
     phases: list[Phase]
     record: FlightRecord  #: With `MARGIN` before and after.
-    #: attitude, battery, link, delays: As in `Vehicle`.
+    #: attitude, true_pose, battery, link, delays: As in `Vehicle`.
     attitude: Rows
+    true_pose: Rows
     battery: Rows
     link: Rows
     delays: Rows
@@ -253,6 +256,7 @@ def flights(
             phases,
             _record(vehicle, phases, first, last),
             _between(vehicle.attitude, first, last),
+            _between(vehicle.true_pose, first, last),
             _between(vehicle.battery, first, last),
             _between(vehicle.link, first, last),
             _between(vehicle.delays, phases[0].start, phases[-1].end),

@@ -99,6 +99,13 @@ ROLES = (
         POSE_FIELDS,
         {"geometry_msgs/PoseStamped": lambda message: pose_row(message.pose)},
     ),
+    # A virtual vehicle publishes it.
+    Role(
+        "true_pose",
+        "true_pose",
+        POSE_FIELDS,
+        {"geometry_msgs/PoseStamped": lambda message: pose_row(message.pose)},
+    ),
     Role("battery", "battery", ("voltage",), {"std_msgs/Float32": lambda m: (m.data,)}),
     Role("toggle", "in_flight", (), {"std_msgs/Empty": lambda message: ()}),
 )

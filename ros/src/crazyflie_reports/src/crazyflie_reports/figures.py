@@ -48,6 +48,7 @@ _HOVER = "a takeoff, and a hover of 1 s at its reference"
 _TRACKING = "states and references while the controller flies"
 _CONTROL, _STATE, _BATTERY = "controls in flight", "states in flight", "battery voltages"
 _TILTS = "controls and poses with an attitude, and motion"
+_TRUTH = "true_pose, which a virtual vehicle publishes"
 _STATUS = "vehicle_status, which a driver publishes"
 
 
@@ -94,6 +95,7 @@ def figures(flight: Flight) -> list[Figure]:
     return [
         *_hover(flight),
         *_tracking(flight),
+        _drift(flight),
         *_motion(flight),
         *_controls(flight),
         *_model(flight),
@@ -133,6 +135,18 @@ def _tracking(flight: Flight) -> Iterator[Figure]:
     yield Figure("error in flight, rms", "mm", rms, _TRACKING, maximum=500.0 * TRACKING_LIMIT)
     yield Figure("error in flight, 95 %", "mm", share, _TRACKING, maximum=1e3 * TRACKING_LIMIT)
     yield Figure("error in flight, maximum", "mm", largest, _TRACKING)
+
+
+def _drift(flight: Flight) -> Figure:
+    state, truth = flight.record.state, flight.true_pose
+    times = state.times[(state.times >= flight.start) & (state.times <= flight.end)]
+    drift = math.nan
+    if len(times) and len(truth) > 1:
+        times = times[(times >= truth[0, 0]) & (times <= truth[-1, 0])]
+        true = np.column_stack([np.interp(times, truth[:, 0], truth[:, k]) for k in (1, 2, 3)])
+        estimated = state.values[np.searchsorted(state.times, times), :3]
+        drift = 1e3 * _max(np.linalg.norm(estimated - true, axis=1))
+    return Figure("drift of the estimate, maximum", "mm", drift, _TRUTH)
 
 
 def _motion(flight: Flight) -> Iterator[Figure]:
@@ -206,7 +220,7 @@ def _model(flight: Flight) -> Iterator[Figure]:
 
 
 def _lateness(flight, start, end):
-    """Return by how much roll and pitch follow their commands, s, by their correlation.
+    """Return by how much roll and pitch follow their commands (s), by the correlation of both.
 
     NaN if they do not: without motion, noise is more than the commands.
     """
@@ -216,17 +230,20 @@ def _lateness(flight, start, end):
         return math.nan
     times = np.arange(poses[0, 0], poses[-1, 0] - _MAX_LATENESS, _LATENESS_STEP)
     shifts = np.arange(0.0, _MAX_LATENESS, _LATENESS_STEP)
+    command = _tilts(times, control.times, control.values[:, :2])
     found = np.zeros(len(shifts))
-    for column in (0, 1):
-        command = np.interp(times, control.times, control.values[:, column])
-        command = command - command.mean()
-        for k, shift in enumerate(shifts):
-            tilt = np.interp(times + shift, poses[:, 0], poses[:, 4 + column])
-            spread = command.std() * tilt.std()
-            if spread > 0.0:
-                found[k] += 0.5 * float((command * tilt).mean()) / spread
+    for k, shift in enumerate(shifts):
+        tilt = _tilts(times + shift, poses[:, 0], poses[:, 4:6])
+        spread = np.linalg.norm(command) * np.linalg.norm(tilt)
+        found[k] = (command * tilt).sum() / spread if spread > 0.0 else 0.0
     best = int(found.argmax())
     return float(shifts[best]) if found[best] > _LEAST_CORRELATION else math.nan
+
+
+def _tilts(times, known, values):
+    """Return roll and pitch at some times, less their means, shape (n, 2)."""
+    tilts = np.column_stack([np.interp(times, known, column) for column in values.T])
+    return tilts - tilts.mean(axis=0)
 
 
 def _loop(flight: Flight) -> Iterator[Figure]:

@@ -21,7 +21,7 @@ import rospkg
 TOPICS = (
     r"/tf(_static)?|/diagnostics|/rosout|/flights|(/.*)?/("
     r"(full_)?state|state/full_state|ref(/.*)?|ref_descent|control/(lqr|takeoff|merged|final)|in_flight(_.*)?"
-    r"|pose|goal|cmd_[a-z_]+|external_(pose|position)|battery|rssi|imu|connected|status|vehicle_status"
+    r"|(true_)?pose|goal|cmd_[a-z_]+|external_(pose|position)|battery|rssi|imu|connected|status|vehicle_status"
     r"|parameter_updates)"
 )
 

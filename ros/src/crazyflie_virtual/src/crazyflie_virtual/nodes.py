@@ -3,9 +3,18 @@
 from functools import partial
 from typing import ClassVar, cast
 
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from typing_extensions import override
 
-from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, TransformError
+from crazyflie_utils import (
+    Node,
+    NodeHandle,
+    ParameterError,
+    Parameters,
+    TransformError,
+    parameter,
+)
+from crazyflie_utils.parameters.types import TOPIC
 from crazyflie_virtual.mocap import MocapServer, MocapSettings
 from crazyflie_virtual.server import Server, VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
@@ -64,7 +73,16 @@ class ServerNode(Node):
         self._settings = settings
 
 
+_POSE_PERIOD = 0.05  #: Period at which the true pose is published (s).
 _LOOK_PERIOD = 0.05  #: Period at which the moving objects of the vehicle's world are looked up, s.
+
+
+class VehicleParameters(VehicleSettings):
+    """Parameters of `VirtualCrazyflieNode`."""
+
+    true_pose_topic: str = parameter(
+        TOPIC, "the true pose, for the drift in a report", "~true_pose", "topics/true_pose"
+    )
 
 
 class VirtualCrazyflieNode(ServerNode):
@@ -73,16 +91,26 @@ class VirtualCrazyflieNode(ServerNode):
     What moves in its world is where /tf says, or where it began.
     """
 
-    settings_type = VehicleSettings
+    settings_type = VehicleParameters
     server_type = VehicleServer
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         super().register_callbacks(handle)
         physics = cast(VehicleServer, self._server).vehicle.physics
+        parameters = cast(VehicleParameters, self._settings)
+        self._true_pose = handle.publisher(parameters.true_pose_topic, PoseStamped)
+        handle.timer(_POSE_PERIOD, partial(self._publish, physics))
         if physics.world is not None and physics.world.moving:
             self._lookup = handle.listen_to_transforms()
             handle.timer(_LOOK_PERIOD, partial(self._look, physics, physics.world))
+
+    def _publish(self, physics):
+        if self._true_pose.has_subscribers():
+            position, orientation = Point(*physics.position), Quaternion(*physics.quaternion)
+            message = PoseStamped(pose=Pose(position, orientation))
+            message.header.stamp, message.header.frame_id = self._handle.stamp(), "world"
+            self._true_pose.publish(message)
 
     def _look(self, physics, world):
         centres = {}

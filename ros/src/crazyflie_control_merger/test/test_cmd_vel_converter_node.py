@@ -93,7 +93,7 @@ def test_controls_of_a_simulation_are_not_sent_to_a_vehicle():
     process = FakeProcess()
     process.transport.foreign_services["/control/final/vehicle"] = "/simulator"
     assert not process.launch(CmdVelConverterNode(), "/cmd_vel_converter", PARAMETERS)
-    assert "fly a vehicle of /simulator already (process 1 on" in process.logged("error")[0]
+    assert "already fly a vehicle of /simulator (process 1 on" in process.logged("error")[0]
 
 
 def test_a_simulation_that_has_died_is_in_nobody_s_way():

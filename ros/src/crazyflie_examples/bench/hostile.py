@@ -43,7 +43,7 @@ _ATTACKS = {
 
 
 def main() -> None:
-    """Attack, one way after the other."""
+    """Run all attacks, one after the other."""
     if sys.argv[1:] == ["freeze"]:
         freeze()
     rospy.init_node("victim_watch")
@@ -86,14 +86,14 @@ def main() -> None:
 
 
 def begin(attacker: subprocess.Popen[bytes]) -> None:
-    """Let an attacker begin."""
+    """Start an attacker."""
     assert attacker.stdin is not None
     attacker.stdin.write(b"begin\n")
     attacker.stdin.flush()
 
 
 def end(attacker: subprocess.Popen[bytes]) -> str:
-    """End an attacker, and return to how many subscribers it sent how many messages a second."""
+    """End an attacker; return its number of subscribers and its messages per second."""
     attacker.send_signal(signal.SIGCONT)
     sent, _ = attacker.communicate(b"end\n", timeout=10.0)
     return " x ".join(sent.decode().split())

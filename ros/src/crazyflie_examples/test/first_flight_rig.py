@@ -108,7 +108,7 @@ class FastRig:
             message = TransformStamped(header, "crazyflie", transform)
             self._graph.publish("/tf", TFMessage([message]))
 
-    # What a person and the driver do.
+    # The actions of a person and of the driver.
 
     def examine(self):
         deviation = math.sqrt(self._firmware.variance_velocity)

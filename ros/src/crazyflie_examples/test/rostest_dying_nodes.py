@@ -28,7 +28,7 @@ def process_id(node):
 
 
 def kill(node):
-    """Let a node die, and wait until there is another one."""
+    """Kill a node, and wait until it has been restarted."""
     first = process_id(node)
     os.kill(first, signal.SIGKILL)
     wait_until(lambda: process_id(node) not in (None, first), f"another {node}")

@@ -63,7 +63,7 @@ class Attacker:
 
 @contextlib.contextmanager
 def attackers():
-    """Have all of them ready, for it takes them a while."""
+    """Wait until all of them are ready, which takes a while."""
     ready = {}
     try:
         for kind in ATTACKS:

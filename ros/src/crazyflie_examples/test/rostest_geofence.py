@@ -34,13 +34,13 @@ OUTSIDE = [
 CLOSE = 0.3
 """How near to the walls it comes at least, m."""
 
-# Of the fence, as launched: margin, deceleration, reaction time, recovery rate.
+# The fence's values at the launch: margin, deceleration, reaction time, recovery rate.
 MARGIN, HORIZONTAL, VERTICAL, RATE = 0.5, (1.5, 0.4), (4.0, 0.2), 1.0
 
 
 @dataclass
 class FenceFlight:
-    """What was recorded: true positions, regular and final control, and the legs."""
+    """Recorded data: true positions, regular and final control, and the legs."""
 
     positions: Series
     regular: Series
@@ -172,8 +172,8 @@ def test_takes_over_smoothly(flight):
     times, regular, final = flight.common_controls()
     of_regular = np.abs(np.diff(regular, axis=0))
     of_final = np.abs(np.diff(final, axis=0))
-    # What the regular controller does at once the fence may pass on a period or
-    # two later: it answers the state before, with the regular control before that.
+    # The fence may pass on a regular control a period or two later: it answers the previous state,
+    # with the regular control before that.
     passed_on = np.maximum(np.maximum(of_regular[2:], of_regular[1:-1]), of_regular[:-2])
     consecutive = times[3:] - times[:-3] < 3.5 * PERIOD
     assert consecutive.sum() > 0.8 * (flight.end - flight.start) / PERIOD

@@ -1,4 +1,4 @@
-"""What outsiders see of the example, in one process or in many."""
+"""The example as seen by other nodes, in one process or in many."""
 
 import math
 

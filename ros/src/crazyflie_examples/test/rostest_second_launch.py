@@ -15,7 +15,7 @@ LOWEST, HIGHEST = 0.8, 1.2
 
 
 class SecondLaunch:
-    """What a launch printed while another one was flying."""
+    """Output of a launch while another one was flying."""
 
     def __init__(self, folder, operator, launch_file, arguments):
         self._log = folder / f"{launch_file}.log"
@@ -33,7 +33,7 @@ class SecondLaunch:
 
     @property
     def output(self):
-        """What it has printed so far."""
+        """The output so far."""
         return self._log.read_text(errors="replace")
 
     def _has_refused_all(self):
@@ -79,5 +79,8 @@ def test_the_vehicle_of_the_controls_is_named(flight):
     if "hw_hover" in flight[1]:
         owner = "real vehicle, by /cmd_vel_converter"
         # The simulator's name is free, the controls that it would fly by are not.
-        assert "/control/final fly a vehicle of /cmd_vel_converter" in flight[1]["sw_hover"].output
+        assert (
+            "/control/final already fly a vehicle of /cmd_vel_converter"
+            in flight[1]["sw_hover"].output
+        )
     assert owner in rospy.ServiceProxy("/control/final/vehicle", Trigger)().message

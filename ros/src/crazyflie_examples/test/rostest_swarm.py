@@ -67,7 +67,7 @@ def test_two_that_are_sent_to_each_other_keep_apart(places):
     distances = []
 
     def note(message):
-        # Of one moment: states come one by one, and simulated time passes quickly.
+        # Positions at one moment: states come one by one, and simulated time passes quickly.
         at = {each.child_frame_id: each.transform.translation for each in message.transforms}
         a, b = at["cf1"], at["cf2"]
         distances.append(math.dist((a.x, a.y, a.z), (b.x, b.y, b.z)))

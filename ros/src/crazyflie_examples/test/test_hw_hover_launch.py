@@ -10,8 +10,8 @@ from crazyflie_utils.testing import launch_files
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch"
 
-# What users' own launch files may set, with the defaults they count on; None for a
-# path, or for what is a matter of tuning.
+# Arguments that users' launch files may set, with the defaults on which they rely; None for a path,
+# or for a tuning value.
 ARGUMENTS = {
     "reference_topic": "/ref",
     "state_topic": "/state",
@@ -75,7 +75,7 @@ def test_what_dies_in_flight_is_started_again():
 
 
 def test_the_frame_of_motion_capture_outlives_its_publisher():
-    # What tf2's publisher says is latched, and kept; tf's would have to go on.
+    # Messages of tf2's publisher are latched and kept; tf's publisher would have to repeat them.
     nodes, _ = launch_files.expand(LAUNCH / "hw_hover.launch", rviz="false")
     assert nodes["/mocap_robot_publisher"].package == "tf2_ros"
 

@@ -20,7 +20,7 @@ LQR = Path(RosPack().get_path("crazyflie_lqr"))
 HEIGHT = 1.0
 FRAMES = {"frames/fixed": "world", "frames/robot": "crazyflie"}
 
-# Of the launch files: gains, integrator of x, y, z and its limits, filter.
+# Values of the launch files: gains, integrator of x, y, z and its limits, filter.
 HARDWARE = ("references/K_manual.txt", (-0.05, 0.05, -0.5), (1.0, 1.0, 6.0), "kalman")
 SOFTWARE = ("config/K_quadrotor.txt", (-0.15, 0.15, -10.0), (0.2, 0.2, 0.25), "finite_difference")
 
@@ -70,7 +70,7 @@ def launch(example, mass_error, thrust_error):
 
 
 def heights(process, duration):
-    """Let time pass; return the heights of the vehicle meanwhile."""
+    """Advance the time; return the heights of the vehicle."""
     before = len(process.published("/tf"))
     process.advance(duration)
     messages = process.published("/tf")[before:]

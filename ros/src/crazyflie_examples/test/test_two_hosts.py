@@ -24,7 +24,7 @@ robots:
   cf4: {initial_position: [1, 1, 0], machine: far}
 """
 
-# What a user runs beside the master.
+# Programs that a user runs next to the master.
 SCRIPT = """
 import sys, time
 import rosgraph, rospy

@@ -148,7 +148,7 @@ def test_simulated_vehicles_need_no_address(load):
     [
         (
             TWO.replace("cf2", "cf1"),
-            ":6: robots/cf1 is there twice, first in line 3",
+            ":6: robots/cf1 occurs twice, first in line 3",
         ),
         (
             TWO.replace("radio://0/80/2M/E7E7E7E701", "udp://a:1").replace(
@@ -199,7 +199,7 @@ def test_simulated_vehicles_need_no_address(load):
             ":3) is 'radio://0/80/3M/E7E7E7E701'; expected radio://DONGLE/CHANNEL/RATE/ADDRESS",
         ),
         (TWO + "    enabled: maybe\n", ":8) is 'maybe'; expected true or false"),
-        (TWO + "    initial_position: [0, 1]\n", ":8: robots/cf2/initial_position is there twice"),
+        (TWO + "    initial_position: [0, 1]\n", ":8: robots/cf2/initial_position occurs twice"),
         (
             "robots: {a: {}}\n",
             ":1) is not set; expected a list of 3, each entry a finite number (m)",

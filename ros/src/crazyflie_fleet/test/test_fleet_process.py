@@ -150,7 +150,7 @@ def test_controls_of_another_launch_fly_none_of_these_vehicles():
     nodes = make_nodes(process.handle("/fleet"))
     (name,) = (n for n, node in nodes.items() if isinstance(node, VectorizedSimulatorNode))
     assert not process.launch(nodes[name], name)
-    assert "/cf1/control/final fly a vehicle of /driver already" in process.logged("error")[0]
+    assert "/cf1/control/final already fly a vehicle of /driver" in process.logged("error")[0]
     assert "/cf1/control/final/vehicle" in swarm.process.transport.services
 
 

@@ -24,7 +24,7 @@ USUAL = {
 
 
 def arguments(**changes):
-    """Return a command line; an option that is None is left out."""
+    """Return a command line; an option that is None is omitted."""
     options = {**USUAL, **{f"--{name}": value for name, value in changes.items()}}
     return shlex.split(" ".join(f"{k} {v}" for k, v in options.items() if v is not None))
 
@@ -156,9 +156,9 @@ def test_a_matrix_may_be_longer_than_a_name_of_a_file(tmp_path):
         ({"R": "0 1 1 1"}, "R is not positive definite"),
         ({"R": "1 1 0 0  0 1 0 0  0 0 1 0  0 0 0 1"}, "R is not symmetric"),
         ({"R": "1 1 one 1"}, "'one'"),
-        ({"R": "1 1_0 1 1"}, "'1_0' is no number"),
+        ({"R": "1 1_0 1 1"}, "'1_0' is not a number"),
         ({"Q": "nan 1 4 1 1 4 100"}, "Q has entries that are not finite"),
-        ({"Q": "Q.txt"}, "nor is there such a file"),
+        ({"Q": "Q.txt"}, "and not the name of a file"),
         ({"Q": "1 0 4 1 1 4 0"}, "do not see"),
         ({"delay": "0.1"}, "a delay needs a sample time"),
         ({"sample_time": "-0.1"}, "sample time"),

@@ -1,4 +1,4 @@
-"""What the step responses in the picture show."""
+"""The step responses in the picture."""
 
 import math
 

@@ -171,7 +171,7 @@ def test_an_integral_that_had_no_effect_begins_at_zero():
     np.testing.assert_allclose(after.control(state(), np.zeros(7), 0.3), U_REF)
 
 
-# What the integral does while the control is not what moves the vehicle.
+# The integral while another control moves the vehicle.
 
 
 def lifting(k=-1.0, limit=9.0, K=GENTLE):

@@ -1,4 +1,4 @@
-"""What is followed while the source of references fails."""
+"""The reference that is followed while its source fails."""
 
 import numpy as np
 
@@ -49,7 +49,7 @@ def test_a_valid_one_is_followed_again_and_the_next_hold_point_is_elsewhere():
     assert followed(reference, 14.0, np.ones(7)) == [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 
 
-# Whose reference counts.
+# Priority among the sources of references.
 
 
 def test_an_older_one_does_not_count():
@@ -102,7 +102,7 @@ def test_a_distant_one_is_moved_nearer_once():
     cut = [1.0, 2.4, 2.8, 0.0, 0.0, 0.0, 0.3]
     np.testing.assert_allclose(followed(reference, 0.0, x), cut)
     np.testing.assert_allclose(followed(reference, 1.0, x + 1.0), cut)
-    assert reports == ["the reference is 10.0 m away; going 3 m in its direction"]
+    assert reports == ["the reference is 10.0 m away; flying 3 m in its direction"]
     reference.update(np.array([1.0, 2.9, 1.0, 1.0, 0.0, 0.0, 0.3]), time=2.0)
     assert followed(reference, 2.0, x) == [1.0, 2.9, 1.0, 1.0, 0.0, 0.0, 0.3]
 

@@ -38,7 +38,7 @@ def test_a_large_velocity_keeps_its_direction():
     reference.update([0.0, 0.0, 1.0, 6.0, 0.0, -8.0, 0.3])
     assert reference.value(0.0, HERE) == pytest.approx([0.0, 0.0, 1.0, 1.2, 0.0, -1.6, 0.3])
     assert reports == [
-        "the reference has a velocity of 10.0 m/s; expected <= 2 m/s, with which it is followed"
+        "the reference has a velocity of 10.0 m/s; expected <= 2 m/s, the velocity is limited"
     ]
 
 
@@ -68,7 +68,7 @@ def test_one_that_is_not_renewed_becomes_a_place_to_rest_at():
     for time in (10.5, 20.0):
         assert reference.value(time, HERE) == [0.1, 0.0, 1.0, 0.0, 0.0, 0.0, 0.7]
     assert reports == [
-        "the reference has a velocity and has been the last for 0.5 s; resting where it is"
+        "the reference has a velocity and none has followed for 0.5 s; stopping at its position"
     ]
     reference.update(x_ref, time=30.0)
     assert reference.value(30.1, HERE) == x_ref
@@ -129,10 +129,10 @@ def test_the_velocity_of_points_that_stay_does_not_count_for_long(period, veloci
     reports = []
     followed = streamed(guarded(reports), period, 5.0, stays, lambda time: velocity)
     led = np.linalg.norm(period * followed.sum(axis=0))
-    # Of 0.5 m, some is forgotten meanwhile.
+    # Part of the 0.5 m is forgotten meanwhile.
     assert led <= 0.75 + 2.0 * period
     assert not followed[-10:].any()
-    assert "does not count, since they do not move with it" in reports[-1]
+    assert "is ignored, since they do not move with it" in reports[-1]
 
 
 @pytest.mark.parametrize("size", [0.2, 1.0])

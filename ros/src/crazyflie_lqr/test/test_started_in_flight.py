@@ -1,4 +1,4 @@
-"""A controller that is started anew in flight, and one whose states are late."""
+"""A controller that is restarted in flight, and one whose states are late."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_without_a_reference_it_keeps_the_place_of_a_vehicle_in_flight(process):
     np.testing.assert_allclose(first, HOVER, atol=1e-12)
     [second] = answer(process, x=1.1, y=-2.0, z=1.5)
     assert second[1] < 0.0
-    # The reference that is latched, or comes later, counts.
+    # The latched reference, or a later one, is followed.
     refer(process, x=1.4, y=-2.0, z=1.5)
     [third] = answer(process, x=1.1, y=-2.0, z=1.5)
     assert third[1] > 0.0

@@ -34,7 +34,7 @@ def test_a_lead_of_a_metre_is_the_most():
     assert counts[:3] == [True] * 3
     assert not any(counts[3:])
     assert check._lead == pytest.approx((0.0, 1.0, 0.0))
-    # What leads back counts.
+    # A reference that leads back is used.
     assert check.update(ZERO, (0.0, -2.0, 0.0), 3.625)
 
 

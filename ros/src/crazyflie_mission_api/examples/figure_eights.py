@@ -1,8 +1,8 @@
 #!/usr/bin/env python
-"""Eight vehicles fly figures of eight side by side, every other one the other way round.
+"""Eight vehicles fly figures of eight side by side, every second one in the opposite direction.
 
-Usage: figure_eights.py [NAME ...], the vehicles; by default cf1 ... cf8. Where two of them stand
-less than 1.2 m apart, all fly the same way round.
+Usage: figure_eights.py [NAME ...], the vehicles; by default cf1 ... cf8. If two of them are less
+than 1.2 m apart, all fly in the same direction.
 """
 
 import itertools
@@ -15,7 +15,7 @@ from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.trajectory import Pieces
 
-SPACING = 1.2  #: Distance at which eights that are flown both ways round keep clear (m).
+SPACING = 1.2  #: Distance from which figures of eight in opposite directions do not collide (m).
 
 LIMITS = Limits(speed=1.0, acceleration=1.5)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Many vehicles rise from a square on the floor into a lattice, turn it into a ring, and come back.
+"""Many vehicles rise from a square on the floor into a lattice, form a ring, and come back.
 
 Usage: lattice.py [N | NAME ...], the number of vehicles, cf1, cf2, ... as in sw_swarm.launch, by
 default 100; or their names. With a number and the word "dry_run" after it nothing flies, and no ROS
@@ -55,12 +55,12 @@ if __name__ == "__main__":
     names = sys.argv[1:]
     if not names or names[0].isdecimal():
         names = [f"cf{k + 1}" for k in range(int(names[0]) if names else 100)]
-    # The word of earlier versions was "rehearse".
+    # Earlier versions used the word "rehearse".
     if sys.argv[2:] in (["dry_run"], ["rehearse"]):
         places = map(tuple, square(len(names)).tolist())
         dry_run = DryRun(dict(zip(names, places, strict=True)), Rules(LIMITS))
         mission(dry_run)
-        print(f"{len(names)} vehicles, {dry_run.time():.0f} s, nobody meets")
+        print(f"{len(names)} vehicles, {dry_run.time():.0f} s, no two come too near")
     else:
         with crazyflie_mission_api.Fleet(names, limits=LIMITS) as group:
             group.fly(mission)

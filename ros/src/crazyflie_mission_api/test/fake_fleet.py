@@ -23,7 +23,7 @@ def fake_process(monkeypatch):
     """Return a process in which a `Fleet` finds vehicles."""
     monkeypatch.setattr(fleet, "RosClock", FakeClock)
     monkeypatch.setattr(fleet, "topic_types", lambda handle: {})
-    # What a mission has published is there at once.
+    # Messages of a mission arrive at once.
     monkeypatch.setattr(fleet, "mission_nodes", lambda handle: 0)
     process = FakeProcess()
     # A FakeProcess has started.

@@ -16,7 +16,7 @@ STEP = 0.05
 
 
 class Flight(NamedTuple):
-    """What the model has done: metres."""
+    """Positions of the model during a flight (m)."""
 
     error: float
     """Largest distance of a vehicle from where it was told to be."""

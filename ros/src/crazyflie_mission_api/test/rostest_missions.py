@@ -118,7 +118,7 @@ def test_a_second_mission_for_a_vehicle_is_refused_until_the_first_has_ended(tmp
             peer.wait_until(lambda: all(t[-1][2] > 0.7 for t in tracks.values()), "takeoff", LIMIT)
             status, errors = run(second)
             assert status == 1
-            assert re.search(r"cf2: the mission mission_\w+ has them, and runs", errors), errors
+            assert re.search(r"cf2: in use by the running mission mission_\w+", errors), errors
             assert all(track[-1][2] > 0.7 for track in tracks.values())
         finally:
             process.kill()

@@ -21,7 +21,7 @@ NODES = {
 
 
 class Swarm:
-    """What `sw_swarm.launch` flies: vehicles cf1, cf2, ... where they stand, m."""
+    """The vehicles of `sw_swarm.launch`, cf1, cf2, ..., at their start points (m)."""
 
     def __init__(self, monkeypatch, tmp_path, places, buffer=0.15):
         self.process = fake_process(monkeypatch)

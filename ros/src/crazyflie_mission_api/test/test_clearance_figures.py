@@ -65,7 +65,7 @@ def test_an_approach_that_the_fleet_would_hold_is_refused():
     # 1.17 s; the next moment is 1.2 s, at 0.8 m.
     text = (
         r"^a and b would come near each other too fast, 1.2 s from now: at 0.8 m, and in 0.5 s at "
-        r"their speeds less than 0.33 m; expected slower ways"
+        r"their speeds less than 0.33 m; expected slower"
     )
     with pytest.raises(MissionError, match=text):
         Clearance(0.3, BUFFERS).check(["a", "b"], *head_on(0.5, 0.4))
@@ -102,7 +102,7 @@ def test_three_moments_are_enough_to_see_an_approach():
     places[1, :, 0] = 0.9
     with pytest.raises(MissionError, match="too fast, 0.0 s from now"):
         Clearance(0.3, BUFFERS).check(["a", "b"], np.array([0.0, 0.1, 0.2]), places)
-    # Of two there is no speed yet.
+    # Two references do not yet give a speed.
     Clearance(0.3, BUFFERS).check(["a", "b"], np.array([0.0, 0.1]), places[:, :2])
 
 

@@ -1,4 +1,4 @@
-"""What trajectories ask of a vehicle, against numbers that were calculated by hand."""
+"""Demands of trajectories on a vehicle, against numbers that were calculated by hand."""
 
 import math
 

@@ -54,7 +54,7 @@ def test_going_nowhere_is_no_error(flying):
 
 def test_a_takeoff_to_where_the_vehicle_is_is_refused():
     table = DryRun({"cf1": (0.0, 0.0, 1.0)})
-    with pytest.raises(MissionError, match="the height is 1 m, and it is at 1.00 m; expected at"):
+    with pytest.raises(MissionError, match="the height is 1 m, and the vehicle is at 1.00 m"):
         table.takeoff(1.0)
     assert table.flying == []
 
@@ -80,7 +80,7 @@ def test_a_relative_heading_is_relative():
     group.takeoff(1.0)
     group.go_to((0.0, 0.0, 0.2), yaw=0.25, relative=True)
     assert yaws(group) == pytest.approx([1.25, -0.25])
-    # Its yaw rate counts, of the vehicle as it heads.
+    # The velocity is in the vehicle's heading frame, which turns at its yaw rate.
     begin = group.time()
     group["cf1"].go_to((0.0, 0.0, 1.2), yaw=1.25 - math.pi)
     assert group.time() - begin == pytest.approx(math.pi * 35.0 / 16.0 / 1.5, abs=0.06)
@@ -97,7 +97,7 @@ def test_some_fly_while_others_wait(flying):
     flying["cf1"].go_to((-1.0, 0.0, 1.0), wait=False)
     assert flying.position("cf1") == pytest.approx((0.0, 0.0, 1.0))
     flying["cf2"].go_to((1.0, 0.2, 1.0))
-    with pytest.raises(MissionError, match=r"cf1: go_to: it is on its way for another \d\.\d s"):
+    with pytest.raises(MissionError, match=r"cf1: go_to: the vehicle is under way for another \d"):
         flying["cf1"].go_to((0.0, 0.0, 1.0))
     flying.arrive()
     assert flying.position("cf1") == pytest.approx((-1.0, 0.0, 1.0))
@@ -123,7 +123,7 @@ def test_vehicles_that_do_not_begin_together_are_checked_as_if_each_were_late():
     late = DryRun(STARTS, rules, start_skews={"cf1": 0.15, "cf2": 0.15})
     text = (
         r"cf1 and cf2 would be 0.949 m apart, \d.\d s from now; expected at least 0.95 m; "
-        r"that is if cf2 begins 0.15 s after the others"
+        r"this happens if cf2 begins 0.15 s after the others"
     )
     with pytest.raises(MissionError, match=text):
         one_behind_the_other(late)
@@ -131,7 +131,7 @@ def test_vehicles_that_do_not_begin_together_are_checked_as_if_each_were_late():
     mixed = DryRun(STARTS, rules, start_skews={"cf1": 0.15})
     with pytest.raises(MissionError, match="if cf2 begins 0.15 s after the others"):
         one_behind_the_other(mixed)
-    # What is on its way already may have begun late, too.
+    # A vehicle that is under way already may also have begun late.
     late = DryRun(STARTS, Rules(separation=0.96), start_skews={"cf1": 0.15, "cf2": 0.15})
     late.takeoff(1.0)
     late["cf2"].go_to((2.0, 0.0, 1.0), wait=False)
@@ -196,8 +196,8 @@ def test_a_dry_run_has_the_headings_of_the_vehicles():
 
 
 BAD = {
-    "there is no vehicle 'cf3'; expected one of cf1, cf2": lambda t: t["cf3"],
-    "cf1: takeoff: it flies already": lambda t: t.takeoff(1.0),
+    "no vehicle has the name 'cf3'; expected one of cf1, cf2": lambda t: t["cf3"],
+    "cf1: takeoff: the vehicle flies already": lambda t: t.takeoff(1.0),
     r"go_to: one goal \(0, 0, 1\) for 2 vehicles": lambda t: t.go_to((0, 0, 1)),
     "cf1: goal is 5; expected x, y, z": lambda t: t.go_to({"cf1": 5}),
     r"cf1: goal is \(0, nan, 1\)": lambda t: t.go_to({"cf1": (0, math.nan, 1)}),
@@ -216,13 +216,15 @@ BAD = {
     "go_to: duration is 'long'; expected a finite number": lambda t: t["cf1"].go_to(
         (0, 1, 1), duration="long"
     ),
-    r"begins at \(0.00, 0.00, 0.00\), 1.00 m from where": lambda t: t["cf1"].follow(figure8()),
+    r"begins at \(0.00, 0.00, 0.00\), 1.00 m from the vehicle": lambda t: t["cf1"].follow(
+        figure8()
+    ),
     "cf1: trajectory: the speed is 0.83": lambda t: t["cf1"].follow(figure8(), relative=True),
     "cf1: trajectory has no pieces": lambda t: t["cf1"].follow([]),
     "cf1: trajectory is 'eight.csv'; expected a list of": lambda t: t["cf1"].follow("eight.csv"),
-    "follow: there are no trajectories": lambda t: t.follow({}),
-    "go_to: there are no goals": lambda t: t.go_to({}),
-    "there is no vehicle 0; expected one of cf1, cf2": lambda t: t[0],
+    "follow: no trajectories are given": lambda t: t.follow({}),
+    "go_to: no goals are given": lambda t: t.go_to({}),
+    "no vehicle has the name 0; expected one of cf1, cf2": lambda t: t[0],
     "formation: the number of places is 1; expected 2": lambda t: t.formation([(0, 0, 1)]),
     "wait is -1; expected a finite number >= 0": lambda t: t.wait(-1),
 }
@@ -251,14 +253,14 @@ def test_a_takeoff_needs_all_of_its_way(group):
 def test_a_takeoff_goes_up():
     group = DryRun({"cf1": (0.0, 0.0, 0.7)})
     with pytest.raises(
-        MissionError, match="the height is 0.75 m, and it is at 0.70 m; expected at"
+        MissionError, match="the height is 0.75 m, and the vehicle is at 0.70 m; expected at"
     ):
         group.takeoff(0.75)
     group.takeoff(0.8)
 
 
 def test_commands_on_the_ground_are_refused(group):
-    with pytest.raises(MissionError, match="cf1: go_to: it is on the ground; expected takeoff"):
+    with pytest.raises(MissionError, match="cf1: go_to: the vehicle is on the ground; call"):
         group["cf1"].go_to((0, 0, 1))
     with pytest.raises(MissionError, match="cf1: takeoff .* z is 3 m; expected 0 to 2 m"):
         group.takeoff(3.0)

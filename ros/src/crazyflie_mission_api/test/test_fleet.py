@@ -204,7 +204,7 @@ def test_vehicles_behind_the_driver_do_not_begin_at_the_same_moment(process):
         group.takeoff(1.0)
         group.go_to((1.0, 0.0, 0.0), relative=True)
 
-    text = "expected at least 0.95 m; that is if cf2 begins 0.15 s after the others"
+    text = "expected at least 0.95 m; this happens if cf2 begins 0.15 s after the others"
     with pytest.raises(MissionError, match=text):
         fleet.dry_run(mission)
     with pytest.raises(MissionError, match=text), fleet:
@@ -288,7 +288,7 @@ def test_names_of_a_fleet_file(process, controlled, driven, tmp_path):
             "no takeoff and land, and no go_to, below /cf9 after 0.1 s; takeoff is offered",
         ),
         ([], r"the vehicles are \[\]; expected names"),
-        (["cf1", "cf1"], "there are two vehicles 'cf1'"),
+        (["cf1", "cf1"], "the vehicle 'cf1' is named twice"),
         ([1], r"the vehicles are \[1\]"),
     ],
 )
@@ -307,7 +307,7 @@ def claim(process, mission, *words):
 
 def test_a_vehicle_of_a_mission_that_runs_is_refused(process, controlled, driven):
     with Fleet(["cf1"], process=process, startup_timeout=0.5) as first:
-        text = rf"cf1: the mission {first._mission} has them, and runs; expected it to end before"
+        text = rf"cf1: in use by the running mission {first._mission}; wait for its end"
         with pytest.raises(MissionError, match=text):
             Fleet(NAMES, process=process, startup_timeout=0.5)
         Fleet(["cf2"], process=process, startup_timeout=0.5)
@@ -321,7 +321,9 @@ def test_a_mission_that_was_killed_has_no_vehicles(fleet, process):
     with fleet:
         for seconds in (1.0, 3.5):
             process.advance(seconds)
-            with pytest.raises(MissionError, match="cf1, cf2: the mission killed has them"):
+            with pytest.raises(
+                MissionError, match="cf1, cf2: in use by the running mission killed"
+            ):
                 fleet.takeoff(0.5)
         process.advance(1.5)
         fleet.takeoff(0.5)
@@ -329,7 +331,7 @@ def test_a_mission_that_was_killed_has_no_vehicles(fleet, process):
 
 
 def test_a_mission_whose_vehicles_another_one_has_leaves_them(fleet, process, controlled, driven):
-    with pytest.raises(MissionError, match="cf2: the mission other has them"), fleet:
+    with pytest.raises(MissionError, match="cf2: in use by the running mission other"), fleet:
         fleet.takeoff(0.8)
         # It was stopped for a while.
         claim(process, "other", "cf2", "|", "cf2")

@@ -16,7 +16,7 @@ TOWER = {"cf0": (0.0, 0.0, 1.0), "cf1": (0.0, 0.0, 2.0), "cf2": (0.0, 0.0, 3.0),
 
 
 def to_the_tower(group):
-    """Fly three vehicles above each other, one stays beside them."""
+    """Fly three vehicles above each other; one stays next to them."""
     group.takeoff(1.0)
     for height in (2.0, 3.0):
         name = f"cf{height - 1:.0f}"

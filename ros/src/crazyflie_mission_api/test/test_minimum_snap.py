@@ -115,7 +115,7 @@ def test_tilt_and_thrust_are_limits_too():
 @pytest.mark.parametrize(
     ("waypoints", "text"),
     [
-        ([(0, 0, 1), (0, math.nan, 1)], r"waypoint 2 is \(0, nan, 1\); expected x, y, z"),
+        ([(0, 0, 1), (0, math.nan, 1)], r"waypoint 2 is \(0, nan, 1\); expected finite numbers"),
         ([(0, 0, 1), (0, 1)], r"waypoint 2 is \(0, 1\)"),
         ([(0, 0, 1), "here"], "waypoint 2 is 'here'"),
         ([(0, 0, 1)], "the number of waypoints is 1; expected at least 2"),

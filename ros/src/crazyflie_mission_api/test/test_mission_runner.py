@@ -116,7 +116,7 @@ def test_a_mission_goes_on_when_nothing_reads_its_output_any_more(run, monkeypat
 def test_why_a_flight_fails(run):
     status, _, errors = run("fly", "fleet.go_to((0, 0, 1))")
     assert status == 1
-    assert errors.startswith("the mission failed: cf1: go_to: it is on the ground")
+    assert errors.startswith("the mission failed: cf1: go_to: the vehicle is on the ground")
     assert run("fly", "raise KeyboardInterrupt")[::2] == (130, "interrupted\n")
 
 
@@ -133,7 +133,7 @@ def test_a_trajectory(vehicle, tmp_path, capsys):
     ("arguments", "text"),
     [
         (["flight", "one.py"], "invalid choice: 'flight'"),
-        (["fly", "none.py"], "there is no file none.py; expected a script, or a trajectory"),
+        (["fly", "none.py"], "the file none.py does not exist; expected a script, or a trajectory"),
         ([], "the following arguments are required: word, file"),
     ],
 )

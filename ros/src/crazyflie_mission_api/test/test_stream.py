@@ -43,7 +43,7 @@ class Bench:
             self.asked[-1][1].set_exception(ServiceError(error))
 
     def setpoints(self, seconds):
-        """Let time pass; return the setpoints of that time."""
+        """Advance the time; return the setpoints of that time."""
         before = len(self.process.published("/cf1/cmd_full_state"))
         self.process.advance(seconds)
         return self.process.published("/cf1/cmd_full_state")[before:]

@@ -39,7 +39,7 @@ def test_a_late_vehicle_is_named():
             raise MissionError("too near")
 
     ways = {name: TimedTrajectory(WAY, 3.0, 0.1) for name in "ab"}
-    with pytest.raises(MissionError, match="too near; that is if b begins 0.1 s after the others"):
+    with pytest.raises(MissionError, match="too near; this happens if b begins 0.1 s after"):
         check_with_skew(ways, 3.0, refuse)
 
 

@@ -81,7 +81,7 @@ def test_rotation_matrix_is_as_documented():
 
 
 def test_zero_quaternion_is_refused():
-    with pytest.raises(ValueError, match="no rotation"):
+    with pytest.raises(ValueError, match="not a rotation"):
         rpy_from_quaternion(0.0, 0.0, 0.0, 0.0)
 
 

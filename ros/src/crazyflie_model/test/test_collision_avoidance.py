@@ -83,7 +83,7 @@ def test_a_velocity_leads_back_into_the_cell():
     velocity = avoidance.velocity_setpoint(
         STILL, np.array([[0.15, 0.0, 0.0]]), np.array([0.3, 0.0, 0.0])
     )
-    # From 0.15 m to 0.2 m apart, half of it by each.
+    # From 0.15 m to 0.2 m apart; each vehicle moves half of the difference.
     assert velocity == pytest.approx([-0.025, 0.0, 0.0], abs=1e-5)
 
 
@@ -112,7 +112,7 @@ def test_only_distances_count(origin, other, goal):
 
 @pytest.mark.parametrize(
     ("velocity", "found"),
-    # In 2 s up to the wall at 0.5 - 0.1 m, and no more than 0.5 m/s where there is none.
+    # In 2 s up to the wall at 0.5 - 0.1 m, and no more than 0.5 m/s without a wall.
     [(0.05, 0.05), (0.5, 0.2), (-0.3, -0.3), (-0.9, -0.5)],
 )
 def test_a_velocity_ends_at_the_wall_within_the_horizon(velocity, found):

@@ -1,4 +1,4 @@
-"""What the planner flies, against its conditions."""
+"""The planner's trajectories, against their boundary conditions."""
 
 import math
 
@@ -74,7 +74,7 @@ def on_spiral(start, angle, radii, ascent, sideways, clockwise, s):
     """Return where a spiral is at a part of its way, as a complex number, height and yaw."""
     heading = np.exp(1j * start.yaw)
     sense = -1 if clockwise else 1
-    # From where it begins the axis is to the left or behind; clockwise to the right or ahead.
+    # At the start the axis is to the left or behind; clockwise, to the right or ahead.
     to_axis = heading * (-sense if sideways else 1j * sense)
     axis = complex(*start.position[:2]) + radii[0] * to_axis
     radius = (1 - s) * radii[0] + s * radii[1]

@@ -99,7 +99,7 @@ FLEETS = [
     ),
     (PAIR.replace("id: 2", "id: 1"), "id is that of cf1 in line 3; expected another"),
     ("vehicles: {a: 1}", "has neither robots .* nor crazyflies"),
-    ("crazyflies: [", "is no YAML"),
+    ("crazyflies: [", "is not valid YAML"),
     ("crazyflies: []", "has no enabled vehicle"),
     (
         "robots: {cf1: {uri: usb, initial_position: [0, 0, 0]}}",

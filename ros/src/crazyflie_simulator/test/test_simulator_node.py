@@ -298,7 +298,9 @@ def test_a_simulator_does_not_join_the_flight_of_a_real_vehicle(node_class):
     process.transport.foreign_services["/control/final/vehicle"] = "/cmd_vel_converter"
     parameters = {**PARAMETERS, "topics/control": "/control/final"}
     assert not process.launch(node_class(), "/simulator", parameters)
-    assert "/control/final fly a vehicle of /cmd_vel_converter" in process.logged("error")[0]
+    assert (
+        "/control/final already fly a vehicle of /cmd_vel_converter" in process.logged("error")[0]
+    )
 
 
 def test_poses_are_those_of_their_stamps_where_a_control_is_interrupted(monkeypatch):

@@ -84,7 +84,7 @@ def test_node_that_is_asked_while_it_waits_for_a_master_ends():
         wait_until(lambda: "waiting for a ROS master" in process.output, "it to wait")
         interrupt(process, "early")
         assert process.wait() == 1
-    assert "ends before there was a ROS master" in process.output
+    assert "ended before a ROS master was found" in process.output
     assert "Traceback" not in process.output
 
 

@@ -76,4 +76,4 @@ def test_a_second_vehicle_of_the_same_controls_ends_after_a_pause():
             assert second.is_running()
             second.signal(signal.SIGINT)
             assert second.wait() == 1
-    assert "the controls of /controls fly a vehicle of /one already" in second.output
+    assert "the controls of /controls already fly a vehicle of /one" in second.output

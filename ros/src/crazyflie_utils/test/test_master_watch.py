@@ -69,7 +69,7 @@ def test_a_master_that_is_started_anew_is_told_of_this_process(world):
     world.master.is_there = False
     for _ in range(3):
         world.watch.look()
-    assert world.said == ["the ROS master is gone; what is connected goes on"]
+    assert world.said == ["the ROS master does not answer; existing connections continue"]
     world.master.is_there, world.master.known, world.master.pid = True, False, 2000
     for _ in range(3):
         world.watch.look()

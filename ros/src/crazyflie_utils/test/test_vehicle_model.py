@@ -64,7 +64,9 @@ def test_what_is_wrong_is_named_with_its_line_and_what_was_expected(tmp_path, te
 
 
 def test_a_type_without_published_figures_says_so():
-    with pytest.raises(ParameterError, match="no model bolt: a Bolt has .*expected one of cf21,"):
+    with pytest.raises(
+        ParameterError, match="model bolt does not exist: a Bolt has .*expected one of cf21,"
+    ):
         vehicle_model.load("bolt")
     with pytest.raises(ParameterError, match="no model cf5; expected one of cf21,"):
         vehicle_model.load("cf5")

@@ -119,9 +119,12 @@ def test_what_does_not_fit_together_is_named_with_its_line(load):
         ("[1, 2]\n", ":1: the file is [1, 2]; expected a mapping"),
         ("a: 1\nboxes: {}\n", ":2: boxes has no table; it has nothing"),
         ("a: 1\n", ":1: the file has no boxes; it has a"),
-        ("boxes:\n  table: {}\n  table: {}\n", ":3: boxes/table is there twice, first in line 2"),
+        ("boxes:\n  table: {}\n  table: {}\n", ":3: boxes/table occurs twice, first in line 2"),
         ("boxes:\n  3: {}\n", ":2: boxes has the key 3; expected a string"),
-        ("boxes: {\n", ":2: is no YAML: expected the node content, but found '<stream end>'"),
+        (
+            "boxes: {\n",
+            ":2: is not valid YAML: expected the node content, but found '<stream end>'",
+        ),
         ("boxes: !!python/name:os.system\n", ":1: boxes cannot be read"),
     ],
 )
@@ -139,7 +142,7 @@ def test_a_file_that_cannot_be_read(tmp_path):
     with pytest.raises(ParameterError, match=r"none\.yaml: cannot be read: No such file"):
         yaml_file.load(tmp_path / "none.yaml")
     (tmp_path / "latin.yaml").write_bytes(b"name: Stra\xdfe\n")
-    with pytest.raises(ParameterError, match=r"latin\.yaml:1: is no text in UTF-8"):
+    with pytest.raises(ParameterError, match=r"latin\.yaml:1: is not text in UTF-8"):
         yaml_file.load(tmp_path / "latin.yaml")
     with pytest.raises(ParameterError, match=r"cannot be read: embedded null byte"):
         yaml_file.load("lab\0.yaml")
@@ -151,10 +154,10 @@ def test_a_file_that_cannot_be_read(tmp_path):
 @pytest.mark.parametrize(
     ("content", "complaint"),
     [
-        (b"a: 1\nname: Stra\xdfe\n", ":2: is no text in UTF-8"),
-        (b"\xef\xbb\xbfa: 1\n\nname: \xff\n", ":3: is no text in UTF-8"),
+        (b"a: 1\nname: Stra\xdfe\n", ":2: is not text in UTF-8"),
+        (b"\xef\xbb\xbfa: 1\n\nname: \xff\n", ":3: is not text in UTF-8"),
         (b"a: 1\nb: 2\nc: \0\n", ":3: has a NUL"),
-        (b"a: 1\nb: \x07\n", ":2: is no YAML: it has the character U+0007"),
+        (b"a: 1\nb: \x07\n", ":2: is not valid YAML: it has the character U+0007"),
         (b"a: " + b"x" * 2_000_000, ": is too long; expected at most 1000000 bytes"),
     ],
 )
@@ -180,14 +183,14 @@ TEN_TIMES = "a0: &a0 [1, 2]\n" + "".join(
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("a: 1\nb: " + "[" * 20_000, ":2: is nested too deep; expected at most 50 levels"),
+        ("a: 1\nb: " + "[" * 20_000, ":2: is nested too deeply; expected at most 50 levels"),
         ("a: " + "[" * 20_000 + "]" * 20_000, ":1: is nested too deep"),
         ("{a: " * 20_000, ":1: is nested too deep"),
         ("- " * 20_000 + "1", ":1: is nested too deep"),
-        ("a: [" + "1," * 60_000 + "]", ":1: holds too much; expected at most 50000 values"),
-        (TEN_TIMES, ":6: holds too much"),
-        ("a: 1\nb: &b {c: [*b]}\n", ":2: has the alias *b in what it stands for"),
-        ("a: *" + "x" * 200_000, ":1: is no YAML: found undefined alias"),
+        ("a: [" + "1," * 60_000 + "]", ":1: has too many values; expected at most 50000"),
+        (TEN_TIMES, ":6: has too many values"),
+        ("a: 1\nb: &b {c: [*b]}\n", ":2: has the alias *b within the node to which it refers"),
+        ("a: *" + "x" * 200_000, ":1: is not valid YAML: found undefined alias"),
     ],
     ids=map(str, range(8)),
 )

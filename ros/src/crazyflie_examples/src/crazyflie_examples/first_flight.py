@@ -1,6 +1,6 @@
-"""The protocol of a first flight: its steps, and what each must show before the next may come.
+"""The protocol of a first flight: its steps, and the condition that each must meet before the next.
 
-It knows no ROS: a `Rig` moves the vehicle and records it, a person answers.
+It does not use ROS: a `Rig` moves the vehicle and records it; a person answers.
 """
 
 import html
@@ -18,25 +18,27 @@ from crazyflie_model.units import HOVER_PWM
 
 Array = NDArray[np.float64]
 
-HEIGHT = 0.3  #: Of all hovers, m.
-STEP = 0.3  #: Of the steps along each axis, m.
+HEIGHT = 0.3  #: Height of all hovers (m).
+STEP = 0.3  #: Length of the steps along each axis (m).
 TURN = 90.0  #: degrees.
-CARRY = 1.0  #: How far the vehicle is carried by hand, along each axis, m.
-HIDDEN = 0.4  #: How long no poses come, s.
-LOWEST_PWM = 8000  #: At which each motor is turned.
+CARRY = 1.0  #: Distance over which the vehicle is carried by hand, along each axis (m).
+HIDDEN = 0.4  #: Duration of the loss of poses (s).
+LOWEST_PWM = 8000  #: Command with which each motor is turned (PWM).
 
-MAX_SCALE_ERROR = 0.05  #: Of the way by hand; a person errs by 2 cm in 1 m.
-MAX_TURN_ERROR = 15.0  #: Of the turn by hand, degrees.
-MAX_DELAY = 0.06  #: Of poses behind the gyroscope, s.
-MAX_ERROR = 0.1  #: Of a hover, largest distance from its mean place, m.
-MAX_OFFSET = 0.15  #: Of a hover, mean distance from its goal, m.
-MAX_IMBALANCE = 0.15  #: Of one motor's command against the mean of the four.
+#: Largest relative error of the distance by hand; a person errs by 2 cm in 1 m.
+MAX_SCALE_ERROR = 0.05
+MAX_TURN_ERROR = 15.0  #: Largest error of the turn by hand (degrees).
+MAX_DELAY = 0.06  #: Largest delay of poses behind the gyroscope (s).
+MAX_ERROR = 0.1  #: Largest distance of a hover from its mean position (m).
+MAX_OFFSET = 0.15  #: Largest distance of a hover's mean position from its goal (m).
+#: Largest relative difference of one motor's command from the mean of the four.
+MAX_IMBALANCE = 0.15
 #: Mean motor command over `HOVER_PWM`: 33 g, with a battery from full to half empty.
 HOVER_RANGE = (0.8, 1.2)
-MIN_VOLTAGE = 3.2  #: In flight, V.
-FULL_PWM = 65000  #: From here on a motor is saturated.
-MAX_SATURATION = 0.02  #: Share of samples with a saturated motor.
-MAX_LOSS_WAY = 0.3  #: Way while no poses come, m.
+MIN_VOLTAGE = 3.2  #: Lowest voltage in flight (V).
+FULL_PWM = 65000  #: Command from which a motor is saturated (PWM).
+MAX_SATURATION = 0.02  #: Largest fraction of samples with a saturated motor.
+MAX_LOSS_WAY = 0.3  #: Largest distance that the vehicle moves without poses (m).
 MAX_TOUCHDOWN = 0.8  #: m/s.
 
 
@@ -44,7 +46,7 @@ class Sample(NamedTuple):
     """A sample of a flight; motors, battery and gyroscope are those of the vehicle's log."""
 
     time: float  # s.
-    x: float  # m, fixed frame; as poses show it.
+    x: float  # Position from the poses (m, fixed frame).
     y: float
     z: float
     yaw: float  # rad.
@@ -62,13 +64,13 @@ class Rig(Protocol):
         """Return the facts of the doctor."""
 
     def run(self, duration: float) -> None:
-        """Let time pass (s)."""
+        """Wait for a duration (s)."""
 
     def spin(self, motor: int, pwm: int) -> None:
         """Turn one motor, 1 to 4, for a second."""
 
     def carry(self, x: float, y: float, z: float, yaw: float) -> None:
-        """Have the vehicle carried, m and degrees from where it stood, in the directions of it."""
+        """Ask a person to carry the vehicle, m and degrees from its start, in its directions."""
 
     def driver_takeoff(self, height: float) -> None:
         """Take off by the vehicle's own high-level commander, to a height (m)."""
@@ -89,19 +91,19 @@ class Rig(Protocol):
         """End the flight by the LQR."""
 
     def hide_poses(self, duration: float) -> None:
-        """Let no poses come for a duration (s)."""
+        """Withhold poses for a duration (s)."""
 
     def emergency(self) -> None:
         """Stop the motors for good."""
 
 
 class Stop(Exception):  # noqa: N818
-    """The protocol ends; the text names what is wrong."""
+    """The protocol ends; the text names the fault."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """The end of a step."""
+    """The result of a step."""
 
     step: str
     passed: bool
@@ -110,7 +112,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Step:
-    """A step: what happens, in a line, and the work, which returns figures or raises `Stop`."""
+    """A step: a line that explains it, and the function, which returns figures or raises `Stop`."""
 
     name: str
     explanation: str
@@ -120,7 +122,7 @@ class Step:
 def _columns(samples: Sequence[Sample]) -> tuple[Array, Array]:
     """Return times, shape (n,), and positions, shape (n, 3)."""
     if not samples:
-        raise Stop("no poses have come; is the vehicle seen?")
+        raise Stop("no poses have come; does motion capture see the vehicle?")
     table = np.array([sample[:4] for sample in samples], dtype=float)
     return table[:, 0], table[:, 1:]
 
@@ -204,11 +206,11 @@ def _in_heading(way, yaw):
 def _check_axes(measured: Array) -> None:
     """Raise `Stop` unless a matrix is near the identity.
 
-    Its columns are the measured ways, over the true ones, forward, left and up.
+    Its columns are the measured displacements forward, left and up, divided by the true ones.
     """
     lengths = np.linalg.norm(measured, axis=0)
     if not (lengths > 0.2).all():
-        raise Stop("poses do not follow the hand: is it this vehicle that is tracked?")
+        raise Stop("poses do not follow the movement by hand: is this the tracked vehicle?")
     directions = measured / lengths
     nearest = np.rint(directions)
     names = np.array(["forward", "left", "up"])
@@ -238,9 +240,9 @@ def _check_axes(measured: Array) -> None:
 
 
 def pose_delay(samples: Sequence[Sample]) -> float:
-    """Return by how much the heading of poses is behind the gyroscope's integral, s.
+    """Return the delay of the poses' heading behind the gyroscope's integral, s.
 
-    It is the shift for which they differ least in a turn, of those from 0 to 0.3 s.
+    It is the shift between 0 and 0.3 s for which the two differ least in a turn.
     """
     times, _ = _columns(samples)
     yaw = np.unwrap([sample.yaw for sample in samples])
@@ -266,15 +268,15 @@ def _in_flight(samples, goal):
     if abs(imbalance[worst]) > MAX_IMBALANCE:
         raise Stop(
             f"motor {worst + 1} is commanded {100 * imbalance[worst]:+.0f} % against the others, "
-            f"expected within {100 * MAX_IMBALANCE:.0f} %: it is weak, or the weight is not in the "
-            "middle; change its propeller, then the motor"
+            f"expected within {100 * MAX_IMBALANCE:.0f} %: the motor is weak, or the centre of "
+            "mass is off; change its propeller, then the motor"
         )
     load = means.mean() / HOVER_PWM
     if not HOVER_RANGE[0] <= load <= HOVER_RANGE[1]:
         raise Stop(
             f"the mass is off: hover takes {100 * load:.0f} % of the model's thrust, expected "
-            f"{100 * HOVER_RANGE[0]:.0f} to {100 * HOVER_RANGE[1]:.0f} %: weigh it, and choose or "
-            "identify its model"
+            f"{100 * HOVER_RANGE[0]:.0f} to {100 * HOVER_RANGE[1]:.0f} %: weigh the vehicle, and "
+            "choose or identify its model"
         )
     voltage = min(sample.voltage for sample in samples)
     if voltage < MIN_VOLTAGE:
@@ -284,10 +286,12 @@ def _in_flight(samples, goal):
         raise Stop(f"a motor is saturated for {100 * saturated:.0f} % of the time")
     offset = float(np.linalg.norm(places.mean(axis=0) - goal))
     if offset > MAX_OFFSET:
-        raise Stop(f"it is {offset:.2f} m from where it should be, expected {MAX_OFFSET:g} m")
+        raise Stop(
+            f"the vehicle is {offset:.2f} m from its goal, expected at most {MAX_OFFSET:g} m"
+        )
     spread = float(np.linalg.norm(places - places.mean(axis=0), axis=1).max())
     if spread > MAX_ERROR:
-        raise Stop(f"it oscillates by {spread:.2f} m, expected {MAX_ERROR:g} m at most")
+        raise Stop(f"the vehicle oscillates by {spread:.2f} m, expected at most {MAX_ERROR:g} m")
     return (
         f"within {100 * spread:.0f} cm, {100 * offset:.0f} cm off; thrust {100 * load:.0f} % of "
         f"the model's; {voltage:.2f} V"
@@ -298,7 +302,7 @@ def _driver_hover(rig, _):
     place, _ = _rest(rig)
     rig.driver_takeoff(HEIGHT)
     rig.run(2.0)
-    # Where it hovers by its own estimate is not far from where it stood.
+    # By its own estimate, the vehicle hovers near its start.
     return _in_flight(_since(rig, 5.0), place + (0.0, 0.0, HEIGHT))
 
 
@@ -308,7 +312,7 @@ def _yaw(rig, _):
     rig.run(3.0)
     angle = math.degrees((rig.samples[-1].yaw - before.yaw + math.pi) % (2 * math.pi) - math.pi)
     if abs(angle - TURN) > MAX_TURN_ERROR:
-        raise Stop(f"it has turned by {angle:.0f} degrees, expected {TURN:g}")
+        raise Stop(f"the vehicle has turned by {angle:.0f} degrees, expected {TURN:g}")
     rig.driver_turn(-TURN)
     rig.run(3.0)
     text = _in_flight(_since(rig, 2.0), before[1:4])
@@ -339,7 +343,9 @@ def _loss(rig, _):
     rig.run(0.2)
     moved = max(moved, float(np.linalg.norm(np.array(rig.samples[-1][1:4]) - before)))
     if moved > MAX_LOSS_WAY:
-        raise Stop(f"it moves by {moved:.2f} m without poses, expected {MAX_LOSS_WAY:g} m")
+        raise Stop(
+            f"the vehicle moves by {moved:.2f} m without poses, expected at most {MAX_LOSS_WAY:g} m"
+        )
     rig.run(3.0)
     return f"moves by {100 * moved:.0f} cm; {_in_flight(_since(rig, 1.0), (0.0, 0.0, HEIGHT))}"
 
@@ -351,9 +357,11 @@ def _land(rig, _):
     speeds = -np.gradient(places[:, 2], times) if len(times) > 2 else np.zeros(1)
     fastest = float(np.convolve(speeds, np.full(5, 0.2), "valid").max())
     if places[-1, 2] > 0.08:
-        raise Stop(f"it is at a height of {places[-1, 2]:.2f} m after the landing")
+        raise Stop(f"the vehicle is at a height of {places[-1, 2]:.2f} m after the landing")
     if fastest > MAX_TOUCHDOWN:
-        raise Stop(f"it has sunk at {fastest:.2f} m/s, expected {MAX_TOUCHDOWN:g} m/s at most")
+        raise Stop(
+            f"the vehicle has sunk at {fastest:.2f} m/s, expected at most {MAX_TOUCHDOWN:g} m/s"
+        )
     return f"sinks at {fastest:.2f} m/s at most"
 
 
@@ -366,23 +374,25 @@ def _emergency(rig, _):
 
 
 STEPS = (
-    Step("doctor", "battery, link, decks and firmware are looked at", _doctor),
+    Step("doctor", "battery, link, decks and firmware are checked", _doctor),
     Step(
-        "motors", "props off, or the vehicle held: each motor turns at the lowest thrust", _motors
+        "motors",
+        "take the propellers off, or hold the vehicle: each motor turns at the lowest thrust",
+        _motors,
     ),
-    Step("poses by hand", "you carry the vehicle: forward, left, up, and turn it left", _hand),
+    Step("poses by hand", "you carry the vehicle forward, left and up, and turn it left", _hand),
     Step("hover by the driver", f"it takes off to {HEIGHT:g} m and hovers for 5 s", _driver_hover),
     Step("yaw", f"it turns by {TURN:g} degrees and back, and lands", _yaw),
     Step("hover by the LQR", "the same with this workspace's controller", _lqr_hover),
     Step("steps", f"{STEP:g} m along each axis, and back", _steps),
     Step("loss of poses", f"no poses come for {HIDDEN:g} s", _loss),
     Step("landing", "it lands", _land),
-    Step("emergency", "on the ground the motors are stopped for good", _emergency),
+    Step("emergency", "on the ground, the emergency stop is latched", _emergency),
 )
 
 
 def fly(rig: Rig, ask: Callable[[str], bool]) -> Iterator[Verdict]:
-    """Do the steps one after the other and yield their verdicts; the first that fails is the last.
+    """Do the steps one after the other and yield their verdicts; stop after the first failure.
 
     ``ask(text)`` asks a person, and returns whether the answer is yes; every step begins with it.
     """
@@ -398,7 +408,7 @@ def fly(rig: Rig, ask: Callable[[str], bool]) -> Iterator[Verdict]:
 
 
 def report(verdicts: Sequence[Verdict], title: str, bag: str) -> str:
-    """Return a report as HTML: a verdict for each step, those that were not done, and the bag."""
+    """Return a report as HTML: a verdict for each step, the remaining steps, and the bag."""
     done = {verdict.step: verdict for verdict in verdicts}
     rows = []
     for step in STEPS:

@@ -47,10 +47,10 @@ from crazyflie_utils.parameters.declaration import parse_arguments
 from crazyflie_utils.parameters.types import BOOLEAN, FINITE, FRAME, Text
 
 PREFIX = "/crazyflie"
-_RELAYED = "first_flight"  #: Frame by which the LQR flies: the poses, until they are hidden.
-_LIMIT = 60.0  #: Of starts and of services, s.
-_CARRY_TIME = 4.0  #: In which a virtual vehicle is carried, s.
-_DURATION = genpy.Duration(2)  #: Of the driver's commands.
+_RELAYED = "first_flight"  #: Frame that the LQR uses: the relayed poses, until they are hidden.
+_LIMIT = 60.0  #: Timeout of starts and of services (s).
+_CARRY_TIME = 4.0  #: Duration of a virtual vehicle's carrying (s).
+_DURATION = genpy.Duration(2)  #: Namespace of the driver's commands.
 _HAND = ("handX", "handY", "handZ", "handYaw")
 
 
@@ -59,11 +59,11 @@ class FirstFlightParameters(Parameters):
 
     positioning: str = parameter(Text(SOURCES), "source of the pose", MOCAP)
     mocap_frame: str = parameter(
-        FRAME, "frame of the vehicle in motion capture, which has to run", "HY5/base_link"
+        FRAME, "frame of the vehicle in motion capture, which must be running", "HY5/base_link"
     )
-    out: str = parameter(Text(), "folder of report and recording", "out/first_flight")
+    out: str = parameter(Text(), "folder of the report and the recording", "out/first_flight")
     yes: bool = parameter(
-        BOOLEAN, "every question is answered with yes: for virtual vehicles only", False
+        BOOLEAN, "answer every question with yes: for virtual vehicles only", False
     )
 
 
@@ -82,7 +82,7 @@ class LiveRig:
         self._frame = options.mocap_frame if is_mocap else f"{PREFIX[1:]}/estimate"
 
     def begin(self) -> None:
-        """Connect to the graph, which roscore or a launch of this command has begun."""
+        """Connect to the graph, which roscore or a launch of this command has started."""
         process, self._end_node = begin_script("first_flight")
         self._handle = handle = process.handle("/first_flight")
         self._tf = handle.publisher("/tf", TFMessage)
@@ -130,7 +130,7 @@ class LiveRig:
         return examine(self._uri)
 
     def run(self, duration: float) -> None:
-        """Let time pass (s); any key ends the protocol."""
+        """Wait for a duration (s); any key ends the protocol."""
         end = time.monotonic() + duration
         while (left := end - time.monotonic()) > 0.0:
             if self._launched is not None and self._launched.poll() is not None:
@@ -143,7 +143,7 @@ class LiveRig:
                 time.sleep(min(left, 0.1))
 
     def spin(self, motor: int, pwm: int) -> None:
-        """Turn one motor for a second, on a link of its own."""
+        """Turn one motor for a second, by a separate link."""
         names = [f"motor.m{i}" for i in range(1, 5)]
 
         def note(_: int, values: tuple[float, ...]) -> None:
@@ -165,7 +165,7 @@ class LiveRig:
             raise Stop(str(error)) from None
 
     def carry(self, x: float, y: float, z: float, yaw: float) -> None:
-        """Have a person carry the vehicle; a virtual one is carried by its own parameters."""
+        """Ask a person to carry the vehicle; a virtual one is moved by its parameters."""
         self._launch("first_flight.launch", f"positioning:={self._options.positioning}")
         name = f"{PREFIX}/virtual/{_HAND[0]}"
         if self._handle.get_param(name, FINITE, math.inf) == math.inf:
@@ -173,7 +173,7 @@ class LiveRig:
             goal = [f"{way:g} m {name}" for way, name in ways if way]
             goal += [f"turned {yaw:g} degrees to the left"] if yaw else []
             where = f"Carry it from its place: {' '.join(goal)}" if goal else "Put it in its place"
-            input(f"{where}; Enter while it is still. ")
+            input(f"{where}; press Enter when it is still. ")
             return
         for name, value in zip(_HAND, (x, y, z, yaw), strict=True):
             self._handle.set_param(f"{PREFIX}/virtual/{name}", float(value))
@@ -243,7 +243,7 @@ class LiveRig:
         self._call("emergency", Empty, EmptyRequest())
 
     def end(self) -> None:
-        """Land, if it flies, and end what was launched."""
+        """Land, if the vehicle flies, and end the launched processes."""
         if self._landing is not None:
             with contextlib.suppress(Stop):
                 self._landing()
@@ -255,7 +255,7 @@ class LiveRig:
         self._landing = None
 
     def close(self) -> None:
-        """End what was launched, and the node."""
+        """End the launched processes, and the node."""
         self.end()
         self._end_node()
 
@@ -272,8 +272,8 @@ class LiveRig:
             self.run(0.1)
             if time.monotonic() > end:
                 raise Stop(
-                    f"no pose in the frame {self._frame} within {_LIMIT:g} s of the launch; is the "
-                    "vehicle seen, and is it connected?"
+                    f"no pose in the frame {self._frame} within {_LIMIT:g} s of the launch; does "
+                    "motion capture see the vehicle, and is it connected?"
                 )
 
     def _call(self, name: str, service: Any, request: Any) -> None:
@@ -304,8 +304,9 @@ def main(arguments: list[str] | None = None) -> int:
         FirstFlightParameters,
         rest,
         "first_flight URI",
-        "A first flight, one step at a time, each asked for with Enter and ended by any key and "
-        "Enter; it ends with a report. Exit status: 0 all have passed, 1 not, 2 wrong usage.",
+        "A first flight, one step at a time; Enter starts each step, any key and Enter end it. "
+        "The last output is a report. Exit status: 0 all steps have passed, 1 a step has failed, "
+        "2 wrong usage.",
     )
     try:
         Address.parse(uri)

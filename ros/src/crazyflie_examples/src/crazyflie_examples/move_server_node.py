@@ -55,7 +55,7 @@ class MoveServerParameters(Parameters):
     reference_topic: str = parameter(TOPIC, "where references go", name="topics/ref")
     service: str = parameter(SERVICE, "moves the vehicle to the next point", "/move", "srv/move")
     points: tuple[Point, ...] = parameter(
-        Points(), "the route; after its last point comes the first", DEFAULT_POINTS
+        Points(), "the route; after its last point it starts again", DEFAULT_POINTS
     )
 
 

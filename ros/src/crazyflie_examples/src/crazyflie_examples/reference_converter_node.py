@@ -1,4 +1,4 @@
-"""ROS interface between references of position and velocity and controllers that want more."""
+"""ROS interface between references of position and velocity and controllers that need more."""
 
 from functools import partial
 
@@ -12,7 +12,7 @@ from crazyflie_msgs.msg import (
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TOPIC, Text
 
-#: What a reference can be converted to, by the value of the parameter ``state``.
+#: Types to which a reference can be converted, by the value of the parameter ``state``.
 TYPES = {
     "position_velocity_yaw": PositionVelocityYawStateStamped,
     "full_state": FullStateStamped,
@@ -31,9 +31,9 @@ class ReferenceConverterParameters(Parameters):
 
 
 class ReferenceConverterNode(Node):
-    """Pass references on as another message; what they do not have is zero: level, yaw 0.
+    """Pass references on as another message; missing fields are zero: level, yaw 0.
 
-    Those of a descent, on the topics' names + ``_descent``, too.
+    References of a descent, on the topics' names + ``_descent``, are also converted.
     """
 
     needed_in_flight = True
@@ -46,8 +46,8 @@ class ReferenceConverterNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
-        # A reference is often sent once, and the controller may be late; one of a descent is
-        # worth nothing later.
+        # Latched, since a reference is often sent once, and the controller may start late; a late
+        # reference of a descent is useless.
         for suffix, latch in (("", True), ("_descent", False)):
             publisher = handle.publisher(parameters.converted_topic + suffix, self._type, latch)
             handle.subscribe(

@@ -18,7 +18,7 @@ ROLL, PITCH, YAW_DOT, THRUST = range(4)
 YAW = 6  #: Index of the yaw in states with position, velocity and yaw.
 X_DIM, U_DIM = 7, 4  #: Lengths of these states, and of controls.
 
-#: Least and most of each control.
+#: Smallest and largest value of each control.
 LIMITS = (
     (-MAX_TILT, MAX_TILT),
     (-MAX_TILT, MAX_TILT),

@@ -30,7 +30,8 @@ class Weights:
     Q: NDArray[np.float64]
     #: Weights of the control, shape (u_dim, u_dim), symmetric, positive definite.
     R: NDArray[np.float64]
-    #: Weights of products, shape (x_dim, u_dim); ``[[Q, N], [N^T, R]]`` is positive semidefinite.
+    #: Weights of the products of state and control, shape (x_dim, u_dim); ``[[Q, N], [N^T, R]]`` is
+    #: positive semidefinite.
     N: NDArray[np.float64]
 
     def check(self) -> None:
@@ -79,7 +80,7 @@ class Design:
 
     @property
     def feedback(self) -> NDArray[np.float64]:
-        """Gains on all states of the plant, shape (u_dim, n): none on controls on their way."""
+        """Gains on all states of the plant, shape (u_dim, n); zero on delayed controls."""
         missing = self.A.shape[0] - self.K.shape[1]
         return np.pad(self.K, ((0, 0), (0, missing)))
 
@@ -190,7 +191,7 @@ def _padded(weights, n):
 
 
 def _check_solvable(model, weights):
-    """Raise `DesignError` for modes that no control reaches, or no weight sees.
+    """Raise `DesignError` for modes that are not stabilisable, or not detectable by the weights.
 
     The test is Hautus's, for every mode that does not decay by itself.
     """

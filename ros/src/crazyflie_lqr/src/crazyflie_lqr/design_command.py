@@ -21,7 +21,7 @@ integral of x'Qx + u'Ru + 2x'Nu; print closed-loop poles and margins, and those 
 it is flown.
 """
 
-LEAST_DELAY = 0.02  #: Least delay margin of gains as flown; with less, ``--force`` is needed (s).
+LEAST_DELAY = 0.02  #: Least delay margin of gains as flown (s); below it, ``--force`` is needed.
 
 _MATRIX_HELP = """
 numbers, separated by blanks or commas: the diagonal, or the matrix row by row; or the path
@@ -121,18 +121,19 @@ def _parser():
         "--sample_time",
         type=float,
         default=0.0,
-        help="s; design for a control that is held so long (default 0: in continuous time)",
+        help="time for which a control is held, s (default 0: continuous time)",
     )
     parser.add_argument(
         "--delay",
         type=float,
         default=0.0,
-        help="s, from the measurement of a state until its control acts; needs --sample_time",
+        help="time from the measurement of a state until its control acts, s; needs --sample_time",
     )
     parser.add_argument(
         "--plant",
         choices=sorted(MODELS),
-        help="what is flown, for the margins (default: the model); full_state has an attitude lag",
+        help="plant that is flown, for the margins (default: the model); full_state has an "
+        "attitude lag",
     )
     parser.add_argument(
         "--force",
@@ -175,7 +176,7 @@ def _matrix(name, words, rows, columns):
     try:
         values = _numbers(text)
     except ValueError as error:
-        raise DesignError(f"{name}: {error}, nor is there such a file") from None
+        raise DesignError(f"{name}: {error}, and not the name of a file") from None
     if len(values) == rows * columns:
         return np.reshape(values, (rows, columns))
     if rows == columns == len(values):

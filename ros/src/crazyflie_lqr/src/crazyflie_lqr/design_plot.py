@@ -17,15 +17,15 @@ _OUTPUTS = {"x": "pitch", "y": "roll", "z": "thrust", "yaw": "yaw_dot"}
 _UNITS = {"roll": "rad", "pitch": "rad", "yaw_dot": "rad/s", "thrust": "m/s²"}
 
 
-Responses = dict[str, NDArray[np.float64]]  #: By name of an output, shape (n,).
+Responses = dict[str, NDArray[np.float64]]  #: Responses by name of an output, shape (n,).
 
 
 def step_responses(
     model: LinearModel, design: Design
 ) -> tuple[NDArray[np.float64], Responses, Responses]:
-    """Return what follows a unit step of the reference in x, y, z and yaw, each alone.
+    """Return the responses to unit steps of the reference in x, y, z and yaw, each alone.
 
-    That is: the times (s), how each output moves (m or rad), and the control that moves it.
+    These are the times (s), the motion of each output (m or rad), and its control.
     """
     slowest = -design.poles.real.max()
     duration = min(8.0 / slowest, 60.0)

@@ -19,7 +19,7 @@ from crazyflie_utils.text import number_from_text, shortened, shown
 
 
 class GainFileError(ValueError):
-    """A gain file is unusable; the text names the file, the line and the expected shape."""
+    """A gain file is invalid; the text names the file, the line and the expected shape."""
 
 
 def load_matrix(path: str, rows: int, columns: int) -> NDArray[np.float64]:
@@ -57,7 +57,7 @@ def load_vector(path: str, length: int) -> NDArray[np.float64]:
 def save_matrix(path: str, matrix: ArrayLike, comment: str = "") -> None:
     """Write a matrix, shape (rows, columns), with 12 digits, and a comment at the end."""
     with open(path, "w", encoding="utf-8") as file:
-        # Adding 0 turns -0, which would look like a meaningful sign, into 0.
+        # Adding 0 turns -0, whose sign would look meaningful, into 0.
         for row in np.asarray(matrix) + 0.0:
             file.write(" ".join(f"{value:.12g}" for value in row) + "\n")
         for line in comment.splitlines():
@@ -101,12 +101,12 @@ def _rows(path, expected):
         with open(path, encoding="utf-8", errors="replace") as file:
             lines = file.read().split("\n")
     except (OSError, ValueError) as error:
-        # A path with a NUL raises ValueError.
+        # A path with a NUL character raises ValueError.
         reason = error.strerror if isinstance(error, OSError) else error
         where = shortened(os.path.abspath(path))
         raise GainFileError(f"cannot read {where}: {reason}, {expected}") from None
     if lines[-1].endswith(".") and "#" not in lines[-1]:
-        # With a line break after it, that is a valid number.
+        # With a line break behind it, the number would be valid.
         raise GainFileError(
             f"{path}, line {len(lines)}: the file ends in a number without the digits behind its "
             f"point; expected them, or a line break, {expected}"

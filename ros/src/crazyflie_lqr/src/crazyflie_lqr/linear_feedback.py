@@ -43,7 +43,7 @@ class Climb:
 
     After a step of the reference, the integrator of a soft height loop would collect the error of
     the climb, and the vehicle overshoot. So the reference climbs as fast as a vehicle can follow,
-    and what differs from nominal is found by a disturbance observer (Ohnishi et al., Motion control
+    and a disturbance observer estimates the difference from nominal (Ohnishi et al., Motion control
     for advanced mechatronics, IEEE/ASME Trans. Mechatronics 1(1), 1996):
 
         z_ddot = thrust - u_ref + d,    d' = RATE (z_ddot - (thrust - u_ref) - d).
@@ -152,8 +152,8 @@ class LinearFeedback:
     """The control law u = u_ref + K e, with e of `heading_error`.
 
     A subclass overrides `control`; or `law`, which is the same in plain floats and what `control`
-    calls. K has the shape (u_dim, x_dim), with the sign that belongs to the plus; u_ref is the
-    control at the reference, hover; ``yaw_index`` is where the yaw is in the state.
+    calls. K has the shape (u_dim, x_dim), with the sign of this formula; u_ref is the control at
+    the reference, hover; ``yaw_index`` is where the yaw is in the state.
     """
 
     def __init__(self, K: Iterable[Iterable[float]], u_ref: Iterable[float], yaw_index: int):

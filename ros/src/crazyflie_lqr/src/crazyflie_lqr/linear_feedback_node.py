@@ -31,7 +31,8 @@ class Gains(MatrixFile):
         path = TEXT(value)
         if not vehicle_model.is_model(path):
             return super().__call__(path)
-        # Here, since python-control takes a second to load, and most controllers read a file.
+        # Imported here, since python-control takes a second to load, and most controllers read a
+        # file.
         from crazyflie_lqr.vehicle_gains import gains
 
         try:
@@ -66,7 +67,8 @@ class LinearFeedbackParameters(Parameters):
     control_topic: str = parameter(TOPIC, "where controls go", name="topics/control")
     own_descent_topic: str | None = parameter(
         TOPIC,
-        "references that count before all others; by default the name of reference + `_descent`",
+        "references of a descent, which override all others; by default the name of reference + "
+        "`_descent`",
         None,
         name="topics/descent_reference",
     )
@@ -78,22 +80,22 @@ class LinearFeedbackParameters(Parameters):
     )
     max_jump: float = parameter(
         Number("m", above=0.0),
-        "how far from the vehicle a new reference may be; a further one is moved nearer",
+        "largest distance of a new reference from the vehicle; a further one is moved nearer",
         3.0,
         name="reference/max_jump",
         live=True,
     )
     max_speed: float = parameter(
         Number("m/s", above=0.0, maximum=MAX_SPEED),
-        "a larger velocity of a reference is made as large as this",
+        "largest velocity of a reference; a larger one is limited",
         2.0,
         name="reference/max_speed",
         live=True,
     )
     max_age: float = parameter(
         Number("s", above=0.0),
-        "older states are not answered; the age of stamps of another clock, a minute off, is their "
-        "delay",
+        "older states are not answered; if stamps come from another clock, more than a minute "
+        "off, their age is the delay",
         HOLD_LIMIT,
         name="state/max_age",
     )
@@ -112,10 +114,10 @@ class LinearFeedbackParameters(Parameters):
 
 
 class LinearFeedbackNode(Node):
-    """Answer every state with a control that leads towards the reference.
+    """Answer every state with a control that moves the vehicle towards the reference.
 
     A subclass describes its state in class attributes, and may override `complete_reference` and
-    `make_controller`. Unless it does, or the controller overrides `control`, no arrays are made.
+    `make_controller`. Unless it does, or the controller overrides `control`, no arrays are created.
     """
 
     needed_in_flight = True
@@ -125,8 +127,9 @@ class LinearFeedbackNode(Node):
     reference_type: type
     #: `LinearFeedbackParameters` or a subclass.
     parameters_type: type[LinearFeedbackParameters] = LinearFeedbackParameters
-    yaw_index: int  #: Where the yaw is in the state, which begins with position and velocity.
-    reference_tail: tuple[float, ...] = ()  #: Reference of the states that messages do not have.
+    yaw_index: int  #: Index of the yaw in the state, which begins with position and velocity.
+    #: Reference of the states that the messages do not contain.
+    reference_tail: tuple[float, ...] = ()
 
     def __init__(self) -> None:
         self._reference = GuardedReference(self.yaw_index, report=self._warn_of_reference)
@@ -238,7 +241,8 @@ class LinearFeedbackNode(Node):
         x = to_tuple(message.state)
         x_ref = self._reference.value(self._handle.time(), x)
         if x_ref is None and self._flight_state == FlightStatus.FLYING:
-            # Restarted in flight; the reference may have been published once, long ago.
+            # The node was restarted in flight; the reference may have been published once, long
+            # ago.
             self._reference.update(at_rest(x, self.yaw_index))
             x_ref = self._reference.value(self._handle.time(), x)
         if x_ref is None:
@@ -261,7 +265,7 @@ class LinearFeedbackNode(Node):
         if age <= self._parameters.max_age:
             self._clocks_agree = True
             return False
-        # If the clocks have agreed before, the message was late.
+        # If the clocks agreed before, the message was late.
         cause = (
             "this computer, or the network, is too busy"
             if self._clocks_agree

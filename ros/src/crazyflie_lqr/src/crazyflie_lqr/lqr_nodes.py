@@ -40,9 +40,9 @@ class IntegratorGains(Parameters):
 class IntegratorLimits(Parameters):
     """Limits of the integral of the position error."""
 
-    x: float = parameter(_LIMIT, "the integral stays within +- this", 0.0, live=True)
-    y: float = parameter(_LIMIT, "the integral stays within +- this", 0.0, live=True)
-    z: float = parameter(_LIMIT, "the integral stays within +- this", 0.0, live=True)
+    x: float = parameter(_LIMIT, "limit of the integral's magnitude", 0.0, live=True)
+    y: float = parameter(_LIMIT, "limit of the integral's magnitude", 0.0, live=True)
+    z: float = parameter(_LIMIT, "limit of the integral's magnitude", 0.0, live=True)
 
 
 class LiftLqrParameters(LinearFeedbackParameters):

@@ -21,7 +21,8 @@ _RATE = "_dot"  #: Suffix of the names of rates.
 
 _FREQUENCIES = 500
 
-_INFINITE = 1e9  #: Gain at rest from which a loop has an open integrator, in spite of rounding.
+#: Gain at rest above which a loop is treated as having an integrator, in spite of rounding.
+_INFINITE = 1e9
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Margins:
     #: they may without limit.
     gain_up: float
     gain_down: float
-    phase: float  #: Phase that the loop may lose (rad); infinity if its gain is never 1.
+    phase: float  #: Phase margin (rad); infinity if the loop gain is never 1.
     crossover: float  #: Frequency of the phase margin (rad/s); NaN without one.
     delay: float  #: Additional delay of the control that the loop tolerates (s); 0 if unstable.
     #: Least distance of the loop from -1, 1 / max |S| with the sensitivity S = 1 / (1 + L): 1 is a
@@ -64,7 +65,7 @@ def flown(
     A, B = sampled(plant, period, delay)
     n = A.shape[0]
     measured = [i for i, name in enumerate(plant.states) if not name.endswith(_RATE)]
-    # Behind the plant's states: the last pose.
+    # The last pose follows the plant's states.
     A = np.pad(A, (0, len(measured)))
     B = np.pad(B, ((0, len(measured)), (0, 0)))
     A[n + np.arange(len(measured)), measured] = 1.0

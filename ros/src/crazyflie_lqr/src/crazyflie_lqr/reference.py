@@ -162,7 +162,7 @@ class GuardedReference:
         velocity = x_ref[3:6]
         if not self._velocity_check.update(x_ref[:3], velocity, time):
             self._report(
-                "the velocity of the references does not count, since they do not move with it"
+                "the velocity of the references is ignored, since they do not move with it"
             )
             return at_rest(x_ref, self._yaw_index)
         speed = math.hypot(*velocity)
@@ -170,7 +170,7 @@ class GuardedReference:
             return x_ref
         self._report(
             f"the reference has a velocity of {speed:.1f} m/s; expected <= {self.max_speed:g} m/s, "
-            "with which it is followed"
+            "the velocity is limited"
         )
         return [*x_ref[:3], *limited(velocity, self.max_speed), *x_ref[6:]]
 
@@ -180,8 +180,8 @@ class GuardedReference:
             # A landing ends a stream of references as it should.
             if self._descent is None or self._descent_time < self._time:
                 self._report(
-                    f"the reference has a velocity and has been the last for {VELOCITY_LIMIT:g} s; "
-                    "resting where it is"
+                    f"the reference has a velocity and none has followed for {VELOCITY_LIMIT:g} "
+                    "s; stopping at its position"
                 )
         return self._rest
 
@@ -191,7 +191,7 @@ class GuardedReference:
             self._near = self._far = None
             return x_ref
         self._report(
-            f"the reference is {distance:.1f} m away; going {self.max_jump:g} m in its direction"
+            f"the reference is {distance:.1f} m away; flying {self.max_jump:g} m in its direction"
         )
         # A distant reference that is repeated must not lead the vehicle there step by step.
         is_repeated = self._far is not None and math.dist(x_ref[:3], self._far[:3]) < self.max_jump
@@ -208,11 +208,11 @@ class GuardedReference:
         return self._near
 
 
-#: Difference above which two clocks are not meant to agree (s): one of them is simulated, or is
-#: that of a bag.
+#: Difference above which two clocks are unrelated (s): one of them is simulated, or is that of a
+#: bag.
 SAME_CLOCK = 60.0
 
-_DRIFT = 1e-3  #: Largest relative drift of clocks that are not meant to agree (s/s).
+_DRIFT = 1e-3  #: Largest relative drift of unrelated clocks (s/s).
 
 
 class StateAge:

@@ -15,14 +15,15 @@ from crazyflie_model.units import GRAVITY
 #: Bandwidth of a position loop times the time by which its control comes late: delay, lag and the
 #: half period of sampling and difference. The loops then have a modulus margin of about 0.5.
 PACE = 0.42
-DAMPING = 0.9  #: Of the position loops.
+DAMPING = 0.9  #: Damping ratio of the position loops.
 #: Largest bandwidths, rad/s, horizontal, vertical and of yaw: noise of poses is not to shake the
 #: vehicle.
 MAX_BANDWIDTH = (3.5, 4.0, 5.0)
-#: A loop bears this much more delay than the vehicle has, s, and is at least this far from -1.
+#: Least delay margin of a loop beyond the vehicle's delay (s), and least distance of the loop from
+#: -1.
 LEAST_DELAY, LEAST_MODULUS = 0.03, 0.4
 
-_SLOWER = 0.85  #: Factor of the pace for the next attempt.
+_SLOWER = 0.85  #: Factor of the bandwidths for the next attempt.
 
 
 def weights(model: QuadrotorParameters, pace: float = PACE) -> Weights:
@@ -49,7 +50,7 @@ def weights(model: QuadrotorParameters, pace: float = PACE) -> Weights:
 def design(model: QuadrotorParameters) -> tuple[Design, list[Margins]]:
     """Return gains for a vehicle, and the margins of the loops as they are flown.
 
-    `DesignError`: the vehicle comes too late for any.
+    `DesignError`: the vehicle's delay is too long for any gains.
     """
     plant, states = vehicle_plant(model), near_hover()
     pace = PACE

@@ -48,7 +48,7 @@ class TrajectoryMemory:
         self._rooms: dict[int, range] = {}
 
     def upload(self, trajectory_id: int, piece_offset: int, pieces: Pieces) -> None:
-        """Write pieces; ValueError when there is no room."""
+        """Write pieces; ValueError if the memory is full."""
         where = f"{self._name}.uploadTrajectory"
         room = range(piece_offset, piece_offset + len(pieces))
         if room.stop > MEMORY:
@@ -76,7 +76,7 @@ class TrajectoryMemory:
         self._pieces |= dict(zip(room, pieces, strict=True))
 
     def __getitem__(self, trajectory_id: int) -> list[PolynomialPiece]:
-        """Return the pieces of a trajectory; ValueError for one that is not there."""
+        """Return the pieces of a trajectory; ValueError for one that does not exist."""
         if trajectory_id not in self._rooms:
             raise ValueError(
                 f"{self._name}.startTrajectory: trajectoryId is {trajectory_id}; expected one that "
@@ -150,7 +150,9 @@ class IdealVehicle(MissionVehicle):
         if not self._may_plan("takeoff", group_mask):
             return done(None)
         if self.is_active:
-            self._warn(f"{self.name}.takeoff: it flies; a real vehicle ignores the command")
+            self._warn(
+                f"{self.name}.takeoff: the vehicle flies already; a real one ignores the command"
+            )
             return done(None)
         return self._climb(height, duration, flies=True)
 
@@ -232,10 +234,10 @@ class IdealVehicle(MissionVehicle):
         return group_mask == 0 or bool(group_mask & self.groups)
 
     def _warn(self, text: str) -> None:
-        """Process what a real vehicle would not do."""
+        """Report a command that a real vehicle would not carry out."""
 
     def _stop_motors(self, method: str) -> None:
-        """Stop where it is."""
+        """Stop at the present position."""
         self._forget_plan()
 
     def _forget_plan(self):
@@ -260,7 +262,7 @@ _STEP = 0.05  #: Time step (s).
 
 
 class DryRunClock(Clock):
-    """Time that passes during waits only."""
+    """A clock whose time passes during waits only."""
 
     def __init__(self, on_step: Callable[[], None] = lambda: None):
         self._time = 0.0
@@ -325,7 +327,7 @@ def dry_run(group: VehicleGroup, mission: Callable[[VehicleGroup], Any]) -> floa
         {name: vehicle.start_skew for name, vehicle in group._vehicles.items()},
         group.observer.step,
     )
-    # Where they are now.
+    # Their present positions.
     obstacles = group.obstacles()
     run.obstacles = lambda: obstacles
     with run:

@@ -86,7 +86,7 @@ class RosClock(Clock):
         last, moved_at = self.time(), time.monotonic()
         while not (done := condition()) and (now := self.time()) < deadline:
             if self._has_ended():
-                raise MissionError("ROS has shut down; expected it to run as long as the mission")
+                raise MissionError("ROS has shut down before the end of the mission")
             if now != last:
                 last, moved_at = now, time.monotonic()
             elif time.monotonic() - moved_at > _FROZEN:
@@ -126,8 +126,8 @@ class Fleet(VehicleGroup):
     Raises
     ------
     MissionError
-        A vehicle is not there, and the text says what was looked for; or another mission that runs
-        has it.
+        A vehicle was not found (the text says what was searched for), or belongs to another running
+        mission.
     """
 
     def __init__(
@@ -240,16 +240,16 @@ class Fleet(VehicleGroup):
         for mission, claim in [*self._missions.claims.items()]:
             if taken := [name for name in self.names if name in claim.vehicles]:
                 for name in taken:
-                    # They are landed by the other one.
+                    # The other mission lands them.
                     self.release(name)
                 raise MissionError(
-                    f"{', '.join(taken)}: the mission {mission} has them, and runs; expected it to "
-                    "end before, or other vehicles"
+                    f"{', '.join(taken)}: in use by the running mission {mission}; wait for its "
+                    "end, or choose other vehicles"
                 )
 
     @override
     def _check_apart(self, changed: Mapping[str, TimedTrajectory]) -> None:
-        # The other one may have begun at the same moment, or while this one was stopped.
+        # The other mission may have begun at the same moment, or while this one was stopped.
         self._refuse_claimed()
         super()._check_apart(changed)
 
@@ -301,7 +301,7 @@ def vehicles_of(names: str | Path | Sequence[str]) -> tuple[list[str], dict[str,
     Raises
     ------
     MissionError
-        There are none, or one twice.
+        The list is empty, or has a name twice.
     """
     if isinstance(names, Path) or (isinstance(names, str) and names.endswith((".yaml", ".yml"))):
         try:
@@ -314,7 +314,7 @@ def vehicles_of(names: str | Path | Sequence[str]) -> tuple[list[str], dict[str,
         raise MissionError(f"the vehicles are {names!r}; expected names, such as ['cf1', 'cf2']")
     for name in chosen:
         if chosen.count(name) > 1:
-            raise MissionError(f"there are two vehicles {name!r}; expected different names")
+            raise MissionError(f"the vehicle {name!r} is named twice; expected different names")
     return chosen, {}
 
 

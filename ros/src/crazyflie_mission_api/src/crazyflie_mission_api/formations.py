@@ -51,9 +51,10 @@ def circle(n: int, radius: float, center: Sequence[float] = (0.0, 0.0, 1.0)) -> 
 def assign(places: Mapping[str, Sequence[float]], goals: Array) -> dict[str, Point]:
     """Assign goals to vehicles with the least sum of squared distances.
 
-    Vehicles that then fly straight there with the same time law come no nearer than
-    min(start distance, goal distance) / sqrt(2), distances as in `Clearance`: Turpin, Michael and
-    Kumar, CAPT: Concurrent Assignment and Planning of Trajectories for Multiple Robots (IJRR 2014).
+    Vehicles that then fly there on straight lines, with the same time law, stay at least this far
+    apart: min(start distance, goal distance) / sqrt(2), distances as in `Clearance`: Turpin,
+    Michael and Kumar, CAPT: Concurrent Assignment and Planning of Trajectories for Multiple Robots
+    (IJRR 2014).
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ class GroupState:
         self, vehicles: Iterable[MissionVehicle], clock: Clock, rules: Rules | None = None
     ):
         self._vehicles = {vehicle.name: vehicle for vehicle in vehicles}
-        # Subgroups, too, keep apart from all vehicles.
+        # Subgroups also keep apart from all vehicles.
         self._all_vehicles = self._vehicles
         self._clock = clock
         self.rules = rules or Rules()
@@ -125,7 +125,7 @@ class GroupState:
         Raises
         ------
         MissionError
-            A vehicle is not there `Rules.arrival_timeout` after the planned end.
+            A vehicle has not arrived `Rules.arrival_timeout` after the planned end.
         """
         end = max((self._commanded[name].end for name in self.flying), default=self.time())
         self._wait(never, end)
@@ -165,8 +165,8 @@ class GroupState:
             on_ground[name] = obstacle.position
             if obstacle.is_flying and obstacle.position is None:
                 raise MissionError(
-                    f"{name}: its position is not known, and another mission flies it; expected to "
-                    "know how far away it is"
+                    f"{name}: its position is not known, and another mission flies it; its "
+                    "distance cannot be checked"
                 )
         resting = {name: TimedTrajectory.hover(p) for name, p in on_ground.items() if p is not None}
         everything = {**resting, **self._commanded, **changed}
@@ -176,7 +176,7 @@ class GroupState:
         for name in names:
             if name not in self._vehicles:
                 raise MissionError(
-                    f"there is no vehicle {name!r}; expected one of {', '.join(self._vehicles)}"
+                    f"no vehicle has the name {name!r}; expected one of {', '.join(self._vehicles)}"
                 )
 
     def _answers(self, command, names=None):

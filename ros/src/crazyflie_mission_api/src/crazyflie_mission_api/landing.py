@@ -1,4 +1,4 @@
-"""Landing of the vehicles of a group: in rounds, the lowest first, none on another."""
+"""Landing of the vehicles of a group: in rounds, the lowest first, none above another."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,8 +17,8 @@ from crazyflie_mission_api.trajectories import TimedTrajectory, check_with_skew,
 _DESCENT_SPEED = 0.3  #: Mean speed of landings (m/s).
 _SHORTEST_LANDING = 2.0  #: Shortest duration of a landing (s).
 
-#: A moving vehicle stops at its goal of this time ahead, within this duration (s): it begins with
-#: its present speed.
+#: Time ahead whose goal a moving vehicle takes as stopping point, and duration of that stop (s):
+#: the move begins with its present speed.
 _STOP_AHEAD, _STOP_DURATION = 1.0, 2.0
 
 _PERIOD = 0.05  #: Period of the checks of vehicles that land (s).
@@ -38,7 +38,7 @@ class LandingGroup(GroupState):
         Raises
         ------
         MissionError
-            Two would come too near; or some cannot land, which are named.
+            Two vehicles would come too near, or some cannot land; the text names them.
         """
         raise_failures("land", self._land_all(is_checked=True))
 
@@ -80,7 +80,8 @@ class LandingGroup(GroupState):
         for name, vehicle in self._all_vehicles.items():
             measured = vehicle.position()
             if name in self._commanded:
-                # Commanded positions were checked; a vehicle away from its own has the real one.
+                # Commanded positions were checked; a vehicle away from its commanded position has
+                # the measured one.
                 places[name] = commanded = self._commanded[name].goal(self.time()).position
                 if measured is None or math.dist(measured, commanded) <= self.rules.tolerance:
                     continue

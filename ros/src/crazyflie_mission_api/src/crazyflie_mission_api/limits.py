@@ -27,13 +27,14 @@ class MissionError(Exception):
 class Limits:
     """Largest demands of a trajectory on a vehicle."""
 
-    #: speed, acceleration: Largest ones (m/s, m/s^2).
+    #: speed, acceleration: Largest speed and acceleration (m/s, m/s^2).
     speed: float = 0.5
     acceleration: float = 1.0
-    yaw_rate: float = 1.5  #: Largest yaw rate (rad/s).
-    #: Largest angle between thrust and vertical (rad), that of controllers.
+    #: Largest yaw rate (rad/s). Largest angle between thrust and vertical (rad), the limit of the
+    #: controllers.
+    yaw_rate: float = 1.5
     tilt: float = MAX_TILT
-    #: min_thrust, max_thrust: Range of the thrust (m/s^2), that of controllers.
+    #: min_thrust, max_thrust: Range of the thrust (m/s^2), that of the controllers.
     min_thrust: float = MIN_THRUST
     max_thrust: float = MAX_THRUST
 
@@ -81,7 +82,7 @@ class Bounds:
         positions : ndarray, shape (3,) or (n, 3)
             m.
         what : str
-            Name of the positions for the text of the error.
+            Name of the positions in the error text.
 
         Raises
         ------
@@ -203,7 +204,7 @@ class Clearance:
                     raise MissionError(
                         f"{one} and {two} would come near each other too fast, {time:.1f} s from "
                         f"now: at {pair.distance:.3g} m, and in {LOOK_AHEAD:g} s at their speeds "
-                        f"less than {pair.limit:.3g} m; expected slower ways, or others"
+                        f"less than {pair.limit:.3g} m; expected slower or other paths"
                         f"{self._reasons(one, two)}"
                     )
 

@@ -41,7 +41,7 @@ def plan(
     waypoints : sequence of [x, y, z] or [x, y, z, yaw]
         At least two, m and rad; without a yaw, a waypoint has that of the one before, or 0.
     limits : Limits, optional
-        The trajectory is as quick as they allow.
+        The trajectory is as fast as they allow.
     what : str
         Name of a waypoint in errors.
 
@@ -109,8 +109,8 @@ def _points(waypoints, what):
             values = []
         if len(values) not in (3, 4) or not all(map(math.isfinite, values)):
             raise MissionError(
-                f"{what} {number} is {waypoint!r}; expected x, y, z in m, and yaw in rad if "
-                "wanted, finite numbers"
+                f"{what} {number} is {waypoint!r}; expected finite numbers: x, y, z in m, and "
+                "optionally yaw in rad"
             )
         yaw = values[3:] or [points[-1][3] if points else 0.0]
         points.append([*values[:3], *yaw])
@@ -120,6 +120,6 @@ def _points(waypoints, what):
         if math.dist(one, two) < _NEAREST:
             raise MissionError(
                 f"{what} {number} is {tuple(one)}, and {number + 1} is the same; expected "
-                "different ones"
+                "different points"
             )
     return np.array(points)

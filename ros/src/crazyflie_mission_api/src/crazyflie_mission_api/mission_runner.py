@@ -44,7 +44,7 @@ class _Printer(MissionObserver):
         self._first = time if self._first is None else self._first
         count = len(vehicles)
         names = ", ".join(vehicles) if count <= _SHOWN_NAMES else f"{count} vehicles"
-        # The program that reads the output may have ended; the vehicles must land all the same.
+        # The program that reads the output may have ended; the vehicles must still land.
         with contextlib.suppress(OSError):
             print(f"{time - self._first:7.1f} s  {command}: {names}", flush=True)
 
@@ -78,13 +78,15 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="mission_runner", description=__doc__)
     parser.add_argument("word", choices=("dry_run", "fly"))
     parser.add_argument("file", help="script, or trajectory (CSV)")
-    parser.add_argument("others", nargs=argparse.REMAINDER, help="of the script, or vehicles")
+    parser.add_argument(
+        "others", nargs=argparse.REMAINDER, help="arguments of the script, or names of vehicles"
+    )
     options = parser.parse_args(arguments)
     path, others, is_dry = options.file, options.others, options.word == "dry_run"
     if not os.path.isfile(path):
-        parser.error(f"there is no file {path}; expected a script, or a trajectory (CSV)")
+        parser.error(f"the file {path} does not exist; expected a script, or a trajectory (CSV)")
     observer.of_process = _DryRunReport() if is_dry else _Printer()
-    # As if the program were started directly.
+    # sys.argv and the path are as if the script were started directly.
     sys.argv, sys.path[0] = [path, *others], os.path.dirname(os.path.abspath(path))
     try:
         if path.endswith(".csv"):

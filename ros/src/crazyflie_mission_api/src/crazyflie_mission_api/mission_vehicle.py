@@ -82,9 +82,9 @@ Setpoint = (
 
 
 def led_to(setpoint: Setpoint, place: Triple, yaw: float, duration: float) -> Triple | None:
-    """Return where a setpoint leads a vehicle from a place (m) and yaw (rad) in a duration (s).
+    """Return where a vehicle is after a duration (s) of a setpoint, from a place (m) and yaw (rad).
 
-    None where that is not known.
+    None if that is not known.
     """
     x, y, z = place
     if isinstance(setpoint, FullStateSetpoint | PositionSetpoint):
@@ -134,7 +134,7 @@ class Commands(Protocol):
         """Sink straight down to a height (m), None is the ground, in about a duration (s)."""
 
     def stop(self, group_mask: int = 0) -> "Future[Any]":
-        """Stop the motors of a vehicle that has landed: those of the firmware idle on."""
+        """Stop the motors of a vehicle that has landed, which the firmware keeps idling."""
 
     def go_to(self, move: Move, group_mask: int = 0) -> "Future[Any]":
         """Fly to a point."""

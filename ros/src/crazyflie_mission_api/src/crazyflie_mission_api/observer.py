@@ -1,4 +1,4 @@
-"""Observer of a user's mission, by which the program that runs it follows and restricts it."""
+"""Observer of a user's mission: the program that runs the mission follows and restricts it."""
 
 import functools
 from collections.abc import Callable
@@ -14,7 +14,8 @@ NO_DRY_RUN = "the script does not call fleet.fly(mission): there is no dry run o
 class MissionObserver:
     """Is called at each command of fleets; does nothing itself."""
 
-    dry_runs_only = False  #: Fleets refuse every command; `Fleet.fly` makes its dry run.
+    #: Whether fleets refuse every command, and `Fleet.fly` only makes its dry run.
+    dry_runs_only = False
     command = ""  #: The command that is carried out; its parts are not reported.
 
     def begin(self, command: str, vehicles: list[str], time: float) -> None:

@@ -40,7 +40,7 @@ from crazyflie_utils.parameters.types import FINITE
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 
 _LANDED_HEIGHT = 0.1  #: Largest height above the start of a vehicle that has landed (m).
-#: Flight states after the flight.
+#: States of the takeoff server after the flight.
 _ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
 
 _STEP = 0.02  #: Time within which starts of vehicles are combined in one message (s).
@@ -49,7 +49,8 @@ CALL_TIMEOUT = 60.0  #: Timeout of a service (s of the machine's clock).
 _SETTLING_TIME = 0.5  #: Time after the planned end of a landing until the vehicle is down (s).
 _HIGH_LEVEL = "commander/enHighLevel"  #: The firmware parameter that enables high-level commands.
 _HOLD_DURATION = 0.5  #: Duration of the go_to to the vehicle's place at the end of a stream (s).
-_HOLD_TIMEOUT = 3.0  #: Timeout of its answer (s of the machine's clock); the driver's is 1 s.
+#: Timeout of the answer to that go_to (s of the machine's clock); the driver's is 1 s.
+_HOLD_TIMEOUT = 3.0
 
 #: Time for which a landing is retried while setpoints are streamed (s): without an answer they
 #: would end with the mission, and the vehicle would fall.

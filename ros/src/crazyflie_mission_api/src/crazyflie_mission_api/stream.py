@@ -33,7 +33,7 @@ from crazyflie_utils.topics import Publisher
 
 STEP = 0.02  #: Period of the setpoints (s).
 
-#: Longest time until a command is accepted (s): a later one is sent again. From `OVERLAP` after a
+#: Longest time until a command is accepted (s); otherwise it is sent again. From `OVERLAP` after a
 #: command, the driver passes setpoints on again, which override the command.
 MAX_ANSWER_TIME = OVERLAP / 2.0
 

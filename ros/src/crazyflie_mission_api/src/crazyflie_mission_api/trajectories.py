@@ -24,7 +24,8 @@ _UNITS = {
 }
 _TOLERANCE = 1e-6
 
-_SHORTEST = 1e-3  #: Shortest duration of a trajectory (s): one without motion has no demands.
+#: Shortest duration of a trajectory (s): a trajectory without motion has no demands.
+_SHORTEST = 1e-3
 
 _STEP = 0.05  #: Time between two checks of distances (s).
 
@@ -143,9 +144,9 @@ def straight(
 def within_limits(pieces: Pieces, limits: Limits) -> list[PolynomialPiece]:
     """Return the trajectory on the same path, as slow as the limits demand.
 
-    With the time s times as long, speeds and yaw rates are 1/s, accelerations 1/s^2 as large.
-    Tilt and thrust follow from acceleration, in which gravity is not; for these the
-    time is stretched in steps until they are kept, too.
+    If the time is s times as long, speeds and yaw rates are 1/s, accelerations 1/s^2 as large. Tilt
+    and thrust also depend on gravity, which does not scale; for these the time is stretched in
+    steps until the limits are kept.
     """
     peaks = {name: float(values.max()) for name, values in demands(sampled(pieces)[1]).items()}
     factor = max(
@@ -220,7 +221,7 @@ def check_with_skew(
             check({**trajectories, name: trajectory.later(skew)})
         except MissionError as error:
             raise MissionError(
-                f"{error}; that is if {name} begins {skew:g} s after the others"
+                f"{error}; this happens if {name} begins {skew:g} s after the others"
             ) from None
 
 

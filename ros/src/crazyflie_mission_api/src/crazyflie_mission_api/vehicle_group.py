@@ -42,12 +42,14 @@ class VehicleGroup(LandingGroup):
         climbs = {}
         for name in self._vehicles:
             if name in self._commanded:
-                raise MissionError(f"{name}: takeoff: it flies already; expected it on the ground")
+                raise MissionError(
+                    f"{name}: takeoff: the vehicle flies already; expected it on the ground"
+                )
             x, y, z = self.position(name)
             if height < z + _MIN_CLIMB:
                 raise MissionError(
-                    f"{name}: takeoff: the height is {height:g} m, and it is at {z:.2f} m; "
-                    f"expected at least {_MIN_CLIMB:g} m more, or the vehicle on the ground"
+                    f"{name}: takeoff: the height is {height:g} m, and the vehicle is at {z:.2f} "
+                    f"m; expected at least {_MIN_CLIMB:g} m more, or the vehicle on the ground"
                 )
             goal = (x, y, height)
             self.fence(name).check(np.array(goal), f"{name}: takeoff to {text(goal)}")
@@ -110,7 +112,7 @@ class VehicleGroup(LandingGroup):
         moves = {name: stretched(move, seconds) for name, move in moves.items()}
         self._check(moves, "go_to", "a longer duration")
 
-        # Service calls take time: where it is possible, vehicles start by one message.
+        # Service calls take time: if possible, vehicles start by one message.
         prompt = [name for name in moves if self._vehicles[name].start_skew == 0.0]
         together = prompt if len(moves) > 1 else []
         self._prepare({name: moves[name] for name in together}, "go_to", stream=False)
@@ -148,7 +150,7 @@ class VehicleGroup(LandingGroup):
         factor = number(timescale, "follow: timescale", 1e-3)
         given = paths if isinstance(paths, Mapping) else dict.fromkeys(self._vehicles, paths)
         if not given:
-            raise MissionError("follow: there are no trajectories; expected one at least")
+            raise MissionError("follow: no trajectories are given; expected at least one")
         self._check_names(given)
         flown = {}
         for name, pieces in given.items():
@@ -162,8 +164,8 @@ class VehicleGroup(LandingGroup):
                 flown[name] = moved(flown[name], (x, y, z))
             elif math.dist(first, start) > self.rules.tolerance:
                 raise MissionError(
-                    f"{what} begins at {text(first)}, {math.dist(first, start):.2f} m from where "
-                    f"the vehicle is, {text(start)}; expected at most {self.rules.tolerance:g} m"
+                    f"{what} begins at {text(first)}, {math.dist(first, start):.2f} m from the "
+                    f"vehicle at {text(start)}; expected at most {self.rules.tolerance:g} m"
                 )
         self._check(flown, "trajectory", "a timescale > 1")
         self._prepare(flown, "upload", stream)
@@ -173,7 +175,7 @@ class VehicleGroup(LandingGroup):
     def formation(
         self, places: Array | Sequence[Point], duration: float | None = None, wait: bool = True
     ) -> dict[str, tuple[float, float, float]]:
-        """Fly to places without meeting; return the place of each vehicle, m.
+        """Fly to places without collisions; return the place of each vehicle, m.
 
         Parameters
         ----------
@@ -216,7 +218,7 @@ class VehicleGroup(LandingGroup):
                 )
             goals = dict.fromkeys(self._vehicles, goals)
         if not goals:
-            raise MissionError("go_to: there are no goals; expected one at least")
+            raise MissionError("go_to: no goals are given; expected at least one")
         self._check_names(goals)
         places = {name: point(goal, f"{name}: goal") for name, goal in goals.items()}
         if relative:
@@ -229,12 +231,14 @@ class VehicleGroup(LandingGroup):
     def _destination(self, name, command):
         """Return the commanded goal of a vehicle that hovers."""
         if name not in self._commanded:
-            raise MissionError(f"{name}: {command}: it is on the ground; expected takeoff before")
+            raise MissionError(
+                f"{name}: {command}: the vehicle is on the ground; call takeoff first"
+            )
         left = self._commanded[name].end - self.time()
         if left > 0.0:
             raise MissionError(
-                f"{name}: {command}: it is on its way for another {left:.1f} s; expected arrive() "
-                "before"
+                f"{name}: {command}: the vehicle is under way for another {left:.1f} s; call "
+                "arrive() first"
             )
         return self._commanded[name].destination
 

@@ -66,7 +66,7 @@ def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> Triple:
     """
     norm_squared = x * x + y * y + z * z + w * w
     if norm_squared == 0.0:
-        raise ValueError("quaternion (0, 0, 0, 0) is no rotation")
+        raise ValueError("quaternion (0, 0, 0, 0) is not a rotation")
     s = 2.0 / norm_squared
     r00 = 1.0 - s * (y * y + z * z)
     r01 = s * (x * y - w * z)

@@ -199,11 +199,11 @@ class Coupled7D(SevenDimensional):
     def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.step`: as exact as needed, and quick.
 
-        The acceleration turns with the heading; what its integrals have of the third order in the
-        yaw rate is left out: at 3.5 rad/s it is 1e-9 of them.
+        The acceleration turns with the heading; terms of its integrals of third order in the yaw
+        rate are neglected: at 3.5 rad/s they are 1e-9 of the integrals.
         """
         if type(self).rates is not Coupled7D.rates:
-            # A model that is derived from this one.
+            # A model that is derived from this one has other rates.
             return super().step(count, x, u)
         px, py, pz, vx, vy, vz, yaw = x
         yaw_dot, half = u[2], STEP / 2.0

@@ -71,7 +71,7 @@ def where(condition: bool | NDArray[np.bool_], value: Many, other: Many) -> Many
 
 
 def nowhere(condition: bool | NDArray[np.bool_]) -> bool:
-    """Return whether a condition certainly holds for no vehicle: nothing is to be computed."""
+    """Return whether a condition is known to be false for all vehicles: nothing is computed."""
     if isinstance(condition, bool):
         return not condition
     return isinstance(condition, np.ndarray) and not condition.any()

@@ -19,8 +19,8 @@ from crazyflie_model.inner_loops import HEADING, TILT
 from crazyflie_model.quadrotor import QuadrotorParameters
 from crazyflie_model.units import GRAVITY
 
-#: Lags where a model has none (s): those of the firmware's attitude loops, which turn an error into
-#: a rate; its rate loop is much faster.
+#: Default lags (s): those of the firmware's attitude loops, which turn an error into a rate; its
+#: rate loop is much faster.
 TILT_LAG, YAW_LAG = 1.0 / TILT.kp, 1.0 / HEADING.kp
 
 
@@ -37,8 +37,8 @@ def lags(parameters: QuadrotorParameters) -> tuple[float, float, float]:
 class FirstOrderQuadrotor(Dynamics):
     """The lags, the motors' lag and the drag (linear, as in hover) of a vehicle.
 
-    The vehicle's delay is not here: whoever keeps the controls delays them. Thrust is over the
-    vehicle's own mass: 9.81 hovers.
+    The model does not contain the vehicle's delay: the caller, which stores the controls, delays
+    them. Thrust is over the vehicle's own mass: 9.81 hovers.
     """
 
     x_dim = 11

@@ -12,7 +12,7 @@ MAX_TILT = 0.2618  #: Largest roll and pitch that controllers ask for, rad (15 d
 #: teleoperation.
 MAX_YAW_RATE = 3.4907
 
-#: A vehicle that is tilted more than this, rad (60 degrees), has crashed or is about to.
+#: Tilt beyond which a vehicle has crashed or is about to, rad (60 degrees).
 CRASH_TILT = 1.0472
 
 #: Range of the thrust that controllers ask for in flight (m/s^2): with less a vehicle is on the

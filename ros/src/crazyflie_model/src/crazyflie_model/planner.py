@@ -123,7 +123,7 @@ def spiral_piece(
     """
     sense = -1.0 if clockwise else 1.0
     rate = sense * angle / duration
-    # From the axis to the vehicle.
+    # Vector from the axis to the vehicle.
     direction = start.yaw - sense * math.pi / 2.0 + (math.pi / 2.0 if sideways else 0.0)
     growth = (radii[1] - radii[0]) / duration
     x, y, z = start.position

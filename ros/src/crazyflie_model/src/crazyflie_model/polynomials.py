@@ -29,7 +29,7 @@ def evaluate(
     The constant is the first of its coefficients.
     """
     if derivatives == 2:
-        # The loop below without an inner one: trajectories are evaluated at each reference.
+        # The loop below, without its inner loop: trajectories are evaluated at each reference.
         value = first = half = 0.0 * t
         for c in reversed(coefficients):
             half, first, value = half * t + first, first * t + value, value * t + c
@@ -87,7 +87,7 @@ def bezier(points: Sequence[float], duration: float) -> tuple[float, ...]:
     differences = list(points)
     for k in range(degree + 1):
         coefficient = math.comb(degree, k) * differences[0]
-        # One after the other: a power of the duration may be 0 or infinite.
+        # Divided one after the other: a power of the duration may be 0 or infinite.
         for _ in range(k):
             coefficient /= duration
         coefficients.append(coefficient)
@@ -143,7 +143,7 @@ class PolynomialPiece:
         """
         *numbers, duration = _PIECE.unpack(data)
         if not all(map(math.isfinite, numbers)) or not 0.0 <= duration < math.inf:
-            raise ValueError("it holds numbers that are not finite, or a negative duration")
+            raise ValueError("the piece has numbers that are not finite, or a negative duration")
         return cls(duration, *(numbers[i : i + COEFFICIENTS] for i in range(0, 32, 8)))
 
     def pack(self) -> bytes:

@@ -70,11 +70,12 @@ class QuadrotorParameters:
     thrust_quadratic: float = 0.0
     delay: float = 0.0  #: Time from the arrival of a command at the driver to the motion (s).
     #: roll_lag, pitch_lag, yaw_lag: First-order lag of roll, pitch and yaw rate behind their
-    #: commands, s; None: as the inner loops lead to it.
+    #: commands, s; None: the lag follows from the inner loops.
     roll_lag: float | None = None
     pitch_lag: float | None = None
     yaw_lag: float | None = None
-    #: roll_trim, pitch_trim: Added to a command, so that the vehicle does not drift, rad.
+    #: roll_trim, pitch_trim: Angles that are added to a command so that the vehicle does not drift,
+    #: rad.
     roll_trim: float = 0.0
     pitch_trim: float = 0.0
     #: tilt_limit, yaw_rate_limit, thrust_limit: Largest roll and pitch (rad), yaw rate (rad/s) and
@@ -99,7 +100,7 @@ class QuadrotorParameters:
         Below 0 it is linear, and not limited.
         """
         a, b, force = self.thrust_linear, self.thrust_quadratic, thrust * (self.mass / 4.0)
-        # The root of b f^2 + a f = force that is right also for b = 0.
+        # A form of the root of b f^2 + a f = force that is also valid for b = 0.
         root = functions(force).sqrt(a * a + 4.0 * b * clip(force, 0.0, math.inf))
         return 2.0 * force / (a + root) * FULL_PWM
 
@@ -257,7 +258,7 @@ class Airframe:
             return x
         qz, qw = x[8], x[9]
         norm = functions(qz).hypot(qz, qw)
-        # Upside down, heading is lost; the squares of tiny numbers have no digits left.
+        # Upside down, the heading is undefined; the squares of tiny numbers underflow.
         lost = norm < _LEAST_NORM
         norm = where(lost, 1.0, norm)
         upright: Vector[Number] = [

@@ -15,7 +15,7 @@ _STEPS_PER_SAMPLE = round(inner_loops.PERIOD / STEP)
 
 
 def still_air(t: float) -> Triple:
-    """Return the velocity of air that does not move, m/s."""
+    """Return the velocity of still air, m/s."""
     return STILL_AIR
 
 
@@ -44,7 +44,7 @@ class StabilizedQuadrotor(Dynamics):
     ):
         self.airframe = Airframe(parameters.with_errors(mass_error, thrust_error))
         self._nominal = parameters
-        # Of the default type the link's own conversion: the same, and quicker.
+        # The default type uses the link's own conversion, which is the same and faster.
         self._pwm = pwm_from_thrust if parameters == CRAZYFLIE else parameters.pwm
         self._wind = wind
 

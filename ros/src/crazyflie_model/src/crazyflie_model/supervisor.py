@@ -23,7 +23,7 @@ class SupervisorState(enum.IntFlag):
 
     @classmethod
     def of(cls, **flags: bool) -> "SupervisorState":
-        """Return the state in which the flags hold that are true; names in small letters."""
+        """Return the state with the flags that are true; names in small letters."""
         return cls(sum(cls[name.upper()] for name, holds in flags.items() if holds))
 
     @property

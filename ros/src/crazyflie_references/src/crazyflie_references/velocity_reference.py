@@ -43,8 +43,8 @@ class LimitParameters(Parameters):
     acceleration: float = parameter(
         Number("m/s^2", above=0.0), "largest acceleration, also when stopping", 1.0, live=True
     )
-    min_height: float = parameter(Number("m"), "the reference sinks no lower", 0.3, live=True)
-    max_height: float = parameter(Number("m"), "and rises no higher", 2.0, live=True)
+    min_height: float = parameter(Number("m"), "lowest height of the reference", 0.3, live=True)
+    max_height: float = parameter(Number("m"), "largest height of the reference", 2.0, live=True)
 
     @override
     def complaints(self) -> Iterator[str]:
@@ -92,10 +92,10 @@ class VelocityReference:
             return
         self._velocity = self._approach(self._target(time), dt)
         v, pose = self._velocity, self.pose
-        # With the heading in the middle of the step a circle is closed.
+        # The heading in the middle of the step is used, so that a circle closes.
         dx, dy = rotate_by_yaw(v.x * dt, v.y * dt, pose.yaw + v.yaw_dot * dt / 2.0)
         z = pose.z + v.z * dt
-        # Where a place outside was given, it is not left abruptly.
+        # If a place outside the limits was given, the reference does not jump.
         lowest = min(self.limits.min_height, pose.z)
         highest = max(self.limits.max_height, pose.z)
         if not lowest <= z <= highest:
@@ -117,7 +117,7 @@ class VelocityReference:
             return Velocity()
         limits, command = self.limits, self._command
         speed = math.hypot(command.x, command.y)
-        # The direction stays.
+        # The direction is kept.
         scale = min(1.0, limits.horizontal / speed) if speed > 0.0 else 1.0
         return Velocity(
             scale * command.x,

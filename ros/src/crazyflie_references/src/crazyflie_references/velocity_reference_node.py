@@ -24,21 +24,24 @@ class VelocityReferenceParameters(Parameters):
     )
     reference_topic: str = parameter(
         TOPIC,
-        "references of others, such as the takeoff server's, which are passed on",
+        "references of other nodes, such as the takeoff server's, which are passed on",
         name="topics/reference",
     )
     controller_reference_topic: str = parameter(
         TOPIC, "references for the controller go here", name="topics/controller_reference"
     )
     flight_status_topic: str = parameter(
-        TOPIC, "the takeoff server's", "in_flight_flight_status", "topics/flight_status"
+        TOPIC,
+        "flight status of the takeoff server",
+        "in_flight_flight_status",
+        "topics/flight_status",
     )
     flight_state_topic: str | None = parameter(
         TOPIC, "text of a takeoff server without flight status", None, "topics/flight_state"
     )
-    time_step: float = parameter(TIME_STEP, "between two references", 0.02)
+    time_step: float = parameter(TIME_STEP, "period of the references", 0.02)
     silence: float = parameter(
-        TIME_STEP, "after so long without a velocity the vehicle stops", 0.5, live=True
+        TIME_STEP, "time without a velocity after which the vehicle stops", 0.5, live=True
     )
     limits: LimitParameters = group(LimitParameters, "limits")
 
@@ -46,8 +49,8 @@ class VelocityReferenceParameters(Parameters):
 class VelocityReferenceNode(Node):
     """Fly a vehicle by velocity: integrate cmd_vel into references while it flies.
 
-    References of others are passed on with the present heading; flying by velocity goes on
-    from there. So takeoff, landing and cmd_vel need one publisher to the controller only.
+    References of other nodes are passed on with the present heading; flight by velocity continues
+    from there. So the controller has a single publisher for takeoff, landing and cmd_vel.
     """
 
     needed_in_flight = True
@@ -125,7 +128,7 @@ class VelocityReferenceNode(Node):
             return
         self._reference.advance(dt, now)
         self._publish()
-        # At rest and without commands it leaves the topic to others.
+        # At rest and without commands, the node leaves the topic to others.
         self._is_moving = self._reference.is_commanded(now) or any(self._reference.velocity)
 
     def _publish(self, velocity=None):

@@ -93,7 +93,7 @@ def test_lines_are_counted_as_editors_do(path):
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
-        (b"duration\n\nStra\xdfe\n", ", line 3: is no text in UTF-8"),
+        (b"duration\n\nStra\xdfe\n", ", line 3: is not text in UTF-8"),
         (b"duration\n1,\0\n", ", line 2: has a NUL"),
     ],
 )

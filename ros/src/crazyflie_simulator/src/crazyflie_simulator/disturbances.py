@@ -1,4 +1,4 @@
-"""What disturbs a flight: moving air, and the errors of a motion capture system."""
+"""Disturbances of a flight: moving air, and the errors of a motion capture system."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ class MotionCapture:
         dropout: float = 0.0,
         seed: int | Sequence[int] = 0,
     ):
-        self.position_noise = position_noise  #: Standard deviation along each axis (m).
-        #: Standard deviation of the rotation about each axis of the body (rad).
+        #: Standard deviation of the position along each axis (m). Standard deviation of the
+        #: rotation about each axis of the body (rad).
+        self.position_noise = position_noise
         self.attitude_noise = attitude_noise
         self.latency = latency  #: Time from a measurement to its arrival (s).
         self.dropout = dropout  #: Probability in [0, 1] that a pose is lost.

@@ -49,15 +49,15 @@ class RealTimeWatch:
         self._late.append(now)
         if len(self._late) == LATE_TICKS and now - self._late[0] < WINDOW:
             self._handle.warn(
-                f"this computer is too busy: {LATE_TICKS} times in {now - self._late[0]:.1f} s the "
-                f"simulator had to wait more than {LATENESS:g} s. The flight will not be as it "
-                "should; with sim_time:=true real_time_factor:=0 it does not depend on that",
+                f"this computer is too busy: {LATE_TICKS} times in {now - self._late[0]:.1f} s "
+                f"the simulator was late by more than {LATENESS:g} s. The flight will be wrong; "
+                "with sim_time:=true real_time_factor:=0 it does not depend on the load",
                 throttle=WINDOW,
                 key="busy",
             )
 
 
-#: Longest time that is integrated at once (s); more, after a jump of the clock, is skipped.
+#: Longest time that is integrated at once (s); a longer one, after a jump of the clock, is skipped.
 MAX_CATCH_UP = 1.0
 #: Age up to which poses are broadcast late after the machine was busy (s).
 MAX_LATENESS = 0.1
@@ -90,7 +90,7 @@ class MotionCaptureParameters(Parameters):
 class SimulatorParameters(Parameters):
     """Parameters of every `SimulatorNode`."""
 
-    time_step: float = parameter(TIME_STEP, "time from one broadcast to the next")
+    time_step: float = parameter(TIME_STEP, "period of the broadcasts")
     init_x: float = parameter(METRES, "initial position; the ground is z = 0", name="init/x")
     init_y: float = parameter(METRES, "initial position; the ground is z = 0", name="init/y")
     init_z: float = parameter(METRES, "initial position; the ground is z = 0", name="init/z")
@@ -99,20 +99,20 @@ class SimulatorParameters(Parameters):
     control_topic: str = parameter(TOPIC, "where controls come from", name="topics/control")
     publishes_clock: bool = parameter(
         BOOLEAN,
-        "be the source of simulated time; needs `/use_sim_time`",
+        "whether to be the source of simulated time; needs `/use_sim_time`",
         False,
         name="clock/publish",
     )
     real_time_factor: float = parameter(
         Number(minimum=0.0),
-        "how fast simulated time passes at most; 0 is as fast as possible",
+        "largest speed of simulated time, over real time; 0 is as fast as possible",
         1.0,
         name="clock/real_time_factor",
     )
     mocap: MotionCaptureParameters = group(MotionCaptureParameters, "mocap")
     seed: int = parameter(
         Integer(0, 2**32 - 1),
-        "of everything random; motion capture errors also differ by the node's name",
+        "seed of all random numbers; motion capture errors also differ by the node's name",
         0,
     )
 
@@ -128,7 +128,7 @@ class SimulatorNode(Node):
     #: `SimulatorParameters`, or a subclass if the model has parameters of its own.
     parameters_type: type[SimulatorParameters] = SimulatorParameters
     max_tilt = math.inf  #: See `SimulatedVehicle`; for models that can turn over.
-    delay = 0.0  #: From a control to its effect, s.
+    delay = 0.0  #: Delay from a control to its effect (s).
 
     def __init__(self) -> None:
         self._ticks = 0
@@ -151,7 +151,7 @@ class SimulatorNode(Node):
         if parameters.publishes_clock and not handle.uses_sim_time:
             raise ParameterError(
                 f"parameter {handle.resolve('~clock/publish')} is true, but /use_sim_time is "
-                "not; expected both, so that nodes live by /clock"
+                "not; expected both, so that nodes use /clock"
             )
         self._parameters = parameters
         self._motion_capture = MotionCapture(
@@ -247,7 +247,8 @@ class SimulatorNode(Node):
         if skipped > 0.0:
             self._vehicle.skip(skipped)
             self._handle.warn(
-                f"time has moved by {skipped:.1f} s too much to simulate; the vehicle skips that",
+                f"time has jumped by {skipped:.1f} s more than can be simulated; the vehicle "
+                "skips that time",
                 throttle=1.0,
                 key="skipped time",
             )
@@ -273,7 +274,7 @@ class SimulatorNode(Node):
         if parameters.real_time_factor > 0.0:
             return 1
         wait = self._handle.next_event() - self._tick_time(self._ticks)
-        # A new consumer soon gets poses.
+        # A new consumer receives poses soon.
         wait = min(max(wait, 0.0), IDLE_PERIOD)
         return max(math.ceil((wait - 1e-6) / parameters.time_step), 1)
 

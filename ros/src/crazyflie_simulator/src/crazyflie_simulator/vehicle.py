@@ -45,7 +45,7 @@ class SimulatedVehicle:
         self._steps = 0
         self._control_step: int | None = None
         self._delay_steps = round(delay / STEP)
-        # The controls that are still on their way, with the steps from which they act.
+        # Delayed controls, with the steps from which they act.
         self._pending: deque[tuple[int, Vector[float]]] = deque()
 
     @property

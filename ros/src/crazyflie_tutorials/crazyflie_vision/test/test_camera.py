@@ -54,8 +54,8 @@ def test_all_of_it_has_a_default(tmp_path):
         ("latency: soon\n", 1, "expected a finite number >= 0 (s)"),
         ("mount:\n  x: 0.0\n  pitch: 100\n", 3, "expected a finite number >= -90 and <= 90 (deg)"),
         ("rate: 30\nshutter: 2\n", 2, "shutter is not known; expected one of"),
-        ("rate: 30\nrate: 20\n", 2, "is there twice"),
-        ("rate: [30\n", 2, "is no YAML"),
+        ("rate: 30\nrate: 20\n", 2, "occurs twice"),
+        ("rate: [30\n", 2, "is not valid YAML"),
     ],
 )
 def test_bad_files(tmp_path, text, line, expected):

@@ -34,8 +34,8 @@ class ClockSource:
     def publisher(self) -> Callable[..., None]:
         """Return ``set_clock(*moments)``, which moves simulated time to moments (s).
 
-        Other processes are sent all of them, at once. In this process time moves to the last
-        one, after the present callback; then the timers that are due run.
+        Other processes receive all of them at once. In this process time moves to the last one,
+        after the present callback; then the due timers run.
         """
         publisher = self._publisher = self._topics.publisher("/clock", Clock, latch=False)
 
@@ -50,8 +50,8 @@ class ClockSource:
     def next_event(self) -> float:
         """Return the next moment, s, at which simulated time must stop.
 
-        That is when a timer of this process is due; or at once, where /clock has another subscriber
-        in this process than the process itself.
+        That is when a timer of this process is due; or at once, if /clock has a subscriber in this
+        process in addition to the process itself.
         """
         if self._publisher is None or self._publisher.is_read_here(excluding=1):
             return -math.inf
@@ -62,7 +62,7 @@ class ProcessContext:
     """One executor, one clock, one set of topics and one tf buffer for all nodes of a process.
 
     With ``use_sim_time`` the clock is simulated time, which stands still until it is set; a test
-    passes a ``clock`` of its own.
+    passes its own ``clock``.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class ProcessContext:
             MAX_FUTURE_STAMP_SIMULATED if use_sim_time else MAX_FUTURE_STAMP,
         )
         self._tf_log = NodeLog(transport, "/tf")
-        # The poses of vehicles that are simulated in one tick are one message.
+        # The poses of all vehicles that are simulated in one tick form one message.
         tf = self.transforms.gather, self.transforms.send_gathered
         self._steady = SteadyTimers(TimerQueue(self.executor, *tf), SteadyClock())
         self._simulated = TimerQueue(self.executor, *tf)
@@ -139,8 +139,8 @@ class ProcessContext:
         return self._simulated.next_deadline()
 
     def _on_clock(self, clock, message):
-        # As work among the other work: time does not move within a callback, and
-        # a reset does not overtake messages of the simulation before it.
+        # Queued with all other work: time does not move within a callback, and a reset does not
+        # overtake earlier messages of the simulation.
         self.executor.submit(clock.set, message.clock.to_sec())
 
     def _run_simulated(self, now, is_reset):

@@ -1,4 +1,4 @@
-"""Which vehicles are in flight: a process waits for them before it ends."""
+"""The vehicles in flight, for which a process waits before it ends."""
 
 import time
 from collections.abc import Iterable
@@ -16,7 +16,7 @@ class ShutdownInhibitor:
     """Publishes the flights that a node starts and ends, which inhibit the end of processes."""
 
     def __init__(self, topics: Topics, node: str):
-        self.node = node  #: Its absolute name.
+        self.node = node  #: Absolute name of the node.
         self.in_flight = False  #: Last published value.
         self._publisher = topics.publisher(TOPIC, String, latch=True)
 
@@ -26,7 +26,7 @@ class ShutdownInhibitor:
         self._send(_IN_FLIGHT if in_flight else _ON_GROUND)
 
     def publish_ending(self) -> None:
-        """Publish that a flight, if there is one, is to end because its process is to end."""
+        """Publish that the flight, if any, is ending because its process is to end."""
         if self.in_flight:
             self._send(_TO_END)
 
@@ -40,7 +40,7 @@ class ShutdownInhibitor:
 
 
 class Flights:
-    """The flights that matter to nodes, by absolute name: in their namespaces, above and below."""
+    """The flights that concern nodes, by absolute name: in their namespaces, above and below."""
 
     def __init__(self, topics: Topics, nodes: Iterable[str]):
         self._namespaces = [_namespace(node) for node in nodes]

@@ -40,8 +40,8 @@ class NodeHandle:
     """Names, parameters, topics, services, timers, time, tf and log of one node.
 
     Callbacks run one at a time, also those of several nodes in a process. One that raises is logged
-    once with its traceback, `on_fault` makes the node safe, and the callback will be called again.
-    ``name`` is the node's absolute name, such as /simulator.
+    once with its traceback, `on_fault` puts the node into its safe state, and the callback will be
+    called again. ``name`` is the node's absolute name, such as /simulator.
     """
 
     def __init__(self, process: ProcessContext, name: str):
@@ -62,7 +62,7 @@ class NodeHandle:
         #: For the node that publishes /clock; see `ClockSource`.
         self.clock_publisher, self.next_event = source.publisher, source.next_event
         tf = process.transforms
-        self.broadcast_transforms = tf.broadcaster  #: This and the next five: see `Transforms`.
+        self.broadcast_transforms = tf.broadcaster  #: Methods of `Transforms`, like the next five.
         self.broadcast_static_transforms = tf.static_broadcaster
         self.listen_to_transforms, self.listen_to_poses = tf.listener, tf.pose_listener
         self.has_pose_consumers = tf.has_pose_consumers
@@ -77,7 +77,7 @@ class NodeHandle:
         return child
 
     def close(self) -> None:
-        """End all that was made through this handle; its callbacks are not called any more."""
+        """End everything that was created through this handle; its callbacks no longer run."""
         self.is_closed = True
         while self._undo:
             self._undo.pop()()
@@ -93,8 +93,9 @@ class NodeHandle:
     def load(self, parameters: type[P], on_change: Callable[[P], None] | None = None) -> P:
         """Return the node's own (private) parameters; `ParameterError` lists all errors.
 
-        With ``on_change``, dynamic_reconfigure can change the live ones: it is called with all
-        of them, checked, after some were changed. It may raise `ParameterError` to refuse.
+        With ``on_change``, dynamic_reconfigure can change the live ones: after a change the
+        function is called with all parameters, checked. It may raise `ParameterError` to refuse the
+        change.
         """
         source = PrivateParameters(self._process.transport.get_param, self.name, self.resolve)
         loaded = parameters.read(source.get, source.full_name)
@@ -147,7 +148,7 @@ class NodeHandle:
             if self.is_closed:
                 return
             try:
-                # If the sum is finite, so are the numbers; it may also overflow.
+                # If the sum is finite, so are the numbers; if it is not, it may have overflowed.
                 if (
                     not finite
                     or (numbers and math.isfinite(sum(numbers(message))))
@@ -187,7 +188,9 @@ class NodeHandle:
 
             def work():
                 if is_withdrawn():
-                    self.warn(f"{full_name}: the caller has given up on this call; nothing is done")
+                    self.warn(
+                        f"{full_name}: the caller has cancelled this call; it is not carried out"
+                    )
                     answer.set_exception(ServiceError(f"{full_name}: the call was withdrawn"))
                 else:
                     serve(callback, request, answer, self)
@@ -213,12 +216,12 @@ class NodeHandle:
         if place is not None:
             self._process.is_refused = True
             raise ParameterError(
-                f"{self.name}: the controls of {self.resolve(topic)} fly a vehicle of {owner} "
-                f"already ({place}, see {name}); expected no second one. End its launch first, or "
-                "give this vehicle topics of its own"
+                f"{self.name}: the controls of {self.resolve(topic)} already fly a vehicle of "
+                f"{owner} ({place}, see {name}); end its launch first, or give this vehicle "
+                "topics of its own"
             )
         answer = TriggerResponse(True, f"a {kind} vehicle, by {self.name}")
-        # A second vehicle of one process flies by its nodes' own topics, or on purpose.
+        # A second vehicle in this process has its own topics, or shares them on purpose.
         with contextlib.suppress(ServiceError):
             self.advertise_service(name, Trigger, lambda _: answer)
 
@@ -235,8 +238,8 @@ class NodeHandle:
         Its exception is a `ServiceError` when the service refuses, is not there, is not reached
         within ``start_limit`` seconds of the machine's clock, or does not answer within ``limit``
         seconds. The call is withdrawn then: a process that was stopped does not carry it out when
-        it goes on. What is added to the future with ``add_done_callback`` runs like any callback;
-        none may wait for it.
+        it goes on. Functions that are added with ``add_done_callback`` run like any callback; no
+        callback may wait for the future.
         """
         transport, outcome = self._process.transport, Reply(self)
         reply = transport.call_service(
@@ -251,7 +254,7 @@ class NodeHandle:
         return self._process.uses_sim_time
 
     def age(self, stamp: genpy.Time) -> float:
-        """Return how long ago data with a stamp was measured, s; 0 without one or ahead of now."""
+        """Return the age of data with a stamp, s; 0 without a stamp, or if it is ahead of now."""
         return max(self.nanoseconds() - stamp.to_nsec(), 0) * 1e-9 if stamp else 0.0
 
     def timer(
@@ -263,7 +266,7 @@ class NodeHandle:
     ) -> Timer:
         """Call ``callback()`` every ``period`` seconds; ticks that are missed are skipped.
 
-        With ``steady`` they are seconds of the machine's clock also if time is simulated; with
+        With ``steady`` the period is by the machine's clock even if time is simulated; with
         ``stagger`` the ticks differ from those of other timers, for reports of many nodes. See
         `TimerQueue.add`.
         """
@@ -369,7 +372,7 @@ def serve(
 class Reply(Future[Any]):
     """The response to a call; functions added to it are callbacks of the node.
 
-    A plain future would only log their exceptions, and the node would not be made safe.
+    A plain future would only log their exceptions, and the node would not enter its safe state.
     """
 
     def __init__(self, handle: NodeHandle):

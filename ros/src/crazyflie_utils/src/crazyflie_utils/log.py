@@ -55,9 +55,9 @@ class NodeLog:
 
 
 class FaultHandler:
-    """Logs exceptions of a node's callbacks, and makes the node safe.
+    """Logs exceptions of a node's callbacks, and calls its `enter_safe_state`.
 
-    A fault is logged with its traceback when it is new, and later only counted.
+    A new fault is logged with its traceback; repetitions are only counted.
     """
 
     def __init__(self, log: NodeLog):
@@ -66,7 +66,7 @@ class FaultHandler:
         self._counts: dict[tuple[type, str, int | None], int] = {}
 
     def report(self, callback: Callable[..., Any], error: Exception) -> None:
-        """Log that ``callback`` has raised ``error``, and make the node safe."""
+        """Log that ``callback`` has raised ``error``, and put the node into its safe state."""
         where = traceback.extract_tb(error.__traceback__)[-1]
         fault = (type(error), where.filename, where.lineno)
         count = self._counts[fault] = self._counts.get(fault, 0) + 1

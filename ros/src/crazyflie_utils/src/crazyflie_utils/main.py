@@ -22,7 +22,7 @@ from crazyflie_utils.ros1.master_watch import MasterWatch, namesake
 from crazyflie_utils.ros1.transport import RosTransport
 from crazyflie_utils.shutdown import FLUSH_TIME, Shutdown, catch_signals, exit_at_once, fail
 
-_END_LIMIT = 5.0  #: Longest time that the end waits for nodes that have no flight any more (s).
+_END_LIMIT = 5.0  #: Longest time that the shutdown waits for nodes without a flight (s).
 #: Time that a refused node of roslaunch waits before it ends (s): with respawn, it would otherwise
 #: take the processor from the nodes that fly.
 _REFUSED_TIME = 5.0
@@ -60,8 +60,9 @@ def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, No
     """Run the nodes that a function makes; does not return.
 
     ``make_nodes(handle)``, with the handle of the process's own node, returns all nodes by absolute
-    name; or it is named as "package.module:function". What it raises ends the process with status
-    1. The launch file may give another name than ``default_name`` to the process's own node.
+    name; or it is named as "package.module:function". An exception of the function ends the process
+    with status 1. The launch file may give another name than ``default_name`` to the process's own
+    node.
     """
     signals = catch_signals()
     _run(begin(default_name, signals), make_nodes, signals)
@@ -113,10 +114,10 @@ def _node_class(path):
 def begin(default_name: str, signals: list[int] | None = None) -> Process:
     """Make this process a ROS node; return the `Process`, not yet started.
 
-    Exits with status 1 without a ROS master, if a node of this name lives, which the master would
-    shut down, and at ``signals``, see `catch_signals`.
+    Exits with status 1 without a ROS master, if another node of this name is alive (which the
+    master would shut down), and at ``signals``, see `catch_signals`.
     """
-    # rospy's log does not flush: the last texts of a node that dies would be lost in a pipe.
+    # rospy's log is not flushed: the last texts of a node that dies would be lost in a pipe.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     _wait_for_master(signals)
@@ -140,7 +141,7 @@ def _pause_refused(signals):
 
 
 def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
-    """Make a user's script, where Ctrl-C is Python's, a ROS node, unless it is one already.
+    """Make a user's script, in which Python handles Ctrl-C, a ROS node, unless it is one already.
 
     Returns the process, not yet started, which has an exit status when ROS has shut down; and
     ``end()``, which stops it, and the ROS node if it was made here.
@@ -169,7 +170,7 @@ def ros_process() -> Process:
     except ValueError:
         rospy.logerr(f"parameter /use_sim_time is {value!r}; expected {BOOLEAN}")
         fail()
-    # In simulated time any number of messages a second is allowed.
+    # In simulated time the rate of messages is not limited.
     transport = RosTransport(limits_rate=not use_sim_time)
     if use_sim_time:
         transport.follow_clock()
@@ -190,7 +191,7 @@ def _wait_for_master(signals=None):
         pause.wait(0.5)
         waited += 0.5
         if signals:
-            sys.exit(f"signal {signals[0]}: ends before there was a ROS master")
+            sys.exit(f"signal {signals[0]}: ended before a ROS master was found")
 
 
 def _run(process, make_nodes, signals):
@@ -219,7 +220,7 @@ def _run(process, make_nodes, signals):
     watch = MasterWatch()
     watch.start()
     _avoid_pauses()
-    # Not in this thread, which must be able to end the process if a callback does not return.
+    # Run in another thread: this one must be able to end the process if a callback does not return.
     threading.Thread(target=process.start, name="start", daemon=True).start()
     while not signals and process.exit_status is None and not rospy.is_shutdown():
         time.sleep(0.1)
@@ -227,7 +228,7 @@ def _run(process, make_nodes, signals):
         shutdown.wait_for_flights()
     watch.stop()
     rospy.signal_shutdown(f"signal {signals}" if signals else "the node has ended")
-    # At the request of another process, a thread of rospy may run the shutdown.
+    # If another process requests it, a thread of rospy may run the shutdown.
     shutdown.has_ended.wait(_END_LIMIT)
     if shutdown.is_stuck:
         exit_at_once(1)

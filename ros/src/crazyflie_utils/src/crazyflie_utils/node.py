@@ -56,13 +56,13 @@ class Node:
         raise NotImplementedError
 
     def enter_safe_state(self) -> None:
-        """Make the vehicle safe after an exception of a callback, and at shutdown.
+        """Put the vehicle into a safe state after an exception of a callback, and at shutdown.
 
         By default the node publishes nothing, and the vehicle's watchdog acts.
         """
 
     def prepare_shutdown(self) -> None:
-        """Begin to end a flight: called at SIGINT, after which callbacks still run for a while."""
+        """Start to end a flight. Called at SIGINT, after which callbacks still run for a while."""
 
     def shutdown(self) -> None:
         """Clean up: called once, when timers no longer fire and topics still work."""

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any, NoReturn
 
-#: Modules that may be missing -> section of ros/debian.txt and ros/requirements.txt that brings
+#: Modules that may be missing -> section of ros/debian.txt and ros/requirements.txt that installs
 #: them, and package. Those of PyPI are named as there, those of Debian begin with python3-.
 PACKAGES = {
     "cflib": ("demo", "cflib"),
@@ -34,7 +34,8 @@ PACKAGES = {
 def missing_module(error: BaseException | None) -> str:
     """Return a sentence with the module of `PACKAGES` that is missing, and how to install it.
 
-    That is the cause of an error, or the cause of its cause; empty if there is none.
+    The missing module is the cause of an error, or the cause of its cause; the text is empty if no
+    module is missing.
     """
     while error is not None:
         name = ((isinstance(error, ModuleNotFoundError) and error.name) or "").partition(".")[0]

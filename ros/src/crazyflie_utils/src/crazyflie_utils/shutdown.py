@@ -88,12 +88,12 @@ class Shutdown:
         flights = self._flights
         if flights is None or not flights.in_flight:
             return
-        # Before the log says that another signal ends this: one may come at once.
+        # Reset before the log says that another signal ends the wait: one may come at once.
         begin, signals = time.monotonic(), len(self._signals)
         own = self._process.own_flights
         if own:
             self._log_waiting(own)
-        # Not in this thread: a callback may never return.
+        # In another thread: a callback may never return.
         prepare = self._process.prepare_shutdown
         threading.Thread(target=prepare, args=(self._nodes,), name="end", daemon=True).start()
         is_logged = bool(own)
@@ -115,7 +115,7 @@ class Shutdown:
 
 
 def fail() -> NoReturn:
-    """End a process that cannot begin, with status 1."""
+    """End a process that cannot start, with status 1."""
     rospy.signal_shutdown("failed to initialize")
     exit_at_once(1)
 

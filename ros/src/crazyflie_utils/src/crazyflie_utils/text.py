@@ -47,7 +47,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 class TextFileError(Exception):
-    """A file holds no text; ``line`` is the number of the line at fault, from 1, or None."""
+    """A file is not a text; ``line`` is the number of the line at fault, from 1, or None."""
 
     def __init__(self, reason: str, line: int | None = None):
         super().__init__(reason)
@@ -76,19 +76,20 @@ def read_text(path: str | Path, max_size: int = MAX_SIZE) -> str:
         # The bytes that failed are counted without the byte order mark.
         failed = error.object[: error.start]
         line = bytes(failed).count(b"\n") + 1
-        raise TextFileError(f"is no text in UTF-8: {error.reason}", line) from None
+        raise TextFileError(f"is not text in UTF-8: {error.reason}", line) from None
     before, nul, _ = text.partition("\0")
     if nul:
-        raise TextFileError("has a NUL; expected text", before.count("\n") + 1)
+        raise TextFileError("has a NUL character; expected text", before.count("\n") + 1)
     return text
 
 
 def number_from_text(text: str) -> float:
     """Return the number in a text by the common rules: 1e-3, but not 1_000.
 
-    ``nan`` and ``inf`` are numbers that the caller may refuse. ValueError if there is none.
+    ``nan`` and ``inf`` are numbers that the caller may refuse. ValueError if the text is not a
+    number.
     """
     word = text.strip()
     if _NUMBER.fullmatch(word) or word.lower().lstrip("+-") in ("nan", "inf", "infinity"):
         return float(word)
-    raise ValueError(f"{shown(text)} is no number")
+    raise ValueError(f"{shown(text)} is not a number")

@@ -41,7 +41,7 @@ class Publisher:
         return self._topic.name
 
     def has_subscribers(self, excluding: int = 0) -> bool:
-        """Return whether there are subscribers, except ``excluding`` ones of this process."""
+        """Return whether there are subscribers, not counting ``excluding`` ones of this process."""
         return self.is_read_here(excluding) or self.is_heard_outside()
 
     def is_heard_outside(self) -> bool:
@@ -100,7 +100,7 @@ class Subscriber:
 
     def close(self) -> None:
         """End the subscription."""
-        # Not in place: a message may be being delivered to the others.
+        # Replaced, not changed: a message may just be delivered to the other receivers.
         receivers = self._topic.receivers
         self._topic.receivers = [each for each in receivers if each is not self._receiver]
         self._external.close()
@@ -121,7 +121,7 @@ class LatestMessage:
 
 
 class Topics:
-    """All topics of a process; TypeError for one that has another type already."""
+    """All topics of a process; TypeError for a topic that already has another type."""
 
     def __init__(self, transport: Transport):
         self._transport = transport

@@ -20,7 +20,7 @@ M = TypeVar("M", bound=genpy.Message)
 def stamped(message_type: type[M], stamp: genpy.Time, frame_id: str = "", **fields: Any) -> M:
     """Return a message with a header and all its other fields.
 
-    Several times quicker than the type's own constructor.
+    Several times faster than the type's own constructor.
     """
     header = object.__new__(Header)
     header.seq, header.stamp, header.frame_id = 0, stamp, frame_id
@@ -45,7 +45,7 @@ def _getter(message_type: Any) -> Callable[[genpy.Message], tuple[float, ...]]:
 def to_vector(message: genpy.Message) -> NDArray[np.float64]:
     """Return the fields of a flat message, shape (number of fields,), units as there.
 
-    TypeError if a field is not a number but, say, a header.
+    TypeError if a field is not a number, for example a header.
     """
     return np.array([getattr(message, field) for field in message.__slots__], dtype=float)
 
@@ -79,7 +79,7 @@ def is_finite(message: genpy.Message) -> bool:
 def number_getter(
     message_type: Any, field: str
 ) -> Callable[[genpy.Message], tuple[float, ...]] | None:
-    """Return a function for the numbers of a field of a message; None if it is not a flat one."""
+    """Return a function for the numbers of a field of a message; None if the field is not flat."""
     inner_type: Any = type(getattr(message_type(), field))
     if not (hasattr(inner_type, "_slot_types") and _is_flat(inner_type)):
         return None
@@ -100,5 +100,5 @@ def _is_finite(value):
         return is_finite(value)
     if isinstance(value, (list, tuple)):
         return all(map(_is_finite, value))
-    # Arrays and single precision of numpy.
+    # Slower path for arrays and numpy's single precision.
     return _is_finite(value.tolist()) if hasattr(value, "tolist") else True

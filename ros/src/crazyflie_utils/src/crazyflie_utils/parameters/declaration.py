@@ -1,7 +1,7 @@
 """Parameters, declared once: a class whose fields say name, type, default and help.
 
-From a declaration come the checks at start, the tables in the READMEs, command
-lines, and what dynamic_reconfigure may change in flight::
+A declaration defines the checks at start, the tables in the READMEs, command lines, and the
+parameters that dynamic_reconfigure may change in flight::
 
     class LimiterParameters(Parameters):
         limit: float = parameter(Number("m/s^2", above=0.0), "largest thrust", live=True)
@@ -16,7 +16,7 @@ from typing import Any, Self, TypeVar, dataclass_transform
 from crazyflie_utils.parameters.types import ParameterType
 from crazyflie_utils.text import shown
 
-REQUIRED = dataclasses.MISSING  #: Default of a parameter that has none.
+REQUIRED = dataclasses.MISSING  #: Default of a parameter that must be set.
 
 _KEY = "declaration"
 
@@ -114,7 +114,7 @@ class Parameters:
     def from_mapping(cls, values: Mapping[str, Any], prefix: str = "") -> Self:
         """Return the parameters in a mapping; messages call each ``prefix`` and its name.
 
-        Raises `ParameterError`, see `read`; also about names that are not declared.
+        Raises `ParameterError`, see `read`; also for names that are not declared.
         """
         known = {declaration.name for declaration in cls.declarations()}
         unknown = [
@@ -155,7 +155,8 @@ def read_parameter(
     try:
         return expected(raw)
     except (ValueError, TypeError, OverflowError) as error:
-        # TypeError and OverflowError have Python's own texts about something that is not a number.
+        # The texts of TypeError and OverflowError are Python's own, about something that is not a
+        # number.
         reason = f" ({error})" if isinstance(error, ValueError) and str(error) else ""
         raise ParameterError(
             f"parameter {full_name(declaration.name)} is {shown(raw)}; expected {expected}{reason}"

@@ -1,8 +1,8 @@
 """Parameters that dynamic_reconfigure and rqt_reconfigure can change in flight.
 
 Changes come through the node handle, between two callbacks; the library's own server uses threads
-of rospy. Only its messages are imported: its other modules load two hundred modules, 20 MiB, that
-find packages in the file system.
+of rospy. Only the library's messages are imported: its other modules load two hundred modules (20
+MiB) that find packages in the file system.
 """
 
 import contextlib
@@ -42,7 +42,7 @@ class Reconfiguration:
         self._handle = handle
         self._type = type(parameters)
         self._on_change = on_change
-        # All of them now: at a change, in flight, no callback may wait for the master.
+        # All are read now: at a change, in flight, no callback may wait for the master.
         self._values = _read(self._type.declarations(), get)
         self._live = {d.name: d for d in self._type.declarations() if d.live}
         descriptions = handle.publisher("~parameter_descriptions", ConfigDescription, latch=True)
@@ -72,7 +72,7 @@ class Reconfiguration:
         if unknown:
             raise ParameterError(
                 f"{', '.join(sorted(unknown))} cannot be changed while {self._handle.name} runs; "
-                f"expected some of {', '.join(self._live)}"
+                f"expected names among {', '.join(self._live)}"
             )
         before = self._values
         self._values = {**before, **wanted}

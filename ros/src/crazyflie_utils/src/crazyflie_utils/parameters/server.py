@@ -1,4 +1,4 @@
-"""The parameter server: a node reads its own parameters in one request, a thread sets them."""
+"""The parameter server: a node reads its own parameters in one request; a thread sets them."""
 
 import threading
 from collections.abc import Callable
@@ -41,7 +41,7 @@ class PrivateParameters:
 class ParameterWriter:
     """Sets parameters in the order in which they changed, each to its latest value.
 
-    A thread calls ``write(name, value)``, however long that takes, and ``report(text)`` on errors.
+    A thread calls ``write(name, value)``, which may take any time, and ``report(text)`` on errors.
     """
 
     def __init__(self, write: Callable[[str, Any], None], report: Callable[[str], None]):
@@ -73,7 +73,7 @@ class ParameterWriter:
             try:
                 self._write(name, value)
             except Exception as error:
-                # The master may be gone, or xmlrpc may not support the value.
+                # The master may have ended, or xmlrpc may not support the value.
                 self._report(f"parameter {name} is not set on the parameter server: {error!r}")
                 done.set_exception(error)
             else:

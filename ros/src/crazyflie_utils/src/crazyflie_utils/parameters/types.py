@@ -200,17 +200,17 @@ class ListOf(ParameterType):
 
     @property
     def label(self) -> str:  # type: ignore[override]
-        """That of the entries."""
+        """The same property of the entries."""
         return f"list of {self.entry.label}"
 
     @property
     def unit(self) -> str:  # type: ignore[override]
-        """That of the entries."""
+        """The same property of the entries."""
         return self.entry.unit
 
     @property
     def range(self) -> str:  # type: ignore[override]
-        """That of the entries."""
+        """The same property of the entries."""
         return self.entry.range
 
     @override
@@ -243,7 +243,7 @@ class File(ParameterType):
 FINITE = Number()
 POSITIVE = Number(above=0.0)
 DURATION = Number(unit="s", minimum=0.0)
-#: A period of a node; with a shorter one it would always be late.
+#: Shortest period of a node, which could not keep up with a shorter one.
 TIME_STEP = Number(unit="s", minimum=1e-4)
 METRES = Number(unit="m")
 BOOLEAN = Boolean()

@@ -16,7 +16,8 @@ from crazyflie_utils.parameters.types import TEXT, ListOf, Number, ParameterType
 #: Types of vehicles for which Bitcraze publishes no mass and no thrust.
 UNPUBLISHED = {"bolt": "a Bolt has the frame, the motors and the mass that you gave it"}
 
-RESULT = "identified"  #: Key of a file below which `identify` notes where its figures are from.
+#: Key of a model file below which `identify` stores the origin of its figures.
+RESULT = "identified"
 
 _INERTIA = Number("kg m^2", minimum=1e-7, maximum=0.1)
 _DRAG = Number("kg", minimum=0.0, maximum=1e-3)
@@ -27,12 +28,16 @@ _TRIM = Number("rad", minimum=-0.2, maximum=0.2)
 class ModelParameters(Parameters):
     """Figures of a model file; those that are missing are the type's."""
 
-    type: str = parameter(Text(tuple(TYPES)), "has the figures that are not given", "cf21")
+    type: str = parameter(
+        Text(tuple(TYPES)), "type of vehicle that supplies the missing figures", "cf21"
+    )
     mass: float | None = parameter(
-        Number("kg", minimum=0.005, maximum=2.0), "with battery and decks; 33 g are 0.033", None
+        Number("kg", minimum=0.005, maximum=2.0),
+        "mass with battery and decks; 33 g are 0.033",
+        None,
     )
     arm: float | None = parameter(
-        Number("m", minimum=0.01, maximum=1.0), "from the centre to a rotor's axis", None
+        Number("m", minimum=0.01, maximum=1.0), "distance from the centre to a rotor's axis", None
     )
     thrust_curve: tuple[float, float] | None = parameter(
         ListOf(Number("N", minimum=-100.0, maximum=100.0), 2),
@@ -45,7 +50,7 @@ class ModelParameters(Parameters):
     drag_horizontal: float | None = parameter(
         _DRAG, "drag over airspeed over the sum of the rotor speeds, across their axes", None
     )
-    drag_vertical: float | None = parameter(_DRAG, "the same along the rotors' axes", None)
+    drag_vertical: float | None = parameter(_DRAG, "the same ratio along the rotors' axes", None)
     inertia_x: float | None = parameter(_INERTIA, "moment of inertia about forward", None)
     inertia_y: float | None = parameter(_INERTIA, "moment of inertia about left", None)
     inertia_z: float | None = parameter(_INERTIA, "moment of inertia about up", None)
@@ -53,7 +58,7 @@ class ModelParameters(Parameters):
         Number("m", minimum=1e-4, maximum=1.0), "torque of a rotor over its thrust", None
     )
     delay: float | None = parameter(
-        Number("s", minimum=0.0, maximum=0.3), "from a command to the motion", None
+        Number("s", minimum=0.0, maximum=0.3), "delay from a command to the motion", None
     )
     roll_lag: float | None = parameter(
         _LAG, "first-order lag of roll behind its command", None, "lag/roll"
@@ -86,7 +91,7 @@ class ModelParameters(Parameters):
     @override
     def complaints(self) -> list[str]:
         curve, figures = self.thrust_curve, self.figures()
-        # Falling somewhere between no and full command, it has no inverse.
+        # A curve that falls anywhere between zero and full command has no inverse.
         if curve is not None and (curve[0] <= 0.0 or curve[0] + 2.0 * curve[1] <= 0.0):
             return [
                 f"thrust_curve is {list(curve)}; expected one that rises from command 0 to 1: "
@@ -121,14 +126,15 @@ def is_model(name: str) -> bool:
 def load(name: str) -> QuadrotorParameters:
     """Return the model of a type, or of a model file.
 
-    `ParameterError` names everything that is wrong: file, line, value, and what was expected.
+    `ParameterError` names all errors: file, line, value, and what was expected.
     """
     if name in TYPES:
         return TYPES[name]
     if name in UNPUBLISHED or not is_model(name):
         reason = f": {UNPUBLISHED[name]}" if name in UNPUBLISHED else ""
         raise ParameterError(
-            f"there is no model {name}{reason}; expected one of {', '.join(TYPES)}, or a model "
+            f"the model {name} does not exist{reason}; expected one of {', '.join(TYPES)}, or a "
+            "model "
             "file, NAME.yaml"
         )
     top = yaml_file.load(name)
@@ -137,7 +143,7 @@ def load(name: str) -> QuadrotorParameters:
 
 
 def save(path: Path, type: str, model: QuadrotorParameters, result: dict[str, Any]) -> None:  # noqa: A002
-    """Write a model file; ``result`` says where its figures are from.
+    """Write a model file; ``result`` states the origin of its figures.
 
     OSError: it cannot be written.
     """

@@ -18,7 +18,7 @@ from typing_extensions import override
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters
 from crazyflie_utils.text import TextFileError, read_text, shortened, shown
 
-MAX_SIZE = 1_000_000  #: Largest file (bytes): that of a thousand vehicles has a third of it.
+MAX_SIZE = 1_000_000  #: Largest file (bytes): three times that of a thousand vehicles.
 MAX_DEPTH = 50  #: Largest number of nested lists and mappings.
 MAX_NODES = 50_000  #: Largest number of values and keys, with aliases expanded.
 
@@ -26,21 +26,21 @@ MAX_NODES = 50_000  #: Largest number of values and keys, with aliases expanded.
 def compose(text: str, name: str) -> yaml.Node | None:
     """Return the node of a YAML text; None for one without content. ``name`` is its file's.
 
-    Raises `TextFileError` if it is no YAML, is beyond the limits above, or has an alias in what the
-    alias stands for.
+    Raises `TextFileError` if it is not YAML, exceeds the limits above, or has an alias within the
+    node to which the alias refers.
     """
     try:
         loader = _Loader(text, name)
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
-        reason = f"is no YAML: it has the character U+{error.character:04X}"
+        reason = f"is not valid YAML: it has the character U+{error.character:04X}"
         raise TextFileError(reason, line) from None
     try:
         return loader.get_single_node()
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         problem = shortened(error.problem or str(error))
-        raise TextFileError(f"is no YAML: {problem}", mark and mark.line + 1) from None
+        raise TextFileError(f"is not valid YAML: {problem}", mark and mark.line + 1) from None
     finally:
         loader.dispose()
 
@@ -59,7 +59,7 @@ class _Loader(yaml.SafeLoader):
         before = self._count
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise _parse_error(f"is nested too deep; expected at most {MAX_DEPTH} levels", event)
+            raise _parse_error(f"is nested too deeply; expected at most {MAX_DEPTH} levels", event)
         node = super().compose_node(parent, index)
         self._depth -= 1
         if not isinstance(event, yaml.AliasEvent):
@@ -69,10 +69,11 @@ class _Loader(yaml.SafeLoader):
             self._count += self._sizes[id(node)]
         else:
             raise _parse_error(
-                f"has the alias *{shortened(event.anchor)} in what it stands for", event
+                f"has the alias *{shortened(event.anchor)} within the node to which it refers",
+                event,
             )
         if self._count > MAX_NODES:
-            raise _parse_error(f"holds too much; expected at most {MAX_NODES} values", event)
+            raise _parse_error(f"has too many values; expected at most {MAX_NODES}", event)
         return node
 
 
@@ -86,8 +87,8 @@ P = TypeVar("P", bound=Parameters)
 def load(path: str | Path) -> "Entry":
     """Return the content of a file, which is a mapping.
 
-    `ParameterError`: it cannot be read, is no YAML, no mapping, has a key twice, or is larger than
-    a file of settings can be, see `yaml_loader`.
+    `ParameterError`: it cannot be read, is not a YAML mapping, has a key twice, or exceeds the
+    limits of a file of settings, see `yaml_loader`.
     """
     try:
         text = read_text(path, MAX_SIZE)
@@ -118,12 +119,12 @@ def _refusal(name, error):
 class Entry:
     """A value in a file, and its place, which is part of each `ParameterError`."""
 
-    name: str  #: Its keys from the top of the file, such as "boxes/table"; empty for the whole.
+    name: str  #: Keys from the top of the file, such as "boxes/table"; empty for the whole file.
     node: yaml.Node  #: The parser's node.
 
     @property
     def file(self) -> Path:
-        """The file that it is in."""
+        """Name of the file that contains it."""
         return Path(self.node.start_mark.name)
 
     @property
@@ -133,7 +134,7 @@ class Entry:
 
     @property
     def value(self) -> Any:
-        """The value by YAML's rules; some texts have none, such as a date in a 13th month."""
+        """The value by YAML's rules, which refuse some texts, such as a date in a 13th month."""
         loader = yaml.SafeLoader("")
         try:
             return loader.construct_document(self.node)
@@ -160,7 +161,7 @@ class Entry:
                 )
             entry = Entry(f"{self.name}/{key}".lstrip("/"), node)
             if key in found:
-                raise entry.error(f"is there twice, first in line {found[key].line}")
+                raise entry.error(f"occurs twice, first in line {found[key].line}")
             found[key] = entry
         return found
 
@@ -187,9 +188,9 @@ class Entry:
     ) -> P:
         """Return the parameters in a mapping; those of a group are in a mapping of their own.
 
-        Keys in ``extra_keys`` are known, too, and read elsewhere. The error lists everything that
-        is missing, unknown or invalid; with ``on_unknown(entry, known)`` this function is
-        called with each entry that is unknown instead.
+        Keys in ``extra_keys`` are also accepted; they are read elsewhere. The error lists
+        everything that is missing, unknown or invalid; with ``on_unknown(entry, known)`` this
+        function is called with each entry that is unknown instead.
         """
         names = {declaration.name for declaration in parameters.declarations()}
         known: dict[str, Entry] = {}

@@ -98,7 +98,7 @@ class _Connection:
         with self._lock:
             self._expect_open()
             transport = self._transport = TCPROSTransport(proxy.protocol, proxy.resolved_name)
-        # The answer of the service's process to the header shows that it runs.
+        # Only an answer to the header shows that the service's process runs.
         transport.connect(address, port, proxy.uri)
         with self._lock:
             self._expect_open()
@@ -113,7 +113,7 @@ class _Connection:
 
 
 class WithdrawableService(rospy.Service):
-    """A service whose handler can ask whether the caller is still there.
+    """A service whose handler can check whether the caller still waits.
 
     ``is_withdrawn()`` returns it while the handler runs; other threads may call it, too.
     """
@@ -148,7 +148,8 @@ def _after(delay, future, act, *arguments):
 def wait_for_answer(answer: Future[Any], name: str, time: Callable[[], float]) -> Any:
     """Return the outcome of ``answer``, for the caller of the service ``name``.
 
-    `ServiceError` is the service's; or the process ends, or ``time()`` stands still, before.
+    `ServiceError`: the service refuses, or before its answer the process ends or ``time()`` stands
+    still.
     """
     seen, seen_at = time(), monotonic()
     while not wait([answer], timeout=0.1).done:

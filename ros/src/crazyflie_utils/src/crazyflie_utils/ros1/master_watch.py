@@ -27,8 +27,8 @@ def register() -> None:
     listeners = registration.get_registration_listeners()
     topics, services = registration.get_topic_manager(), registration.get_service_manager()
     # With publishers first, the master need not notify the subscribers that come next. Services are
-    # in the order of their names: whoever looks meanwhile and finds a vehicle's takeoff finds its
-    # high_level/go_to, which says how it is flown.
+    # registered in the order of their names: a program that finds a vehicle's takeoff meanwhile
+    # also finds its high_level/go_to, by which it selects how to fly the vehicle.
     registered = [
         *(("pub", *each) for each in topics.get_publications()),
         *(("sub", *each) for each in topics.get_subscriptions()),
@@ -41,7 +41,7 @@ def register() -> None:
         outcome: Any = request()
         answers = [outcome[k] for k in range(len(registered))]
     except (OSError, http.client.HTTPException, xmlrpc.client.Error):
-        # One by one, and each until the master is there.
+        # One by one, each repeated until the master answers.
         for kind, name, type_or_uri in registered:
             listeners.notify_added(name, type_or_uri, kind)
         return
@@ -75,7 +75,7 @@ class _BoundedTransport(xmlrpc.client.Transport):
 
 
 def living_node(name: str) -> str | None:
-    """Return where a node runs, such as "process 12 on HOST", if it is registered and answers."""
+    """Return the place of a node, such as "process 12 on HOST", if it is registered and answers."""
     caller = rospy.get_name()
     try:
         uri = rosgraph.Master(caller).lookupNode(name)
@@ -93,11 +93,11 @@ def living_node(name: str) -> str | None:
 
 
 def namesake(names: set[str]) -> str | None:
-    """Return which node of these names runs, and what to do about it; None without any."""
+    """Return which node of these names is running, with the remedy; None without any."""
     try:
         registrations = rosgraph.Master(rospy.get_name()).getSystemState()
     except (OSError, rosgraph.MasterException):
-        # The master has just gone; the registration waits for it.
+        # The master has just ended; the registration waits for a new one.
         return None
     registered = {node for kind in registrations for _, nodes in kind for node in nodes}
     for name in sorted(names & registered):
@@ -137,11 +137,11 @@ class MasterWatch:
             pid = self._pid if is_known and self._pid is not None else self._master.getPid()
         except (OSError, xmlrpc.client.Error, rosgraph.MasterException):
             if self._was_there:
-                rospy.logwarn("the ROS master is gone; what is connected goes on")
+                rospy.logwarn("the ROS master does not answer; existing connections continue")
             self._was_there = False
             return
         self._was_there = True
-        # A process that ends takes back its registrations, while this thread may still ask.
+        # A process that ends removes its registrations, while this thread may still ask.
         if not is_known and not self._end.is_set() and not rospy.core.is_shutdown_requested():
             if self._pid in (None, pid):
                 rospy.logwarn("the ROS master does not know this node any more; registering again")

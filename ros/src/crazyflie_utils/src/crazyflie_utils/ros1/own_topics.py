@@ -54,7 +54,8 @@ class NonBlockingConnection:
         self._waiting: deque[bytes] = deque(maxlen=limit or None)
         # The rest of a message that was sent in part; while there is one, a thread sends.
         self._rest = b""
-        # Not only where the subscriber asks for it: messages above 490 bytes wait up to 40 ms.
+        # Set even if the subscriber does not ask for it: messages above 490 bytes would wait up to
+        # 40 ms.
         connection.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def __getattr__(self, name: str) -> Any:
@@ -98,7 +99,7 @@ class NonBlockingConnection:
                 poll.poll(1000)
                 if self._has_caught_up():
                     return
-        # The socket may be closed by others at any moment.
+        # Another thread may close the socket at any moment.
         except (TransportTerminated, OSError, ValueError, AttributeError, TypeError):
             self._connection.close()
 
@@ -116,8 +117,8 @@ class NonBlockingConnection:
 class OwnCallback:
     """A callback of a handle, which ignores messages that handles of this process publish.
 
-    Those are passed by a call, if ``is_handed_over()``. They also come by a socket if rospy
-    subscribes to the topic in this process, too, and without `skip_self_connections`.
+    Those are passed by a call, if ``is_handed_over()``. They also come by a socket without
+    `skip_self_connections`, or if rospy also subscribes to the topic in this process.
     """
 
     def __init__(self, deliver: Callable[[Any], None], is_handed_over: Callable[[], bool]):
@@ -147,7 +148,7 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
         patches: frozenset[str],
     ):
         super().__init__(name, message_type)
-        # It is remapped already; rospy would do it once more.
+        # The name is remapped already; rospy would remap it once more.
         self.resolved_name = self.name = name
         self.tcp_nodelay = True
         self._is_handed_over = is_handed_over
@@ -196,7 +197,7 @@ class OwnPublication(rospy.topics._PublisherImpl):
     def __init__(self, name: str, message_type: type, queue_size: int, latch: bool):
         super().__init__(name, message_type)
         self.resolved_name = self.name = name
-        # Set now: as soon as the topic is registered, subscribers connect.
+        # Set before the registration, since subscribers connect at once.
         self._limit = queue_size
         self.is_latch = latch
 

@@ -3,8 +3,8 @@
 The changes are to objects that handles own: their topics, and the process's server and clock.
 rospy's modules and classes, and topics that are subscribed or published by rospy alone, stay as
 they are. If a target is not the code for which a patch was written, or the environment variable
-CRAZYFLIE_ROSPY_PATCHES ("all", "none" or names such as "send_at_once,connect_once") leaves it out,
-rospy's own code runs, and the log has one line about it.
+CRAZYFLIE_ROSPY_PATCHES ("all", "none" or names such as "send_at_once,connect_once") disables the
+patch, rospy's own code runs, and one line is logged.
 
 The figures are those of
 
@@ -39,7 +39,8 @@ ROSOUT = "rosout"  #: The logger behind rospy.loginfo and its like.
 class Shielded(logging.Handler):
     """Passes records to another handler, and handles its errors as Python's own handlers do.
 
-    rospy's, which writes to the screen, does not. Under roslaunch the "screen" may be a file.
+    rospy's handler, which writes to the screen, does not. Under roslaunch the "screen" may be a
+    file.
     """
 
     def __init__(self, handler: logging.Handler) -> None:
@@ -66,12 +67,12 @@ def shield_screen_log() -> None:
 def log_without_master() -> None:
     """Read the parameter with which rospy leaves topics out of /rosout, once; by default it does.
 
-    rospy caches no parameter that is not set: it asked the master at each line, and waited for one
-    that was frozen, in the middle of an emergency. In a process of 100 vehicles the names of all
-    topics made a line take 2 ms, and lines of all vehicles at once a gap in their control.
+    rospy does not cache a parameter that is not set: it asked the master at each line, and waited
+    for a frozen one even in an emergency. In a process of 100 vehicles, the names of all topics
+    made a line take 2 ms, so that lines of all vehicles at once caused a gap in their control.
     """
     value = True
-    # A master that has just gone does not block the process.
+    # A master that has just ended does not block the process.
     with contextlib.suppress(OSError):
         value = rospy.get_param(_NO_TOPICS, True)
     paramserver.get_param_server_cache().set(_NO_TOPICS, value)
@@ -89,8 +90,8 @@ class Patch:
 
     replaces: str  #: Behaviour of rospy.
     reason: str  #: Behaviour with the patch, and the reason.
-    gain: str  #: Measured without -> with it, on a machine that did other things, too.
-    without: str  #: Text for the log about the effect of its absence.
+    gain: str  #: Figures without -> with the patch, measured on a machine with other load.
+    without: str  #: Text for the log about behaviour without the patch.
     #: "module:Class.function" to its parameters and, behind a colon, names that its code uses.
     targets: dict[str, str]
     versions: str = "1.15.15"  #: Versions of rospy with which it was tested.
@@ -108,18 +109,19 @@ PATCHES = {
         },
     ),
     "connect_once": Patch(
-        "each time that the master tells of a publisher makes a connection, and the last one stays",
-        "the first one stays: subscriber and publisher may differ about which came last, and then "
-        "both are closed and nothing is received any more",
-        "no figure: it is about messages that never come",
+        "each report of a publisher by the master makes a connection, and the last one stays",
+        "the first one stays: subscriber and publisher may disagree about which came last, and "
+        "would then close both, so that nothing is received any more",
+        "no figure: it prevents lost messages",
         "a subscriber may miss a publisher that starts at the same moment",
         {f"{_TOPICS}_SubscriberImpl.add_connection": "self c: connections c_lock endpoint_id"},
     ),
     "harden_subscribers": Patch(
-        "all that comes is decoded; if a message cannot be, rospy connects again, for ever",
-        "it is dropped and named once; a flood is decoded in part, so that control goes on",
+        "every message is decoded; if that fails, rospy reconnects for ever",
+        "an invalid message is dropped and logged once; a flood is decoded in part, so that "
+        "control continues",
         "no figure: it guards flights (docs/faults.md, Peers)",
-        "publishers that send nonsense, or floods, delay the nodes of this process",
+        "publishers that send invalid messages, or floods, delay the nodes of this process",
         {
             f"{_TCP}TCPROSTransport.receive_once": "self: read_buff protocol is_latched latch",
             f"{_TCP}TCPROSTransport._validate_header": "self header: callerid_pub is_latched",
@@ -140,7 +142,7 @@ PATCHES = {
     ),
     "harden_tcp_server": Patch(
         "headers of connections are read one after the other, without a limit of time",
-        "each in a thread, within 5 s: a peer that connects and is silent keeps /emergency waiting",
+        "each in a thread, within 5 s: otherwise a silent peer would delay /emergency",
         "no figure: it guards flights (docs/faults.md, Peers)",
         "a peer that connects and says nothing blocks all others",
         {
@@ -151,7 +153,8 @@ PATCHES = {
     ),
     "register_together": Patch(
         "each topic and service is registered by a request of its own",
-        "those of the nodes that start are registered in one, when all of them are complete",
+        "all topics and services of the starting nodes are registered in one request, when all "
+        "nodes are complete",
         "announce a topic: 2.8 -> 0.5 ms, 0.25 -> 0.04 ms of CPU",
         "nodes register their topics and services one by one",
         {
@@ -192,7 +195,7 @@ def active() -> frozenset[str]:
     names = set(PATCHES) if wanted == "all" else set(wanted.split(",")) - {"none", ""}
     for unknown in sorted(names - set(PATCHES)):
         rospy.logwarn(
-            f"{SWITCH}: there is no {unknown}; expected all, none or {', '.join(PATCHES)}"
+            f"{SWITCH}: unknown patch {unknown}; expected all, none or {', '.join(PATCHES)}"
         )
     on = set()
     for name, patch in PATCHES.items():
@@ -200,9 +203,12 @@ def active() -> frozenset[str]:
         if name in names and not misfits:
             on.add(name)
         elif name in names:
-            rospy.logwarn(f"rospy is another one: {patch.without} ({', '.join(misfits)} changed)")
+            rospy.logwarn(
+                f"this rospy differs from the tested one: {patch.without} "
+                f"({', '.join(misfits)} changed)"
+            )
         else:
-            rospy.loginfo(f"{SWITCH} leaves out {name}: {patch.without}")
+            rospy.loginfo(f"{SWITCH} disables {name}: {patch.without}")
     return frozenset(on)
 
 
@@ -255,7 +261,7 @@ def registering_together() -> Iterator[None]:
         yield
         return
     listeners = registration.get_registration_listeners()
-    # They are in rospy's tables by then, which `register` reads.
+    # By then they are in rospy's tables, which `register` reads.
     listeners.notify_added = lambda *_: None
     try:
         yield

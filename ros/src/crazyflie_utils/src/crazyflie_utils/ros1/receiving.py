@@ -1,4 +1,4 @@
-"""Reception of messages by subscribers of a handle, from publishers that may send anything.
+"""Reception of messages by subscribers of a handle, from publishers that may send invalid data.
 
 Messages that cannot be decoded are dropped and the connection goes on, where rospy would connect
 again and again. Publishers of another type and messages without end are disconnected, and a flood
@@ -58,7 +58,7 @@ class Inbox:
 
     def __init__(self, connection: Any, report: Report):
         self.sock = connection.socket
-        # The connection deletes it when it is closed, which another thread may do at any moment.
+        # Another thread may close the connection at any moment, which deletes the attribute.
         self._protocol = connection.protocol
         self._connection = connection
         self._report = report
@@ -181,7 +181,7 @@ def harden(connection: Any, report: Report, limits_rate: bool) -> None:
 def _validate_header(connection, validate, report, header):
     mismatch = _type_mismatch(connection.protocol, header)
     if mismatch:
-        # Closed, so that rospy does not try again and again.
+        # Closed, so that rospy does not retry for ever.
         topic, peer = connection.protocol.resolved_name, header.get("callerid", "a publisher")
         connection.close()
         report(f"ignoring {peer} on {topic}: {mismatch}", ("type", topic, peer))
@@ -189,8 +189,8 @@ def _validate_header(connection, validate, report, header):
     try:
         validate(header)
     except TransportInitError:
-        # For example from a publisher that is still starting. rospy is to try again, but takes a
-        # connection that has a socket for an established one.
+        # For example from a publisher that is still starting. rospy must try again, but treats a
+        # connection that has a socket as established.
         connection.socket.close()
         connection.socket = None
         raise

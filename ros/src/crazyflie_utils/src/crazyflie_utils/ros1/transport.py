@@ -80,7 +80,7 @@ class RosTransport(Transport):
     """rospy, for a process that has called ``rospy.init_node``.
 
     If ``limits_rate``, it decodes floods in part; not in simulated time, which may pass quickly.
-    ``refused`` counts what peers did wrong, by kind.
+    ``refused`` has the numbers of peers' errors, by kind.
     """
 
     def __init__(self, limits_rate: bool = True) -> None:
@@ -118,7 +118,7 @@ class RosTransport(Transport):
             self._is_starting, self._services_at_start = False, None
 
     def _refuse(self, text, key):
-        # Reported once, since a faulty peer stays so; and for the first 64 only.
+        # Reported once, since a faulty peer stays faulty; and for the first 64 peers only.
         if self._complaints.passes(key, math.inf, 0.0):
             self.log("warn", text)
         elif key not in self.refused:
@@ -126,7 +126,7 @@ class RosTransport(Transport):
         self.refused[key] += 1
 
     def remap(self, name: str) -> str:
-        """Return what the command line maps the name to."""
+        """Return the name to which the command line remaps a name."""
         return self._remappings.get(name, name)
 
     def _rospy_name(self, name):
@@ -173,7 +173,7 @@ class RosTransport(Transport):
         return _RosSubscriber(register, self._run)
 
     def _run(self, work):
-        """Do what waits for the master: in callbacks, and after them, by a thread, in order."""
+        """Do work that waits for the master: in order, from callbacks in a thread."""
         if self._for_master is None:
             if not self.is_in_callback():
                 work()
@@ -239,7 +239,7 @@ class RosTransport(Transport):
 
     def log(self, level: str, text: str) -> None:
         """Log to the screen, the node's log file and /rosout."""
-        # The screen may be gone; rospy's handler lets the error out.
+        # The screen may have been closed; rospy's handler does not catch the error.
         with contextlib.suppress(OSError):
             _LOGGERS[level](text)
 
@@ -256,13 +256,13 @@ def allow_many_topics() -> None:
     forty vehicles.
     """
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    # Where it is refused, a process with few topics does not need it.
+    # If the system refuses, a process with few topics does not need it.
     with contextlib.suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 def _write_param(name, value):
-    # Not through rospy's own connection to the master, which other threads use.
+    # A new connection: other threads use rospy's own connection to the master.
     rosgraph.Master(rospy.get_name()).setParam(name, value)
 
 

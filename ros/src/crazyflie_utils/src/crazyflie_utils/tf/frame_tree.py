@@ -1,7 +1,7 @@
 """The tf frames of a process.
 
 Transforms of other processes are decoded only for frames that were looked up, and for those above
-them in the tree. Of the others the last transform is kept serialized.
+them in the tree. The last transform of every other frame is kept serialized.
 
 Nearly every lookup is of the latest pose of a frame in its parent, which is answered here. The
 others go to tf2, whose buffer is filled with the latest poses at the first of them.
@@ -65,11 +65,11 @@ class Buffer:
 _HISTORY = 100  #: Number of poses of a frame that are kept until tf2 is used.
 _NORM_TOLERANCE = 0.01  #: tf2's tolerance of the squared norm of a quaternion.
 
-#: Largest step back of a stamp that came late by a slower path (ns): the younger pose stays the
-#: present one.
+#: Largest step back of a stamp that came late by a slower path (ns): the newer pose stays the
+#: latest.
 _STEP_BACK = 100_000_000
 
-_STEPS_BACK = 3  #: Number of these in a row after which the source's clock was set back.
+_STEPS_BACK = 3  #: Number of such steps in a row that show that the source's clock was set back.
 _MAX_FRAMES = 1000  #: Largest number of known frames, and of frames kept serialized.
 _MAX_BYTES = 1024  #: Largest transform that is kept serialized (bytes).
 _ONE = b"\x01\0\0\0"  #: The length of a message with one transform.
@@ -87,11 +87,11 @@ class _Frame:
 
 
 class FrameTree:
-    """Frames, their poses and parents. Not for several threads at once.
+    """Frames, their poses and parents. Not thread-safe.
 
-    ``warn(text, key)`` is called about every transform that is dropped; with the same key it is for
-    the same reason. ``ahead`` is how far the stamp of a transform may be ahead of now, s.
-    ``on_new(pose)`` is called with every pose that is the latest of its frame.
+    ``warn(text, key)`` is called for every dropped transform; the key identifies the reason.
+    ``ahead`` is how far the stamp of a transform may be ahead of now, s. ``on_new(pose)`` is called
+    with every pose that is the latest of its frame.
     """
 
     def __init__(
@@ -209,7 +209,7 @@ class FrameTree:
                 kept = self._unread.pop(name, None)
                 if kept is not None:
                     self.read(_ONE + kept, now)
-            # Not before, to avoid a recursion over a long chain.
+            # Called afterwards, to avoid a recursion over a long chain.
             self.followed.add(frame)
             frame = self._parent(frame)
 
@@ -222,7 +222,7 @@ class FrameTree:
             name = self._parent(name)
 
     def _check_parents(self, name):
-        """Refuse a frame above which one has two parents, or that is in a loop: tf2 does not.
+        """Refuse a frame in a loop, or with an ancestor that has two parents: tf2 does not.
 
         That happens if two bodies are swapped, or the frames of a static transform are exchanged.
         """
@@ -268,9 +268,9 @@ class FrameTree:
         self._warn(text, (pose.parent, pose.child, reason))
 
     def _why_untimely(self, frame, stamp, now):
-        """Return why a pose is rejected now; "" if that needs no warning; None if it is not."""
+        """Return why a pose is rejected; "" if that needs no warning; None if it is accepted."""
         if stamp > now + self._ahead:
-            # Until the first /clock of a simulation that runs, now is 0.
+            # Before the first /clock of a running simulation, now is 0.
             return "is stamped in the future" if now else ""
         if frame is None:
             return None

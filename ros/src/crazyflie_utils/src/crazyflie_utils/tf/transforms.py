@@ -14,7 +14,7 @@ from crazyflie_utils.topics import Subscriber, Topics
 
 #: Largest time of a stamp ahead of now (s). tf's static_transform_publisher stamps 0.1 s ahead.
 MAX_FUTURE_STAMP = 0.2
-#: The same in simulated time (s): pose and /clock come by different paths.
+#: The same limit in simulated time (s): pose and /clock come by different paths.
 MAX_FUTURE_STAMP_SIMULATED = 2.0
 
 
@@ -29,7 +29,7 @@ class _Listener:
     def is_due(self, stamp: int) -> bool:
         """Return whether a pose, by its stamp in ns, is due."""
         early = self._due - stamp
-        # Tolerates rounding; a much earlier stamp is that of a clock that was set back.
+        # Tolerates rounding; a much earlier stamp comes from a clock that was set back.
         if self._period // 100 < early <= 2 * self._period:
             return False
         self._due = stamp + self._period if early > 0 else max(self._due + self._period, stamp)
@@ -168,9 +168,9 @@ class Transforms:
     def lookup(self, target: str, source: str, stamp: genpy.Time | None = None) -> TransformStamped:
         """Return the pose of frame ``source`` in frame ``target``, with its own stamp.
 
-        The stamp asked for is by default (and 0) the latest. Others are known from the first such
-        lookup on, for 10 s, and before it the last 100 transforms of frames that were looked up.
-        `TransformError`: a frame is unknown, the two are not connected, or not at that time.
+        By default, and for stamp 0, the pose is the latest. Other stamps are available for 10 s
+        from the first such lookup on; before it, the last 100 transforms of frames that were looked
+        up. `TransformError`: a frame is unknown, the two are not connected, or not at that time.
         """
         return self.lookup_pose(target, source, stamp).message()
 
@@ -207,7 +207,7 @@ class Transforms:
                 self._arrived.append(listener)
 
     def _notify_listeners(self):
-        # Not under the lock, since callbacks may look up poses.
+        # Called without the lock, since callbacks may look up poses.
         if self._arrived:
             with self._lock:
                 arrived, self._arrived = self._arrived, []

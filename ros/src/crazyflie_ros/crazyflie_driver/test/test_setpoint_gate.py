@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from crazyflie_driver.setpoint_gate import (
     OVERLAP,
-    PAUSE,
     REASONS,
+    STREAM_PAUSE,
     TRANSITIONS,
     Block,
     GateEvent,
@@ -68,7 +68,7 @@ def test_what_was_streamed_while_a_vehicle_did_not_lift_off_stays_blocked(standi
 
 
 def test_a_new_stream_zero_thrust_and_a_call_are_new_attempts(standing):
-    assert stream(standing, 2.0 + PAUSE + 0.1, 4.0) == (0, "")
+    assert stream(standing, 2.0 + STREAM_PAUSE + 0.1, 4.0) == (0, "")
     standing.handle(GateEvent.NOT_LIFTED)
     assert standing.refusal(4.0, True) == ""
     assert stream(standing, 4.02, 5.0) == (0, "")
@@ -79,7 +79,7 @@ def test_a_new_stream_zero_thrust_and_a_call_are_new_attempts(standing):
 
 def test_a_pause_opens_it(lost):
     assert stream(lost, 2.0, 2.2)[0] == 10
-    assert stream(lost, 2.2 + PAUSE + 0.1, 4.0) == (0, "")
+    assert stream(lost, 2.2 + STREAM_PAUSE + 0.1, 4.0) == (0, "")
 
 
 def test_a_pause_during_the_loss_opens_it():

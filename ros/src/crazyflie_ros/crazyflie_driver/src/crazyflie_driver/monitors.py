@@ -4,6 +4,7 @@ import enum
 import threading
 from typing import NamedTuple
 
+from crazyflie_driver.setpoint_gate import STREAM_PAUSE
 from crazyflie_model.limits import LEVEL_AGE
 
 
@@ -124,7 +125,6 @@ LIFT_LIMIT = 2.0  #: Time in which a vehicle has to lift off, s.
 MIN_CLIMB = 0.15  #: Setpoints that are lower above the ground do not ask for a flight, m.
 MAX_RISE = 0.05  #: A vehicle on the ground estimates no more above it, m.
 MAX_TURN = 10.0  #: Largest turn from the heading on the ground to the commanded one, degrees.
-STREAM_PAUSE = 1.0  #: After a pause of this length, s, setpoints are a new attempt.
 
 MAX_REST_SPEED = 0.1  #: A vehicle on the ground estimates no more, m/s.
 

@@ -5,7 +5,8 @@ import enum
 import threading
 from collections.abc import Iterator
 
-PAUSE = 1.0  #: A stream that goes on after a pause of this length, s, was restarted on purpose.
+#: A stream that goes on after a pause of this length, s, was restarted on purpose.
+STREAM_PAUSE = 1.0
 
 #: Time after a high-level command or cmd_stop in which setpoints are not sent, s. Each topic has a
 #: connection of its own, so that some are under way then: a single one would take the vehicle from
@@ -64,7 +65,7 @@ TRANSITIONS = {
     GateEvent.STREAM_BEGUN: (_NONE, _NONE, _ON_TRIAL),
 }
 
-_ADVICE = f"pause the stream for {PAUSE:g} s, send zero thrust or call a service"
+_ADVICE = f"pause the stream for {STREAM_PAUSE:g} s, send zero thrust or call a service"
 
 #: Block -> words of the warning; the first that holds is named.
 REASONS = {
@@ -132,7 +133,7 @@ class SetpointGate:
 
     def is_blocking(self, now: float) -> bool:
         """Return whether a stream is blocked because the link was lost."""
-        is_streamed = self._latest is not None and now - self._latest <= PAUSE
+        is_streamed = self._latest is not None and now - self._latest <= STREAM_PAUSE
         return is_streamed and Block.UNCONFIRMED in self._blocks
 
     def refusal(self, now: float, is_zero: bool) -> str:
@@ -142,7 +143,7 @@ class SetpointGate:
         """
         with self._lock:
             before, self._latest = self._latest, now
-            if is_zero or before is None or now - before > PAUSE:
+            if is_zero or before is None or now - before > STREAM_PAUSE:
                 if not self._blocks & ~_ON_TRIAL:
                     self.handle(GateEvent.STREAM_BEGUN)
             for block, reason in REASONS.items():

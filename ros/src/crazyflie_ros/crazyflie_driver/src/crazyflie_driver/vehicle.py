@@ -29,7 +29,7 @@ from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.parameters.types import Text
 
-PAUSE = 0.2  #: Between two attempts to connect, s.
+_RETRY_PERIOD = 0.2  #: Between two attempts to connect, s.
 
 _EMERGENCY_LIMIT = 1.0  #: Time limit of the vehicle's confirmation of an emergency stop, s.
 _LOOK_PERIOD = 0.1
@@ -55,7 +55,7 @@ def connect_within(
         except NoAnswerError:
             if is_closing() or clock() >= end:
                 raise
-        sleep(PAUSE)
+        sleep(_RETRY_PERIOD)
 
 
 class DriverVehicle(VehicleContext):

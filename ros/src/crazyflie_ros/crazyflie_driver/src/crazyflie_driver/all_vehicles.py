@@ -186,5 +186,5 @@ def _results(
 
 
 def _text(refusals: Mapping[DriverVehicle, str], count: int) -> str:
-    texts = sorted(f"{vehicle.parameters.name}: {text}" for vehicle, text in refusals.items())
+    texts = sorted(f"{vehicle.name}: {text}" for vehicle, text in refusals.items())
     return f"{len(texts)} of {count} vehicles: " + "; ".join(texts)

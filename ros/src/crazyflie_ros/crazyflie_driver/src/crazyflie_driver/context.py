@@ -110,9 +110,17 @@ class VehicleContext:
         """Absolute namespace of the vehicle, such as /crazyflie1; empty for the root."""
         return self.parameters.prefix
 
-    def warn(self, text: str) -> None:
-        """Log a warning about the vehicle."""
-        self.handle.warn(f"{self.name}: {text}")
+    def info(self, text: str) -> None:
+        """Log information about the vehicle."""
+        self.handle.info(f"{self.name}: {text}")
+
+    def warn(self, text: str, throttle: float = 0.0, key: str = "") -> None:
+        """Log a warning about the vehicle; see `NodeLog.warn`."""
+        self.handle.warn(f"{self.name}: {text}", throttle, (self.name, key or text))
+
+    def error(self, text: str) -> None:
+        """Log an error of the vehicle."""
+        self.handle.error(f"{self.name}: {text}")
 
     def refuse_after_emergency(self) -> None:
         """Raise `ServiceError` after an emergency stop, which holds until the removal."""

@@ -164,7 +164,7 @@ class FlightCommands:
         """
         if self._reason is None:
             detail = self._log.battery.words() if reason is Reason.BATTERY else reason.words
-            self._context.handle.error(f"{self._context.name}: {detail}: landing")
+            self._context.error(f"{detail}: landing")
         if self._reason is not Reason.BATTERY:
             self._reason = reason
         landing = self._landing
@@ -247,9 +247,8 @@ class FlightCommands:
             self._check_and_arm(job)
         elif command.name == LAND:
             if self._flight.is_on_ground():
-                self._context.handle.info(
-                    f"{self._context.name}: land is not sent, the vehicle is on the ground: it "
-                    "would start its motors"
+                self._context.info(
+                    "land is not sent, the vehicle is on the ground: it would start its motors"
                 )
                 return False
         elif command.name != STOP:
@@ -477,8 +476,7 @@ class FlightCommands:
             try:
                 context.crazyflie.supervisor.feed_watchdog()
             except CrazyflieError as error:
-                name = context.name
-                context.handle.warn(f"{name}: watchdog not fed: {error}", 1.0, (name, "watchdog"))
+                context.warn(f"watchdog not fed: {error}", 1.0, "watchdog")
 
 
 def _send(command: Command, high_level: HighLevel) -> bool:

@@ -109,7 +109,7 @@ class CrazyflieServerNode(Node):
         if address.channel not in self._channels:
             self._channels[address.channel] = Channel(address, self._parameters.broadcast)
         self._channels[address.channel].add(vehicle)
-        self._handle.info(f"{requested.name}: connecting to {requested.uri}")
+        vehicle.info(f"connecting to {requested.uri}")
         return self._when_done(vehicle.connect(), self._finish_adding, vehicle)
 
     def _finish_adding(self, vehicle, done):
@@ -133,7 +133,7 @@ class CrazyflieServerNode(Node):
         self._forget(vehicle)
         if problem := done.result():
             raise ServiceError(f"{vehicle.parameters.uri} is removed, but {problem}")
-        self._handle.info(f"{vehicle.parameters.name}: removed")
+        vehicle.info("removed")
         return RemoveCrazyflieResponse()
 
     def _on_emergency(self, _):
@@ -141,13 +141,12 @@ class CrazyflieServerNode(Node):
         for channel in self._channels.values():
             channel.broadcaster.send(BROADCAST_STOP, urgent=True)
         for vehicle in self._vehicles.values():
-            name = vehicle.parameters.name
             try:
                 vehicle.latch_emergency()
             except CrazyflieError as error:
-                self._handle.error(f"{name}: emergency stop, sent when there is a link: {error}")
+                vehicle.error(f"emergency stop, sent when there is a link: {error}")
             else:
-                self._handle.error(f"{name}: emergency stop of all vehicles")
+                vehicle.error("emergency stop of all vehicles")
         return std_srvs.EmptyResponse()
 
     def _forget(self, vehicle: DriverVehicle) -> None:
@@ -183,7 +182,7 @@ class CrazyflieServerNode(Node):
                 status=[
                     diagnostics(
                         vehicle.status.status(),
-                        f"{component}: {vehicle.parameters.name}",
+                        f"{component}: {vehicle.name}",
                         vehicle.parameters.uri,
                         self._parameters.link,
                     )

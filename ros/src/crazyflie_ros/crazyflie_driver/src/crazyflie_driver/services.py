@@ -118,11 +118,10 @@ class VehicleServices:
             self._latch_emergency()
         except CrazyflieError as error:
             text = f"emergency stop may not have arrived, is sent when the link is back: {error}"
-            self._context.handle.error(f"{self._context.name}: {text}")
+            self._context.error(text)
             raise ServiceError(text) from None
-        self._context.handle.error(
-            f"{self._context.name}: emergency stop; to fly again remove the vehicle, restart it "
-            "and add it again"
+        self._context.error(
+            "emergency stop; to fly again remove the vehicle, restart it and add it again"
         )
         return EmptyResponse()
 

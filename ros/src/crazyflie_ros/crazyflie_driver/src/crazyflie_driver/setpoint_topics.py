@@ -253,11 +253,8 @@ class SetpointTopics:
     def _on_external(self, name, sender, message):
         if self._log.positioning is not None:
             # It may be the vehicle's own estimate: it would correct itself by itself.
-            self._context.handle.warn(
-                f"{self._context.name}: ignoring {name}: its positioning is "
-                f"{self._log.positioning.source}",
-                throttle=5.0,
-                key=(self._context.name, name),
+            self._context.warn(
+                f"ignoring {name}: its positioning is {self._log.positioning.source}", 5.0, name
             )
             return
         self._external_time = self._context.handle.time()
@@ -302,8 +299,7 @@ class SetpointTopics:
                 self.notify_setpoints_stop()
 
     def _warn(self, text, key):
-        name = self._context.name
-        self._context.handle.warn(f"{name}: {text}", throttle=_THROTTLE, key=(name, key))
+        self._context.warn(text, _THROTTLE, key)
 
     def _cmd_vel(self, message):
         # The link's pitch is the negative of cmd_vel's, and cflib negates it; tests compare bytes.

@@ -68,8 +68,6 @@ class DriverVehicle(VehicleContext):
     def __init__(
         self, handle: NodeHandle, parameters: VehicleParameters, server: CrazyflieServerParameters
     ):
-        # Messages go out through it after the vehicle's own is closed, too.
-        self._server_handle = handle
         name, own = parameters.name, handle.child()
         super().__init__(
             own,
@@ -79,11 +77,11 @@ class DriverVehicle(VehicleContext):
                 parameters.uri,
                 reconnect=True,
                 on_state=self._on_link_state,
-                on_console=self._on_console,
+                on_console=self.info,
                 on_packet=self._on_packet,
             ),
             SetpointGate(),
-            Jobs(name, self._on_failed_job),
+            Jobs(name, self.error),
             Delivery(own, name),
             Connection(f"connecting to {parameters.uri}"),
         )
@@ -157,7 +155,7 @@ class DriverVehicle(VehicleContext):
             self._end()
             raise
         self.delivery.submit(self.status.publish)
-        self._server_handle.info(f"{self.name}: connected to {self.parameters.uri}")
+        self.info(f"connected to {self.parameters.uri}")
 
     def _choose_positioning(self):
         name = f"{self.prefix}/{POSITIONING_PARAMETER}"
@@ -286,21 +284,14 @@ class DriverVehicle(VehicleContext):
         if not self.connection.is_closing():
             self.log.publish_packet(port, channel, data)
 
-    def _on_console(self, line):
-        self._server_handle.info(f"{self.name}: {line}")
-
-    def _on_failed_job(self, text):
-        self._server_handle.error(f"{self.name}: {text}")
-
     # In turn with the callbacks of the node.
 
     def _report(self, state, text):
         self.status.publish()
-        name = self.name
         if state is LinkState.LOST:
-            self._server_handle.error(f"{name}: {text}; trying to connect again")
+            self.error(f"{text}; trying to connect again")
         elif state is LinkState.CONNECTED and self.connection.is_ready():
-            self._server_handle.warn(f"{name}: {text}")
+            self.warn(text)
             if self.connection.state is ConnectionState.RESUMING:
                 self.jobs.submit("taking up the link again", self._resume)
 

@@ -2,15 +2,20 @@
 
 import pytest
 
-from crazyflie_driver.context import TRANSITIONS, Connection, ConnectionEvent, ConnectionState
+from crazyflie_driver.context import TRANSITIONS, ConnectionEvent, ConnectionState, VehicleContext
 
 CONNECTING, SETTING_UP, READY, LOST, RESUMING, CLOSING, CLOSED = ConnectionState
 
 
+def make_vehicle():
+    """Return a vehicle that has only a state."""
+    return VehicleContext(*[None] * 7, link_text="new")
+
+
 def after(*events):
-    """Return the states that a connection goes through."""
-    connection = Connection("new")
-    return [connection.handle(event) for event in events]
+    """Return the states that a vehicle goes through."""
+    vehicle = make_vehicle()
+    return [vehicle.transition(event) for event in events]
 
 
 def test_a_flight_with_a_silence_and_a_new_link():
@@ -31,35 +36,35 @@ def test_a_flight_with_a_silence_and_a_new_link():
 
 
 def test_a_vehicle_is_ready_only_once_it_has_been_announced():
-    connection = Connection("new")
+    vehicle = make_vehicle()
     for event in set(ConnectionEvent) - {ConnectionEvent.LINK_OPENED, ConnectionEvent.REMOVAL}:
-        assert connection.handle(event) is CONNECTING
-    assert not connection.is_ready()
-    connection.handle(ConnectionEvent.LINK_OPENED)
+        assert vehicle.transition(event) is CONNECTING
+    assert not vehicle.is_ready()
+    vehicle.transition(ConnectionEvent.LINK_OPENED)
     for event in (ConnectionEvent.LINK_LOST, ConnectionEvent.LINK_RENEWED):
-        assert connection.handle(event) is SETTING_UP
-    assert not connection.is_ready()
-    connection.handle(ConnectionEvent.ANNOUNCED)
-    assert connection.is_ready()
+        assert vehicle.transition(event) is SETTING_UP
+    assert not vehicle.is_ready()
+    vehicle.transition(ConnectionEvent.ANNOUNCED)
+    assert vehicle.is_ready()
     # Topics and services stay while the link is lost.
     for event in (ConnectionEvent.LINK_LOST, ConnectionEvent.LINK_RENEWED):
-        connection.handle(event)
-        assert connection.is_ready()
+        vehicle.transition(event)
+        assert vehicle.is_ready()
 
 
 @pytest.mark.parametrize("state", [CONNECTING, SETTING_UP, READY, LOST, RESUMING])
 def test_every_vehicle_can_be_removed_and_does_not_come_back(state):
-    connection = Connection("new")
-    connection.state = state
-    assert not connection.is_closing()
-    assert connection.handle(ConnectionEvent.REMOVAL) is CLOSING
+    vehicle = make_vehicle()
+    vehicle.state = state
+    assert not vehicle.is_closing()
+    assert vehicle.transition(ConnectionEvent.REMOVAL) is CLOSING
     for event in set(ConnectionEvent) - {ConnectionEvent.REMOVED}:
-        assert connection.handle(event) is CLOSING
-    assert connection.is_closing()
-    assert not connection.is_ready()
-    assert connection.handle(ConnectionEvent.REMOVED) is CLOSED
-    assert {connection.handle(event) for event in ConnectionEvent} == {CLOSED}
-    assert connection.is_closing()
+        assert vehicle.transition(event) is CLOSING
+    assert vehicle.is_closing()
+    assert not vehicle.is_ready()
+    assert vehicle.transition(ConnectionEvent.REMOVED) is CLOSED
+    assert {vehicle.transition(event) for event in ConnectionEvent} == {CLOSED}
+    assert vehicle.is_closing()
 
 
 def test_every_state_can_be_reached():

@@ -123,9 +123,7 @@ class AllVehicles:
             )
         command = requested(name, request)
         channels = list(self._channels.values())
-        ready = [
-            each for channel in channels for each in channel.vehicles if each.connection.is_ready()
-        ]
+        ready = [each for channel in channels for each in channel.vehicles if each.is_ready()]
         if not ready:
             raise ServiceError(f"{name} of all vehicles: none is connected; expected one or more")
         # Begun here, in the order of the calls.

@@ -1,8 +1,8 @@
-"""The objects that all parts of one vehicle share, and the state of its connection."""
+"""What all parts of one vehicle share, and the states of its connection."""
 
 import enum
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from crazyflie_driver.jobs import Delivery, Jobs
 from crazyflie_driver.parameters import CrazyflieServerParameters, VehicleParameters
@@ -58,37 +58,12 @@ TRANSITIONS: dict[tuple[ConnectionState, ConnectionEvent], ConnectionState] = {
 }
 
 
-class Connection:
-    """The state of a vehicle's connection, which all threads of the vehicle use.
-
-    ``text`` says why the link is in its state.
-    """
-
-    def __init__(self, text: str):
-        self.text = text
-        self.state = ConnectionState.CONNECTING
-        self._lock = threading.Lock()
-
-    def handle(self, event: ConnectionEvent) -> ConnectionState:
-        """Change the state by an event, and return it."""
-        with self._lock:
-            self.state = TRANSITIONS.get((self.state, event), self.state)
-            return self.state
-
-    def is_ready(self) -> bool:
-        """Return whether topics and services are there; also while the link is lost."""
-        return self.state in (ConnectionState.READY, ConnectionState.LOST, ConnectionState.RESUMING)
-
-    def is_closing(self) -> bool:
-        """Return whether the vehicle is being removed, or has been."""
-        return self.state in (ConnectionState.CLOSING, ConnectionState.CLOSED)
-
-
 @dataclass(eq=False)
 class VehicleContext:
-    """The objects that all parts of one vehicle share.
+    """What all parts of one vehicle share.
 
-    The handle is closed when the vehicle is removed. Calls that block on the vehicle are jobs.
+    The handle is closed when the vehicle is removed. Calls that block on the vehicle are jobs. All
+    threads of the vehicle use its state; ``link_text`` says why the link is in its own.
     """
 
     handle: NodeHandle
@@ -98,7 +73,9 @@ class VehicleContext:
     gate: SetpointGate
     jobs: Jobs
     delivery: Delivery
-    connection: Connection
+    link_text: str
+    state: ConnectionState = ConnectionState.CONNECTING
+    _state_lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property
     def name(self) -> str:
@@ -109,6 +86,20 @@ class VehicleContext:
     def prefix(self) -> str:
         """Absolute namespace of the vehicle, such as /crazyflie1; empty for the root."""
         return self.parameters.prefix
+
+    def transition(self, event: ConnectionEvent) -> ConnectionState:
+        """Change the state by an event, and return it."""
+        with self._state_lock:
+            self.state = TRANSITIONS.get((self.state, event), self.state)
+            return self.state
+
+    def is_ready(self) -> bool:
+        """Return whether topics and services are there; also while the link is lost."""
+        return self.state in (ConnectionState.READY, ConnectionState.LOST, ConnectionState.RESUMING)
+
+    def is_closing(self) -> bool:
+        """Return whether the vehicle is being removed, or has been."""
+        return self.state in (ConnectionState.CLOSING, ConnectionState.CLOSED)
 
     def info(self, text: str) -> None:
         """Log information about the vehicle."""

@@ -124,7 +124,7 @@ class CrazyflieServerNode(Node):
         if vehicle is None:
             known = ", ".join(each.parameters.uri for each in self._vehicles.values()) or "none"
             raise ServiceError(f"no vehicle {request.uri!r} has been added; known: {known}")
-        if vehicle.connection.is_closing():
+        if vehicle.is_closing():
             raise ServiceError(f"{request.uri} is being removed already")
         removed = vehicle.remove(self._parameters.landing_limit)
         return self._when_done(removed, self._finish_removing, vehicle)

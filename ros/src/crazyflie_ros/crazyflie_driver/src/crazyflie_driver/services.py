@@ -60,7 +60,7 @@ class VehicleServices:
         names = context.handle.get_param(context.prefix or "/", _Controllers(), frozenset())
         awaited = {f"{context.prefix}/{name}" for name in names}
         end = time.monotonic() + CONTROLLER_LIMIT
-        while awaited and not context.connection.is_closing() and time.monotonic() < end:
+        while awaited and not context.is_closing() and time.monotonic() < end:
             awaited = {node for node in awaited if not self._is_ready(node)}
             if awaited:
                 time.sleep(CONTROLLER_PERIOD)

@@ -179,7 +179,7 @@ class StatusPublisher:
         message = VehicleStatus(
             header=Header(stamp=context.handle.stamp()),
             link=_LINKS[crazyflie.state.value],
-            link_text=context.connection.text,
+            link_text=context.link_text,
             supervisor=int(state or 0),
             has_supervisor=state is not None,
             is_emergency=context.gate.is_emergency,
@@ -222,7 +222,7 @@ class StatusPublisher:
         if before is None or message.text != before.text:
             self._text.publish(String(message.text))
         is_connected = message.link == VehicleStatus.CONNECTED
-        self.publish_connected(is_connected and self._context.connection.is_ready())
+        self.publish_connected(is_connected and self._context.is_ready())
 
     def publish_connected(self, is_connected: bool) -> None:
         """Publish whether the vehicle is connected, if that is new."""

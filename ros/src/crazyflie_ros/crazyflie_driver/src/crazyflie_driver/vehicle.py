@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 
-from crazyflie_driver.context import Connection, ConnectionEvent, ConnectionState, VehicleContext
+from crazyflie_driver.context import ConnectionEvent, ConnectionState, VehicleContext
 from crazyflie_driver.flight_commands import FlightCommands, Reason
 from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.jobs import Delivery, Job, Jobs
@@ -83,7 +83,7 @@ class DriverVehicle(VehicleContext):
             SetpointGate(),
             Jobs(name, self.error),
             Delivery(own, name),
-            Connection(f"connecting to {parameters.uri}"),
+            link_text=f"connecting to {parameters.uri}",
         )
         self.log = LogTopics(self, self._on_log)
         self.setpoints = SetpointTopics(self, self.log)
@@ -126,7 +126,7 @@ class DriverVehicle(VehicleContext):
         that of a landing: the vehicle lands without its link, too. The result says what could not
         be done, and is empty after a success.
         """
-        self.connection.handle(ConnectionEvent.REMOVAL)
+        self.transition(ConnectionEvent.REMOVAL)
         self.status.publish_connected(False)
         self.gate.handle(GateEvent.REMOVAL)
         self.jobs.supersede("the removal")
@@ -140,18 +140,18 @@ class DriverVehicle(VehicleContext):
     def _connect(self, _: Job) -> None:
         limit = self.server.connect_limit
         try:
-            connect_within(limit, self.crazyflie.connect, self.connection.is_closing)
-            self.connection.handle(ConnectionEvent.LINK_OPENED)
+            connect_within(limit, self.crazyflie.connect, self.is_closing)
+            self.transition(ConnectionEvent.LINK_OPENED)
             self._choose_positioning()
             self._services.wait_for_controllers()
             with self._announcing:
-                if self.connection.is_closing():
+                if self.is_closing():
                     raise ServiceError("removed while connecting")
                 self._connection_count = self.crazyflie.connection_count
                 self._announce()
-                self.connection.handle(ConnectionEvent.ANNOUNCED)
+                self.transition(ConnectionEvent.ANNOUNCED)
         except BaseException:
-            self.connection.handle(ConnectionEvent.REMOVAL)
+            self.transition(ConnectionEvent.REMOVAL)
             self._end()
             raise
         self.delivery.submit(self.status.publish)
@@ -188,7 +188,7 @@ class DriverVehicle(VehicleContext):
                 self._mirror.publish()
             self.setpoints.open_thrust_lock(self.flight.read())
         finally:
-            self.connection.handle(ConnectionEvent.RESUMED)
+            self.transition(ConnectionEvent.RESUMED)
 
     def _remove(self, limit, done):
         try:
@@ -206,7 +206,7 @@ class DriverVehicle(VehicleContext):
             self.handle.close()
         self.delivery.close()
         self.jobs.close()
-        self.connection.handle(ConnectionEvent.REMOVED)
+        self.transition(ConnectionEvent.REMOVED)
 
     def _land_or_stop(self, limit):
         # Land a vehicle that flies and can land by itself, stop the motors of any other. The
@@ -265,23 +265,22 @@ class DriverVehicle(VehicleContext):
     # end the node waits for the end of the link.
 
     def _on_link_state(self, state: LinkState, text: str) -> None:
-        connection = self.connection
-        connection.text = text
+        self.link_text = text
         if state is LinkState.LOST:
             self.log.forget_state()
             self.gate.handle(GateEvent.LINK_LOST)
-            connection.handle(ConnectionEvent.LINK_LOST)
+            self.transition(ConnectionEvent.LINK_LOST)
         elif state is LinkState.CONNECTED:
             self.gate.handle(GateEvent.LINK_BACK)
             is_known = self.crazyflie.connection_count == self._connection_count
-            connection.handle(
+            self.transition(
                 ConnectionEvent.LINK_HEARD if is_known else ConnectionEvent.LINK_RENEWED
             )
-        if not connection.is_closing():
+        if not self.is_closing():
             self.delivery.submit(self._report, state, text)
 
     def _on_packet(self, port, channel, data):
-        if not self.connection.is_closing():
+        if not self.is_closing():
             self.log.publish_packet(port, channel, data)
 
     # In turn with the callbacks of the node.
@@ -290,9 +289,9 @@ class DriverVehicle(VehicleContext):
         self.status.publish()
         if state is LinkState.LOST:
             self.error(f"{text}; trying to connect again")
-        elif state is LinkState.CONNECTED and self.connection.is_ready():
+        elif state is LinkState.CONNECTED and self.is_ready():
             self.warn(text)
-            if self.connection.state is ConnectionState.RESUMING:
+            if self.state is ConnectionState.RESUMING:
                 self.jobs.submit("taking up the link again", self._resume)
 
     def _on_log(self):

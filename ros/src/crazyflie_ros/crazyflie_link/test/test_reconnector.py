@@ -1,4 +1,4 @@
-"""When a link is kept, and when it is tried again, with a clock that is moved by hand."""
+"""When a link is kept, and until when it is tried, with a clock that is moved by hand."""
 
 from types import SimpleNamespace
 from unittest.mock import patch
@@ -7,7 +7,13 @@ import pytest
 
 from crazyflie_link import crazyflie as module
 from crazyflie_link.crazyflie import Crazyflie, LinkState
-from crazyflie_link.errors import LinkLostError
+from crazyflie_link.errors import (
+    AddressError,
+    LinkLostError,
+    NoAnswerError,
+    NoDongleError,
+    SetupError,
+)
 from crazyflie_link.link import Link
 from crazyflie_link.link_monitor import LinkHealth
 from crazyflie_link.supervisor import EmergencyStop
@@ -27,6 +33,57 @@ class Bench:
     def wait(self, period):
         self.now += period
         return False
+
+
+class Late(Bench):
+    """A vehicle that answers from a time on, and counts the attempts to connect to it."""
+
+    def __init__(self, monkeypatch, comes_after, error=NoAnswerError):
+        super().__init__(monkeypatch)
+        self.attempts, self._error = 0, error
+        self._begin, self._end = self.now, self.now + comes_after
+        self.vehicle._open = self.open
+        monkeypatch.setattr(self.vehicle, "_watch", lambda: None)
+
+    def open(self):
+        self.attempts += 1
+        if self.now < self._end:
+            raise self._error("no answer")
+
+    @property
+    def waited(self):
+        return self.now - self._begin
+
+
+def test_a_vehicle_that_comes_5_s_later_is_waited_for(monkeypatch):
+    bench = Late(monkeypatch, comes_after=5.0)
+    bench.vehicle.connect(15.0)
+    assert 5.0 <= bench.waited < 5.5
+    assert bench.states[-3:] == [LinkState.DISCONNECTED, LinkState.CONNECTING, LinkState.CONNECTED]
+
+
+def test_a_vehicle_that_does_not_come_is_given_up_after_the_limit(monkeypatch):
+    bench = Late(monkeypatch, comes_after=100.0)
+    with pytest.raises(NoAnswerError):
+        bench.vehicle.connect(15.0)
+    assert 15.0 <= bench.waited < 15.5
+    assert bench.states[-1] is LinkState.DISCONNECTED
+
+
+@pytest.mark.parametrize("error", [NoDongleError, AddressError, SetupError])
+def test_what_waiting_does_not_mend_is_not_tried_again(monkeypatch, error):
+    bench = Late(monkeypatch, 5.0, error)
+    with pytest.raises(error):
+        bench.vehicle.connect(15.0)
+    assert bench.attempts == 1
+
+
+def test_closing_ends_the_attempts(monkeypatch):
+    bench = Late(monkeypatch, comes_after=5.0)
+    bench.vehicle._closed.wait = lambda period: bench.wait(period) or bench.waited > 1.0
+    with pytest.raises(NoAnswerError):
+        bench.vehicle.connect(15.0)
+    assert bench.waited < 1.5
 
 
 def test_pauses_between_attempts_grow_up_to_five_seconds(monkeypatch):

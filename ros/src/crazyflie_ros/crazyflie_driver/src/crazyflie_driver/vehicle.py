@@ -3,7 +3,6 @@
 import dataclasses
 import threading
 import time
-from collections.abc import Callable
 from concurrent.futures import Future
 
 from crazyflie_driver.context import ConnectionEvent, ConnectionState, VehicleContext
@@ -23,39 +22,15 @@ from crazyflie_driver.setpoint_gate import GateEvent, SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import StatusPublisher
 from crazyflie_link.crazyflie import Crazyflie, LinkState
-from crazyflie_link.errors import CrazyflieError, NoAnswerError
+from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.transmission import REPLY_LIMIT
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.parameters.types import Text
 
-_RETRY_PERIOD = 0.2  #: Between two attempts to connect, s.
-
 _EMERGENCY_LIMIT = 1.0  #: Time limit of the vehicle's confirmation of an emergency stop, s.
 _LOOK_PERIOD = 0.1
 _REACTION_TIME = 0.3  #: Time after which the vehicle has begun to land, s.
-
-
-def connect_within(
-    limit: float,
-    connect: Callable[[], None],
-    is_closing: Callable[[], bool],
-    clock: Callable[[], float] = time.monotonic,
-    sleep: Callable[[float], None] = time.sleep,
-) -> None:
-    """Call ``connect()`` repeatedly while the vehicle does not answer; blocks.
-
-    Raises the last `NoAnswerError` after a limit (s) or once ``is_closing()``; other errors at
-    once.
-    """
-    end = clock() + limit
-    while True:
-        try:
-            return connect()
-        except NoAnswerError:
-            if is_closing() or clock() >= end:
-                raise
-        sleep(_RETRY_PERIOD)
 
 
 class DriverVehicle(VehicleContext):
@@ -138,9 +113,8 @@ class DriverVehicle(VehicleContext):
     # Connecting and the end, in threads that may block.
 
     def _connect(self, _: Job) -> None:
-        limit = self.server.connect_limit
         try:
-            connect_within(limit, self.crazyflie.connect, self.is_closing)
+            self.crazyflie.connect(self.server.connect_limit)
             self.transition(ConnectionEvent.LINK_OPENED)
             self._choose_positioning()
             self._services.wait_for_controllers()

@@ -15,6 +15,7 @@ from crazyflie_link.discovery import check_is_radio, reboot
 from crazyflie_link.errors import (
     CrazyflieError,
     LinkLostError,
+    NoAnswerError,
     RefusedError,
     UnknownNameError,
     ValueRangeError,
@@ -36,6 +37,8 @@ CHECK_PERIOD = 0.05  #: Period at which the link is checked, s.
 #: Silence of up to 1.4 s ends that way before 2 s, when the firmware locks; the set-up of a new
 #: link can take a second on a busy machine.
 SILENCE_LIMIT = 1.0
+
+_RETRY_PERIOD = 0.2  #: Between two attempts to connect for the first time, s.
 
 #: Pause after the first failed attempt to connect again, and the longest one, s; each is twice the
 #: one before.
@@ -153,17 +156,26 @@ class Crazyflie:
         """Close."""
         self.close()
 
-    def connect(self) -> None:
-        """Connect for the first time; blocks. A `CrazyflieError` has the reason and what to do."""
+    def connect(self, limit: float = 0.0) -> None:
+        """Connect for the first time; blocks. A `CrazyflieError` has the reason and what to do.
+
+        Where nothing answers, it is tried again until a limit (s) or `close`; what waiting does not
+        mend is raised at once.
+        """
         uri = self.address.uri
         if self._watcher is not None or self._closed.is_set():
             raise CrazyflieError(f"{uri}: connect can be called once only")
-        self._set_state(LinkState.CONNECTING, f"connecting to {uri}")
-        try:
-            self._open()
-        except CrazyflieError as error:
-            self._set_state(LinkState.DISCONNECTED, str(error))
-            raise
+        end = time.monotonic() + limit
+        while True:
+            self._set_state(LinkState.CONNECTING, f"connecting to {uri}")
+            try:
+                self._open()
+                break
+            except CrazyflieError as error:
+                self._set_state(LinkState.DISCONNECTED, str(error))
+                may_come = isinstance(error, NoAnswerError) and time.monotonic() < end
+                if not may_come or self._closed.wait(_RETRY_PERIOD):
+                    raise
         self._set_state(LinkState.CONNECTED, f"connected to {uri}")
         self._watcher = threading.Thread(target=self._watch, name="crazyflie-watch", daemon=True)
         self._watcher.start()

@@ -258,7 +258,7 @@ def test_messages_cut_what_is_long(load):
 
 def test_aliases_within_themselves_are_refused(load):
     (found,) = complaints_of(load, "robots: &a\n  cf1: {initial_position: [0, 0, 0], more: *a}\n")
-    assert found == ":2: has the alias *a in what it stands for"
+    assert found == ":2: has the alias *a within the node to which it refers"
 
 
 def test_what_is_inherited_is_wrong_once(load):

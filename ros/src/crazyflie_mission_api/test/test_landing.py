@@ -244,7 +244,7 @@ def test_when_a_script_is_killed_the_fleet_lands_its_vehicles(monkeypatch, tmp_p
     assert swarm.track("cf1")[-1, 2] == swarm.track("cf2")[-1, 2] == 0.0
     assert swarm.nearest() > 0.3
     (text,) = swarm.process.logged("error")
-    assert text.startswith("/fleet: no message of the mission that flew cf1, cf2 for 5 s")
+    assert text.startswith("/fleet: no message from the mission that flew cf1, cf2 for 5 s")
 
 
 def one_above_the_other(fleet):

@@ -97,7 +97,7 @@ FLEETS = [
         "crazyflies: [{initialPosition: [0, 0, 0]}]",
         "crazyflies.0. has no id; it has initialPosition",
     ),
-    (PAIR.replace("id: 2", "id: 1"), "id is that of cf1 in line 3; expected another"),
+    (PAIR.replace("id: 2", "id: 1"), "id is also that of cf1 in line 3; expected another"),
     ("vehicles: {a: 1}", "has neither robots .* nor crazyflies"),
     ("crazyflies: [", "is not valid YAML"),
     ("crazyflies: []", "has no enabled vehicle"),

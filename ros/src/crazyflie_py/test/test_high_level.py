@@ -169,7 +169,7 @@ def test_a_vehicle_that_flies_does_not_take_off_again(caplog):
     swarm.allcfs.crazyflies[0].takeoff(2.0, 1.0)
     swarm.timeHelper.sleep(1.0)
     assert positions(swarm)[:, 2] == pytest.approx(1.0, abs=ATOL)
-    assert "cf1.takeoff: it flies" in caplog.text
+    assert "cf1.takeoff: the vehicle flies" in caplog.text
 
 
 def test_motors_that_stop_in_the_air_are_reported(caplog):

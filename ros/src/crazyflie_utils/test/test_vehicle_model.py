@@ -68,7 +68,7 @@ def test_a_type_without_published_figures_says_so():
         ParameterError, match="model bolt does not exist: a Bolt has .*expected one of cf21,"
     ):
         vehicle_model.load("bolt")
-    with pytest.raises(ParameterError, match="no model cf5; expected one of cf21,"):
+    with pytest.raises(ParameterError, match="the model cf5 does not exist; expected one of cf21,"):
         vehicle_model.load("cf5")
     with pytest.raises(ValueError, match="nothing.yaml"):
         vehicle_model.VEHICLE_MODEL("nothing.yaml")

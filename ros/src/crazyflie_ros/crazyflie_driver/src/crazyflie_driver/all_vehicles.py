@@ -1,7 +1,6 @@
 """The vehicles of the server by radio channel, and services that command all of them at once."""
 
 import contextlib
-import threading
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, wait
@@ -9,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from crazyflie_driver.commands import SERVICE_TYPES, Command, Need, requested
+from crazyflie_driver.jobs import Job
 from crazyflie_driver.parameters import BroadcastParameters
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_link.address import Address
@@ -128,18 +128,12 @@ class AllVehicles:
             raise ServiceError(f"{name} of all vehicles: none is connected; expected one or more")
         # Begun here, in the order of the calls.
         checks = {vehicle: vehicle.commands.check(command) for vehicle in ready}
-        answer: Future[Any] = Future()
 
-        def work():
-            try:
-                self._send(command, channels, checks)
-            except Exception as error:
-                answer.set_exception(error)
-            else:
-                answer.set_result(response)
+        def work(_: Job) -> Any:
+            self._send(command, channels, checks)
+            return response
 
-        threading.Thread(target=work, name=f"all-{name}", daemon=True).start()
-        return answer
+        return Job(work).start(f"all-{name}")
 
     def _send(
         self,

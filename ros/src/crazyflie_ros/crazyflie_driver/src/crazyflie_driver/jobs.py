@@ -42,6 +42,11 @@ class Job:
             reason = self.superseded_by or "its caller, who waits no longer"
             raise ServiceError(f"given up for {reason}")
 
+    def start(self, name: str) -> Future[Any]:
+        """Do the job in a thread of its own with a name; return the future of its result."""
+        threading.Thread(target=self.run, name=name, daemon=True).start()
+        return self.done
+
     def run(self) -> None:
         """Call `work`; result or error go to `done`."""
         try:

@@ -105,10 +105,7 @@ class DriverVehicle(VehicleContext):
         self.status.publish_connected(False)
         self.gate.handle(GateEvent.REMOVAL)
         self.jobs.supersede("the removal")
-        done: Future[str] = Future()
-        name = f"{self.name}-close"
-        threading.Thread(target=self._remove, args=(limit, done), name=name, daemon=True).start()
-        return done
+        return Job(lambda _: self._remove(limit)).start(f"{self.name}-close")
 
     # Connecting and the end, in threads that may block.
 
@@ -164,14 +161,10 @@ class DriverVehicle(VehicleContext):
         finally:
             self.transition(ConnectionEvent.RESUMED)
 
-    def _remove(self, limit, done):
-        try:
-            problem = self._land_or_stop(limit)
-            self._end()
-        except BaseException as error:
-            done.set_exception(error)
-        else:
-            done.set_result(problem)
+    def _remove(self, limit):
+        problem = self._land_or_stop(limit)
+        self._end()
+        return problem
 
     def _end(self):
         # First the link: its end ends the wait for answers in `_connect`.
@@ -226,11 +219,9 @@ class DriverVehicle(VehicleContext):
         time.sleep(min(_REACTION_TIME, max(0.0, end - time.monotonic())))
         while True:
             state = self.flight.read()
-            if state is not None:
-                # FLYING holds until 2 s after the motors have stopped.
-                reported = SupervisorState.HIGH_LEVEL_ACTIVE
-                if (reported if state.reports_planner else SupervisorState.FLYING) not in state:
-                    return True
+            # FLYING alone holds until 2 s after the motors have stopped.
+            if state is not None and not self.flight.has_taken_off(state):
+                return True
             if time.monotonic() > end:
                 return False
             time.sleep(_LOOK_PERIOD)

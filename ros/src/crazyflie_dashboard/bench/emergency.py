@@ -65,19 +65,17 @@ class Bench:
     def fly(self) -> None:
         """Bring all vehicles into the air, whatever the state before."""
         self.dashboard.pages.take_over(self.page)
-        for action in (Action.RESET, Action.TAKEOFF):
-            wait_for(lambda action=action: self._is_done(action), action.value)
+        wait_for(self._is_up, "a takeoff")
 
-    def _is_done(self, action):
+    def _is_up(self):
         now = self.dashboard.scene().vehicles
         if len(now) < len(NAMES) or any(each.is_stale for each in now.values()):
             return False
-        if action == Action.RESET and not any(each.is_emergency for each in now.values()):
-            return True
-        command = Command(action, NAMES, time.monotonic())
+        is_stopped = any(each.is_emergency for each in now.values())
+        command = Command(Action.RESET if is_stopped else Action.TAKEOFF, NAMES, time.monotonic())
         outcomes = self.dashboard.command(self.page, command).result(30.0)
         time.sleep(1.0)
-        return not any(each.text for each in outcomes)
+        return not is_stopped and not any(each.text for each in outcomes)
 
     def measure(self, prepare: Callable[[], None]) -> float:
         """Return the time until the last vehicle's motors are off, s."""

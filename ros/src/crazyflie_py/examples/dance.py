@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""All vehicles dance: the same steps, relative to where each is, and half a turn."""
+"""All vehicles dance: the same steps, relative to each one's position, and half a turn."""
 
 import math
 

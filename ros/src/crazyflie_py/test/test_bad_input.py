@@ -84,8 +84,7 @@ def test_a_wrong_argument(swarm, call, message):
 def test_an_unknown_parameter_is_kept_with_a_warning(swarm, caplog):
     swarm.allcfs.setParam("usd.logging", 1)
     assert [record.getMessage() for record in caplog.records] == [
-        "cf1.setParam: usd.logging is no parameter that the simulation knows; it is kept, without "
-        "effect"
+        "cf1.setParam: the simulation has no parameter usd.logging; it is stored without effect"
     ]
     assert swarm.allcfs.crazyflies[1].getParam("usd/logging") == 1
 
@@ -108,7 +107,7 @@ FLEETS = [
     ("robots: {a: {initial_position: [0, 0, 0]}}", "a has no id: its address is None; expected"),
     (
         "robots: {cf1: {initial_position: [0, 0, 0]}, b1: {initial_position: [1, 0, 0]}}",
-        "cf1, b1 have one id, 1; expected different ids",
+        "cf1, b1 have the same id, 1; expected different ids",
     ),
     ("robots: {cf1: 3}", "cf1 is 3; expected a mapping"),
 ]
@@ -138,13 +137,13 @@ def test_without_a_fleet_file_the_vehicles_of_the_examples_fly(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["script.py"])
     assert [cf.id for cf in simulated(fleet=None).allcfs.crazyflies] == [1, 2]
-    assert "no fleet file: none of ../launch/crazyflies.yaml" in caplog.text
+    assert "no fleet file was found (../launch/crazyflies.yaml" in caplog.text
 
 
 @pytest.mark.parametrize("key", [99, "cf99"])
 def test_a_vehicle_that_is_not_there(swarm, key):
     found = swarm.allcfs.crazyfliesById if key == 99 else swarm.allcfs.crazyfliesByName
-    with pytest.raises(KeyError, match=f"there is no vehicle {key!r}; expected one of "):
+    with pytest.raises(KeyError, match=f"no vehicle has the key {key!r}; expected one of "):
         found[key]
 
 
@@ -157,6 +156,6 @@ def test_what_a_real_vehicle_refuses_is_a_warning(swarm, caplog):
     assert [record.getMessage() for record in caplog.records] == [
         "cf1.setParam: stabilizer.controller is 9; expected 0 to 2: a real vehicle refuses it",
         "cf1.setParam: ring.effect is 300; expected a uint8_t: a real vehicle refuses it",
-        "allcfs.takeoff: groupMask is 64, and no vehicle is in one of these groups by "
-        "setGroupMask; they ignore the command",
+        "allcfs.takeoff: groupMask is 64, and setGroupMask has put no vehicle into these "
+        "groups; all vehicles ignore the command",
     ]

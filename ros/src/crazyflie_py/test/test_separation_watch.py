@@ -70,8 +70,8 @@ def fly(vehicles, duration, connection=None):
 def test_the_one_that_approaches_is_held_in_time():
     one, two = Vehicle("cf1", (0.01, 0, 1), (0.5, 0, 0)), Vehicle("cf2", (1, 0, 1))
     assert fly([one, two], 1.0) == [
-        "cf1 comes too near to cf2: 0.54 m, or so it will be in 0.5 s; expected at least 0.30 m "
-        "(a metre of height counts half); it is held there"
+        "cf1 comes too near to cf2, now or in 0.5 s: 0.54 m; expected at least 0.30 m "
+        "(vertical distances are halved); the vehicle is held"
     ]
     assert one.places == [pytest.approx((0.46, 0.0, 1.0))]
     assert two.places == []
@@ -92,7 +92,7 @@ def test_who_is_not_held(why):
     warnings = fly([one, two], 1.0, Connection(why == "unchecked"))
     assert one.places == []
     assert [text.rpartition("; ")[2] for text in warnings] == (
-        ["it flies on"] if why == "unchecked" else []
+        ["the vehicle flies on"] if why == "unchecked" else []
     )
 
 

@@ -77,7 +77,7 @@ def test_a_script_writes_a_video_between_two_moments(tmp_path):
 
 
 def test_a_video_that_cannot_be_written_is_an_error(tmp_path):
-    with pytest.raises(ValueError, match="there is no folder .*/nowhere"):
+    with pytest.raises(ValueError, match="the folder .*/nowhere does not exist"):
         swarm_with(f"--video {tmp_path}/nowhere/flight.mp4")
 
 

@@ -159,7 +159,7 @@ def test_a_type_without_a_local_definition_is_left_out(tmp_path):
     with rosbag.Bag(str(path), "a") as bag:
         bag.write("/lqr_controller/parameter_updates", Unknown(), bags.stamp(5.0))
     (log,) = read(path, tmp_path)
-    assert any("/lqr_controller/parameter_updates is left out" in each for each in log.remarks)
+    assert any("/lqr_controller/parameter_updates is omitted" in each for each in log.remarks)
 
 
 @pytest.mark.parametrize(

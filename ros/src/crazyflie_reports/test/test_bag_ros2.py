@@ -74,7 +74,7 @@ def test_a_definition_in_a_bag_runs_nothing(tmp_path, monkeypatch, storage):
         type(bag_ros2.types()), "register", lambda self, each: registered.append(each)
     )
     (log,) = read(tmp_path / "a", tmp_path)
-    assert any("/cf1/battery is left out: std_msgs/msg/Float32" in each for each in log.remarks)
+    assert any("/cf1/battery is omitted: std_msgs/msg/Float32" in each for each in log.remarks)
     assert registered == []
     assert not trace.exists()
 
@@ -85,7 +85,7 @@ def test_a_type_with_other_fields_is_left_out(tmp_path):
         bags.write_crazyswarm2(write)
     (log,) = read(tmp_path / "a", tmp_path)
     (remark,) = log.remarks
-    assert "/cf1/status is left out: crazyflie_interfaces/msg/Status has the fields" in remark
+    assert "/cf1/status is omitted: crazyflie_interfaces/msg/Status has the fields" in remark
     assert len(list(flights_of(log))) == 1
 
 
@@ -112,7 +112,7 @@ def test_a_chunk_that_only_the_index_has_is_not_decompressed(tmp_path):
     place = data.rindex(struct.pack("<QQ", begin, 9 + size))
     struct.pack_into("<Q", data, place, begin + 100)
     file.write_bytes(data)
-    with pytest.raises(BagError, match="its index has a chunk that the file has not"):
+    with pytest.raises(BagError, match="its index has a chunk that is not in the file"):
         read(file, tmp_path)
 
 

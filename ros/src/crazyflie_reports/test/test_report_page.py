@@ -185,7 +185,7 @@ def test_the_legend_shows_the_values_of_the_time_of_the_replay(wide, tmp_path):
     assert tell(wide, values)[0:4:3] == ["1.00 s", "0.50"]
     wide.execute_script("seek(5)")
     assert tell(wide, values)[3] == "1.00"
-    # A reference is one until the next.
+    # A reference is valid until the next one.
     assert tell(wide, values)[6] == "1.00"
 
 

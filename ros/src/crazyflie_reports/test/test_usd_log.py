@@ -174,8 +174,8 @@ def test_a_log_that_breaks_off_or_is_damaged_is_read_as_far_as_it_goes(tmp_path)
     ("data", "text"),
     [
         (b"\xbc\x03\0\0\0", "has version 3 of the format; expected 1 or 2"),
-        (b"\xbc\x02", "the head of this log is damaged"),
-        (b"\xbc\x02\0\xff\xff\1\0name", "the head of this log is damaged"),
+        (b"\xbc\x02", "the header of this log is damaged"),
+        (b"\xbc\x02\0\xff\xff\1\0name", "the header of this log is damaged"),
         (b"\xbc\x02\0\1\0\1\0e\0\1\0acc.x\0", r"variables acc.x; expected each as in acc.x\(f\)"),
         (b"\xbc\x02\0\1\0\1\0e\0\1\0acc.x(s)\0", "variables acc.x"),
         (b"\xbc\x02\0\1\0\1\0e\0\1\0acc.x(f)\0", "no variables of a flight; .* There are: acc.x"),

@@ -5,8 +5,8 @@ from setuptools import setup
 
 setup(
     **generate_distutils_setup(
-        # crazyflie and uav_trajectory are what users' scripts import. Packages and not modules, of
-        # which catkin makes empty ones in a devel space.
+        # Users' scripts import crazyflie and uav_trajectory. They are packages, since catkin
+        # creates empty modules in a devel space.
         packages=["crazyflie", "crazyflie_demo", "uav_trajectory"],
         package_dir={"": "src"},
     )

@@ -1,4 +1,4 @@
-"""The button that scripts wait for: of a joystick, or any key."""
+"""The button for which scripts wait: that of a joystick, or any key."""
 
 import glob
 import logging
@@ -16,11 +16,11 @@ from crazyflie_py.crazyflie import TimeHelper
 _log = logging.getLogger(__name__)
 
 BUTTON = 5  #: Number of Crazyswarm's button: right shoulder of a gamepad.
-BUTTONS = (3, 4, 5)  #: Any of these counts for `Input.checkIfAnyButtonIsPressed`.
-#: After this time (s) --sim presses the button itself, without a joystick and a terminal.
+BUTTONS = (3, 4, 5)  #: Buttons of `Input.checkIfAnyButtonIsPressed`.
+#: Time after which --sim presses the button itself, without a joystick and a terminal (s).
 UNATTENDED_DELAY = 3.0
 _POLL_PERIOD = 0.01  #: s.
-_KEY = [0] * BUTTON + [1]  #: A key is the button.
+_KEY = [0] * BUTTON + [1]  #: Buttons that are reported for a key.
 
 
 class Device(Protocol):
@@ -51,7 +51,7 @@ class JoystickDevice:
         return self._joystick.state()[1]
 
     def _lost(self, reason):
-        return RuntimeError(f"swarm.input: the joystick {self._path} is gone ({reason})")
+        return RuntimeError(f"swarm.input: the joystick {self._path} was disconnected ({reason})")
 
 
 class KeyboardDevice:
@@ -70,7 +70,7 @@ class KeyboardDevice:
 
 
 class UnattendedDevice:
-    """Nobody is there: the button is pressed for one poll, `UNATTENDED_DELAY` after the first."""
+    """No operator: the button is pressed for one poll, `UNATTENDED_DELAY` after the first poll."""
 
     def __init__(self, time: Callable[[], float]):
         self._time = time
@@ -87,16 +87,16 @@ class UnattendedDevice:
 
 
 class Input:
-    """``swarm.input``: a joystick, else the terminal's keys.
+    """``swarm.input``: a joystick, or else the terminal's keys.
 
     Parameters
     ----------
     time_helper : TimeHelper
     is_simulated : bool
-        Whether the button is pressed in time where there is neither. Otherwise methods raise
-        RuntimeError, as a wait would never end.
+        Whether the button is pressed automatically without both. Otherwise methods raise
+        RuntimeError, since a wait would never end.
     devices : str
-        Pattern of joysticks; the first that can be read is taken.
+        Pattern of joysticks; the first that can be read is used.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class Input:
         self._device: Device | None = None
 
     def _poll(self) -> Sequence[int]:
-        # The device is looked for late: most scripts need none.
+        # The device is opened late: most scripts need none.
         if self._device is None:
             self._device = self._find()
         return self._device.poll()
@@ -123,14 +123,14 @@ class Input:
             return KeyboardDevice()
         if self._is_simulated:
             _log.warning(
-                "swarm.input: there is neither a joystick nor a terminal; the button is pressed "
-                "%g s after it is waited for",
+                "swarm.input: neither a joystick nor a terminal is connected; the button is "
+                "pressed %g s after the wait begins",
                 UNATTENDED_DELAY,
             )
             return UnattendedDevice(self._time_helper.time)
         raise RuntimeError(
-            f"swarm.input: there is neither a joystick ({self._pattern}) nor a terminal to press "
-            "a button with; expected one"
+            f"swarm.input: neither a joystick ({self._pattern}) nor a terminal is connected; "
+            "expected one of them"
         )
 
     def checkIfButtonIsPressed(self) -> bool:

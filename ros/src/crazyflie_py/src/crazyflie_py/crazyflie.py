@@ -46,7 +46,7 @@ class TimeHelper:
     dt : float
         Period of the simulation's steps, s; 0 without --sim.
     visualizer : NullVisualizer
-        What --sim draws with; without --sim it does nothing.
+        Visualizer of --sim; without --sim it does nothing.
     crazyflies : sequence of Crazyflie
     """
 
@@ -78,7 +78,7 @@ class TimeHelper:
         return self._swarm.is_shutdown()
 
     def nextPhase(self) -> None:
-        """Begin the next file of --writecsv."""
+        """Start the next file of --writecsv."""
         self._swarm.next_phase()
 
 
@@ -107,8 +107,8 @@ class ScriptCommands:
         mask = check.byte(where, "groupMask", mask)
         if mask and not mask & self._groups():
             _log.warning(
-                "%s: groupMask is %d, and no vehicle is in one of these groups by setGroupMask; "
-                "they ignore the command",
+                "%s: groupMask is %d, and setGroupMask has put no vehicle into these groups; all "
+                "vehicles ignore the command",
                 where,
                 mask,
             )
@@ -128,7 +128,7 @@ class ScriptCommands:
         duration : float
             s.
         groupMask : int
-            0, or the groups that are meant; see `Crazyflie.setGroupMask`.
+            0, or the groups of the command; see `Crazyflie.setGroupMask`.
         """
         height, seconds, mask = self._climb("takeoff", targetHeight, duration, groupMask)
         self._command(
@@ -219,7 +219,7 @@ class ScriptCommands:
         Parameters
         ----------
         remainValidMillisecs : int
-            How long the last setpoint still counts, ms.
+            Time for which the last setpoint remains valid, ms.
         groupMask : int
             See `Crazyflie.setGroupMask`.
         """
@@ -270,7 +270,7 @@ class Crazyflie(ScriptCommands):
         self.prefix = f"/{vehicle.name}"
         #: Start point in the fleet file (m).
         self.initialPosition: Array = np.array(vehicle.position)
-        #: Colour that `setLEDColor` has set; before, Crazyswarm's colour in pictures.
+        #: Colour that `setLEDColor` has set; initially, Crazyswarm's colour in pictures.
         self.ledRGB = DEFAULT_COLOR
         self._group_mask = 0
 
@@ -293,7 +293,7 @@ class Crazyflie(ScriptCommands):
     ) -> None:
         """Fly smoothly to a position and yaw and stay there; returns at once.
 
-        With ``relative`` both are added to those that are planned for now.
+        With ``relative`` both are added to the presently planned ones.
         """
         self._go_to(goal, yaw, duration, relative, groupMask)
 
@@ -303,7 +303,7 @@ class Crazyflie(ScriptCommands):
         Parameters
         ----------
         trajectoryId : int
-            By which `startTrajectory` names it.
+            Number for `startTrajectory`.
         pieceOffset : int
             Pieces of other trajectories before it in the memory, which has room for 31.
         trajectory : uav_trajectory.Trajectory
@@ -427,7 +427,8 @@ class Crazyflie(ScriptCommands):
         Parameters
         ----------
         others : sequence of Crazyflie
-            Whom --sim avoids; with hardware all others on the same channel are avoided.
+            Vehicles that are avoided with --sim; with hardware all others on the same channel are
+            avoided.
         ellipsoidRadii : array_like, shape (3,)
             Semi-axes of the ellipsoid that is kept free, m.
         bboxMin, bboxMax : sequence of float, 3 each
@@ -461,14 +462,16 @@ class Crazyflie(ScriptCommands):
 
 
 class _Found(dict[Any, Crazyflie]):
-    """Vehicles by a key; the error about one that is not there names those that are."""
+    """Vehicles by a key; the error about an unknown key names the known ones."""
 
     def __missing__(self, key: object) -> Crazyflie:
-        raise KeyError(f"there is no vehicle {key!r}; expected one of {', '.join(map(str, self))}")
+        raise KeyError(
+            f"no vehicle has the key {key!r}; expected one of {', '.join(map(str, self))}"
+        )
 
 
 class CrazyflieServer(ScriptCommands):
-    """All vehicles; its commands are broadcast and concern all at the same moment."""
+    """All vehicles; its commands are broadcast to all at the same moment."""
 
     def __init__(self, swarm: Swarm):
         super().__init__(swarm)

@@ -23,7 +23,7 @@ def build_argparser(
     )
     parser.add_argument("--sim", help="fly ideal vehicles, without ROS", action="store_true")
     parser.add_argument(
-        "--unchecked", help="warn of what is refused as unsafe, and do it", action="store_true"
+        "--unchecked", help="carry out unsafe commands with a warning", action="store_true"
     )
     group = parser.add_argument_group("with --sim only")
     add = group.add_argument
@@ -62,12 +62,12 @@ class Crazyswarm:
     ----------
     crazyflies_yaml : str or Path, optional
         Fleet file, or its text: Crazyswarm's layout or crazyswarm2's. With --sim without it,
-        crazyflies.yaml in the folder launch or config beside that of the script; otherwise the
-        vehicles are those that run.
+        crazyflies.yaml in the folder launch or config next to that of the script; otherwise all
+        running vehicles.
     parent_parser : argparse.ArgumentParser, optional
         The script's own options, made with ``add_help=False``.
     args : str or sequence of str, optional
-        The command line; that of the script by default. What is not known is ignored.
+        The command line; that of the script by default. Unknown options are ignored.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Crazyswarm:
     ):
         parser = build_argparser([] if parent_parser is None else [parent_parser])
         options, _ = parser.parse_known_args(args.split() if isinstance(args, str) else args)
-        # The starting program decides that a script does not fly, whatever options it gives itself.
+        # The starting program decides that a script does not fly, whatever options the script has.
         options.sim = options.sim or bool(os.environ.get(fleet.DRY_RUN))
         swarm = _swarm(crazyflies_yaml, options)
         atexit.register(swarm.close)
@@ -88,7 +88,7 @@ class Crazyswarm:
 
 
 def _print_warnings() -> None:
-    # On a handler of its own: rospy replaces those of the root.
+    # With its own handler: rospy replaces those of the root logger.
     log = logging.getLogger("crazyflie_py")
     if not log.handlers:
         handler = logging.StreamHandler()
@@ -104,7 +104,7 @@ def _swarm(crazyflies_yaml: str | Path | None, options: argparse.Namespace) -> S
         vehicles = fleet.load(crazyflies_yaml)
         names = fleet.chosen([vehicle.name for vehicle in vehicles])
         return Simulation([each for each in vehicles if each.name in names], options)
-    # Only here, so that scripts with --sim need neither ROS nor the time to import it.
+    # Imported here, so that scripts with --sim need neither ROS nor the time to import it.
     from crazyflie_py.ros_swarm import RosSwarm
 
     return RosSwarm(crazyflies_yaml, options)

@@ -25,7 +25,7 @@ _LOG = logging.getLogger(__name__)
 
 #: Where Crazyswarm and crazyswarm2 have the file, from the script's folder.
 _PLACES = ("../launch/crazyflies.yaml", "../config/crazyflies.yaml")
-_SUFFIXES = (".yaml", ".yml")  #: A text that ends so is the name of a file.
+_SUFFIXES = (".yaml", ".yml")  #: Endings of a text that is the name of a file.
 
 
 class FleetVehicle(NamedTuple):
@@ -33,8 +33,8 @@ class FleetVehicle(NamedTuple):
 
     name: str
     id: int  #: Last byte of the radio address, or else the number at the end of the name.
-    position: Triple  #: Before takeoff, m.
-    buffer: float = 0.15  #: Radius of the space that is the vehicle's own, m.
+    position: Triple  #: Position before takeoff (m).
+    buffer: float = 0.15  #: Radius of the space that is reserved for the vehicle (m).
 
 
 def load(crazyflies_yaml: str | Path | None) -> list[FleetVehicle]:
@@ -65,14 +65,14 @@ def load(crazyflies_yaml: str | Path | None) -> list[FleetVehicle]:
     for vehicle_id in ids:
         if ids.count(vehicle_id) > 1:
             names = ", ".join(v.name for v in vehicles if v.id == vehicle_id)
-            raise ValueError(f"{names} have one id, {vehicle_id}; expected different ids")
+            raise ValueError(f"{names} have the same id, {vehicle_id}; expected different ids")
     return vehicles
 
 
 def chosen(names: Sequence[str]) -> list[str]:
-    """Return those of a fleet's vehicles that the variable `VEHICLES` of the environment names.
+    """Return the vehicles of a fleet that the environment variable `VEHICLES` names.
 
-    Without it they are all. ValueError if it names none of them.
+    Without it, return all. ValueError if it names none of them.
     """
     text = os.environ.get(VEHICLES)
     if not text:
@@ -105,7 +105,7 @@ def _usual_file():
             return path
     path = Path(rospkg.RosPack().get_path("crazyflie_py")) / "launch" / "crazyflies.yaml"
     _LOG.warning(
-        "there is no fleet file: none of %s; flying the vehicles of %s",
+        "no fleet file was found (%s); flying the vehicles of %s",
         ", ".join(map(str, dict.fromkeys(places))),
         path,
     )

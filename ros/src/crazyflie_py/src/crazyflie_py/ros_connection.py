@@ -1,4 +1,4 @@
-"""The vehicles that run, for scripts of Crazyswarm's API."""
+"""The running vehicles, for scripts of Crazyswarm's API."""
 
 import math
 import re
@@ -29,7 +29,7 @@ class ScriptConnection:
     def __init__(self, handle: NodeHandle, fleet: Fleet, is_unchecked: bool):
         self.handle = handle
         self.fleet = fleet
-        self.is_unchecked = is_unchecked  #: Whether what is refused is a warning.
+        self.is_unchecked = is_unchecked  #: Whether refusals are only warnings.
         self.said: set[str] = set()  #: See `SimulatedParameters`.
 
     def call(self, service: str, service_type: Any, *arguments: Any) -> "Future[Any]":
@@ -70,7 +70,7 @@ class ScriptConnection:
 
 
 def running_vehicles(handle: NodeHandle) -> list[str]:
-    """Return the names of the vehicles that run: in the order of their fleet file, then by number.
+    """Return the names of the running vehicles: in the order of their fleet file, then by number.
 
     Raises
     ------
@@ -88,7 +88,8 @@ def running_vehicles(handle: NodeHandle) -> list[str]:
             return sorted(names, key=lambda name: (places[name], _number_key(name)))
         time.sleep(0.1)
     raise MissionError(
-        f"no vehicle runs: for {_SEARCH_LIMIT:g} s there was no service /NAME/{HIGH_LEVEL}/go_to "
+        f"no vehicle is running: for {_SEARCH_LIMIT:g} s there was no service "
+        f"/NAME/{HIGH_LEVEL}/go_to "
         "or /NAME/upload_trajectory; expected, for example, roslaunch crazyflie_examples "
         "sw_swarm.launch, or a vehicle of crazyflie_driver; or the option --sim"
     )

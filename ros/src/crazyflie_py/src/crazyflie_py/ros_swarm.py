@@ -1,4 +1,4 @@
-"""The swarm of vehicles that run: simulated, virtual or real ones, by ROS."""
+"""The swarm of running vehicles: simulated, virtual or real ones, by ROS."""
 
 import argparse
 import math
@@ -40,9 +40,8 @@ _COMMON = ("land", "stop", "go_to", "start_trajectory", "emergency")
 class RosSwarm(Swarm):
     """A `crazyflie_py.swarm.Swarm` of running vehicles.
 
-    ``crazyflies_yaml`` says which of the vehicles that run take part, by default all do. The
-    process is made, unless it is given. Without a master or vehicles, the script ends with the
-    reason and status 1.
+    ``crazyflies_yaml`` selects running vehicles, by default all. The process is created unless it
+    is given. Without a master or vehicles, the script ends with the reason and status 1.
     """
 
     dt = 0.0
@@ -95,7 +94,7 @@ class RosSwarm(Swarm):
             paths["emergency"] = f"{top.removesuffix(f'/{HIGH_LEVEL}')}/emergency"
             self._common = ServiceCommands(handle, paths)
             if top == ALL_OF_FLEET:
-                # One call: a hundred of them would keep the fleet from flying.
+                # One call: a hundred calls would delay the fleet's callbacks.
                 self._shared = ("takeoff", *_COMMON)
         self._watch_separation()
         handle.subscribe("/fleet/waiting", String, self._on_held)
@@ -116,7 +115,7 @@ class RosSwarm(Swarm):
         return {name: vehicle.parameters for name, vehicle in self._vehicles.items()}
 
     def _watch_separation(self):
-        # A fleet's process keeps apart what it flies.
+        # A fleet's process keeps its own vehicles apart.
         watched = [each for each in self._fleet if self._vehicles[each.name].vehicle.uses_driver]
         buffers = self._connection.fleet.rules.buffers
         radii = [buffers.get(each.name, each.buffer) for each in watched]
@@ -126,7 +125,7 @@ class RosSwarm(Swarm):
             self._connection.handle.timer(_WATCH_PERIOD, lambda: self._look(watch))
 
     def _look(self, watch):
-        # The landing at the end keeps vehicles apart itself.
+        # The landing at the end keeps the vehicles apart.
         if not self._is_closed:
             watch.update()
 
@@ -249,9 +248,9 @@ class RosSwarm(Swarm):
             if vehicle.vehicle.has_landed():
                 fleet.release(name)
             else:
-                # Its landing begins where it is now.
+                # The landing begins at the present position.
                 fleet.adopt(name)
-        # They land as after an error, whatever their distances.
+        # The vehicles land as after an error, whatever their distances.
         fleet.__exit__(RuntimeError, None, None)
 
 
@@ -267,8 +266,8 @@ def ids_of(names: list[str]) -> list[int]:
 def _begin():
     if not rosgraph.is_master_online():
         sys.exit(
-            f"no ROS master at {rosgraph.get_master_uri()}, so no vehicle runs; expected, for "
-            "example, roslaunch crazyflie_examples sw_swarm.launch, or the option --sim"
+            f"no ROS master at {rosgraph.get_master_uri()}, so no vehicle is running; expected, "
+            "for example, roslaunch crazyflie_examples sw_swarm.launch, or the option --sim"
         )
     process, end = begin_script("crazyswarm")
     catch_signals()

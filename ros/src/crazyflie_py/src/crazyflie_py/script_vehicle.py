@@ -1,4 +1,4 @@
-"""A running vehicle of a script: what it may be commanded, its parameters and its state."""
+"""A running vehicle of a script: checks of its commands, its parameters and its state."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -64,8 +64,8 @@ class MeasuredStates:
         pose = self._vehicle.pose()
         if pose is None:
             raise TimeoutError(
-                f"{self._vehicle.name}: no position for {_STATE_TIMEOUT:g} s; does motion capture "
-                "track it?"
+                f"{self._vehicle.name}: no position for {_STATE_TIMEOUT:g} s; does motion "
+                "capture track the vehicle?"
             )
         return pose
 
@@ -116,14 +116,14 @@ class FirmwareParameters:
             value: float = self._connection.handle.get_param(path, FirmwareNumber())
         except ParameterError:
             raise ValueError(
-                f"{self.name}: the firmware has no parameter {name}, as the driver has not set "
-                f"{path}; expected one that `rosparam list /{self.name}` prints"
+                f"{self.name}: the firmware has no parameter {name}, since the driver has not "
+                f"set {path}; expected one that `rosparam list /{self.name}` prints"
             ) from None
         return value
 
 
 class ScriptVehicle:
-    """One running vehicle: checks of its commands, what is noted of them, and its state."""
+    """One running vehicle: checks and records of its commands, and its state."""
 
     def __init__(
         self,
@@ -164,7 +164,7 @@ class ScriptVehicle:
         return group_mask == 0 or bool(group_mask & self._groups)
 
     def prepare(self, order: Order) -> None:
-        """Refuse a command to a goal out of the fence; note what follows from it otherwise."""
+        """Refuse a command to a goal outside the fence; otherwise record its consequences."""
         if order.goal is not None:
             self._check("goTo" if order.name == "go_to" else order.name, order.goal)
         if order.flies:
@@ -172,7 +172,7 @@ class ScriptVehicle:
         self.held.free(order.duration)
 
     def send(self, setpoint: Setpoint) -> None:
-        """Send a setpoint; one that holds the vehicle, while it is too near to another."""
+        """Send a setpoint; while the vehicle is too near to another, send one that holds it."""
         self.note_flight()
         self.vehicle.send(self.held.passed(setpoint))
 
@@ -186,13 +186,13 @@ class ScriptVehicle:
         return 0.0
 
     def _check(self, what, goal):
-        """Refuse a goal (m) that is out of the fence of the vehicle, or below the ground."""
+        """Refuse a goal (m) outside the vehicle's fence, or below the ground."""
         bounds, place = self.vehicle.bounds, self.vehicle.position() or self._start
         goal = [old if math.isnan(new) else new for new, old in zip(goal, place, strict=True)]
         for value, low, high, axis in zip(goal, bounds.lower, bounds.upper, "xyz", strict=True):
             if not low <= value <= high:
                 self._connection.refuse(
-                    f"{self.name}: {what}: {axis} is {value:.3g} m, out of the fence; expected "
+                    f"{self.name}: {what}: {axis} is {value:.3g} m, outside the fence; expected "
                     f"{low:g} to {high:g} m"
                 )
 
@@ -215,15 +215,15 @@ class ScriptVehicle:
         except ValueError as error:
             self._connection.refuse(f"{self.name}: enableCollisionAvoidance: {error}")
 
-    # End of the flight.
+    # The flight is ended here.
 
     def note_flight(self) -> None:
-        """Note that the vehicle is landed at the end of the script."""
+        """Record that the vehicle must be landed at the end of the script."""
         self.held.is_landing = False
         self._connection.fleet.adopt(self.name)
 
     def note_landing(self, group_mask: int) -> None:
-        """Note that the script has vehicles of groups land."""
+        """Record that the script lands the vehicles of groups."""
         self.held.is_landing = self.held.is_landing or self.is_member(group_mask)
 
     def has_begun(self) -> bool:

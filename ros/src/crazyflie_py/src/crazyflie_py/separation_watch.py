@@ -20,12 +20,12 @@ from crazyflie_model.angles import Triple
 from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_py.ros_connection import ScriptConnection
 
-_HOLD_DURATION = 0.8  #: In which a vehicle that is held stops, s.
+_HOLD_DURATION = 0.8  #: Time in which a held vehicle stops (s).
 
-_SHORTEST_SPAN = 0.02  #: Between two poses from which a velocity follows, s.
-_LONGEST_SPAN = 0.3  #: After it the first pose says nothing about a velocity, s.
-_LOWEST_SPEED = 0.05  #: A slower vehicle hovers, m/s.
-_REPEAT = 2.0  #: Between two warnings of a vehicle, s.
+_SHORTEST_SPAN = 0.02  #: Least time between two poses for a velocity (s).
+_LONGEST_SPAN = 0.3  #: Age of the first pose above which it is not used for a velocity (s).
+_LOWEST_SPEED = 0.05  #: Speed below which a vehicle hovers (m/s).
+_REPEAT = 2.0  #: Shortest time between two warnings of a vehicle (s).
 
 
 class HeldVehicle:
@@ -40,7 +40,7 @@ class HeldVehicle:
         self._free_until = -math.inf
         self._vehicle = vehicle
         self._connection = connection
-        # The last setpoint, and when it came, s; where the vehicle is held, m.
+        # The last setpoint, and its time (s); the position at which the vehicle is held (m).
         self._streamed: tuple[Setpoint, float] | None = None
         self._held_at: Triple | None = None
 
@@ -52,11 +52,11 @@ class HeldVehicle:
         return PositionSetpoint(self._held_at, self._vehicle.heading())
 
     def free(self, duration: float) -> None:
-        """Note that it takes off or lands, for a duration (s)."""
+        """Record that it takes off or lands, for a duration (s)."""
         self._free_until = self._connection.fleet.time() + duration
 
     def end_setpoints(self) -> None:
-        """Note that a command follows setpoints."""
+        """Record that a command follows setpoints."""
         self._streamed = self._held_at = None
 
     @property
@@ -67,11 +67,11 @@ class HeldVehicle:
         return is_flying and not is_free and not self.is_landing and not self.avoids
 
     def pose(self) -> TimedPose | None:
-        """Return where it is; None if that is not known."""
+        """Return its position, m; None if that is not known."""
         return self._vehicle.pose()
 
     def streamed_goal(self, place: Triple) -> Triple | None:
-        """Return where setpoints lead it from a place (m); None if none are sent."""
+        """Return the place to which setpoints move it from a place (m); None without setpoints."""
         if self._streamed is None:
             return None
         setpoint, time = self._streamed
@@ -93,21 +93,23 @@ class HeldVehicle:
 
     def _note_hold(self, answer):
         if answer.exception() is not None:
-            self._connection.handle.warn(f"{self.name}: it cannot be held: {answer.exception()}")
+            self._connection.handle.warn(
+                f"{self.name}: the vehicle cannot be held: {answer.exception()}"
+            )
 
 
 class SeparationWatch:
     """Holds vehicles that come too near to another, by the rule of a fleet.
 
-    The goal of a vehicle without setpoints is where its velocity leads it.
+    The goal of a vehicle without setpoints follows from its velocity.
 
     Parameters
     ----------
     vehicles : sequence of HeldVehicle
     buffers : sequence of float
-        Radii of their own space, m.
+        Radii of the space that is reserved for each vehicle, m.
     connection : Connection
-        Warns; unchecked, there are only the warnings.
+        Logs warnings; if unchecked, vehicles are not held.
     """
 
     def __init__(
@@ -124,7 +126,7 @@ class SeparationWatch:
         self._held: set[int] = set()
 
     def update(self) -> None:
-        """Look at all vehicles, and hold or release them."""
+        """Check all vehicles, and hold or release them."""
         positions = np.full((len(self._vehicles), 3), math.nan)
         goals = positions.copy()
         for k, vehicle in enumerate(self._vehicles):
@@ -161,9 +163,9 @@ class SeparationWatch:
         x, y, z = position.tolist()
         is_held = not self._connection.is_unchecked
         self._connection.handle.warn(
-            f"{self._vehicles[k].name} comes too near to {other.name}: {pair.distance:.2f} m, or "
-            f"so it will be in {LOOK_AHEAD:g} s; expected at least {pair.limit:.2f} m (a metre of "
-            f"height counts half); {'it is held there' if is_held else 'it flies on'}",
+            f"{self._vehicles[k].name} comes too near to {other.name}, now or in {LOOK_AHEAD:g} "
+            f"s: {pair.distance:.2f} m; expected at least {pair.limit:.2f} m (vertical distances "
+            f"are halved); {'the vehicle is held' if is_held else 'the vehicle flies on'}",
             throttle=_REPEAT,
             key=f"separation {self._vehicles[k].name}",
         )

@@ -36,7 +36,7 @@ class SimulatedParameters:
     planner : Planner or other object
         Has the ``groups``.
     said : set of str
-        Names that were warned of, which vehicles have in common.
+        Names that have caused a warning, shared by all vehicles.
     """
 
     def __init__(self, name: str, planner: HasGroups, said: set[str]):
@@ -46,15 +46,14 @@ class SimulatedParameters:
         self._values: dict[str, float] = {}
 
     def update(self, values: Mapping[str, float]) -> None:
-        """Set parameters; what the virtual vehicle does not know is kept, with a warning."""
+        """Set parameters; those that the virtual vehicle lacks are stored, with a warning."""
         for key, value in values.items():
             if key == "hlCommander.groupmask":
                 self._planner.groups = int(value)
             elif key not in self._said and key not in _defaults():
                 self._said.add(key)
                 _log.warning(
-                    "%s.setParam: %s is no parameter that the simulation knows; it is kept, "
-                    "without effect",
+                    "%s.setParam: the simulation has no parameter %s; it is stored without effect",
                     self._name,
                     key,
                 )

@@ -57,7 +57,7 @@ class IdealMotion:
     max_speed : float
         m/s.
     disturbance : float
-        Standard deviation of what is added to the velocity of velocity setpoints, m/s.
+        Standard deviation of the noise of velocity setpoints, m/s.
     """
 
     def __init__(self, position: Triple, max_speed: float, disturbance: float):
@@ -68,16 +68,16 @@ class IdealMotion:
         self.now = SimulatedMotion(np.array(position), np.zeros(3), np.zeros(3), 0.0)
 
     def avoid(self, others: Sequence[Self], settings: AvoidanceSettings | None) -> None:
-        """Avoid others; None for settings ends collision avoidance."""
+        """Avoid other vehicles; None for settings ends collision avoidance."""
         self._others = others
         self._avoidance = None if settings is None else CollisionAvoidance(settings)
 
     def held(self) -> SimulatedMotion:
-        """Return the motion of staying in place."""
+        """Return the motion of a vehicle that stays at its place."""
         return SimulatedMotion(self.now.position, np.zeros(3), np.zeros(3), self.now.yaw)
 
     def tracked(self, goal: Goal[float] | FullStateSetpoint, dt: float) -> SimulatedMotion:
-        """Return the motion ``dt`` (s) from now, as far as avoidance and speed permit the goal."""
+        """Return the motion ``dt`` (s) from now, towards the goal, as far as limits permit."""
         vectors = (goal.position, goal.velocity, goal.acceleration)
         position, velocity, acceleration = map(np.array, vectors)
         return self._limited(SimulatedMotion(position, velocity, acceleration, goal.yaw), dt)
@@ -155,8 +155,8 @@ def _clamped(vector, limit):
 class SimulatedVehicle(IdealVehicle):
     """The ideal vehicle of missions, which moves in steps.
 
-    It follows its plan, or the last setpoint, as far as speed and avoidance permit. Where it does
-    more than a real one would, a warning says so, once.
+    It follows its plan, or the last setpoint, as far as speed and avoidance permit. A warning is
+    logged once where a real vehicle would do less.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ class SimulatedVehicle(IdealVehicle):
 
     @override
     def emergency(self) -> "Future[Any]":
-        self._warn(f"{self.name}.emergency: it does not react to commands any more")
+        self._warn(f"{self.name}.emergency: the vehicle ignores all further commands")
         self._stop_motors("emergency")
         self._locked = True
         return done(None)
@@ -250,14 +250,14 @@ class SimulatedVehicle(IdealVehicle):
         self._setpoint = None
 
     def avoid(self, others: Sequence[Self], settings: AvoidanceSettings | None) -> None:
-        """Avoid others; None for settings ends collision avoidance."""
+        """Avoid other vehicles; None for settings ends collision avoidance."""
         self._motion.avoid([other._motion for other in others], settings)
 
     # State.
 
     @property
     def motion(self) -> SimulatedMotion:
-        """Where the vehicle is, and how it moves."""
+        """Position and motion of the vehicle."""
         return self._motion.now
 
     @motion.setter
@@ -300,7 +300,7 @@ class SimulatedVehicle(IdealVehicle):
         }
 
     def next_motion(self, dt: float) -> SimulatedMotion:
-        """Return where the vehicle is at the present time, ``dt`` (s) after `motion`."""
+        """Return the motion at the present time, ``dt`` (s) after `motion`."""
         now = self._time()
         if now > self._expiry:
             self._setpoint = None

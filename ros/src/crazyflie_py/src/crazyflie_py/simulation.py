@@ -1,4 +1,4 @@
-"""The swarm of --sim: ideal vehicles and a clock that passes as fast as it goes."""
+"""The swarm of --sim: ideal vehicles, and a clock that runs as fast as possible."""
 
 import argparse
 import logging
@@ -20,14 +20,14 @@ from crazyflie_py.visualizer import visualizer_for
 
 _log = logging.getLogger(__name__)
 
-_ROUNDING = 1e-9  #: Part of a step by which a sleep may be too short for it, due to rounding.
+_ROUNDING = 1e-9  #: Fraction of a step by which a sleep may be too short, due to rounding.
 
 
 class CsvOutput:
     """Files cfID_phaseN.csv in the working directory.
 
     Columns: time since the beginning of the phase (s), position (m), roll, pitch, yaw (rad).
-    ``timeHelper.nextPhase()`` begins a phase; a script without it has one, number 0.
+    ``timeHelper.nextPhase()`` begins a phase; a script without phases has one, number 0.
     """
 
     def __init__(self) -> None:
@@ -81,7 +81,7 @@ class Simulation:
             self.visualizer.startVideoOutput(options.video, self.dt)
         self._output = CsvOutput() if options.writecsv else None
 
-    # Commands, which nothing restricts.
+    # Commands, without restrictions.
 
     def _chosen(self, name: str | None) -> list[SimulatedVehicle]:
         return self.vehicles if name is None else [self._by_name[name]]
@@ -122,7 +122,7 @@ class Simulation:
         return self._steps * self.dt
 
     def sleep(self, duration: float) -> None:
-        # Time passes in whole steps; what is left of a sleep counts for the next one.
+        # Time passes in whole steps; the remainder of a sleep is added to the next one.
         total = max(0.0, duration) + self._residual
         steps = math.floor(total / self.dt + _ROUNDING)
         self._residual = max(0.0, total - steps * self.dt)
@@ -141,7 +141,7 @@ class Simulation:
         if self._output is not None:
             self._output.update(time, self.vehicles)
         self._steps += 1
-        # All from the same state, whatever their order.
+        # All motions are computed from the same state, whatever the order.
         motions = [vehicle.next_motion(self.dt) for vehicle in self.vehicles]
         for vehicle, motion in zip(self.vehicles, motions, strict=True):
             vehicle.motion = motion
@@ -155,8 +155,8 @@ class Simulation:
             one, two = self.vehicles[i], self.vehicles[j]
             if (i, j) not in self._close and (one.is_flying or two.is_flying):
                 _log.warning(
-                    "%s and %s are %.2f m apart at %.2f s; expected at least %.2f m "
-                    "(a metre of height counts half)",
+                    "%s and %s are %.2f m apart at %.2f s; expected at least %.2f m (vertical "
+                    "distances are halved)",
                     one.name,
                     two.name,
                     distance,

@@ -32,14 +32,15 @@ class ScriptState(NamedTuple):
 
 
 class Order(NamedTuple):
-    """A command of a script, and what a swarm checks and notes before it sends it."""
+    """A command of a script, with the data that a swarm checks and records before it sends it."""
 
     name: str  #: Name of the service, for errors: "go_to".
     send: Callable[[Any], Any]  #: Calls the method of a `MissionVehicle` or of `Commands`.
     group_mask: int = 0
     flies: bool = False  #: Whether a flight may begin, which the end of the script has to end.
-    goal: Triple | None = None  #: Where it leads (m), if that must be in the fence; NaN: as now.
-    duration: float = -math.inf  #: Time for which it takes off or lands (s).
+    #: Goal of the command, if it must be in the fence (m); NaN: unchanged.
+    goal: Triple | None = None
+    duration: float = -math.inf  #: Duration of its takeoff or landing (s).
 
 
 class ParameterStore(Protocol):

@@ -29,7 +29,7 @@ class MatplotlibVisualizer(NullVisualizer):
     Parameters
     ----------
     has_window : bool
-        Otherwise pictures are drawn for videos only, which needs no display.
+        If False, pictures are drawn for videos only, which needs no display.
     """
 
     def __init__(self, has_window: bool):
@@ -43,13 +43,13 @@ class MatplotlibVisualizer(NullVisualizer):
         self._artists: list[Any] = []
 
     def _window(self):
-        """Return the figure in a window; None where none can be opened."""
+        """Return the figure in a window; None if no window can be opened."""
         try:
-            # As slow to import as all else, hence here.
+            # Imported here, since it takes as long as all other imports.
             from matplotlib import pyplot
 
             figure = pyplot.figure()
-            # Where no toolkit finds the display, matplotlib draws without a window.
+            # If no toolkit finds the display, matplotlib draws without a window.
             if figure.canvas.required_interactive_framework is None:
                 raise RuntimeError(f"matplotlib has chosen {pyplot.get_backend()}")
         except Exception as error:
@@ -77,7 +77,7 @@ class MatplotlibVisualizer(NullVisualizer):
 
         target = Path(path)
         if not target.parent.is_dir():
-            raise ValueError(f"--video: {path}: there is no folder {target.parent}")
+            raise ValueError(f"--video: {path}: the folder {target.parent} does not exist")
         writer = FFMpegWriter
         if target.suffix != ".gif" and not FFMpegWriter.isAvailable():
             target = target.with_suffix(".gif")
@@ -143,6 +143,6 @@ def visualizer_for(name: str, has_video: bool) -> NullVisualizer:
     if name == "null" and not has_video:
         return NullVisualizer()
     if name == "vispy":
-        _log.warning("--vis vispy: there is no such window here; matplotlib draws")
+        _log.warning("--vis vispy: not available here; matplotlib draws")
     has_display = bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
     return MatplotlibVisualizer(has_display and name in ("mpl", "vispy"))

@@ -1,4 +1,4 @@
-"""Events of a flight in the messages of a bag: what went wrong, or was changed, and when."""
+"""Events of a flight in the messages of a bag: faults and changes, with their times."""
 
 import itertools
 import math
@@ -12,8 +12,8 @@ from typing import Any
 
 from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
 
-MERGE_TIME = 1.0  #: An event that repeats within this time counts as one (s).
-MAX_EVENTS = 20_000  #: Events of a bag; more are only counted.
+MERGE_TIME = 1.0  #: Time within which repetitions are one event (s).
+MAX_EVENTS = 20_000  #: Largest number of events of a bag; more are only counted.
 
 _WARN, _ERROR = 4, 8  # Levels of rosgraph_msgs/Log.
 _ROS2_LEVELS = {30: _WARN, 40: _ERROR, 50: _ERROR}  # Of rcl_interfaces/Log.
@@ -35,9 +35,9 @@ class Kind(Enum):
 
 @dataclass
 class Event:
-    """Something that happened."""
+    """An event of a flight."""
 
-    time: float  #: s, when it was recorded.
+    time: float  #: Time of the recording (s).
     namespace: str  #: Namespace of the node or topic that it comes from.
     kind: Kind
     text: str
@@ -49,11 +49,11 @@ class EventLog:
 
     def __init__(self) -> None:
         self.events: list[Event] = []
-        self.dropped = 0  #: Those beyond `MAX_EVENTS`.
+        self.dropped = 0  #: Number of events beyond `MAX_EVENTS`.
         #: By namespace, times (s) and states of the flight (constants of FlightStatus).
         self.flight_states: dict[str, list[tuple[float, int]]] = defaultdict(list)
-        #: By namespace, one after the other: time (s), share of answered pings, and setpoints that
-        #: were not sent so far.
+        #: By namespace: time (s), fraction of answered pings, and number of setpoints that were not
+        #: sent so far.
         self.links: dict[str, array[float]] = defaultdict(lambda: array("d"))
         self._last: dict[Any, Any] = {}
         self._latest: dict[tuple[str, Kind, str], tuple[float, Event]] = {}
@@ -77,7 +77,7 @@ class EventLog:
         self._latest[key] = time, event
 
     def _changes(self, key, value):
-        """Tell whether a value is another one than the last of this key."""
+        """Return whether a value differs from the last one of this key."""
         changes = self._last.get(key) != value
         self._last[key] = value
         return changes
@@ -161,7 +161,7 @@ class EventLog:
 
 
 def concerning(events: list[Event], name: str, others: set[str]) -> Iterator[Event]:
-    """Yield the events of a vehicle, and those that are no other vehicle's, by namespaces."""
+    """Yield the events of a vehicle, and those that belong to no other vehicle, by namespaces."""
     for event in events:
         words = {word.strip("/").split("/")[0] for word in re.findall(r"[\w/]+", event.text)}
         if event.namespace == name or not (event.namespace in others or words & others):
@@ -169,7 +169,7 @@ def concerning(events: list[Event], name: str, others: set[str]) -> Iterator[Eve
 
 
 def _line_of_log(name, line, level):
-    """Yield the event of a line of a log, if it is one."""
+    """Yield the event of a line of a log, if any."""
     own_name = re.match(r"(/\S+): ", line)
     node = own_name[1] if own_name else name
     kind = None

@@ -1,7 +1,7 @@
 """Messages of a bag file in the order in which they were recorded.
 
-The file is read from its beginning to its end, without its index: a bag without one, or one that
-breaks off, is read as far as it goes, and memory holds one chunk (768 kB by default) at a time.
+The file is read from its beginning to its end, without its index: a bag without an index, or a
+truncated one, is read as far as possible, and memory holds one chunk (768 kB by default) at a time.
 Format: https://wiki.ros.org/Bags/Format/2.0.
 """
 
@@ -20,14 +20,16 @@ MAGIC = b"#ROSBAG V2.0\n"
 
 _MESSAGE, _BAG_HEADER, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
 
-LARGEST_CHUNK = 1 << 28  #: Size of a decompressed chunk; rosbag's have 768 kB (bytes).
-#: Size of all decompressed chunks: this many bytes plus this many times the size of the file.
-#: Flights are compressed to a third.
+#: Largest size of a decompressed chunk (bytes); rosbag's have 768 kB. Largest size of all
+#: decompressed chunks: this many bytes plus this many times the size of the file. Flights are
+#: compressed to a third.
+LARGEST_CHUNK = 1 << 28
 LEAST_TOTAL, LARGEST_RATIO = 1 << 30, 100
 
-_LARGEST_HEADER = 1 << 20  #: Longer headers of records, bytes, are no headers: the file is damaged.
+#: Largest header of a record (bytes): with a longer one the file is damaged.
+_LARGEST_HEADER = 1 << 20
 
-_PIECE = 1 << 20  # Of decompressed data, bytes.
+_PIECE = 1 << 20  # Size of decompressed data (bytes).
 
 DECOMPRESSORS = {b"bz2": bz2.BZ2Decompressor, b"lz4": lz4.frame.LZ4FrameDecompressor}
 
@@ -41,17 +43,17 @@ class BagError(Exception):
 
 
 class ExpansionError(Exception):
-    """Compressed data become too large; the text says how large."""
+    """Decompressed data are too large; the text says how large."""
 
 
 class Expansion:
-    """Decompresses a file's chunks, as long as they do not become too large.
+    """Decompresses a file's chunks within a limit of their size.
 
-    A stranger's file of some kilobytes may expand to more than memory or disk hold.
+    A malicious file of some kilobytes may expand to more than memory or disk can hold.
     """
 
     def __init__(self, size: int):
-        """Limit what a file of ``size`` bytes may expand to."""
+        """Set the limit for a file of ``size`` bytes."""
         self._left = LEAST_TOTAL + LARGEST_RATIO * size
 
     def pieces(self, decompressor: Any, data: bytes) -> Iterator[bytes]:
@@ -92,17 +94,18 @@ class Connection:
     encoding: ClassVar[str] = "ros1"  #: Encoding of its messages.
 
     def deserializer(self) -> Callable[[bytes], Any]:
-        """Return what makes a message of its data.
+        """Return a function from data to message.
 
-        `TopicError`: its type is not defined here, or differently.
+        `TopicError`: the type is not defined here, or is defined differently.
         """
-        # The definition in the bag is text of whoever wrote it: a class made of it would run it.
+        # The definition in the bag is not trusted: a class that is generated from it could run its
+        # code.
         message_type = roslib.message.get_message_class(self.datatype)
         if message_type is None:
-            raise TopicError(f"{self.topic} is left out: no package here defines {self.datatype}")
+            raise TopicError(f"{self.topic} is omitted: no package here defines {self.datatype}")
         if message_type._md5sum != self.md5sum:
             raise TopicError(
-                f"{self.topic} is left out: its {self.datatype} has the md5 sum "
+                f"{self.topic} is omitted: its {self.datatype} has the md5 sum "
                 f"{self.md5sum}, expected {message_type._md5sum}"
             )
         return lambda data: message_type().deserialize(data)
@@ -111,13 +114,13 @@ class Connection:
 class BagFile:
     """A bag file that is read once, from its beginning.
 
-    `BagError`: there is no such file, or it is not a bag of format 2.0.
+    `BagError`: the file does not exist, or is not a bag of format 2.0.
     """
 
     def __init__(self, path: Path):
         self._path = path
-        self.connections: list[Connection] = []  #: Those that have been met so far.
-        self.interruption = ""  #: Why reading has ended early; empty if it has not.
+        self.connections: list[Connection] = []  #: Connections that have been read so far.
+        self.interruption = ""  #: Reason why reading has ended early; empty if it has not.
         self._by_id: dict[bytes, Connection] = {}
         try:
             with path.open("rb") as file:
@@ -162,7 +165,7 @@ class BagFile:
         op = fields[b"op"]
         (size,) = _UINT32.unpack(_read(file, 4))
         if op == _CHUNK:
-            # The size of a chunk that was not closed is 0: it is what remains.
+            # The size of a chunk that was not closed is 0: it extends to the end of the file.
             content = file.read(size or -1)
             chunk = self._decompressed(content, fields[b"compression"])
             yield from self._messages_of(chunk, is_wanted)
@@ -179,7 +182,7 @@ class BagFile:
                 self.interruption = self._broken_off(self.size, "its index is missing")
         if size > self.size - file.tell():
             raise _BrokenOffError("it ends within a record")
-        # Also indexes, and connections, which chunks have, too.
+        # Records that are skipped include indexes, and connections, which chunks also have.
         file.seek(size, os.SEEK_CUR)
 
     def _broken_off(self, place, reason):
@@ -211,7 +214,7 @@ class BagFile:
         if compression not in DECOMPRESSORS:
             raise _BrokenOffError(f"its compression is {compression.decode(errors='replace')}")
         try:
-            # Of a chunk that breaks off, as far as it goes.
+            # A truncated chunk is read as far as possible.
             return b"".join(self._expansion.pieces(DECOMPRESSORS[compression](), data))
         except (OSError, RuntimeError) as error:
             raise _BrokenOffError(str(error)) from None

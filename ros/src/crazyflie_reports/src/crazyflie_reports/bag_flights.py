@@ -22,11 +22,12 @@ Rows = NDArray[np.float64]
 
 _TIME, _STAMP, _NUMBER, _FIRST = 0, 1, 2, 3  # Columns of a spool.
 
-OTHER_CLOCK = 10.0  #: Stamps that are further from the time of recording are of another clock (s).
+#: Difference of stamps from the time of recording above which they are of another clock (s).
+OTHER_CLOCK = 10.0
 
-PAUSE = 1.0  #: A flight is over after this time without thrust (s).
-LIFT = 0.1  #: A vehicle of which only poses are known flies this high above the lowest, m.
-MARGIN = 1.0  #: Time that is shown before and after a flight (s).
+PAUSE = 1.0  #: Time without thrust after which a flight has ended (s).
+LIFT = 0.1  #: Height above the lowest pose from which a vehicle with poses only is in flight (m).
+MARGIN = 1.0  #: Time before and after a flight that is shown (s).
 
 PHASES = {
     FlightStatus.UNKNOWN: "unknown",
@@ -45,30 +46,30 @@ class Vehicle:
     in the others; there may be no rows.
     """
 
-    name: str  #: Its namespace, or, where it has none, the frame of /tf.
+    name: str  #: Its namespace, or, without one, its frame on /tf.
     namespace: str
-    is_driven: bool  #: A driver has sent its controls: it is no simulated one.
+    is_driven: bool  #: Whether a driver has sent its controls: it is not a simulated one.
     #: state, reference: STATE_FIELDS; velocities and yaw may be NaN.
     state: Rows
     stamps: Rows  #: Stamps of the states; 0 for a state without (s).
     reference: Rows
     control: Rows  #: CONTROL_FIELDS.
-    command: Rows  #: CONTROL_FIELDS as the driver was given them; none without a driver.
+    command: Rows  #: CONTROL_FIELDS as sent to the driver; no rows without a driver.
     attitude: Rows  #: POSE_FIELDS.
-    pose_stamps: Rows  #: Of the poses with an attitude, s; 0 for a pose without.
+    pose_stamps: Rows  #: Stamps of the poses with an attitude (s); 0 for a pose without a stamp.
     true_pose: Rows  #: POSE_FIELDS, as a virtual vehicle knows it.
     battery: Rows  #: V.
-    link: Rows  #: Share of answered pings, and setpoints that were not sent so far.
+    link: Rows  #: Fraction of answered pings, and number of setpoints that were not sent so far.
     toggles: Rows  #: Without fields.
     delays: Rows  #: Time from the stamp of the newest pose to each control (s).
-    #: States that were published and not recorded; None without numbers in sequence.
+    #: Number of states that were published and not recorded; None without sequence numbers.
     lost: int | None
 
 
 def vehicle_namespaces(log: BagLog) -> list[str]:
     """Return the namespaces of the vehicles of a recording, sorted.
 
-    A vehicle is a namespace with states or controls; if there is none, one with poses.
+    A vehicle is a namespace with states or controls; without any, one with poses.
     """
     flown, driven = _having(log, "state", "final_control"), _having(log, "cmd_vel")
     if flown == {""} and len(driven) == 1:
@@ -108,20 +109,20 @@ def _frame_of(namespace, is_alone, frames):
     name = namespace.rpartition("/")[2]
     named = [each for each in frames if name and name in each.split("/")]
     candidates = [each for each in named or (frames if is_alone else ()) if _moves(frames[each])]
-    # The vehicle's own, and not that of its model.
+    # The vehicle's own frame, not that of its model.
     candidates.sort(key=lambda each: (each.endswith("base_link"), -frames[each].count))
     return candidates[0] if candidates else None
 
 
 def _moves(spool: Spool) -> bool:
-    """Tell whether a frame is not only another name of its parent, as base_link is."""
+    """Return whether a frame is more than another name of its parent, as base_link is."""
     return bool(spool.rows()[:, _FIRST : _FIRST + 3].any())
 
 
 def _vehicle(namespace, sources, frame, frames, link):
     def rows(role, width):
         of_role = [each.spool for each in sources if each.role.name == role]
-        # Of several topics the one that is used most.
+        # Among several topics, the one with the most messages.
         longest = max(of_role, key=lambda spool: spool.count, default=None)
         return longest.rows() if longest else np.empty((0, _FIRST + width))
 
@@ -160,9 +161,9 @@ def _without_header(rows: Rows) -> Rows:
 
 
 def _states_of(poses: Rows) -> Rows:
-    """Return rows of states, with velocities by central differences, of rows of poses.
+    """Return rows of states from rows of poses, with velocities by central differences.
 
-    A velocity is NaN where there is no pose next to it, as between two gaps.
+    A velocity is NaN without a neighbouring pose, as between two gaps.
     """
     increasing = np.r_[True, np.diff(poses[:, _TIME]) > 1e-4][: len(poses)]
     poses = poses[increasing]
@@ -181,7 +182,7 @@ def _lost(rows: Rows) -> int | None:
     if not numbers.any():
         return None
     steps = np.diff(numbers)
-    # The numbers of a publisher that was started again begin again.
+    # A restarted publisher also restarts its sequence numbers.
     return int((steps[steps > 1.0] - 1.0).sum())
 
 
@@ -213,9 +214,9 @@ class Flight:
     """A flight of a vehicle."""
 
     vehicle: str  #: Its name.
-    number: int  #: Of the vehicle's flights in the recording, from 1.
+    number: int  #: Number of the flight among the vehicle's flights in the recording, from 1.
     phases: list[Phase]
-    record: FlightRecord  #: With `MARGIN` before and after.
+    record: FlightRecord  #: States with `MARGIN` before and after.
     #: attitude, true_pose, battery, link, delays: As in `Vehicle`.
     attitude: Rows
     true_pose: Rows
@@ -322,7 +323,7 @@ def _record(vehicle, phases, first, last):
 
 def _series(rows, fields, first, last):
     rows = _between(rows, first, last)
-    # Positions, or controls, that are no numbers, which every node rejects, too.
+    # Positions or controls that are not finite, which every node also rejects.
     rows = rows[np.isfinite(rows[:, :4]).all(axis=1)]
     rows[np.isinf(rows)] = np.nan
     return Series.of(fields, rows[:, 0], rows[:, 1:])

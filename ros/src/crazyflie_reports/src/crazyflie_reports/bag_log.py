@@ -26,10 +26,10 @@ from crazyflie_reports.usd_log import UsdConnection, UsdLogFile, is_usd_log
 
 POSE_PERIOD = 0.009  #: Period of the transforms that are kept; they may come at 1 kHz (s).
 
-#: Times of ROS before this one, of 1973, are simulated time (s).
+#: ROS time, of 1973, below which times are simulated (s).
 SIMULATED = 1e8
 
-RESTART = 0.5  #: Simulated time that steps back by more than this has started again (s).
+RESTART = 0.5  #: Step back of simulated time above which the simulation was restarted (s).
 
 _BUFFER = 8192  # Numbers.
 
@@ -45,7 +45,7 @@ class Spool:
         self._path, self.fields = path, fields
         self._buffer = array("d")
         self.count = 0  #: Number of rows.
-        self.offset = 0.0  #: Added to the times of recording (s).
+        self.offset = 0.0  #: Offset that is added to the times of recording (s).
         self.last_time = float("-inf")
 
     def append(self, time: float, stamp: float, number: int, row: Sequence[float]) -> None:
@@ -66,7 +66,7 @@ class Spool:
         self._flush()
         rows = np.fromfile(self._path).reshape(-1, 3 + len(self.fields))
         rows[:, 0] += self.offset
-        # Bags that were merged may be in another order.
+        # Merged bags may be in another order.
         is_sorted = (np.diff(rows[:, 0]) >= 0.0).all()
         return rows if is_sorted else rows[np.argsort(rows[:, 0], kind="stable")]
 
@@ -92,13 +92,14 @@ class BagLog:
     #: start, end: Times of the first and the last message that was read, s.
     start: float = float("inf")
     end: float = float("-inf")
-    remarks: list[str] = field(default_factory=list)  #: What is missing, or could not be read.
+    #: Remarks on data that are missing, or could not be read.
+    remarks: list[str] = field(default_factory=list)
 
 
 def files_of(path: Path) -> list[Path]:
     """Return the files of a recording: those of a folder in their order, or the file itself.
 
-    `BagError`: there is no such file or folder, or no bag in the folder.
+    `BagError`: the path does not exist, or the folder has no bags.
     """
     if path.is_file():
         return [path]
@@ -125,10 +126,10 @@ def read(
 ) -> list[BagLog]:
     """Read a recording: a bag, or a folder of bags that follow each other.
 
-    There is one log, or, where simulated time starts again, one for each start. Series that are too
-    long for memory are kept in ``folder`` as long as the logs are used. ``names`` has, by role,
-    regular expressions of topics in place of the documented ones; ``progress`` is called with
-    numbers of bytes. `BagError`: it cannot be read, or has none of the topics.
+    The result is one log, or one for each start of simulated time. Series that are too long for
+    memory are kept in ``folder`` as long as the logs are used. ``names`` has, by role, regular
+    expressions of topics in place of the documented ones; ``progress`` is called with numbers of
+    bytes. `BagError`: the recording cannot be read, or has none of the topics.
     """
     reader = _Reader(path.name, folder, names or {})
     files = [_opened(each, folder) for each in files_of(path)]
@@ -166,7 +167,7 @@ def _opened(path, folder):
 
 
 class _Reader:
-    """Puts messages where they belong."""
+    """Adds messages to series and events."""
 
     def __init__(self, name: str, folder: Path, names: dict[str, str]):
         self._name, self._folder, self._names = name, folder, names
@@ -191,7 +192,7 @@ class _Reader:
 
     def add(self, connection, time, data):
         topic = self._topics[connection]
-        # Each topic by itself: bags that were merged may have one after the other.
+        # Each topic separately: merged bags may have one after the other.
         newest = self._newest.get(connection.topic, time)
         if time < newest - RESTART and newest < SIMULATED:
             self.logs.append(BagLog(self._name))
@@ -209,7 +210,7 @@ class _Reader:
                 log.events.add(
                     time, connection.topic, topic.namespace, connection.datatype, content
                 )
-        except Exception as error:  # Whatever a bag's own fields raise.
+        except Exception as error:  # Damaged fields of a bag may raise any error.
             self._errors.setdefault(connection.topic, f"{connection.topic}: {error}")
             self._bad[connection.topic] = self._bad.get(connection.topic, 0) + 1
 

@@ -1,6 +1,6 @@
 """Recordings as MCAP, for Foxglove and Lichtblick: frames, markers, log, and numbers to plot.
 
-What is written is a ROS 2 bag, by PyPI's rosbags, with the types of this workspace.
+The output is a ROS 2 bag, written by PyPI's rosbags, with the types of this workspace.
 """
 
 import heapq
@@ -32,7 +32,7 @@ Timed = tuple[float, str, str, Any]  # Time (s), topic, type, message.
 
 
 def write(log: BagLog, folder: Path) -> Path:
-    """Write a recording into a new folder, and return its file; the folder must not exist."""
+    """Write a recording into a new folder, which must not exist; return the file."""
     writer = Writer(folder, version=8, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
     connections: dict[str, Any] = {}
@@ -100,7 +100,7 @@ def _of_vehicle(vehicle: Vehicle, log: BagLog) -> Iterator[Timed]:
 
 
 def _numbers(datatype, row, stamp):
-    """Return a message of a header with a stamp (s), and of a message of numbers."""
+    """Return a message of a header with a stamp (s) and a message of numbers."""
     known(datatype)
     _, (field, kind) = types().fielddefs[ros2_name(datatype)][1]
     inner = types().types[kind[1]](*(float(each) for each in row[1:]))
@@ -154,7 +154,7 @@ def _markers(time, topic, markers):
 
 
 def _model(name: str, top: str, poses: np.ndarray) -> Iterator[Timed]:
-    """Yield the markers that stay: the vehicle, which moves with its frame, and its path."""
+    """Yield the permanent markers: the vehicle, which moves with its frame, and its path."""
     if not len(poses):
         return
     time, edge = float(poses[0, 0]), ARM / math.sqrt(2.0)
@@ -168,7 +168,7 @@ def _model(name: str, top: str, poses: np.ndarray) -> Iterator[Timed]:
         [
             _marker(time, name, _LINE_LIST, (0.006, 0.0, 0.0), dark, points=arms, **own),
             *(
-                # Those in front are dark.
+                # The front propellers are dark.
                 _marker(
                     *(time, name, _CYLINDER, (2 * ROTOR, 2 * ROTOR, 0.004)),
                     *(dark if place[0] > 0.0 else light,),

@@ -27,12 +27,12 @@ from crazyflie_reports.usd_overlay import lay_over
 PAGE, FIGURES, EVENTS, DATA = "report.html", "figures.csv", "events.csv", "report.json"
 MCAP = "mcap"  #: Folder of the recordings as MCAP.
 
-#: A cell that begins with one of these is a formula for spreadsheets.
+#: First characters by which spreadsheets take a cell for a formula.
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 class ReportError(Exception):
-    """There is nothing to report on, or nowhere to write it; the text says why."""
+    """No recording can be read, or the report cannot be written; the text says why."""
 
 
 def flights_of(log: bag_log.BagLog) -> Iterator[Flight]:
@@ -46,7 +46,7 @@ def flights_of(log: bag_log.BagLog) -> Iterator[Flight]:
 
 
 class Report:
-    """A report on recordings, which grows with each that is added."""
+    """A report on recordings, to which recordings are added."""
 
     def __init__(self) -> None:
         self.recordings: list[dict[str, Any]] = []  #: As `report_page.page` takes them.
@@ -80,7 +80,7 @@ class Report:
         )
 
     def write(self, folder: Path) -> None:
-        """Write page and tables into a folder, which is made if it is not there."""
+        """Write page and tables into a folder, which is created if it does not exist."""
         names = (
             [[f.name, f.unit, f.needs, f.note] for f in self._flights[0][1]]
             if self._flights
@@ -117,7 +117,7 @@ class Report:
         (folder / DATA).write_text(json.dumps(tables, indent=1, allow_nan=False))
 
     def table(self) -> str:
-        """Return a line for each flight, with the figures that are not normal."""
+        """Return a line for each flight, with the abnormal figures."""
         lines = []
         for entry, found in self._flights:
             bad = [
@@ -134,19 +134,19 @@ def make(
     names: dict[str, str] | None = None,
     has_mcap: bool = False,
 ) -> list[str]:
-    """Write a report on recordings; return what went wrong with any of them.
+    """Write a report on recordings; return the errors.
 
     A path is a bag, a folder of bags that follow each other, or a log of a vehicle's micro SD card,
-    which is laid over the bag that it fits; for ``names`` see `bag_log.read`.
-    With ``has_mcap`` each recording is written as MCAP, too.
-    `ReportError`: none of the recordings can be read, or the folder cannot be written.
+    which is added to the bag that it matches; for ``names`` see `bag_log.read`. With ``has_mcap``
+    each recording is also written as MCAP. `ReportError`: none of the recordings can be read, or
+    the folder cannot be written.
     """
     report, problems, written = Report(), [], []
     logs: list[bag_log.BagLog] = []
-    on_board: list[bag_log.BagLog] = []  # Of vehicles' micro SD cards.
+    on_board: list[bag_log.BagLog] = []  # Logs of vehicles' micro SD cards.
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        # Beside the report, since /tmp may be in memory.
+        # Next to the report, since /tmp may be in memory.
         with tempfile.TemporaryDirectory(dir=folder) as place:
             for number, path in enumerate(paths):
                 try:
@@ -155,7 +155,7 @@ def make(
                     problems.append(str(error))
                     continue
                 for log in found:
-                    # Bags of several folders may have the same name.
+                    # Bags in different folders may have the same name.
                     if [each.name for each in paths].count(path.name) > 1:
                         log.name = str(path) + log.name.removeprefix(path.name)
                 (on_board if path.is_file() and is_usd_log(path) else logs).extend(found)
@@ -177,7 +177,7 @@ def make(
 
 
 def main() -> int:
-    """Make the report that the command line asks for; return the exit status."""
+    """Make a report by the command line; return the exit status."""
     roles = sorted({each.name for each in ROLES})
     parser = argparse.ArgumentParser(prog="flight_report", description=__doc__)
     parser.add_argument(
@@ -185,15 +185,15 @@ def main() -> int:
         nargs="+",
         type=Path,
         metavar="BAG",
-        help="of ROS 1, or of ROS 2 (*.mcap, *.db3), or a folder of bags that follow each other; "
-        "or a log of a vehicle's micro SD card, which is laid over the bag that it fits",
+        help="bag of ROS 1 or ROS 2 (*.mcap, *.db3), or a folder of consecutive bags; or a log "
+        "of a vehicle's micro SD card, which is added to the bag that it matches",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("flight_report"), help="folder of the report (%(default)s)"
     )
     parser.add_argument(
         "--topic", action="append", default=[], metavar="ROLE=NAME",
-        help=f"a topic of another name, below the vehicle's namespace; roles: {', '.join(roles)}",
+        help=f"other name of a topic, below the vehicle's namespace; roles: {', '.join(roles)}",
     )  # fmt: skip
     parser.add_argument(
         "--mcap", action="store_true", help="also write recordings for Foxglove and Lichtblick"
@@ -224,7 +224,7 @@ def _read(path, folder, names):
 
 
 def _new_folder(top, name):
-    """Return the folder of a recording's name, without what was in it."""
+    """Return the folder of a recording's name, emptied."""
     folder = top / re.sub(r"[^\w.-]+", "_", name).strip("._")
     if folder.exists():
         shutil.rmtree(folder)
@@ -247,6 +247,6 @@ def _write_csv(path, header, rows):
 
 
 def _cell(value):
-    """Return a value, or text that a spreadsheet takes for text."""
+    """Return a value, or a text that a spreadsheet does not take for a formula."""
     is_formula = isinstance(value, str) and value.startswith(_FORMULA)
     return f"'{value}" if is_formula else value

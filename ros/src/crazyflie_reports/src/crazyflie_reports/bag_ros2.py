@@ -1,8 +1,8 @@
 """Messages of ROS 2 bags: files of sqlite3 and of MCAP, read by PyPI's rosbags.
 
-rosbags executes code that it makes of message definitions (`Typestore.register`, `get_msgdef`), and
-its AnyReader takes those in the bag. Here a store has the definitions that rosbags brings, those
-that are installed, and those below; the ones in a bag are only parsed, and compared with them.
+rosbags executes code that it generates from message definitions (`Typestore.register`,
+`get_msgdef`), and its AnyReader uses those in the bag. Here a store has the definitions of rosbags,
+the installed ones, and those below; the ones in a bag are only parsed and compared with them.
 Formats: https://mcap.dev/spec, https://github.com/ros2/rosbag2.
 """
 
@@ -57,7 +57,8 @@ FOREIGN = {
     ),
 }
 
-_LARGEST_DEFINITION = 20_000  # Characters; the parser takes a time that grows with their square.
+# Largest length of a definition (characters): the parser's time grows with its square.
+_LARGEST_DEFINITION = 20_000
 _MCAP = b"\x89MCAP0\r\n"
 _CHUNK = 0x06  # The record of MCAP with compressed messages.
 _ZSTD = b"\x28\xb5\x2f\xfd"  # A message of CDR begins with 0.
@@ -69,7 +70,7 @@ _DECOMPRESSORS = {"zstd": zstd.ZstdDecompressor, "lz4": lz4.frame.LZ4FrameDecomp
 
 @cache
 def types() -> Typestore:
-    """Return the definitions that are known: of ROS 2 and of crazyswarm2; others are added."""
+    """Return the known definitions, of ROS 2 and of crazyswarm2; others are added later."""
     store = get_typestore(Stores.ROS2_JAZZY)
     for name, text in FOREIGN.items():
         store.register(get_types_from_msg(text, ros2_name(name)))
@@ -77,10 +78,10 @@ def types() -> Typestore:
 
 
 def known(datatype: str) -> bool:
-    """Tell whether there is a definition of a type ("package/Name"); adds an installed one."""
+    """Return whether a type ("package/Name") is defined; adds an installed definition."""
     name, store = ros2_name(datatype), types()
     if name not in store.fielddefs and (installed := roslib.message.get_message_class(datatype)):
-        # ROS 1's Header is another one.
+        # ROS 1's Header is different.
         parsed = get_types_from_msg(installed._full_text, name)
         store.register({k: v for k, v in parsed.items() if k not in store.fielddefs})
     return name in store.fielddefs
@@ -123,10 +124,10 @@ class Ros2Connection(Connection):
     def deserializer(self) -> Callable[[bytes], Any]:
         """Return what makes a message of its data.
 
-        `TopicError`: its type is not known here, or has other fields.
+        `TopicError`: the type is not known here, or has other fields.
         """
         if not known(self.datatype):
-            raise TopicError(f"{self.topic} is left out: no package here defines {self.datatype}")
+            raise TopicError(f"{self.topic} is omitted: no package here defines {self.datatype}")
         store, name = types(), ros2_name(self.datatype)
         if self.definition:
             try:
@@ -137,7 +138,7 @@ class Ros2Connection(Connection):
                 if other[each][1] != store.fielddefs[each][1]:
                     there, here = _fields(other[each]), _fields(store.fielddefs[each])
                     raise TopicError(
-                        f"{self.topic} is left out: {each} has the fields {there}; expected {here}"
+                        f"{self.topic} is omitted: {each} has the fields {there}; expected {here}"
                     )
         return lambda data: store.deserialize_cdr(data, name)
 
@@ -149,14 +150,14 @@ def _fields(definition):
 class Ros2BagFile:
     """A file of a ROS 2 bag, as `bag_file.BagFile` is one of ROS 1.
 
-    What is compressed as a whole is put into ``folder``. `BagError`: there is no such file, or it
-    cannot be read.
+    A file that is compressed as a whole is decompressed into ``folder``. `BagError`: the file does
+    not exist, or cannot be read.
     """
 
     def __init__(self, path: Path, folder: Path):
         self._path = path
         self.connections: list[Connection] = []
-        self.interruption = ""  #: Why reading has ended early; empty if it has not.
+        self.interruption = ""  #: Reason why reading has ended early; empty if it has not.
         self.size = path.stat().st_size
         self._expansion = Expansion(self.size)
         self._source = path
@@ -168,8 +169,8 @@ class Ros2BagFile:
             self._reader.open()
             index = getattr(self._reader.storage, "chunks", ())
             if {(c.chunk_start_offset, c.compression, c.compressed_size) for c in index} - checked:
-                raise ReaderError("its index has a chunk that the file has not")
-        except Exception as error:  # Whatever rosbags raises on a damaged file.
+                raise ReaderError("its index has a chunk that is not in the file")
+        except Exception as error:  # rosbags may raise any error on a damaged file.
             is_open = self._source.suffix == ".mcap" and not isinstance(error, ExpansionError)
             hint = "; mcap recover mends a file that was not closed" if is_open else ""
             raise BagError(
@@ -206,7 +207,7 @@ class Ros2BagFile:
                     progress(share)
         except ExpansionError as error:
             self.interruption = f"{self._path} is read in part: {error}"
-        except Exception as error:  # Whatever rosbags raises on a damaged file.
+        except Exception as error:  # rosbags may raise any error on a damaged file.
             self.interruption = f"{self._path} is damaged, and is read in part: {error}"
         finally:
             self._reader.close()
@@ -221,9 +222,10 @@ class Ros2BagFile:
         return target
 
     def _checked_chunks(self) -> set[tuple[int, str, int]]:
-        """Return place, compression and size of each chunk, none of which expands to too much.
+        """Return place, compression and size of each chunk, all within the limits.
 
-        rosbags decompresses each as a whole. `ExpansionError`: one, or all of them, expand to more.
+        rosbags decompresses each as a whole. `ExpansionError`: one chunk, or all together, exceed
+        the limit.
         """
         found = set()
         with self._source.open("rb") as file:
@@ -232,7 +234,7 @@ class Ros2BagFile:
                 kind, size = _RECORD.unpack(head)
                 begin = file.tell()
                 if begin + size > self._source.stat().st_size:
-                    break  # rosbags says so.
+                    break  # rosbags reports that itself.
                 if kind == _CHUNK:
                     data = file.read(size)
                     (length,) = struct.unpack_from("<I", data, 28)
@@ -242,6 +244,6 @@ class Ros2BagFile:
                         decompressor = _DECOMPRESSORS[name]()
                         for _ in self._expansion.pieces(decompressor, content):
                             pass
-                        content = decompressor.unused_data  # Of the next frame.
+                        content = decompressor.unused_data  # Size of the next frame.
                 file.seek(begin + size)
         return found

@@ -22,12 +22,12 @@ Row = Sequence[float]
 
 @dataclass(frozen=True)
 class Role:
-    """A series of numbers that topics of some names and types are for a vehicle."""
+    """A series of numbers of a vehicle, from topics of certain names and types."""
 
     name: str
     topics: str  #: Regular expression of the name below the vehicle's namespace.
     fields: tuple[str, ...]  #: Fields of a row.
-    rows: dict[str, Callable[[Any], Row]]  #: By type, what makes a row of a message.
+    rows: dict[str, Callable[[Any], Row]]  #: Type -> function that returns the row of a message.
 
 
 def pose_row(pose: Any) -> Row:
@@ -122,7 +122,7 @@ EVENT_TYPES = {
     "tf/tfMessage": r"tf",
 }
 
-#: Numbers behind the header: these frequent messages are decoded without an object.
+#: Counts of numbers behind the header: these frequent messages are decoded without an object.
 FLOATS = {
     "crazyflie_msgs/ControlStamped": 4,
     "crazyflie_msgs/PositionVelocityStateStamped": 6,
@@ -130,7 +130,7 @@ FLOATS = {
     "crazyflie_msgs/FullStateStamped": 12,
 }
 
-#: Roles of ROS 2 alone: those of crazyswarm2.
+#: Roles of ROS 2 only: those of crazyswarm2.
 _ROS2_ROLES = (
     Role(
         "reference",
@@ -162,7 +162,7 @@ class Topic:
     """How messages of a connection are read."""
 
     namespace: str  #: Namespace of the vehicle, without slashes at its ends.
-    role: Role | None  #: None for messages that are events.
+    role: Role | None  #: The series; None for messages that are events.
     #: ``decode(data)`` returns stamp (s, 0 without one), number in sequence, and a row or, without
     #: a role, the message.
     decode: Callable[[bytes], tuple[float, int, Any]]
@@ -188,7 +188,7 @@ def topic_of(connection: Connection, names: dict[str, str]) -> Topic | None:
 
 
 def expected() -> str:
-    """Return names and types of the topics of which a bag needs one for a flight."""
+    """Return names and types of topics, one of which a bag must have for a flight."""
     return "; ".join(
         f"{role.topics.replace('|', ' or ')} ({' or '.join(role.rows)})"
         for role in ROLES
@@ -218,7 +218,7 @@ def _decoder(connection, convert):
         header = getattr(message, "header", None)
         stamp = seconds(header.stamp) if header else 0.0
         if is_flat:
-            # A header, and a message of nothing but numbers.
+            # A header, and a message that has numbers only.
             _, message = _values(message)
             message = _values(message)
         return stamp, getattr(header, "seq", 0), convert(message)
@@ -227,7 +227,7 @@ def _decoder(connection, convert):
 
 
 def _values(message):
-    """Return the fields of a message of rosbags: its type and constants are attributes, too."""
+    """Return the fields of a message of rosbags, without its type and constants."""
     return tuple(v for name, v in vars(message).items() if name[0] != "_" and name.islower())
 
 

@@ -1,4 +1,4 @@
-"""Figures of a recorded flight, each with its unit and with what is normal."""
+"""Figures of a recorded flight, each with its unit and its normal range."""
 
 import math
 from collections.abc import Iterator
@@ -23,26 +23,28 @@ from crazyflie_reports.flight_record import (
 #: propellers are not ideal.
 HARDWARE_TOLERANCE = 0.05
 
-SHORTEST_HOVER = 1.0  #: A vehicle that leaves the hover point within this time, s, does not hover.
+#: Shortest time at the hover point (s): a vehicle that leaves it earlier does not hover.
+SHORTEST_HOVER = 1.0
 HOVER_TIME_LIMIT = (
     8.0  #: 1 s of open loop and 5 s of hover of the takeoff server, and 2 s more (s).
 )
 TRACKING_LIMIT = 0.2  #: Largest distance from a moving reference, m.
-DELAY_LIMIT = 0.02  #: 95 % of the controls follow the pose within this time (s).
+DELAY_LIMIT = 0.02  #: Time within which 95 % of the controls follow the pose (s).
 LEAST_RATE = 50.0  #: Lowest rate of states and controls; velocities are poor below it (Hz).
-#: Mean change of roll and pitch from one control to the next (rad). Of gains with enough margin;
-#: those at the limit of stability reach ten times as much.
+#: Mean change of roll and pitch from one control to the next (rad). It holds for gains with enough
+#: margin; those at the limit of stability reach ten times as much.
 CHANGE_LIMIT, HARDWARE_CHANGE_LIMIT = 0.01, 0.03
-SATURATED_LIMIT = 0.01  #: Share of controls that are at a limit.
+SATURATED_LIMIT = 0.01  #: Largest fraction of controls at a limit.
 _ROUNDING = 1e-6  #: Rounding error of a control that was sent in degrees (rad).
-_NO_TILT = np.empty((0, 2))  #: Roll and pitch of no control.
-#: Thrust in hover over g: a battery that sags takes a part, a wrong mass or thrust curve more.
+_NO_TILT = np.empty((0, 2))  #: Roll and pitch that no control has.
+#: Thrust in hover over g: a sagging battery explains a part, a wrong mass or thrust curve more.
 HOVER_LIMITS = (0.85, 1.15)
 LATENESS_LIMIT = (
-    0.25  #: Of roll and pitch behind their commands, s: the firmware's loops take 0.19.
+    #: Largest delay of roll and pitch behind their commands (s): the firmware's loops take 0.19 s.
+    0.25
 )
 _MAX_LATENESS, _LATENESS_STEP, _LEAST_POSES, _LEAST_CORRELATION = 0.5, 0.01, 200, 0.5
-LEAST_VOLTAGE = 3.2  #: Of one lithium polymer cell under load, V.
+LEAST_VOLTAGE = 3.2  #: Lowest voltage of one lithium polymer cell under load (V).
 
 _HOVER = "a takeoff, and a hover of 1 s at its reference"
 _TRACKING = "states and references while the controller flies"
@@ -59,8 +61,8 @@ class Figure:
     name: str
     unit: str
     value: float  #: NaN if it is not known.
-    needs: str  #: Topic or flight that is needed to know it.
-    #: minimum, maximum: What is normal, if that is limited.
+    #: Topic or flight from which it is known. minimum, maximum: Limits of the normal range, if any.
+    needs: str
     minimum: float = -math.inf
     maximum: float = math.inf
     note: str = ""  #: Explanation for readers.
@@ -72,7 +74,7 @@ class Figure:
 
     @property
     def normal(self) -> str:
-        """What is normal, in words; empty if nothing is said about it."""
+        """The normal range in words; empty without one."""
         if math.isfinite(self.minimum) and math.isfinite(self.maximum):
             return f"{self.minimum:.3g} to {self.maximum:.3g} {self.unit}"
         if math.isfinite(self.minimum):
@@ -81,7 +83,7 @@ class Figure:
 
 
 def hover_point(flight: Flight) -> tuple[float, float, float] | None:
-    """Return to where a takeoff has led (m): the reference with which it was flying."""
+    """Return the end point of a takeoff (m): the reference at the beginning of the flight."""
     reference = flight.record.reference
     before = reference.times <= flight.record.events["flying"] + 0.5
     if not before.any() or flight.phases[0].name != "taking off":
@@ -115,7 +117,7 @@ def _hover(flight: Flight) -> Iterator[Figure]:
         try:
             mean, largest = record.hover_error(point, min(HOVER_WINDOW, end - begin))
         except ValueError:
-            pass  # The states had ended.
+            pass  # The states had ended before.
     yield Figure("time to hover", "s", time, _HOVER, maximum=HOVER_TIME_LIMIT)
     yield Figure("overshoot", "mm", 1e3 * over, _HOVER, maximum=1e3 * OVERSHOOT_LIMIT)
     yield Figure("hover error, mean", "mm", 1e3 * mean, _HOVER, maximum=1e3 * tolerance)
@@ -124,7 +126,7 @@ def _hover(flight: Flight) -> Iterator[Figure]:
 
 def _tracking(flight: Flight) -> Iterator[Figure]:
     times, errors = flight.record.tracking_errors()
-    # With the controller: takeoff and landing have other references, or none.
+    # While the controller flies: takeoff and landing have other references, or none.
     phases = [each for each in flight.phases if each.name == "flying"]
     flown = np.any([(times >= p.start) & (times <= p.end) for p in phases], axis=0)
     errors = 1e3 * errors[flown] if phases else errors[:0]
@@ -171,7 +173,7 @@ def _motion(flight: Flight) -> Iterator[Figure]:
     yield Figure("duration", "s", flight.end - flight.start, "a flight")
     yield Figure("height, maximum", "m", _max(state[:, 2]), _STATE)
     yield Figure("speed, maximum", "m/s", _max(speed), "velocities in flight")
-    # Of roll or pitch; a control that is limited has the limit itself.
+    # Largest roll or pitch; a limited control has exactly the limit.
     degrees, limit = (round(math.degrees(each), 3) for each in (_max(tilt), MAX_TILT))
     yield Figure(
         "tilt commanded, maximum",
@@ -186,10 +188,10 @@ def _motion(flight: Flight) -> Iterator[Figure]:
 
 
 def _controls(flight: Flight) -> Iterator[Figure]:
-    """Return how restless the controls are while the controller flies."""
+    """Return the mean changes of the controls while the controller flies."""
     phases = [each for each in flight.phases if each.name == "flying"]
     parts = [flight.record.final_control.between(each.start, each.end) for each in phases]
-    # From one phase to the next nothing changes.
+    # Changes between two phases are not included.
     changes = np.concatenate([np.abs(np.diff(each[:, :2], axis=0)) for each in parts] or [_NO_TILT])
     tilt = np.concatenate([np.abs(each[:, :2]).max(axis=1) for each in parts] or [_NO_TILT[:, 0]])
     thrust = np.concatenate([each[:, 3] for each in parts] or [_NO_TILT[:, 0]])
@@ -202,7 +204,7 @@ def _controls(flight: Flight) -> Iterator[Figure]:
 
 
 def _model(flight: Flight) -> Iterator[Figure]:
-    """Return what a flight says about the model of the vehicle: its hover, and how late it is."""
+    """Return figures about the model of the vehicle: its thrust in hover, and its lag."""
     phases = [each for each in flight.phases if each.name == "flying"]
     parts = [flight.record.final_control.between(each.start, each.end) for each in phases]
     thrust = np.concatenate([each[:, 3] for each in parts] or [_NO_TILT[:, 0]])
@@ -220,9 +222,9 @@ def _model(flight: Flight) -> Iterator[Figure]:
 
 
 def _lateness(flight, start, end):
-    """Return by how much roll and pitch follow their commands (s), by the correlation of both.
+    """Return the delay of roll and pitch behind their commands (s), by their correlation.
 
-    NaN if they do not: without motion, noise is more than the commands.
+    NaN without a correlation: without motion, noise exceeds the commands.
     """
     poses = flight.attitude[(flight.attitude[:, 0] >= start) & (flight.attitude[:, 0] <= end)]
     control = flight.record.final_control
@@ -257,7 +259,7 @@ def _loop(flight: Flight) -> Iterator[Figure]:
         )
     for name, series in (("state", flight.record.state), ("control", flight.record.final_control)):
         times = _part(series, flight)[:, 0]
-        # From the first one to the end of the flight, whether it came until then or not.
+        # From the first message to the end of the flight, even if the messages ended earlier.
         steps = np.diff([*times, flight.end]) if len(times) else times
         rate = 1.0 / float(steps.mean()) if steps.any() else math.nan
         yield Figure(f"{name} rate", "Hz", rate, f"{name}s in flight", minimum=LEAST_RATE)

@@ -25,15 +25,15 @@ from crazyflie_utils.vectors import to_vector
 
 
 class FlightError(Exception):
-    """The flight could not be flown; the text says what went wrong."""
+    """The flight could not be flown; the text names the cause."""
 
 
 class FlightOperator:
     """Takes off, hovers and lands through a vehicle's services, and records the flight.
 
-    The process is not started yet; where several operators share it, the last one does (``start``).
-    ``namespace`` is that of the vehicle's topics and services; nothing may take longer than
-    ``limit``, s of the machine's clock.
+    The process is not started yet; if several operators share it, the last one starts it
+    (``start``). ``namespace`` is that of the vehicle's topics and services; nothing may take longer
+    than ``limit``, s of the machine's clock.
     """
 
     def __init__(
@@ -58,12 +58,12 @@ class FlightOperator:
 
     @property
     def position(self) -> NDArray[np.float64]:
-        """Where the vehicle was last, m, shape (3,)."""
+        """Last position of the vehicle, m, shape (3,)."""
         return self.record.state.last[:3]
 
     @property
     def time(self) -> float:
-        """Of the latest state, s."""
+        """Time of the latest state, s."""
         return self.record.state.last_time
 
     def finish(self) -> FlightRecord:
@@ -88,14 +88,14 @@ class FlightOperator:
         self._wait_for(lambda: state.last_time >= end, "states stopped coming")
 
     def refer_to(self, point: Sequence[float]) -> None:
-        """Publish a point (x, y, z), m, as reference, to be at rest there."""
+        """Publish a point (x, y, z), m, as a reference at rest."""
         x, y, z = map(float, point)
         reference = PositionVelocityStateStamped(state=PositionVelocityState(x=x, y=y, z=z))
         reference.header.stamp = self._handle.stamp()
         self._reference.publish(reference)
 
     def land(self) -> None:
-        """Call land and wait for its answer, and for what the vehicle does then."""
+        """Call land and wait for its answer, and for the end of the motion."""
         self._call("land", "landed")
         self.hover(0.5)
 

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 STATE_FIELDS = ("x", "y", "z", "x_dot", "y_dot", "z_dot", "yaw")
 CONTROL_FIELDS = ("roll", "pitch", "yaw_dot", "thrust")
 
-GROUND_TOLERANCE = 0.01  #: A vehicle below this height stands on the ground, m.
-GAP_LIMIT = 0.1  #: A vehicle without a new state for longer than this is not controlled (s).
-_LONG = 3.0  # A series with fewer samples has a gap where it pauses for this many periods.
-AT_POINT = 0.001  #: References closer to a point than this lead to it, m.
+GROUND_TOLERANCE = 0.01  #: Height below which a vehicle is on the ground (m).
+GAP_LIMIT = 0.1  #: Time without a new state after which a vehicle is not controlled (s).
+_LONG = 3.0  # Number of periods of a pause that is a gap in a slower series.
+AT_POINT = 0.001  #: Distance of references from a point below which they lead to it (m).
 
 HOVER_TOLERANCE = 0.01  #: Largest distance from the hover point of a good flight, m.
 HOVER_WINDOW = 5.0  #: Time before the end of the hover in which its error is measured (s).
@@ -23,9 +23,9 @@ TOUCHDOWN_LIMIT = 0.5  #: Fastest touchdown of a good flight, m/s.
 
 
 def gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell which steps of times (s), shape (n,), are gaps; shape (n - 1,), or (0,) without times.
+    """Return which steps of times (s), shape (n,), are gaps; shape (n - 1,), or (0,) without times.
 
-    Nothing is known of what was in a gap. It is longer than `GAP_LIMIT` and than three usual steps.
+    The motion in a gap is not known. A gap is longer than `GAP_LIMIT` and than three usual steps.
     """
     steps = np.diff(times)
     return steps > max(GAP_LIMIT, _LONG * float(np.median(steps)) if len(steps) else 0.0)
@@ -51,7 +51,7 @@ class Series:
 
     def append(self, time: float, row: ArrayLike) -> None:
         """Add a row, shape (len(fields),), at ``time`` (s)."""
-        # In this order, so that each time has its row.
+        # Appended in this order, so that each time has its row.
         self._rows.append(row)
         self._times.append(time)
 
@@ -92,13 +92,14 @@ class Series:
 class FlightRecord:
     """Messages and events of one flight; times in s of ROS time."""
 
-    #: state, final_control, takeoff_control, reference: What was published on these topics.
+    #: state, final_control, takeoff_control, reference: Messages of these topics.
     state: Series = field(default_factory=lambda: Series(STATE_FIELDS))
     final_control: Series = field(default_factory=lambda: Series(CONTROL_FIELDS))
     takeoff_control: Series = field(default_factory=lambda: Series(CONTROL_FIELDS))
     reference: Series = field(default_factory=lambda: Series(STATE_FIELDS[:6]))
-    toggles: list[float] = field(default_factory=list)  #: When in_flight was toggled.
-    #: When something was done: "takeoff" and "land" (called), "flying" and "landed" (answered).
+    #: Times at which in_flight was toggled. Times of events: "takeoff" and "land" (called),
+    #: "flying" and "landed" (answered).
+    toggles: list[float] = field(default_factory=list)
     events: dict[str, float] = field(default_factory=dict)
 
     def position_error(self, point: ArrayLike) -> NDArray[np.float64]:
@@ -106,7 +107,7 @@ class FlightRecord:
         return np.linalg.norm(self.state.values[:, :3] - np.asarray(point), axis=1)
 
     def hover_interval(self, point: ArrayLike) -> tuple[float, float]:
-        """Return from when and until when references led to a point (m), s.
+        """Return begin and end of the time in which references led to a point (m), s.
 
         From the end of the takeoff until /land was called at the latest.
         """
@@ -121,9 +122,9 @@ class FlightRecord:
         return begin, end
 
     def tracking_errors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return times (s) and distances (m) of states from the references of then, shape (n,).
+        """Return times (s) and distances (m) of states from their references, shape (n,).
 
-        Of the states for which a reference has come before.
+        States before the first reference are not included.
         """
         times = self.state.times
         newest = np.searchsorted(self.reference.times, times, side="right") - 1
@@ -133,7 +134,7 @@ class FlightRecord:
         return times[known], np.linalg.norm(states - references, axis=1)
 
     def time_to_hover(self, point: ArrayLike, tolerance: float) -> float:
-        """Return how long after the call of /takeoff the vehicle was at a point to stay, s.
+        """Return the time from the call of /takeoff until the vehicle stays at a point, s.
 
         From then on until the end of `hover_interval` it is within ``tolerance`` of the point, m;
         NaN when it never stayed.
@@ -146,7 +147,7 @@ class FlightRecord:
         return float(times[first] - self.events["takeoff"])
 
     def overshoot(self, point: ArrayLike) -> float:
-        """Return how far the vehicle rose above a hover point (m) until it left it, at least 0."""
+        """Return the overshoot above a hover point (m), at least 0."""
         times, height = self.state.times, np.asarray(point)[2]
         until = self.state.column("z")[times <= self.hover_interval(point)[1]]
         return max(0.0, float(until.max(initial=height)) - float(height))
@@ -165,8 +166,8 @@ class FlightRecord:
     def touchdown_speed(self) -> float:
         """Return the downward speed at which the vehicle met the ground (m/s).
 
-        The fastest of the last tenth of a second above `GROUND_TOLERANCE`. ValueError: it did not
-        come down, or no velocity is known there.
+        The fastest of the last tenth of a second above `GROUND_TOLERANCE`. ValueError: the vehicle
+        did not come down, or no velocity is known there.
         """
         times, heights = self.state.times, self.state.column("z")
         descending = np.flatnonzero((times >= self.events["land"]) & (heights > GROUND_TOLERANCE))
@@ -203,7 +204,7 @@ class FlightReport:
     """Figures of one flight from /takeoff to /land; NaN if it has no hover or no touchdown."""
 
     time_to_hover: float  #: Time from /takeoff until it stayed within `HOVER_TOLERANCE` (s).
-    overshoot: float  #: Above the hover height, m.
+    overshoot: float  #: Overshoot above the hover height, m.
     #: hover_error_mean, hover_error_max: Distance from the hover point at the end of the hover, m.
     hover_error_mean: float
     hover_error_max: float
@@ -235,7 +236,7 @@ class FlightReport:
         )
 
     def complaints(self) -> list[str]:
-        """Return what was bad about the flight, a sentence each; empty for a good one."""
+        """Return the faults of the flight, a sentence each; empty for a good one."""
         checks = [
             (
                 self.hover_error_max <= HOVER_TOLERANCE,

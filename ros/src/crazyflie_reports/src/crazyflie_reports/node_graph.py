@@ -1,4 +1,4 @@
-"""Draws the nodes and topics of the software example, or of what runs.
+"""Draws the nodes and topics of the software example, or of the running graph.
 
 Nodes are ovals, topics boxes; an arrow is a registration of a publisher or subscriber with the
 master.
@@ -32,8 +32,7 @@ EXAMPLE = {
 
 _LIMIT = 60.0
 
-#: A graph that has not changed for this long, in s, is complete: nodes register their topics one by
-#: one.
+#: Time without changes after which a graph is complete (s): nodes register their topics one by one.
 _QUIET = 2.0
 
 
@@ -58,7 +57,7 @@ def dot(published: Registrations, subscribed: Registrations) -> str:
 def running_graph(expected: set[str]) -> tuple[Registrations, Registrations]:
     """Return publications and subscriptions once all ``expected`` nodes have registered theirs.
 
-    TimeoutError: they are not, after some time.
+    TimeoutError: registrations are missing after some time.
     """
     master = rosgraph.Master("/node_graph")
     deadline = time.monotonic() + _LIMIT
@@ -79,7 +78,7 @@ def running_graph(expected: set[str]) -> tuple[Registrations, Registrations]:
 def example_graph() -> tuple[Registrations, Registrations]:
     """Launch the software example, and return its publications and subscriptions.
 
-    TimeoutError: not all nodes are there after some time.
+    TimeoutError: nodes are missing after some time.
     """
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "sw_hover.log"
@@ -92,16 +91,16 @@ def example_graph() -> tuple[Registrations, Registrations]:
 
 
 def main() -> int:
-    """Draw the example, or what runs; return the exit status."""
+    """Draw the example, or the running graph; return the exit status."""
     parser = argparse.ArgumentParser(prog="run graph", description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("docs/images/sw_hover_graph.svg"))
     parser.add_argument(
-        "--running", action="store_true", help="draw what runs; nothing is launched"
+        "--running", action="store_true", help="draw the running graph; nothing is launched"
     )
     arguments = parser.parse_args()
     path = arguments.out.resolve()
     if arguments.running and not rosgraph.is_master_online():
-        print(f"no ROS master at {rosgraph.get_master_uri()}: nothing runs", file=sys.stderr)
+        print(f"no ROS master at {rosgraph.get_master_uri()}: no graph is running", file=sys.stderr)
         return 1
     try:
         graph = dot(*(running_graph(set()) if arguments.running else example_graph()))

@@ -1,7 +1,7 @@
 """Records the topics of a flight, and all parameters, into a folder with the date as its name.
 
-rosbag does it, in a process of its own at low priority: what goes wrong with it, such as a full
-disk, leaves the flight alone.
+rosbag records in a separate process at low priority: its failures, such as a full disk, do not
+affect the flight.
 """
 
 import argparse
@@ -17,7 +17,8 @@ import roslib.packages
 import rosparam
 import rospkg
 
-#: Regular expression of what is recorded: what examples and drivers document, without images.
+#: Regular expression of the recorded topics: those that examples and drivers document, without
+#: images.
 TOPICS = (
     r"/tf(_static)?|/diagnostics|/rosout|/flights|(/.*)?/("
     r"(full_)?state|state/full_state|ref(/.*)?|ref_descent|control/(lqr|takeoff|merged|final)|in_flight(_.*)?"
@@ -31,10 +32,10 @@ PARAMETERS = "parameters.yaml"
 
 
 def record(folder: Path, topics: str, ros_arguments: list[str]) -> int:
-    """Record until the process is told to stop; say what there is then; return the exit status.
+    """Record until the process is told to stop; print a summary; return the exit status.
 
-    The folder is made if it is not there; ``topics`` is a regular expression; the arguments for the
-    recording node are its name and remappings.
+    The folder is created if it does not exist; ``topics`` is a regular expression; the arguments
+    for the recording node are its name and remappings.
     """
     folder.mkdir(parents=True, exist_ok=True)
     rosparam.dump_params(str(folder / PARAMETERS), "/")
@@ -53,10 +54,10 @@ def record(folder: Path, topics: str, ros_arguments: list[str]) -> int:
 
 
 def main() -> int:
-    """Record as the command line asks; return the exit status."""
+    """Record by the command line; return the exit status."""
     parser = argparse.ArgumentParser(prog="record_flight", description=__doc__)
-    parser.add_argument("--folder", default="", help="of all recordings (~/.ros/flights)")
-    parser.add_argument("--topics", default="", help="regular expression of more topics")
+    parser.add_argument("--folder", default="", help="folder of all recordings (~/.ros/flights)")
+    parser.add_argument("--topics", default="", help="regular expression of additional topics")
     options, ros_arguments = parser.parse_known_args()
     top = Path(options.folder or Path(rospkg.get_ros_home()) / "flights").expanduser()
     folder = top / f"{datetime.now():%Y-%m-%d_%H-%M-%S}"

@@ -15,22 +15,22 @@ from crazyflie_reports.flight_record import gaps
 
 Array = NDArray[np.float64]
 
-#: Largest and smallest number of points of a curve, and of those of all flights, about.
+#: Largest and smallest number of points of a curve, and approximate number for all flights.
 MOST_POINTS, LEAST_POINTS, ALL_POINTS = 1000, 100, 40_000
-FRAME_PERIOD = 0.04  #: Period of the replay's poses, where points are enough (s).
-MAX_EVENTS = 300  #: That a flight's list shows.
+FRAME_PERIOD = 0.04  #: Period of the replay's poses, if the number of points allows it (s).
+MAX_EVENTS = 300  #: Largest number of entries in a flight's list.
 
 
 def points_of(vehicles: int) -> int:
-    """Return how many points a curve of a report on so many vehicles has."""
+    """Return the number of points of a curve in a report on a number of vehicles."""
     return int(np.clip(ALL_POINTS // max(1, vehicles), LEAST_POINTS, MOST_POINTS))
 
 
 def decimated(times: Array, values: Array, points: int) -> tuple[Array, Array]:
-    """Return times and values, shape (n,), with at most about ``points`` left.
+    """Return times and values, shape (n,), reduced to about ``points``.
 
-    Of each interval the smallest and the largest value are left, so that peaks are, and one that is
-    NaN, so that gaps are.
+    The smallest and the largest value of each interval are kept, which keeps peaks, and one NaN,
+    which keeps gaps.
     """
     if len(values) <= points:
         return times, values
@@ -45,7 +45,7 @@ def decimated(times: Array, values: Array, points: int) -> tuple[Array, Array]:
 
 
 def flight_data(flight: Flight, found: list[Figure], points: int) -> dict[str, Any]:
-    """Return what the page knows of a flight with its figures; times count from its start, s."""
+    """Return the page's data of a flight with its figures; times are from its start, s."""
     events = flight.events[:MAX_EVENTS]
     return {
         "vehicle": flight.vehicle,
@@ -75,7 +75,7 @@ def page(recordings: list[dict[str, Any]], names: list[list[str]]) -> str:
     folder = Path(rospkg.RosPack().get_path("crazyflie_reports")) / "page"
     data = json.dumps({"recordings": recordings, "figures": names}, allow_nan=False)
     scripts = "".join((folder / f"{name}.js").read_text() for name in ("plots", "replay", "report"))
-    # Its first line is its address: the page has its license in that place.
+    # The first line of the script is its address, which the page replaces by its license.
     library = (folder / "uplot" / "uPlot.iife.min.js").read_text().partition("\n")[2]
     parts = {
         "style": (folder / "uplot" / "uPlot.min.css").read_text(),
@@ -136,7 +136,7 @@ def _plots(flight, points):
 def _curve(name, times, values, start, points):
     known = np.isfinite(values)
     times, values = times[known], values[known]
-    # A reference is one until the next.
+    # A reference is valid until the next one.
     if not name.endswith("reference"):
         ends = np.flatnonzero(gaps(times)) + 1
         times = np.insert(times, ends, (times[ends - 1] + times[ends]) / 2.0)
@@ -182,7 +182,7 @@ def _path(flight, points):
 
 
 def _in_gaps(moments, times):
-    """Tell which moments are in gaps of times, s."""
+    """Return which moments are in gaps of times, s."""
     step = np.searchsorted(times, moments, side="right") - 1
     inside = (step >= 0) & (step < len(times) - 1)
     found = np.zeros(len(moments), dtype=bool)

@@ -102,14 +102,14 @@ _ROWS: dict[str, Callable[[Values], Row | None]] = {
 class UsdConnection(Connection):
     """A role for which the events of a kind have the variables."""
 
-    #: vehicle, role: What the file is called; what the values are.
+    #: vehicle, role: Name of the vehicle, that of the file; role of the values.
     vehicle: str
     role: Role
 
     encoding: ClassVar[str] = "usd"
 
     def entry(self) -> Topic:
-        """Return how rows of `UsdLogFile.messages` are read, which are made already."""
+        """Return the reader for rows of `UsdLogFile.messages`, which need no decoding."""
         return Topic(self.vehicle, self.role, lambda row: (0.0, 0, row))
 
 
@@ -121,18 +121,18 @@ class _Kind:
 
 
 def is_usd_log(path: Path) -> bool:
-    """Tell whether a file begins as these logs do."""
+    """Return whether a file begins like these logs."""
     with path.open("rb") as file:
         return file.read(1) == bytes([MAGIC])
 
 
 class UsdLogFile:
-    """A log, as `bag_file.BagFile` is a bag. `BagError`: its head cannot be read."""
+    """A log, as `bag_file.BagFile` is a bag. `BagError`: the file's header cannot be read."""
 
     def __init__(self, path: Path):
         self._path = path
         self.connections: list[Connection] = []
-        self.interruption = ""  #: Why reading has ended early, or what is wrong with the file.
+        self.interruption = ""  #: Reason why reading has ended early, or fault of the file.
         self._data = path.read_bytes()
         self.size = len(self._data)
         try:
@@ -142,7 +142,7 @@ class UsdLogFile:
             self._place = 5
             self._kinds = dict(self._kind() for _ in range(count))
         except (struct.error, ValueError) as error:
-            raise BagError(f"{path}: the head of this log is damaged: {error}") from None
+            raise BagError(f"{path}: the header of this log is damaged: {error}") from None
         if not self.connections:
             there = ", ".join(name for kind in self._kinds.values() for name in kind.names)
             raise BagError(

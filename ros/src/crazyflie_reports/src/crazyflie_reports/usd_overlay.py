@@ -1,4 +1,4 @@
-"""Where a log of a vehicle's micro SD card belongs in a recording: its attitudes say so."""
+"""Finds the place of a micro SD card's log in a recording by its attitudes."""
 
 from dataclasses import dataclass
 
@@ -11,21 +11,21 @@ from crazyflie_reports.bag_log import BagLog, Source
 
 PERIOD = 0.01  #: Sampling period of the attitudes that are compared (s).
 LEAST_OVERLAP = 3.0  #: Shortest time that a log and a recording have in common (s).
-LEAST_CORRELATION = 0.6  #: Lowest correlation of roll and pitch that counts.
+LEAST_CORRELATION = 0.6  #: Lowest accepted correlation of roll and pitch.
 
 
 @dataclass(frozen=True)
 class Position:
-    """Where a log is in a recording: the time of its time 0 (s), and the correlation there."""
+    """Place of a log in a recording: time of the log's time 0 (s), and correlation."""
 
     offset: float
     correlation: float
 
 
 def position(measured: NDArray[np.float64], recorded: NDArray[np.float64]) -> Position | None:
-    """Return where roll and pitch of a log correlate most with those of a recording.
+    """Return the place at which roll and pitch of a log correlate best with those of a recording.
 
-    Both have times (s), roll and pitch (rad), shape (n, 3). None if they overlap nowhere for
+    Both have times (s), roll and pitch (rad), shape (n, 3). None if they never overlap for
     `LEAST_OVERLAP`. The correlation is that of the common part, with both means removed from the
     whole; the offset is between two samples by a parabola.
     """
@@ -62,10 +62,10 @@ def _resampled(rows):
 
 
 def lay_over(usd: BagLog, logs: list[BagLog]) -> bool:
-    """Add the series of a log to the recording, next to the vehicle that it fits best.
+    """Add the series of a log to the recording, next to the vehicle that it matches best.
 
-    Its times become those of the recording, and it has the phases of the vehicle. A remark says
-    where it is; or, when it fits nowhere and False is returned, why.
+    Its times become those of the recording, and it has the phases of the vehicle. A remark states
+    the place; or, if nothing matches and False is returned, the reason.
     """
     own = next(vehicles(usd), None)
     found = [

@@ -1,8 +1,8 @@
 #!/usr/bin/env python
-"""Takeoff, a short way and landing by cmd_hover; needs a flow deck, or a position from outside.
+"""Takeoff, a short flight and landing by cmd_hover; needs a flow deck, or an external position.
 
-Usage: Hover.py [PREFIX ...], one for each vehicle; by default crazyflie. It is plain rospy, as a
-script of one's own is: copy it, and change what `fly` does.
+Usage: Hover.py [PREFIX ...], one for each vehicle; by default crazyflie. The script uses plain
+rospy, like your own: copy it, and change `fly`.
 """
 
 import math
@@ -14,15 +14,16 @@ from std_msgs.msg import Empty
 
 from crazyflie_driver.msg import Hover
 
-SPEED = 0.2  #: Of all ways, m/s.
+SPEED = 0.2  #: Speed of all moves (m/s).
 RATE = 20.0  #: Setpoints a second; the firmware gives up after 0.5 s without one.
 
 
 class Crazyflie:
     """A vehicle that flies by velocities and a height.
 
-    Every method blocks until the vehicle should be there, and repeats its setpoints meanwhile. If
-    the next one does not follow at once, and when the script is ended in flight, the vehicle falls.
+    Every method blocks until the vehicle should have arrived, and repeats its setpoints meanwhile.
+    The vehicle falls if the next method does not follow at once, or if the script is ended in
+    flight.
 
     The constructor waits until the driver subscribes below the prefix.
     """
@@ -38,7 +39,8 @@ class Crazyflie:
     def goTo(self, x: float, y: float, zDistance: float, yaw: float) -> None:  # noqa: N802, N803
         """Fly straight to a point at `SPEED`, keeping the heading; the yaw is not used.
 
-        The point is x ahead and y to the left of here, at a height above what is below, m.
+        The point is x ahead and y to the left of the vehicle, at a height above the surface below,
+        m.
         """
         start, climb = self._height, zDistance - self._height
         count = math.ceil(math.hypot(x, y, climb) / SPEED * RATE)
@@ -68,7 +70,7 @@ class Crazyflie:
 
 
 def fly(prefix: str) -> None:
-    """Take one vehicle up, ahead and to the left, and down."""
+    """Fly one vehicle up, ahead and to the left, and down."""
     vehicle = Crazyflie(prefix)
     vehicle.takeOff(0.4)
     vehicle.hold(1.0)
@@ -87,5 +89,5 @@ if __name__ == "__main__":
         thread.start()
     for thread in threads:
         thread.join()
-    # What was published last is still on its way.
+    # The last message may still be in transit.
     rospy.sleep(0.2)

@@ -87,7 +87,7 @@ def test_needs_a_terminal(monkeypatch):
         monkeypatch.setattr("sys.stdin", nothing)
         process = FakeProcess()
         assert not process.launch(KeyboardNode(), "/keyboard")
-    assert "no terminal" in process.logged("error")[0]
+    assert "not a terminal" in process.logged("error")[0]
 
 
 def test_the_deflection_may_be_changed(terminal):

@@ -49,7 +49,7 @@ def test_a_heading_empty_lines_and_a_last_comma_do_not_matter(path):
         ([], "no pieces"),
         ([LINE, LINE[:-1]], "line 2 has 32 columns; expected 33"),
         ([[*LINE, "0"]], "line 1 has 34 columns"),
-        ([LINE, ["one", *LINE[1:]]], "line 2: 'one' is no finite number"),
+        ([LINE, ["one", *LINE[1:]]], "line 2: 'one' is not a finite number"),
         ([[*LINE[:-1], "nan"]], "line 1: 'nan'"),
         ([[*LINE[:-1], "inf"]], "line 1: 'inf'"),
         ([["0", *LINE[1:]]], "line 1: the duration is 0"),
@@ -64,9 +64,9 @@ def test_a_bad_file_is_refused(path, lines, reason):
 @pytest.mark.parametrize(
     ("first", "reason"),
     [
-        (["1_5", *LINE[1:]], "line 1: '1_5' is no finite number"),
-        (["nan", *LINE[1:]], "line 1: 'nan' is no finite number"),
-        (["٣", *LINE[1:]], "line 1: '٣' is no finite number"),
+        (["1_5", *LINE[1:]], "line 1: '1_5' is not a finite number"),
+        (["nan", *LINE[1:]], "line 1: 'nan' is not a finite number"),
+        (["٣", *LINE[1:]], "line 1: '٣' is not a finite number"),
         ([*LINE[:-1], "7" * 1000], "line 1: '777"),
         ([*LINE[:-1], "x" * 1000], "line 1: 'xxx"),
         ([*LINE[:-1], "x" * 200_000], "line 1: field larger than field limit"),

@@ -25,7 +25,7 @@ from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 
 _WORLD = "world"  #: The fixed frame, unless the script's parameter ~frames/fixed says otherwise.
-_TF_LIMIT = 10.0  #: Longest time until a position, or a voltage, is received, s.
+_TF_LIMIT = 10.0  #: Timeout of a position or a voltage (s).
 #: Age limit of a position (s): tf keeps the last one of a vehicle that is not tracked any more.
 _MAX_POSITION_AGE = 0.5
 
@@ -55,7 +55,7 @@ _SERVICES = {
 
 
 class Crazyflie:
-    """A vehicle of the driver, or a simulated one; the constructor blocks until it is there.
+    """A vehicle of the driver, or a simulated one; the constructor blocks until it is available.
 
     A command returns when the vehicle has received it, not when it has been carried out. Every
     method raises `rospy.ServiceException` when the driver refuses. ``prefix`` is the vehicle's
@@ -63,7 +63,7 @@ class Crazyflie:
     tf.TransformListener or tf2_ros.Buffer, which is asked for the frame ``prefix``.
     """
 
-    # The names of arguments, here and below, are those of scripts that exist.
+    # The names of arguments, here and below, are those that existing scripts use.
 
     _world = _WORLD
 
@@ -81,7 +81,8 @@ class Crazyflie:
             name: rospy.Publisher(f"{top}/{name}", message_type, queue_size=1)
             for name, message_type in _SETPOINTS.items()
         }
-        # Answered when the driver has read the parameters; what is set earlier is overwritten.
+        # Answered when the driver has read the parameters; values that are set earlier are
+        # overwritten.
         self._call("update_params", [])
 
     def _call(self, service, *arguments):
@@ -112,7 +113,7 @@ class Crazyflie:
         remainValidMillisecs: int = 100,  # noqa: N803
         groupMask: int = 0,  # noqa: N803
     ) -> None:
-        """Go back from setpoints to commands; the last setpoint counts for some ms more."""
+        """Return from setpoints to commands; the last setpoint remains valid for some ms."""
         self._call("notify_setpoints_stop", groupMask, remainValidMillisecs)
 
     def goTo(  # noqa: N802
@@ -201,7 +202,7 @@ class Crazyflie:
         yaw: float,
         omega: Sequence[float],
     ) -> None:
-        """Be at a position, m, with velocity and acceleration, yaw (rad) and body rates (rad/s)."""
+        """Track a position, m, with velocity and acceleration, yaw (rad) and body rates (rad/s)."""
         message = FullState(
             pose=Pose(Point(*pos), Quaternion(*quaternion_from_rpy(0.0, 0.0, yaw))),
             twist=Twist(Vector3(*vel), Vector3(*omega)),
@@ -210,11 +211,11 @@ class Crazyflie:
         self._send("cmd_full_state", message)
 
     def cmdPosition(self, pos: Sequence[float], yaw: float = 0.0) -> None:  # noqa: N802
-        """Be at a position, m, and a yaw, rad."""
+        """Track a position, m, and a yaw, rad."""
         self._send("cmd_position", Position(None, *pos, math.degrees(yaw)))
 
     def cmdVelocityWorld(self, vel: Sequence[float], yawRate: float) -> None:  # noqa: N802, N803
-        """Fly at a velocity, m/s, and turn at a rate, degrees/s, as the driver has it."""
+        """Fly at a velocity, m/s, and turn at a rate, degrees/s, with the driver's sign."""
         self._send("cmd_velocity_world", VelocityWorld(None, Vector3(*vel), yawRate))
 
     def cmdStop(self) -> None:  # noqa: N802
@@ -242,12 +243,12 @@ class Crazyflie:
 
 
 def _commander(prefix):
-    """Return the namespace of a vehicle's services; blocks until there is one."""
+    """Return the namespace of a vehicle's services; blocks until the services exist."""
     tops = (f"{prefix}/{_COMMANDER}", prefix)
     rospy.loginfo("waiting for update_params below %s or %s", *map(rospy.resolve_name, tops))
     while True:
         for top in tops:
-            # It is not there yet; the wait is logged above.
+            # The service does not exist yet; the wait is logged above.
             with contextlib.suppress(rospy.ROSException):
                 rospy.wait_for_service(f"{top}/update_params", 0.2)
                 return top

@@ -17,7 +17,7 @@ class ExternalParameters(Parameters):
 
 
 class _ExternalNode(Node):
-    """Pass a measurement on to ``output``, with its stamp and frame; drop what is not finite."""
+    """Pass a measurement on to ``output``, with stamp and frame; drop it if not finite."""
 
     input_type: type
     finite: str

@@ -1,12 +1,12 @@
 """The figure eight of ``data/figure8.csv``.
 
-A curve of Lissajous, x = WIDTH sin(phase), y = HEIGHT sin(2 phase), z = 0, yaw = 0, run
-through once. The phase begins at rest, reaches a constant rate after `RAMP`, and ends at
-rest; its rate follows `minimum_jerk`, so that position, velocity, acceleration and jerk
-are continuous, and the last three zero at both ends. Between knots `PIECE` apart the
-curve is the polynomial of the 7th degree that shares all four with it at both knots.
+A Lissajous curve, x = WIDTH sin(phase), y = HEIGHT sin(2 phase), z = 0, yaw = 0, run through once.
+The phase begins at rest, reaches a constant rate after `RAMP`, and ends at rest; its rate follows
+`minimum_jerk`, so that position, velocity, acceleration and jerk are continuous, and the last three
+zero at both ends. Between knots `PIECE` apart the curve is the polynomial of the 7th degree that
+shares all four with it at both knots.
 
-Make the file again with ``python3 -m crazyflie_demo.figure8 data/figure8.csv``.
+Create the file again with ``python3 -m crazyflie_demo.figure8 data/figure8.csv``.
 """
 
 import math

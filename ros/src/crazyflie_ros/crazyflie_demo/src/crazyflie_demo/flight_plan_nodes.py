@@ -30,11 +30,11 @@ from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.server import ParameterWriter
 from crazyflie_utils.parameters.types import BOOLEAN, METRES, File, Number
 
-#: Longest time of a service call, of the driver's connection before the first one, and of the
-#: master's answer, s.
+#: Timeout of a service call, of the driver's connection before the first one, and of the master's
+#: answer (s).
 _LIMIT = 15.0
 
-_PAUSE = 0.5  #: Between the end of one manoeuvre and the next, s.
+_PAUSE = 0.5  #: Pause between two manoeuvres (s).
 
 #: Duration of a landing over that of a takeoff. At its end the firmware stops the motors, and the
 #: vehicle, which lags behind the setpoint, is still in the air: from 0.5 m, the virtual one falls
@@ -61,10 +61,10 @@ class Step(NamedTuple):
 class FlightPlanParameters(Parameters):
     """Parameters that all flights by high-level commands have."""
 
-    height: float = parameter(Number("m", above=0.0, maximum=3.0), "how high the takeoff goes", 0.5)
+    height: float = parameter(Number("m", above=0.0, maximum=3.0), "height of the takeoff", 0.5)
     duration: float = parameter(
         Number("s", above=0.0, maximum=60.0),
-        "of takeoff and each go-to; the landing takes half as long again",
+        "duration of the takeoff and of each go-to; the landing takes 1.5 times as long",
         2.0,
     )
 
@@ -101,7 +101,7 @@ class FlightPlanNode(Node):
         self._steps = deque(
             [
                 # Answered when the driver has connected and read all parameters of the vehicle,
-                # which overwrites those that were set before.
+                # which overwrites earlier values.
                 Step("update_params", UpdateParams, UpdateParamsRequest()),
                 Step("update_params", UpdateParams, enable, parameter=(_HIGH_LEVEL, 1)),
                 *self.preparations(),
@@ -141,7 +141,7 @@ class FlightPlanNode(Node):
         self._handle.submit(self._on_parameter_set)
 
     def _on_parameter_set(self):
-        # Later than the limit there are no steps any more.
+        # After the limit no further steps are taken.
         if self._steps:
             self._timer.stop()
             self._call(self._steps[0])
@@ -188,11 +188,11 @@ def seconds(duration: float) -> genpy.Duration:
 class HighLevelFlightParameters(FlightPlanParameters):
     """Parameters of `HighLevelFlightNode`."""
 
-    distance: float = parameter(METRES, "how far ahead the vehicle goes", 0.5)
+    distance: float = parameter(METRES, "distance that the vehicle flies ahead", 0.5)
 
 
 class HighLevelFlightNode(FlightPlanNode):
-    """Take off, go ahead and back again, land."""
+    """Take off, fly ahead and back, land."""
 
     _parameters: HighLevelFlightParameters
 
@@ -217,13 +217,15 @@ class TrajectoryFlightParameters(FlightPlanParameters):
         File(load, "a CSV file with a trajectory"), "CSV file of the trajectory", name="file"
     )
     timescale: float = parameter(
-        Number(above=0.0, maximum=100.0), "2 takes twice as long as the file says", 1.0
+        Number(above=0.0, maximum=100.0),
+        "factor of the duration: 2 takes twice as long as in the file",
+        1.0,
     )
     reversed: bool = parameter(BOOLEAN, "fly from the end to the beginning", False)
 
 
 class TrajectoryFlightNode(FlightPlanNode):
-    """Take off, fly along the trajectory of a file from there on, land."""
+    """Take off, fly along the trajectory of a file from that point on, land."""
 
     _parameters: TrajectoryFlightParameters
 

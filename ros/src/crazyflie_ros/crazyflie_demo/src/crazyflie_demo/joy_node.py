@@ -12,8 +12,8 @@ from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TEXT, Number
 
 _POLL_PERIOD = 0.01  #: Time between two reads of the device, s.
-_OPEN_PERIOD = 1.0  #: Time between two tries to open it, s.
-_EVENTS = 512  #: Events that are read at most at one time.
+_OPEN_PERIOD = 1.0  #: Time between two attempts to open the device (s).
+_EVENTS = 512  #: Largest number of events that are read at once.
 
 _HINTS = {
     errno.ENOENT: "is it plugged in, and does the parameter dev name it?",
@@ -27,13 +27,13 @@ class JoyNodeParameters(Parameters):
     dev: str = parameter(TEXT, "the joystick's device", "/dev/input/js0")
     deadzone: float = parameter(
         Number(minimum=0.0, maximum=0.9),
-        "part of an axis's way about the centre that counts as the centre",
+        "fraction of an axis's range about the centre that is read as the centre",
         0.05,
         live=True,
     )
     autorepeat_rate: float = parameter(
         Number("Hz", minimum=0.0, maximum=100.0),
-        "how often a message is repeated; 0 for never",
+        "rate at which the last message is repeated; 0 for never",
         20.0,
     )
 
@@ -41,8 +41,8 @@ class JoyNodeParameters(Parameters):
 class JoyNode(Node):
     """Publish the state of a joystick.
 
-    The device is opened again and again. When it is unplugged, one message has all axes and buttons
-    at zero.
+    The device is reopened until that succeeds. When it is unplugged, one message has all axes and
+    buttons at zero.
     """
 
     def __init__(self) -> None:
@@ -57,7 +57,7 @@ class JoyNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("joy", Joy)
-        # Hands do not follow simulated time.
+        # Real time, since hands do not follow simulated time.
         handle.timer(_POLL_PERIOD, self._poll, steady=True)
         rate = self._parameters.autorepeat_rate
         if rate > 0.0:
@@ -91,7 +91,7 @@ class JoyNode(Node):
         try:
             data = os.read(self._file, _EVENTS * EVENT.size)
         except BlockingIOError:
-            # Nothing has moved.
+            # No axis or button has moved.
             return
         except OSError as error:
             self._lose(self._file, error)
@@ -101,7 +101,7 @@ class JoyNode(Node):
 
     def _lose(self, file, error):
         self._handle.error(
-            f"lost {self._parameters.dev}: {error.strerror}; all axes are taken for released"
+            f"lost {self._parameters.dev}: {error.strerror}; all axes are treated as released"
         )
         os.close(file)
         self._file = None

@@ -11,7 +11,7 @@ AXES, BUTTONS = 8, 11  #: Number of axes and buttons of a gamepad.
 #: struct js_event: time in ms, value, type, number of the axis or button.
 EVENT = struct.Struct("=IhBB")
 BUTTON, AXIS = 0x01, 0x02  #: Types of events.
-INITIAL = 0x80  #: Added to the type of events that report the state at the opening of the device.
+INITIAL = 0x80  #: Flag in the type of events that report the state when the device is opened.
 _FULL = 32767  #: Value of an axis at its end.
 JoystickState = tuple[list[float], list[int]]  #: Axes and buttons.
 
@@ -30,9 +30,10 @@ class Joystick:
         self._rest = b""
 
     def feed(self, data: bytes) -> list[JoystickState]:
-        """Return the states that data from the device bring about.
+        """Return the states that follow from data of the device.
 
-        There is one after every change of a button, so that no short press is lost, and the last.
+        There is one after every change of a button, so that no short press is lost, and the last
+        one.
         """
         data = self._rest + data
         whole = len(data) - len(data) % EVENT.size
@@ -63,7 +64,7 @@ class Joystick:
         return list(self.axes), list(self.buttons)
 
     def _deflection(self, value):
-        # Linux counts right and down positive.
+        # In Linux, right and down are positive.
         part = max(-1.0, min(1.0, -value / _FULL))
         beyond = max(0.0, abs(part) - self.deadzone) / (1.0 - self.deadzone)
         return beyond if part > 0.0 else -beyond if beyond else 0.0

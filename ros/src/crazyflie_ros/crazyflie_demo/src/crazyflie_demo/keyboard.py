@@ -1,4 +1,4 @@
-"""A keyboard in the place of a joystick: keys become axes and buttons.
+"""A keyboard in place of a joystick: keys become axes and buttons.
 
 A terminal reports a key when it is pressed and repeats it while it is held, but does not report its
 release. So a deflection lasts until the next repetition is due.
@@ -11,9 +11,9 @@ from crazyflie_demo import joystick
 from crazyflie_demo.joystick import PITCH, ROLL, THRUST, YAW
 
 FIRST_HOLD = (
-    0.6  #: Time for which a key counts as held after its press (s): repetition begins late.
+    0.6  #: Time for which a key is treated as held after its press (s): repetition begins late.
 )
-REPEAT_HOLD = 0.15  #: Time for which a key counts as held after a repetition (s).
+REPEAT_HOLD = 0.15  #: Time for which a key is treated as held after a repetition (s).
 
 _DEFLECTIONS = {
     "\x1b[A": (PITCH, 1.0),
@@ -51,7 +51,7 @@ class Keyboard:
     """Axes and buttons that keys move.
 
     A key moves its axis to the deflection, up to 1. With a lift step of 0, so do w and s; otherwise
-    they move the thrust by this step, and it stays, from 0 to 1.
+    they change the thrust by this step, from 0 to 1, and it is kept.
     """
 
     def __init__(self, deflection: float, lift_step: float = 0.0):
@@ -101,7 +101,7 @@ class Keyboard:
         self._rest = ""
         while text:
             if text in ("\x1b", "\x1b[", "\x1bO"):
-                # The rest of an arrow key may be on its way.
+                # The rest of an arrow key's sequence may not have arrived.
                 self._rest = text
                 return
             if text[:2] in ("\x1b[", "\x1bO"):

@@ -1,4 +1,4 @@
-"""ROS interface of a keyboard in the place of a joystick."""
+"""ROS interface of a keyboard in place of a joystick."""
 
 import os
 import select
@@ -24,11 +24,12 @@ class KeyboardParameters(Parameters):
     """Parameters of `KeyboardNode`."""
 
     deflection: float = parameter(
-        Number(above=0.0, maximum=1.0), "how far a key moves an axis", 0.5, live=True
+        Number(above=0.0, maximum=1.0), "deflection of an axis by a key", 0.5, live=True
     )
     lift_step: float = parameter(
         Number(minimum=0.0, maximum=1.0),
-        "0: w and s move their axis while held; otherwise each time by so much, and it stays",
+        "0: w and s move their axis while held; otherwise each press moves it by this step, and "
+        "it is kept",
         0.0,
     )
 
@@ -44,7 +45,7 @@ class KeyboardNode(Node):
     def initialize(self, handle: NodeHandle) -> bool:
         if not sys.stdin.isatty():
             handle.error(
-                "standard input is no terminal; start this node with rosrun, not with roslaunch"
+                "standard input is not a terminal; start this node with rosrun, not with roslaunch"
             )
             return False
         return super().initialize(handle)
@@ -57,12 +58,12 @@ class KeyboardNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("joy", Joy)
-        # Hands do not follow simulated time.
+        # Real time, since hands do not follow simulated time.
         handle.timer(_PERIOD, self._on_timer, steady=True)
         print(HELP, flush=True)
         self._terminal = sys.stdin.fileno()
         self._settings = termios.tcgetattr(self._terminal)
-        # Keys come one by one and are not echoed; Ctrl-C remains what it is.
+        # Keys are read one by one and are not echoed; Ctrl-C still interrupts.
         tty.setcbreak(self._terminal)
 
     @override
@@ -76,7 +77,7 @@ class KeyboardNode(Node):
     def _on_timer(self):
         now = self._handle.time()
         self._presses.extend(self._keyboard.feed(self._read(), now))
-        # A press is one message long.
+        # A press is reported in one message.
         buttons = [0] * BUTTONS
         if self._presses:
             buttons[self._presses.popleft()] = 1
@@ -90,7 +91,7 @@ class KeyboardNode(Node):
             return ""
         data = os.read(self._terminal, 1024)
         if not data:
-            # The terminal is gone: there will be no more keys, not even the one for landing.
+            # The terminal was closed: no more keys will come, not even the one for landing.
             self._handle.error("the terminal has been closed")
             self._handle.end(1)
         return data.decode(errors="ignore")

@@ -16,21 +16,21 @@ RATE = Number("Hz", above=0.0, maximum=500.0)  #: Rate of a publisher.
 
 
 class JoyParameters(Parameters):
-    """Of nodes that follow a joystick."""
+    """Parameters of nodes that follow a joystick."""
 
     joy_topic: str = parameter(TOPIC, "where the joystick's messages come from", "joy")
 
 
 class SetpointParameters(Parameters):
-    """Of nodes that publish cmd_vel."""
+    """Parameters of nodes that publish cmd_vel."""
 
-    rate: float = parameter(RATE, "setpoints a second", 50.0)
+    rate: float = parameter(RATE, "rate of setpoints", 50.0)
 
 
 class GoalParameters(WorldFrameParameters):
-    """Of nodes that publish goals."""
+    """Parameters of nodes that publish goals."""
 
-    rate: float = parameter(RATE, "goals a second", 30.0)
+    rate: float = parameter(RATE, "rate of goals", 30.0)
 
 
 def goal_message(stamp: Time, frame: str, x: float, y: float, z: float, yaw: float) -> PoseStamped:
@@ -43,7 +43,8 @@ def goal_message(stamp: Time, frame: str, x: float, y: float, z: float, yaw: flo
     return message
 
 
-JOY_LIMIT = 0.5  #: Age, s, at which the last message of a joystick that repeats itself expires.
+#: Age at which the last message of a joystick that repeats its messages expires (s).
+JOY_LIMIT = 0.5
 
 REPEATED = "repeated"
 """frame_id, which has no other use, of a Joy whose publisher sends the next one within `JOY_LIMIT`.
@@ -56,7 +57,7 @@ a connection does not show.
 class JoyAxes:
     """The axes that were received last, as long as their publisher is connected.
 
-    One that repeats itself (`REPEATED`) must not be silent, either.
+    A publisher that repeats its messages (`REPEATED`) must also not be silent.
     """
 
     def __init__(self, handle: NodeHandle, topic: str):
@@ -71,9 +72,9 @@ class JoyAxes:
         self._expiry = self._handle.time() + JOY_LIMIT if is_repeated else math.inf
 
     def are_alive(self) -> bool:
-        """Return whether there is a joystick at present."""
+        """Return whether a joystick is present."""
         if not self._subscriber.has_publishers():
-            # Its last message does not count when another publisher comes.
+            # The last message is dropped when another publisher comes.
             self._expiry = -math.inf
         return self._handle.time() <= self._expiry
 

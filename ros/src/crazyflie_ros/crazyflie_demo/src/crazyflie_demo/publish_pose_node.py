@@ -15,10 +15,10 @@ class PublishPoseParameters(GoalParameters):
     """Parameters of `PublishPoseNode`."""
 
     topic: str = parameter(TOPIC, "where goals go", "goal", "name")
-    x: float = parameter(METRES, "where the goal is at first")
-    y: float = parameter(METRES, "where the goal is at first")
-    z: float = parameter(METRES, "where the goal is at first")
-    yaw: float = parameter(Number("rad"), "heading of the goal at first", 0.0)
+    x: float = parameter(METRES, "initial position of the goal")
+    y: float = parameter(METRES, "initial position of the goal")
+    z: float = parameter(METRES, "initial position of the goal")
+    yaw: float = parameter(Number("rad"), "initial heading of the goal", 0.0)
 
 
 class PublishPoseTeleopParameters(PublishPoseParameters, JoyParameters):
@@ -28,11 +28,11 @@ class PublishPoseTeleopParameters(PublishPoseParameters, JoyParameters):
     y_axis: int = parameter(AXIS, "number of the joystick's axis", ROLL, "axes/y")
     z_axis: int = parameter(AXIS, "number of the joystick's axis", THRUST, "axes/z")
     yaw_axis: int = parameter(AXIS, "number of the joystick's axis", YAW, "axes/yaw")
-    x_speed: float = parameter(_SPEED, "at full deflection", 0.5, "speed/x", live=True)
-    y_speed: float = parameter(_SPEED, "at full deflection", 0.5, "speed/y", live=True)
-    z_speed: float = parameter(_SPEED, "at full deflection", 0.3, "speed/z", live=True)
+    x_speed: float = parameter(_SPEED, "value at full deflection", 0.5, "speed/x", live=True)
+    y_speed: float = parameter(_SPEED, "value at full deflection", 0.5, "speed/y", live=True)
+    z_speed: float = parameter(_SPEED, "value at full deflection", 0.3, "speed/z", live=True)
     yaw_speed: float = parameter(
-        Number("rad/s", minimum=0.0), "at full deflection", 1.0, "speed/yaw", live=True
+        Number("rad/s", minimum=0.0), "value at full deflection", 1.0, "speed/yaw", live=True
     )
 
     @property
@@ -68,7 +68,7 @@ class PublishPoseNode(Node):
 
 
 class PublishPoseTeleopNode(PublishPoseNode):
-    """Publish a goal that moves as the sticks are tilted, and stays when there are none."""
+    """Publish a goal that moves as the sticks are tilted, and stays without a joystick."""
 
     _parameters: PublishPoseTeleopParameters
 

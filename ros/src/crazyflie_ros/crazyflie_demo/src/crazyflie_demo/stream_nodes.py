@@ -26,7 +26,7 @@ from crazyflie_utils.parameters.types import METRES, TOPIC, Number
 _LANDING = 2.0  #: Duration of the landing after an interrupted flight, s.
 _LIMIT = 15.0  #: Longest time of a service call, s.
 _FINISH_LIMIT = 10.0  #: Longest time in which a failed landing is requested again, s.
-_RETRY_PERIOD = 1.0  #: Between two requests, s.
+_RETRY_PERIOD = 1.0  #: Time between two requests (s).
 
 #: Longest time of a landing's service call, s. `OVERLAP` after the landing the driver passes
 #: setpoints on again, which override it: one that is accepted later is requested again.
@@ -57,7 +57,7 @@ class StreamNode(Node):
         raise NotImplementedError
 
     def finish(self) -> Future[Any] | None:
-        """Request what follows the last setpoint; the process ends after the response."""
+        """Request the command after the last setpoint; the process ends after the response."""
         return None
 
     def land(self) -> Future[Any]:
@@ -108,7 +108,7 @@ class StreamNode(Node):
         elif error is None:
             self._next_finish = now
         elif now < self._finish_end:
-            self._handle.warn(f"the landing has failed, and is tried again: {error}")
+            self._handle.warn(f"the landing has failed and is retried: {error}")
             self._next_finish = now + _RETRY_PERIOD
         else:
             self._handle.error(
@@ -127,9 +127,11 @@ class PositionFlightParameters(SetpointParameters):
 
     x: float = parameter(METRES, "start of the flight", 0.0)
     y: float = parameter(METRES, "start of the flight", 0.0)
-    height: float = parameter(Number("m", above=0.0, maximum=3.0), "how high it flies", 0.4)
-    distance: float = parameter(METRES, "how far ahead and to the left it goes", 0.2)
-    speed: float = parameter(Number("m/s", above=0.0, maximum=1.0), "of the whole flight", 0.2)
+    height: float = parameter(Number("m", above=0.0, maximum=3.0), "height of the flight", 0.4)
+    distance: float = parameter(METRES, "distance ahead and to the left", 0.2)
+    speed: float = parameter(
+        Number("m/s", above=0.0, maximum=1.0), "duration of the whole flight", 0.2
+    )
 
 
 class PositionFlightNode(StreamNode):
@@ -142,7 +144,7 @@ class PositionFlightNode(StreamNode):
         p = handle.load(PositionFlightParameters)
         side = [p.distance, p.distance, p.height]
         above = [0.0, 0.0, p.height]
-        # Each place twice, to stay there for a second.
+        # Each place occurs twice, so that the vehicle stays there for a second.
         places = np.repeat([[0.0, 0.0, 0.0], above, side, above, [0.0, 0.0, 0.0]], 2, axis=0)
         durations = np.linalg.norm(np.diff(places, axis=0), axis=1) / p.speed
         durations[durations == 0.0] = 1.0
@@ -174,7 +176,7 @@ class TrajectoryStreamParameters(Parameters):
     """Parameters of `TrajectoryStreamNode`."""
 
     topic: str = parameter(TOPIC, "where setpoints go", "/crazyflie/cmd_full_state")
-    rate: float = parameter(RATE, "setpoints a second", 100.0)
+    rate: float = parameter(RATE, "rate of setpoints", 100.0)
 
 
 class TrajectoryStreamNode(StreamNode):
@@ -201,7 +203,7 @@ class TrajectoryStreamNode(StreamNode):
     def setpoint(self, time: float) -> FullState:
         goal = self._trajectory.eval(time)
         if time >= self.duration:
-            # It is repeated until the vehicle lands.
+            # The command is repeated until the vehicle lands.
             goal = goal._replace(vel=_REST, acc=_REST, omega=_REST)
         message = FullState(
             pose=Pose(Point(*goal.pos), Quaternion(*quaternion_from_rpy(0.0, 0.0, goal.yaw))),
@@ -213,7 +215,7 @@ class TrajectoryStreamNode(StreamNode):
 
     @override
     def finish(self) -> Future[Any]:
-        # Without it the vehicle would be locked 2 s later, or fall.
+        # Without this, the vehicle would be locked 2 s later, or fall.
         return self.land()
 
 
@@ -257,7 +259,7 @@ def execute_trajectory() -> None:
     One in a file on the command line is streamed; otherwise the parameter ``~file`` says which one
     is uploaded and flown by the vehicle itself.
     """
-    # Remappings and private parameters are no files.
+    # Remappings and private parameters are not files.
     files = [word for word in sys.argv[1:] if ":=" not in word]
     if len(files) > 1:
         sys.exit("usage: execute_trajectory.py [FILE.csv]")

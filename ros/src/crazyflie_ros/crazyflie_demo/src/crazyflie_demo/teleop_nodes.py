@@ -15,35 +15,37 @@ from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.server import ParameterWriter
 from crazyflie_utils.parameters.types import BOOLEAN, Integer, Number
 
-#: Four joystick axes, numbered from 0, and what they are multiplied by.
+#: Four joystick axes, numbered from 0, and their factors.
 Sticks = tuple[tuple[int, float], ...]
 
 _TILT = Number("deg", above=0.0, maximum=60.0)
 
 
 class TeleopParameters(JoyParameters, SetpointParameters):
-    """Of nodes that turn a joystick's axes into cmd_vel."""
+    """Parameters of nodes that convert a joystick's axes to cmd_vel."""
 
     def sticks(self) -> Sticks:
-        """Return what moves linear.x, linear.y, angular.z and linear.z of cmd_vel."""
+        """Return the axes of linear.x, linear.y, angular.z and linear.z of cmd_vel."""
         raise NotImplementedError
 
 
 class CmdVelTeleopParameters(TeleopParameters):
     """Parameters of `CmdVelTeleopNode`."""
 
-    pitch_axis: int = parameter(AXIS, "number of the axis that pitches", PITCH, "axes/pitch")
-    roll_axis: int = parameter(AXIS, "number of the axis that rolls", ROLL, "axes/roll")
-    yaw_rate_axis: int = parameter(AXIS, "number of the axis that turns", YAW, "axes/yaw_rate")
-    thrust_axis: int = parameter(AXIS, "number of the axis that lifts", THRUST, "axes/thrust")
-    max_pitch: float = parameter(_TILT, "at full deflection", 30.0, "max/pitch", live=True)
-    max_roll: float = parameter(_TILT, "at full deflection", 30.0, "max/roll", live=True)
+    pitch_axis: int = parameter(AXIS, "number of the axis for pitch", PITCH, "axes/pitch")
+    roll_axis: int = parameter(AXIS, "number of the axis for roll", ROLL, "axes/roll")
+    yaw_rate_axis: int = parameter(
+        AXIS, "number of the axis for the yaw rate", YAW, "axes/yaw_rate"
+    )
+    thrust_axis: int = parameter(AXIS, "number of the axis for the thrust", THRUST, "axes/thrust")
+    max_pitch: float = parameter(_TILT, "value at full deflection", 30.0, "max/pitch", live=True)
+    max_roll: float = parameter(_TILT, "value at full deflection", 30.0, "max/roll", live=True)
     max_yaw_rate: float = parameter(
-        Number("deg/s", above=0.0), "at full deflection", 200.0, "max/yaw_rate", live=True
+        Number("deg/s", above=0.0), "value at full deflection", 200.0, "max/yaw_rate", live=True
     )
     max_thrust: float = parameter(
         Number("PWM", above=0.0, maximum=FULL_PWM),
-        "at full deflection",
+        "value at full deflection",
         MAX_SETPOINT_PWM,
         "max/thrust",
         live=True,
@@ -63,8 +65,8 @@ class CmdVelTeleopParameters(TeleopParameters):
 class CmdVelTeleopNode(Node):
     """Tilt, turn and lift a vehicle as the sticks are tilted.
 
-    Thrust counts only after its stick has been at zero once. Without a joystick the
-    node is silent, and the vehicle's watchdog does the rest.
+    The thrust is enabled only after its stick has been at zero once. Without a joystick the node is
+    silent, and the vehicle's watchdog does the rest.
     """
 
     parameters_class: ClassVar[type[TeleopParameters]] = CmdVelTeleopParameters
@@ -127,7 +129,7 @@ class QuadrotorTeleopParameters(TeleopParameters):
 
     @override
     def sticks(self) -> Sticks:
-        """Return the sticks; inversion and no axis are in the factor."""
+        """Return the sticks; the factor contains the inversion, and is 0 without an axis."""
         return tuple(
             (abs(axis) - 1, scale * (axis > 0) - scale * (axis < 0))
             for axis, scale in (
@@ -155,14 +157,14 @@ class JoystickControllerParameters(JoyParameters):
 
     has_controller: bool = parameter(
         BOOLEAN,
-        "whether a crazyflie_controller is there to take off and land",
+        "whether a crazyflie_controller takes off and lands",
         False,
         "use_crazyflie_controller",
     )
 
 
 class JoystickControllerNode(Node):
-    """Land, take off, stop in an emergency, switch the headlight: at the press of a button.
+    """Land, take off, stop in an emergency, or switch the headlight when a button is pressed.
 
     Takeoff and landing are those of crazyflie_controller, if there is one.
     """

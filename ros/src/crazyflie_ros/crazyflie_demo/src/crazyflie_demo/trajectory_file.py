@@ -18,14 +18,14 @@ _GAP = 0.01  #: Largest gap between two pieces where they meet (m or rad).
 
 
 class TrajectoryError(ValueError):
-    """A file holds no trajectory that can be flown; the text says where and why."""
+    """A file has no trajectory that can be flown; the text says where and why."""
 
 
 def load(path: str | Path) -> list[PolynomialPiece]:
     """Return the pieces of a trajectory in a CSV file.
 
     Each line is a piece, with `COLUMNS` numbers; a first line without any number is a heading, and
-    empty lines do not count. Raises `TrajectoryError` for a file that cannot be read, a malformed
+    empty lines are ignored. Raises `TrajectoryError` for a file that cannot be read, a malformed
     line, or two pieces that do not meet.
     """
     pieces = []
@@ -34,7 +34,7 @@ def load(path: str | Path) -> list[PolynomialPiece]:
         if any(cells) and not is_heading:
             pieces.append(_piece(cells, f"{path}, line {line}"))
     if not pieces:
-        raise TrajectoryError(f"{path} holds no pieces")
+        raise TrajectoryError(f"{path} has no pieces")
     for number, (one, two) in enumerate(zip(pieces, pieces[1:], strict=False)):
         end, start = one.evaluate(one.duration), two.evaluate(0.0)
         gap = np.abs(np.subtract((*start.position, start.yaw), (*end.position, end.yaw))).max()
@@ -47,7 +47,7 @@ def load(path: str | Path) -> list[PolynomialPiece]:
 
 
 def _rows(path):
-    """Yield number and cells of every line; of one with line breaks in a cell, its last number."""
+    """Yield number and cells of every line; with line breaks in a cell, the last number."""
     try:
         text = read_text(path)
     except TextFileError as error:
@@ -72,7 +72,7 @@ def _piece(cells, where):
         )
     for cell in cells:
         if not _is_number(cell):
-            raise TrajectoryError(f"{where}: {shown(cell)} is no finite number")
+            raise TrajectoryError(f"{where}: {shown(cell)} is not a finite number")
     duration, *coefficients = map(float, cells)
     if duration <= 0.0:
         raise TrajectoryError(f"{where}: the duration is {duration:g}; expected more than 0 s")

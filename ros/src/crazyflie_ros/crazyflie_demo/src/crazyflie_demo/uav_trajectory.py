@@ -99,7 +99,7 @@ class Trajectory:
     def loadcsv(self, filename: str | Path, skip_header: bool = True) -> None:
         """Load a file; raises `TrajectoryError`, see `crazyflie_demo.trajectory_file.load`.
 
-        A heading is a first line without numbers, whatever scripts say of ``skip_header``.
+        A first line without numbers is a heading, whatever ``skip_header`` is.
         """
         self.polynomials = [Polynomial4D(piece.duration, *piece.axes) for piece in load(filename)]
         self.duration = sum(piece.duration for piece in self.polynomials)

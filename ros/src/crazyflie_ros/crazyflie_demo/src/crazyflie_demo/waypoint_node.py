@@ -14,7 +14,7 @@ class WaypointParameters(GoalParameters, PoseParameters):
     """Parameters of `DemoNode`."""
 
     waypoints: list[Waypoint] | None = parameter(
-        WaypointList(), "where to fly; by default the demo's own waypoints", None
+        WaypointList(), "waypoints; by default the demo's own", None
     )
     position_tolerance: float = parameter(
         Number("m", above=0.0),

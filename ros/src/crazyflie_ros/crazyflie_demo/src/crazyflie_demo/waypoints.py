@@ -11,7 +11,7 @@ from crazyflie_utils.text import shown
 
 
 class Waypoint(NamedTuple):
-    """Position (m) and heading (rad) in the world frame, and how long to stay there, s."""
+    """Position (m) and heading (rad) in the world frame, and the time to stay there (s)."""
 
     x: float
     y: float
@@ -65,7 +65,7 @@ class WaypointFollower:
 
     @property
     def goal(self) -> Waypoint:
-        """Where to be now."""
+        """The present goal."""
         return self._waypoints[self.index]
 
     def update(self, time: float, position: tuple[float, float, float], yaw: float) -> None:

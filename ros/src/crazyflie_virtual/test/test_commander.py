@@ -62,13 +62,13 @@ def test_it_says_why_a_high_level_command_does_nothing():
     bench.firmware.supervisor.stop()
     bench.run(0.2)
     assert bench.ask_one(Port.HIGH_LEVEL, 0, LAND)[3] == errno.EBUSY
-    assert "HLC: refuses command 8: Locked" in said(bench)
+    assert "HLC: refused command 8: Locked" in said(bench)
 
 
 def test_it_says_what_is_no_setpoint():
     bench = Bench()
     bench.ask(Port.GENERIC_SETPOINT, 0, b"\x63")
-    assert "CMD: no setpoints of type 63" in said(bench)
+    assert "CMD: unknown type of setpoint 63" in said(bench)
 
 
 def test_thrust_without_unlocking_prints_a_warning():

@@ -49,7 +49,7 @@ def lines(bench):
         ((Port.LOCALIZATION, 3, b""), "0 bytes on channel 3"),
         ((Port.LOCALIZATION, 0, b"\0" * 8), "8 bytes on channel 0"),
         ((Port.LOCALIZATION, 0, b"\xff" * 12), "not a number"),
-        ((Port.LOCALIZATION, 1, b"\x08" + bytes(28)), "no rotation"),
+        ((Port.LOCALIZATION, 1, b"\x08" + bytes(28)), "not a rotation"),
         ((Port.SUPERVISOR, 1, b"\x63"), "SUP: unknown command 1/99"),
         ((Port.SUPERVISOR, 0, b"\x0d"), "SUP: unknown command 0/13"),
         ((Port.SUPERVISOR, 2, b"\x01"), "SUP: unknown command 2/1"),
@@ -57,7 +57,7 @@ def lines(bench):
         ((Port.HIGH_LEVEL, 0, b"\x07\x00"), "HLC: command 7 is too short"),
         ((Port.SETPOINT, 1, bytes(14)), "CMD: unknown channel 1"),
         ((Port.GENERIC_SETPOINT, 1, b"\x63"), "CMD: unknown command 1/63"),
-        ((Port.GENERIC_SETPOINT, 0, b"\x63"), "CMD: no setpoints of type 63"),
+        ((Port.GENERIC_SETPOINT, 0, b"\x63"), "CMD: unknown type of setpoint 63"),
     ],
 )
 def test_in_vain(bench, packet, text):
@@ -78,7 +78,7 @@ def test_parameter_without_effect(bench):
     for value in (b"\xff", b"\0", b"\xff"):
         bench.ask(*write("led.bitmask", value))
     (line,) = lines(bench)
-    assert "led.bitmask is kept" in line
+    assert "led.bitmask is stored" in line
 
 
 def test_what_has_an_effect_prints_no_warning(bench):

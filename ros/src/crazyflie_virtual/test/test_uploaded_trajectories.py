@@ -129,8 +129,8 @@ def test_trajectory_from_memory(bench, protocol):
         ((1, 0, 0, 0), "0 pieces at byte 0 are not in the memory"),
         ((1, 0, 0, 32), "32 pieces at byte 0 are not in the memory"),
         ((1, 1, 4090, 1), "a compressed trajectory begins with 8 bytes"),
-        ((1, 9, 0, 1), "there are none of type 9 at location 1"),
-        ((2, 0, 0, 1), "there are none of type 0 at location 2"),
+        ((1, 9, 0, 1), "no trajectory has type 9 and location 1"),
+        ((2, 0, 0, 1), "no trajectory has type 0 and location 2"),
         ((1, 0, 132, 1), "numbers that are not finite, or a negative duration"),
     ],
 )
@@ -164,7 +164,7 @@ def test_with_no_positive_time_scale_a_trajectory_is_at_its_end_at_once(bench, s
     bench.run(0.02)
     assert bench.firmware.setpoint.x == pytest.approx(0.2)
     text = b"".join(p.data for p in bench.unsolicited if p.port == Port.CONSOLE).decode()
-    assert "HLC: at its end at once" in text
+    assert "HLC: the trajectory ends at once" in text
 
 
 def test_memory_that_was_never_written_is_at_the_origin(bench):

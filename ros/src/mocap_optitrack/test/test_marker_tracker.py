@@ -112,7 +112,7 @@ def test_a_short_loss_is_held(scene):
 def test_one_that_is_lost_in_flight_is_found_on_the_ground_only(scene):
     scene.move(LEFT, (0.0, 0.5, 1.0), 1.0, RIGHT)
     scene.show(0.6, RIGHT)
-    assert scene.log == ["left is lost: its marker was seen last at (0.00, 0.50, 1.00), 0.5 s ago"]
+    assert scene.log == ["left is lost: its marker was last seen at (0.00, 0.50, 1.00), 0.5 s ago"]
     assert "left" not in scene.show(2.0, (0.0, 0.5, 1.0), RIGHT)
     assert "left" not in scene.move((0.0, 0.5, 1.0), (0.1, 0.5, 0.05), 1.0, RIGHT)
     assert "left" not in scene.show(0.3, (0.1, 0.5, 0.05), RIGHT)

@@ -169,7 +169,7 @@ def test_a_failure_is_warned_of_and_reported():
     for _ in range(3):
         node.on_failure("no server answers")
     process.advance(1.0)
-    assert process.logged("warn") == ["/mocap_node: no server answers (trying again)"]
+    assert process.logged("warn") == ["/mocap_node: no server answers (retrying)"]
     (message,) = process.published("/diagnostics")
     assert {status.level for status in message.status} == {DiagnosticStatus.ERROR}
     assert message.status[0].message == "no server answers"
@@ -237,7 +237,7 @@ def test_the_configuration_of_natnet():
 def test_other_systems(backend):
     process, node = launch(backend=backend, motioncapture_config={"hostname": "10.0.0.1"})
     assert isinstance(node.source, LibrarySource)
-    assert f"looking for {backend}" in process.logged("info")[0]
+    assert f"connecting to {backend}" in process.logged("info")[0]
 
 
 def test_the_shipped_configuration():
@@ -255,7 +255,7 @@ def test_the_shipped_configuration():
 def test_what_means_nothing_is_warned_of():
     process, _ = launch(rigid_bodies={"1": {"pose": "one", "odom": "Odom"}})
     (text,) = process.logged("warn")
-    assert "/mocap_node/rigid_bodies/1/odom means nothing here" in text
+    assert "/mocap_node/rigid_bodies/1/odom is unknown and has no effect" in text
 
 
 @pytest.mark.parametrize(

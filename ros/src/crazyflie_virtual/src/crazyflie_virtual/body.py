@@ -23,13 +23,14 @@ from crazyflie_model.units import GRAVITY
 from crazyflie_world.world import World
 
 _CAPACITY = 900.0  #: Charge of the stock battery, C: 250 mAh [Bitcraze, data sheet].
-_RESISTANCE = 0.14  #: Cell and leads (ohm): about 0.3 V of sag at hover, as vehicles log it.
-_HOVER_CURRENT = 2.1  #: A: the 7 minutes of flight of the data sheet.
+#: Resistance of cell and leads (ohm): about 0.3 V of sag at hover, as vehicles log it.
+_RESISTANCE = 0.14
+_HOVER_CURRENT = 2.1  #: Current at hover (A), from the 7 minutes of flight of the data sheet.
 _IDLE_CURRENT = 0.12  #: Current of the electronics (A).
 
 _CHARGES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-#: Open-circuit voltage, V, over state of charge; the firmware's table, which is of the stock
-#: battery, and 4.2 V when full.
+#: Open-circuit voltage (V) over state of charge: the firmware's table of the stock battery, and 4.2
+#: V when full.
 OPEN_CIRCUIT_VOLTAGES = (3.00, 3.78, 3.83, 3.87, 3.89, 3.92, 3.96, 4.00, 4.04, 4.10, 4.20)
 
 FULL_VOLTAGE = OPEN_CIRCUIT_VOLTAGES[-1]
@@ -44,7 +45,7 @@ class Battery:
     def __init__(self, charge: float = 1.0):
         self.charge = charge
         self.current = _IDLE_CURRENT  #: A.
-        self.voltage = open_circuit_voltage(charge)  #: Under the load of the last step, V.
+        self.voltage = open_circuit_voltage(charge)  #: Voltage under the load of the last step (V).
 
     def step(self, dt: float, load: float) -> None:
         """Drain for ``dt`` (s).
@@ -58,7 +59,7 @@ class Battery:
 
 
 def sag(load: float) -> float:
-    """Return by how much the voltage sinks under a load, see `Battery.step`, V."""
+    """Return the voltage drop under a load, V; see `Battery.step`."""
     return _RESISTANCE * _HOVER_CURRENT * load
 
 
@@ -99,7 +100,7 @@ def _tipped(angle, rate, torque, hold, inertia, dt):
     side = math.copysign(1.0, angle or torque)
     rate += (torque - side * hold * math.cos(angle)) / inertia * dt
     tipped = angle + rate * dt
-    # Past upright the other feet meet the ground.
+    # Beyond upright, the other feet touch the ground.
     return (tipped, rate) if tipped * side > 0.0 else (0.0, 0.0)
 
 
@@ -107,7 +108,7 @@ STEP = PERIOD  #: Step of the integration, s: that of the firmware's attitude co
 
 
 class MotorCommands(NamedTuple):
-    """PWM of the four motors."""
+    """Commands of the four motors (PWM)."""
 
     m1: float
     m2: float
@@ -124,17 +125,17 @@ _HAND_SPEED, _HAND_TURN = 0.5, math.radians(45.0)  #: m/s, rad/s.
 
 
 class Hand:
-    """A hand that carries the vehicle, from where it took it; at rest there while all are 0."""
+    """A hand that carries the vehicle; with all values 0 it rests at its pick-up point."""
 
     def __init__(self) -> None:
-        #: x, y, z, yaw: Where it carries the vehicle, m and degrees, in the vehicle's directions
-        #: when it was taken.
+        #: x, y, z, yaw: Displacement and turn, m and degrees, in the vehicle's directions at the
+        #: pick-up.
         self.x = self.y = self.z = self.yaw = 0.0
         self._start: tuple[Triple, float] | None = None
         self._offset = [0.0] * 4
 
     def carry(self, x: Vector[float]) -> Vector[float] | None:
-        """Return the state of the vehicle after a step, 17 components; None if it is let go."""
+        """Return the state of the vehicle after a step, 17 components; None if not held."""
         goal = [self.x, self.y, self.z, math.radians(self.yaw)]
         if self._start is None:
             if not any(goal):
@@ -162,13 +163,13 @@ class Hand:
 
 
 class _Lags:
-    """Motion of a model with lags, in place of the effect of its rotors and inner loops."""
+    """Motion of a model with lags, which replaces the effect of its rotors and inner loops."""
 
     def __init__(self, model: QuadrotorParameters):
         self._model = model
         self._dynamics = FirstOrderQuadrotor(model)
         late = round(model.delay / STEP)
-        # Controls that are on their way; the first one acts.
+        # Delayed controls; the first one acts.
         self._controls: deque[Vector[float]] = deque([[0.0] * 4] * (late + 1), maxlen=late + 1)
         self._yaw_dot = self._root = 0.0
 
@@ -203,8 +204,8 @@ class _Lags:
 class Physics:
     """Rigid body, four motors, ground; it begins at a position (m) and heading (rad).
 
-    The errors are how much more mass and thrust the vehicle has than its ``model``, as a fraction.
-    A model with the lag of roll follows the ``desired`` attitude with its lags, trims and delay.
+    The errors are the excess of mass and thrust over those of the ``model``, as fractions. A model
+    with the lag of roll follows the ``desired`` attitude with its lags, trims and delay.
     """
 
     def __init__(
@@ -227,14 +228,16 @@ class Physics:
         self._x = x
         #: Acceleration that an accelerometer measures, body frame (m/s^2).
         self.specific_force: Triple = (0.0, 0.0, GRAVITY)
-        #: Surroundings; None for the ground alone. The vehicle collides with the ground only.
+        #: World that ranging sensors see; None for the ground alone. The vehicle collides with the
+        #: ground only.
         self.world: World | None = None
         self.hand = Hand()
-        self.is_overturned = False  #: Came down on its back: lies there until `put_upright`.
+        #: Whether it has come down on its back, where it lies until `put_upright`.
+        self.is_overturned = False
 
     @property
     def has_lags(self) -> bool:
-        """Whether it follows `desired`, and not its rotors."""
+        """Whether it follows `desired` instead of its rotors."""
         return self._lags is not None
 
     @property
@@ -267,7 +270,7 @@ class Physics:
         return sum((speed / self._model.hover_speed) ** 3 for speed in self._x[13:17]) / 4.0
 
     def put_upright(self) -> None:
-        """Pick the vehicle up and put it on its feet."""
+        """Put the vehicle upright on the ground."""
         self.is_overturned = False
         self.specific_force = (0.0, 0.0, GRAVITY)
 
@@ -306,7 +309,7 @@ class Physics:
 NOTHING = 32767  #: Reading of a sensor without an object in its range (mm).
 _REACH = 4.0  #: m.
 
-#: Log variable -> where its sensor looks, body frame.
+#: Log variable -> direction of its sensor, body frame.
 _DIRECTIONS: dict[str, Triple] = {
     "front": (1.0, 0.0, 0.0),
     "back": (-1.0, 0.0, 0.0),
@@ -318,9 +321,9 @@ _DIRECTIONS: dict[str, Triple] = {
 
 
 class RangingSensors:
-    """Distances, mm, as whole numbers; 0 where there is no sensor.
+    """Distances, mm, as whole numbers; 0 without a sensor.
 
-    A multiranger has sensors to all sides and up, a flow deck has one down.
+    A Multi-ranger has sensors to all sides and up, a Flow deck has one down.
     """
 
     def __init__(self, physics: Physics, has_multiranger: bool, has_flow_deck: bool):
@@ -329,7 +332,7 @@ class RangingSensors:
         self.has_flow_deck = has_flow_deck
 
     def distance(self, side: str) -> int:
-        """Return what the sensor of a log variable (of the group ``range``) reports, mm."""
+        """Return the reading of the sensor of a log variable (of the group ``range``), mm."""
         if not (self.has_flow_deck if side == "zrange" else self.has_multiranger):
             return 0
         direction = rotate(self._physics.quaternion, _DIRECTIONS[side])

@@ -1,4 +1,4 @@
-"""Packets of the Crazy RealTime Protocol: in a datagram, their number, and the console's text."""
+"""Packets of the Crazy RealTime Protocol: datagrams, counts, and the console's text."""
 
 from collections import deque
 from collections.abc import Callable, Hashable
@@ -6,7 +6,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 MAX_DATA = 30  #: Bytes of a packet without its header.
-_RESERVED = 3 << 2  #: Bits of the header that are set, but in broadcast packets.
+_RESERVED = 3 << 2  #: Bits of the header that are set, except in broadcast packets.
 
 
 class Port(IntEnum):
@@ -34,14 +34,14 @@ class Packet(NamedTuple):
     data: bytes  #: At most `MAX_DATA`.
 
     def encode(self) -> bytes:
-        """Return the packet as a datagram; ValueError if there is too much data for one."""
+        """Return the packet as a datagram; ValueError if the data are too long for one."""
         if len(self.data) > MAX_DATA:
-            raise ValueError(f"a packet holds {MAX_DATA} bytes, got {len(self.data)}")
+            raise ValueError(f"a packet has at most {MAX_DATA} bytes, got {len(self.data)}")
         return bytes([self.port << 4 | _RESERVED | self.channel]) + self.data
 
 
 def decode(datagram: bytes) -> Packet | None:
-    """Return the packet in a datagram; None when it holds none."""
+    """Return the packet in a datagram, or None."""
     if not 1 <= len(datagram) <= MAX_DATA + 1:
         return None
     return Packet(datagram[0] >> 4, datagram[0] & 3, datagram[1:])
@@ -56,7 +56,7 @@ def is_broadcast(datagram: bytes) -> bool:
     return not is_for_link and not datagram[0] & _RESERVED
 
 
-_ACTIVE = 2.0  #: Age of the last packet below which the client counts as connected (s).
+_ACTIVE = 2.0  #: Age of the last packet up to which the client is connected (s).
 
 
 class LinkStatistics:
@@ -96,19 +96,19 @@ class LinkStatistics:
 
 
 class FirmwareAssertionError(Exception):
-    """An assertion of the firmware has failed, on a packet that it takes no care of.
+    """An assertion of the firmware has failed, on a packet that it does not handle.
 
-    The text says on what.
+    The text names the packet.
     """
 
 
 Warn = Callable[[Hashable, str], bool]  #: See `Console.warn`.
 _BUFFER_SIZE = 100  #: Packets kept until a client is connected: the latest.
-_WARNING_PERIOD = 1.0  #: Between two warnings of one kind, s.
+_WARNING_PERIOD = 1.0  #: Shortest time between two warnings of one kind (s).
 
 
 class Console:
-    """Text on its way to the client; ``time()`` returns the time, s."""
+    """Text that waits for transmission to the client; ``time()`` returns the time, s."""
 
     def __init__(self, time: Callable[[], float]) -> None:
         self._time = time
@@ -121,7 +121,7 @@ class Console:
         self._packets.extend(data[i : i + MAX_DATA] for i in range(0, len(data), MAX_DATA))
 
     def warn(self, kind: Hashable, text: str) -> bool:
-        """Print a line; return False if there was one of its kind within `_WARNING_PERIOD`."""
+        """Print a line; return False if one of its kind was printed within `_WARNING_PERIOD`."""
         now = self._time()
         if now - self._last_warning.get(kind, -_WARNING_PERIOD) < _WARNING_PERIOD:
             return False
@@ -130,5 +130,5 @@ class Console:
         return True
 
     def pop(self) -> bytes | None:
-        """Return the data of the next packet; None when there is none."""
+        """Return the data of the next packet, or None."""
         return self._packets.popleft() if self._packets else None

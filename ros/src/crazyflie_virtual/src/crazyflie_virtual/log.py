@@ -47,7 +47,8 @@ def log_variables() -> list[LogVariable]:
 def _rows(
     number_type: NumberType, scale: float | None = None, /, **sources: str | float
 ) -> list[tuple[str, NumberType, Read]]:
-    # Name -> path from the firmware, or a number where the virtual vehicle has nothing to measure.
+    # Name -> path from the firmware, or a constant for quantities that the virtual vehicle does not
+    # have.
     def reader(source: str | float) -> Read:
         if not isinstance(source, str):
             return lambda firmware: source
@@ -228,9 +229,9 @@ _PERIOD_UNIT = 10  #: Unit of the period on the wire (ms).
 
 
 def packed(value: float, stored: NumberType, sent: NumberType) -> bytes:
-    """Return a variable's bytes in the type that the client asked for.
+    """Return a variable's bytes in the requested type.
 
-    The firmware's logRunBlock copies a whole number's low bytes, of 32 bits, without a limit.
+    The firmware's logRunBlock copies the low bytes of a 32-bit integer, without a limit.
     """
     if sent is stored or sent.is_float:
         return sent.pack(value)
@@ -251,7 +252,7 @@ class _Block:
 
 
 class LogPort:
-    """Sends the values of variables that the client asks for, periodically."""
+    """Sends the values of requested variables periodically."""
 
     def __init__(self, firmware: Firmware):
         self._firmware = firmware
@@ -281,7 +282,7 @@ class LogPort:
             return packets
         for block_id, block in self._blocks.items():
             if block.due is not None and now >= block.due:
-                # The phase is kept; what was missed is skipped.
+                # The phase is kept; missed values are skipped.
                 block.due += (1 + (now - block.due) // block.period) * block.period
                 packets.append(self._data_packet(block_id, block, now))
         self._schedule()
@@ -297,7 +298,7 @@ class LogPort:
                 return errno.EEXIST
             if len(self._blocks) >= MAX_BLOCKS:
                 return errno.ENOMEM
-            # It stays, with the variables that have found a place, also after an error.
+            # After an error, the block remains with the variables that were accepted.
             self._blocks[block_id] = _Block()
             return self._append(self._blocks[block_id], data)
         if command not in (_APPEND, _DELETE, _START, _STOP, _START_2):
@@ -331,8 +332,7 @@ class LogPort:
             if index >= len(self._variables):
                 return errno.ENOENT
             variable = self._variables[index]
-            # The low half of the code is the type to send; of one that there is not,
-            # nothing is sent.
+            # The low half of the code is the type to send; nothing is sent for an unknown type.
             number_type = LOG_TYPES.get(code & 0xF)
             if number_type and block.size + number_type.size > MAX_BYTES:
                 return errno.E2BIG

@@ -21,7 +21,7 @@ _HEADER_MARK, _NAME, _REVISION = 0xEB, 1, 2
 class Deck(NamedTuple):
     """A deck."""
 
-    name: str  #: Also of its parameter in the group ``deck``.
+    name: str  #: Name of the deck, and of its parameter in the group ``deck``.
     product: int
     revision: str
 
@@ -72,7 +72,7 @@ TESTER, LED_TIMINGS, DECKS = 0x15, 0x17, 0x19  #: Types.
 
 NO_SERIAL = bytes(8)
 
-EEPROM_SERIAL = bytes(7) + b"\x50"  #: Its I2C address takes the place of a serial number.
+EEPROM_SERIAL = bytes(7) + b"\x50"  #: The I2C address, in place of a serial number.
 
 _TESTER_SIZE = 4096
 _EEPROM_SIZE = 8191
@@ -100,12 +100,12 @@ class Memory:
         self._buffer = buffer
 
     def read(self, address: int, count: int) -> bytes | None:
-        """Return ``count`` bytes; None where there is no such address."""
+        """Return ``count`` bytes; None if an address does not exist."""
         end = address + count
         return bytes(self._buffer[address:end]) if end <= len(self._buffer) else None
 
     def write(self, address: int, data: bytes) -> bool:
-        """Write; return whether there is such an address."""
+        """Write data; return whether the addresses exist."""
         end = address + len(data)
         if isinstance(self._buffer, bytes) or end > len(self._buffer):
             return False
@@ -114,15 +114,15 @@ class Memory:
 
 
 class MemoryTester(Memory):
-    """A memory that holds its addresses; what is written is compared with them."""
+    """A memory whose content is its addresses; written data are compared with them."""
 
     def __init__(self) -> None:
         super().__init__(TESTER, bytes(address & 0xFF for address in range(_TESTER_SIZE)))
-        self.errors = 0  #: Bytes that were not as they should have been.
+        self.errors = 0  #: Number of wrong bytes.
 
     @property
     def reset_writes(self) -> int:
-        """Always 0; setting it forgets the errors."""
+        """Always 0; setting it resets the errors."""
         return 0
 
     @reset_writes.setter
@@ -142,10 +142,10 @@ class MemoryTester(Memory):
 class LighthouseMemory(Memory):
     """Geometry and calibration of base stations.
 
-    What is ``stored``, by page, outlives a restart.
+    The ``stored`` pages, by number, persist over a restart.
     """
 
-    STATIONS = 4  #: As many as the firmware is built for unless it is configured otherwise.
+    STATIONS = 4  #: Number of base stations in the firmware's default configuration.
 
     CALIBRATION_PAGE = 16  #: Number of the first calibration's page; geometries begin at 0.
 
@@ -165,7 +165,7 @@ class LighthouseMemory(Memory):
         }
 
     def store(self, geometries: int, calibrations: int) -> bool:
-        """Keep what is marked in two bit masks over a restart; return whether all was there."""
+        """Store the pages that two bit masks select; return whether all exist."""
         masks = ((0, geometries), (self.CALIBRATION_PAGE, calibrations))
         marked = [first + i for first, mask in masks for i in range(16) if mask >> i & 1]
         pages = {number: self._pages[number] for number in marked if number in self._pages}
@@ -174,7 +174,7 @@ class LighthouseMemory(Memory):
         return len(pages) == len(marked)
 
     def page(self, number: int) -> bytes:
-        """Return a geometry, or a calibration, which ends in whether it is valid."""
+        """Return a geometry or a calibration, whose last byte tells whether it is valid."""
         page = self._pages[number]
         return page.read(0, page.size) or b""
 
@@ -193,7 +193,7 @@ _NO_PAGE = Memory(LIGHTHOUSE, b"")
 
 
 def _deck_memory():
-    # Describes the decks' own firmware: none of them has any.
+    # Describes the decks' own firmware, which none of them has.
     places, version, info_size = 4, 3, 0x20
     info = bytes([version]) + bytes(2 * places * info_size)
     return Memory(DECKS, info, size=0x10000000 * (places + 1))
@@ -238,7 +238,7 @@ def eeprom(radio_address: int) -> bytearray:
 _INFO, _READ, _WRITE = 0, 1, 2
 _COUNT, _DETAILS = 1, 2
 
-_MOST = 24  #: Bytes read at once.
+_MOST = 24  #: Largest number of bytes of a read.
 
 
 class MemoryPort:
@@ -277,7 +277,9 @@ class MemoryPort:
         if number < len(self._memories):
             content = self._memories[number].read(address, count)
         if content is None:
-            self._warn("memory", f"MEM: {number} has no {count} bytes at {address:#x} to read")
+            self._warn(
+                "memory", f"MEM: memory {number} does not have {count} bytes at {address:#x}"
+            )
             return data[:5] + bytes([errno.EIO])
         return data[:5] + b"\0" + content
 

@@ -1,4 +1,4 @@
-"""The virtual motion capture system: its settings, what its cameras see, and its NatNet server."""
+"""The virtual motion capture system: its settings, its observations, and its NatNet server."""
 
 import random
 import select
@@ -51,13 +51,13 @@ class MocapSwitches:
 
 
 def is_listed(body_id: int, text: str) -> bool:
-    """Return whether a body is named by a text: numbers with commas, or "all"."""
+    """Return whether a text names a body: numbers with commas, or "all"."""
     names = [part.strip() for part in text.split(",")]
     return "all" in names or str(body_id) in names
 
 
 class Scene:
-    """Rigid bodies, as observed last.
+    """Rigid bodies at their last observation.
 
     The noise is in standard deviations along and about each axis, m and rad. ``single_markers`` are
     numbers of the vehicles with one marker, separated by commas, or "all": they are no rigid
@@ -85,16 +85,16 @@ class Scene:
         self._frame_period = 1.0 / rate
 
     def observe(self, observation: Observation) -> None:
-        """Take in an `Observation`."""
+        """Process an `Observation`."""
         body_id = observation.body_id
         if body_id not in self._cameras:
             self._cameras[body_id] = MotionCapture(*self._noise, seed=(self._seed, body_id))
         self._observations[body_id] = observation
 
     def bodies(self, time: float) -> list[StreamedBody]:
-        """Return every rigid body as it is seen at ``time`` (s), in the order of their numbers.
+        """Return every rigid body at ``time`` (s), in the order of their numbers.
 
-        A body that is not tracked has the pose it was seen at last.
+        A body that is not tracked has its last tracked pose.
         """
         return [
             self._see(self._observations[number], time)
@@ -105,7 +105,7 @@ class Scene:
     def markers(self, time: float) -> list[Triple]:
         """Return the markers of vehicles that have one, and reflections, in any order, m.
 
-        A marker that is not seen is not there.
+        Markers that are not seen are missing.
         """
         found = [
             self._see(self._observations[number], time)
@@ -154,7 +154,7 @@ class Scene:
 
 def _extrapolate(observation, time):
     # Observations come with a few milliseconds between them and not in step
-    # with the frames; over these the vehicle goes straight on.
+    # with the frames; between them the vehicle is extrapolated on a straight line.
     dt = time - observation.time
     position = tuple(
         p + v * dt for p, v in zip(observation.position, observation.velocity, strict=True)
@@ -167,10 +167,12 @@ class MocapSettings(Parameters):
     """Settings of the NatNet server; the live ones are its `MocapSwitches`."""
 
     host: str = parameter(
-        TEXT, "address to listen on, and of the interface for multicast", "127.0.0.1"
+        TEXT,
+        "address on which the server listens, and address of the interface for multicast",
+        "127.0.0.1",
     )
     command_port: int = parameter(
-        Integer(0, 65535), "UDP port for commands; 0 takes a free one", 1510
+        Integer(0, 65535), "UDP port for commands; 0 selects a free one", 1510
     )
     data_port: int = parameter(Integer(1, 65535), "UDP port of the multicast stream", 1511)
     multicast: bool = parameter(
@@ -180,10 +182,10 @@ class MocapSettings(Parameters):
     version: str = parameter(
         Text(VERSIONS), "NatNet version of the stream (quote it in YAML)", "3.1"
     )
-    rate: float = parameter(Number("Hz", minimum=1.0, maximum=1000.0), "frames per second", 120.0)
+    rate: float = parameter(Number("Hz", minimum=1.0, maximum=1000.0), "rate of frames", 120.0)
     observer_port: int = parameter(
         Integer(0, 65535),
-        "UDP port at which the vehicles' true poses arrive; 0 takes a free one",
+        "UDP port at which the vehicles' true poses arrive; 0 selects a free one",
         OBSERVER_PORT,
         "observer/port",
     )
@@ -197,9 +199,9 @@ class MocapSettings(Parameters):
         "noise/attitude",
     )
     latency: float = parameter(
-        Number("s", minimum=0.0, maximum=1.0), "from exposure to dispatch", 0.0
+        Number("s", minimum=0.0, maximum=1.0), "time from exposure to dispatch", 0.0
     )
-    seed: int = parameter(Integer(0, 2**31 - 1), "of the noise", 0)
+    seed: int = parameter(Integer(0, 2**31 - 1), "seed of the noise", 0)
     dropout: float = parameter(
         Number(minimum=0.0, maximum=1.0),
         "probability with which a body is not tracked in a frame",
@@ -214,17 +216,17 @@ class MocapSettings(Parameters):
         "fault/invalid",
         live=True,
     )
-    silent: bool = parameter(BOOLEAN, "no frames are sent", False, "fault/silent", live=True)
+    silent: bool = parameter(BOOLEAN, "send no frames", False, "fault/silent", live=True)
     ghosts: float = parameter(
         Number(minimum=0.0, maximum=100.0),
-        "mean number of reflections in a frame, markers of no vehicle",
+        "mean number of reflections in a frame, which belong to no vehicle",
         0.0,
         "fault/ghosts",
         live=True,
     )
     occlusions: float = parameter(
         Number("1/s", minimum=0.0, maximum=100.0),
-        f"how often each vehicle begins to be hidden, for up to {OCCLUSION:g} s",
+        f"rate at which each vehicle is hidden, for up to {OCCLUSION:g} s",
         0.0,
         "fault/occlusions",
         live=True,
@@ -236,16 +238,16 @@ class MocapSettings(Parameters):
     )
 
     def switches(self) -> MocapSwitches:
-        """Return the switches as they are at the beginning."""
+        """Return the initial switches."""
         return MocapSwitches(**{name: getattr(self, name) for name in vars(MocapSwitches())})
 
 
-_CLIENT_LIMIT = 5.0  #: Age of a client's last message above which it gets no frames (s).
+_CLIENT_LIMIT = 5.0  #: Age of a client's last message above which it receives no frames (s).
 _LONGEST_WAIT = 0.1  #: s.
 
 
 class MocapServer(Server):
-    """Streams what a `Scene` shows; OSError if a port is taken or an address is invalid.
+    """Streams the frames of a `Scene`; OSError if a port is taken or an address is invalid.
 
     ``warn`` is not used: the server does not fall behind.
     """
@@ -334,7 +336,7 @@ class MocapServer(Server):
         frame = int((now - self._begin) / self._period)
         if frame <= self._frames:
             return
-        # Frames that were missed are missing, as those of a busy system.
+        # Missed frames are not sent later, like those of a busy system.
         self._frames = frame
         exposure = self._begin + frame * self._period
         if self.switches.silent:

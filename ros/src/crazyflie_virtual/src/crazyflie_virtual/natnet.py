@@ -36,11 +36,11 @@ class StreamedBody(NamedTuple):
     name: str
     position: Triple  #: m.
     quaternion: Quaternion  #: (x, y, z, w).
-    is_tracked: bool  #: Otherwise the pose is an old one.
+    is_tracked: bool  #: Whether it is tracked; otherwise the pose is an old one.
 
 
 def parse(datagram: bytes) -> tuple[int, bytes] | None:
-    """Return number and payload of a message; None if the datagram is no message."""
+    """Return number and payload of a message; None if the datagram is not a message."""
     if len(datagram) < _HEADER.size:
         return None
     number, _ = _HEADER.unpack_from(datagram)
@@ -98,8 +98,8 @@ class Encoder:
         """Return a frame.
 
         Middle of the cameras' exposure, arrival of their data and dispatch of the frame are s of
-        the server's clock. ``markers`` are those of no rigid body, m; Motive sends them twice: as
-        other markers, and flagged as unlabelled among the labelled ones.
+        the server's clock. ``markers`` do not belong to a rigid body, m; Motive sends them twice:
+        as other markers, and flagged as unlabelled among the labelled ones.
         """
         rigid_bodies = b"".join(self._rigid_body(body) for body in bodies)
         others = b"".join(struct.pack("<3f", *marker) for marker in markers)

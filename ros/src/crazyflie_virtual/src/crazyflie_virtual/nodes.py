@@ -23,7 +23,7 @@ _POLL_PERIOD = 0.5  #: Period at which the switches are read (s).
 
 
 class ServerNode(Node):
-    """Runs a server; switches are polled, so that ``rosparam set`` works on them, too."""
+    """Runs a server; switches are polled, so that ``rosparam set`` also works on them."""
 
     needed_in_flight = True
 
@@ -55,8 +55,8 @@ class ServerNode(Node):
         self._server.stop()
 
     def _reconfigure(self, _):
-        # After this callback the change is on the parameter server, where _poll compares
-        # it with what was there: one rule for both ways of changing a switch.
+        # After this callback the change is on the parameter server, where _poll compares it with
+        # the last values: one rule for both ways of changing a switch.
         self._handle.submit(self._poll)
 
     def _poll(self):
@@ -65,7 +65,7 @@ class ServerNode(Node):
         except ParameterError as error:
             self._handle.warn(str(error), throttle=5.0)
             return
-        # Only what has changed, since clients may have set switches as well.
+        # Only changed values, since clients may also have set switches.
         for name in vars(self._server.switches):
             value = getattr(settings, name)
             if value != getattr(self._settings, name):
@@ -88,7 +88,7 @@ class VehicleParameters(VehicleSettings):
 class VirtualCrazyflieNode(ServerNode):
     """A virtual vehicle behind a UDP port.
 
-    What moves in its world is where /tf says, or where it began.
+    Moving objects of its world have the pose on /tf, or their initial one.
     """
 
     settings_type = VehicleParameters
@@ -118,7 +118,7 @@ class VirtualCrazyflieNode(ServerNode):
             try:
                 place = self._lookup(world.frame, each.name).transform.translation
             except TransformError:
-                # No node moves it at present: it stays where it is.
+                # No node moves the object at present: it keeps its place.
                 continue
             centres[each.name] = (place.x, place.y, place.z)
         physics.world = world.placed(centres)

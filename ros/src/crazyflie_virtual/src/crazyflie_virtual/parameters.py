@@ -1,8 +1,8 @@
 """The parameters, with the firmware's names and types, and port 2, which reads and sets them.
 
 A parameter is the attribute at the end of a dotted path from the `Firmware`, as
-it is a variable in the firmware; or a number, which is kept and returned but
-has no effect on the virtual vehicle.
+it is a variable in the firmware; or a number, which is stored and returned but has no effect on the
+virtual vehicle.
 """
 
 import errno
@@ -29,7 +29,7 @@ from crazyflie_virtual.toc import (
     pid_paths,
 )
 
-#: Those of the firmware's parameters, which stores also what is no number.
+#: Limits of the firmware's parameters, which may also be NaN.
 NO_LIMITS = (-math.inf, math.inf)
 
 
@@ -39,10 +39,11 @@ class ParameterSpec(NamedTuple):
     group: str
     name: str
     number_type: NumberType
-    source: str | float  #: Path to the attribute, or the first value of one without effect.
-    persistent: bool = False  #: Can be stored on the vehicle.
+    #: Path to the attribute, or the initial value of a parameter without effect.
+    source: str | float
+    persistent: bool = False  #: Whether it can be stored on the vehicle.
     read_only: bool = False
-    #: Least and greatest value; a write of any other is without effect.
+    #: Smallest and largest value; a write of any other value has no effect.
     limits: tuple[float, float] = NO_LIMITS
 
 
@@ -82,12 +83,12 @@ _MELLINGER = (
     *("i_range_m_xy", "i_range_m_z"),
 )
 
-#: Group -> rows, as `ParameterSpec` without the group. The group "virtual" is not the firmware's:
-#: its parameters are the fault switches.
+#: Group -> rows, as `ParameterSpec` without the group. The group "virtual" is not part of the
+#: firmware: its parameters are the fault switches.
 _GROUPS = {
     "stabilizer": [
         *_rows(U8, estimator=2),
-        # Of the firmware's controllers, those that the virtual vehicle has.
+        # Those of the firmware's controllers that the virtual vehicle has.
         *_limited(U8, DEFAULT, MELLINGER, controller="stabilizer.controller"),
         *_rows(U8, stop="supervisor.emergency_stop"),
     ],
@@ -266,7 +267,7 @@ _TABLE, _READ, _WRITE, _MISC = 0, 1, 2, 3
 _SET_BY_NAME, _EXTENDED_TYPE, _STORE, _STATE, _CLEAR = 0, 2, 3, 4, 5
 _DEFAULT, _EXTENDED_TYPE_2, _DEFAULT_2 = 6, 7, 8
 
-_WORD = 4  #: Bytes of a request in which the answer to a write has the value as it is.
+_WORD = 4  #: Number of bytes of a request after which the answer to a write contains the value.
 _PERSISTENT = 1  #: The only extended type.
 _EXTENDED, _CORE, _READ_ONLY = 0x10, 0x20, 0x40  #: Flags in the byte of the type's code.
 
@@ -274,7 +275,7 @@ _NO_ENTRY = bytes([errno.ENOENT])
 
 
 class Parameter:
-    """A parameter of a firmware that runs."""
+    """A parameter of a running firmware."""
 
     def __init__(self, spec: ParameterSpec, firmware: Firmware):
         self.spec = spec
@@ -294,7 +295,7 @@ class Parameter:
 
     @property
     def has_effect(self) -> bool:
-        """Whether the vehicle uses the value."""
+        """Whether the value has an effect on the vehicle."""
         return self._owner is not None
 
     def set(self, value: float) -> None:
@@ -319,7 +320,8 @@ class Parameter:
 class ParameterPort:
     """Reads and writes parameters, and stores the persistent ones.
 
-    What is ``stored``, by full name, outlives a restart of the vehicle; it is applied at once.
+    The ``stored`` values, by full name, persist over a restart of the vehicle; they are applied at
+    once.
     """
 
     def __init__(self, firmware: Firmware, stored: dict[str, float]):
@@ -360,7 +362,7 @@ class ParameterPort:
             self._warn(parameter.full_name, f"PARAM: {parameter.full_name} is read-only")
             return None
         self._set(parameter, data[2:])
-        # As long as the request, whatever the value's size is.
+        # The answer is as long as the request, whatever the value's size.
         value = parameter.spec.number_type.pack(parameter.value).ljust(_WORD, b"\0")
         return data[:2] + (value[: len(data) - 2] + data[2 + len(value) :])
 
@@ -369,7 +371,7 @@ class ParameterPort:
         value = number_type.unpack(data[: number_type.size].ljust(number_type.size, b"\0"))
         name = parameter.full_name
         if not parameter.has_effect and value != parameter.value:
-            self._warn(name, f"PARAM: {name} is kept, but a virtual vehicle does nothing with it")
+            self._warn(name, f"PARAM: {name} is stored, but has no effect on a virtual vehicle")
         try:
             parameter.set(value)
         except ValueError as error:
@@ -406,7 +408,7 @@ class ParameterPort:
         names = data[: 1 + len(parts[0]) + 1 + len(parts[1]) + 1]
         return (names + bytes([error]))[:MAX_DATA]
 
-    # Answers to the other commands; None where the parameter does not have what is asked for.
+    # Answers to the other commands; None if the parameter does not have the requested property.
 
     def _extended_type(self, parameter):
         return bytes([_PERSISTENT]) if parameter.spec.persistent else None
@@ -433,7 +435,7 @@ class ParameterPort:
 
 
 def _with_status(handler):
-    # The later commands put a 0 before an answer that is no error.
+    # The later commands put a 0 before an answer that is not an error.
     def handle(port, parameter):
         answer = handler(port, parameter)
         return None if answer is None else b"\0" + answer

@@ -55,7 +55,7 @@ def handle_generic(firmware: Firmware, channel: int, data: bytes) -> None:
     if channel == _SETPOINT:
         setpoint = decode_generic(data, f.time)
         if setpoint is None:
-            f.warn("setpoint", f"CMD: no setpoints of type {data[:1].hex()}")
+            f.warn("setpoint", f"CMD: unknown type of setpoint {data[:1].hex()}")
         else:
             f.stream(setpoint)
     elif channel == _META and data[:1] == _SETPOINTS_STOP:
@@ -92,8 +92,7 @@ def _command_supervisor(firmware: Firmware, command: int, data: bytes) -> bytes 
     """
     supervisor = firmware.supervisor
     if command == _ARM:
-        # Without its byte the firmware takes the one that an earlier packet
-        # has left in its place: nothing changes.
+        # Without its byte the firmware reads that of an earlier packet: nothing changes.
         done = supervisor.arm(bool(data[0]) if data else supervisor.is_armed)
         return bytes([done, supervisor.is_armed])
     if command == _RECOVER:
@@ -156,7 +155,7 @@ _PACKED_POSE = struct.Struct("<B3hI")
 
 
 class LocalizationPort:
-    """Hands external measurements to the estimator.
+    """Passes external measurements to the estimator.
 
     ``address`` is the last byte of the radio's: packed positions and poses of several vehicles are
     marked with it.
@@ -168,7 +167,7 @@ class LocalizationPort:
         self._lighthouse = lighthouse
 
     def handle(self, channel: int, data: bytes) -> bytes | None:
-        """Process a measurement; only to storing lighthouse data there is an answer."""
+        """Process a measurement; only the storing of lighthouse data is answered."""
         if channel == _POSITION and len(data) == 12:
             self._take_position(struct.unpack("<fff", data))
         elif channel == _PACKED_POSITIONS:
@@ -200,7 +199,7 @@ class LocalizationPort:
         elif command == _WATCHDOG_MESSAGE:
             supervisor.feed_watchdog(self._firmware.time)
         else:
-            self._firmware.warn("location", f"LOC: nothing done with a message {command}")
+            self._firmware.warn("location", f"LOC: ignoring a message {command}")
 
     def _take_position(self, position):
         if all(map(math.isfinite, position)):
@@ -210,7 +209,7 @@ class LocalizationPort:
 
     def _take_pose(self, position, quaternion):
         norm = math.hypot(*quaternion)
-        # No rotation, or not a number.
+        # Not a rotation, or not a number.
         if not (all(map(math.isfinite, position)) and 0.5 < norm < 2.0):
             self._refuse()
             return
@@ -218,7 +217,9 @@ class LocalizationPort:
         self._firmware.localization.take_pose(self._firmware.time, position, unit)
 
     def _refuse(self):
-        self._firmware.warn("location", "LOC: a measurement that is not a number, or no rotation")
+        self._firmware.warn(
+            "location", "LOC: a measurement that is not a number, or not a rotation"
+        )
 
 
 def _each(form, data):
@@ -247,7 +248,7 @@ def _execute(f, command, data):
     if command in _FOR_ALL:
         return handler(f, *values)
     if command in _PLANS and f.planner.blocked:
-        f.warn("planner", f"HLC: refuses command {command}: {f.supervisor.state.value}")
+        f.warn("planner", f"HLC: refused command {command}: {f.supervisor.state.value}")
         return errno.EBUSY
     if command in _PLANS and f.commander.priority == PRIORITY_CRTP:
         f.warn("planner", f"HLC: command {command} has no effect before setpoints stop")
@@ -296,7 +297,7 @@ def _start(f, relative, relative_yaw, backwards, trajectory_id, time_scale):
     if reason:
         f.console.write_line(f"HLC: no trajectory {trajectory_id}: {reason}")
     elif not time_scale > 0.0:
-        f.console.write_line(f"HLC: at its end at once: time scale {time_scale:g}")
+        f.console.write_line(f"HLC: the trajectory ends at once: time scale {time_scale:g}")
     return f.planner.start(f.time, trajectory_id, time_scale, backwards, relative, relative_yaw)
 
 
@@ -320,4 +321,4 @@ _COMMANDS: dict[int, tuple[str, Callable[..., int]]] = {
 
 #: Commands that are refused while the vehicle cannot fly, for any group.
 _PLANS = tuple(command for command in _COMMANDS if command not in (0, 3, 6))
-_FOR_ALL = (0, 6)  #: Commands that do not begin with the group of vehicles that they are for.
+_FOR_ALL = (0, 6)  #: Commands that do not begin with a group of vehicles.

@@ -61,9 +61,9 @@ def from_matrix(rotation: npt.NDArray[np.float64]) -> Quaternion:
 def compress_quaternion(quaternion: Quaternion) -> int:
     """Return a unit quaternion (x, y, z, w) in 32 bits.
 
-    The two highest bits are the index of the largest component, which is left out. The
-    others follow in order, each as a sign and 9 bits of magnitude in units of
-    ``sqrt(1/2) / 511``, in the sign that makes the largest positive.
+    The two highest bits are the index of the largest component, which is omitted. The others follow
+    in order, each as a sign and 9 bits of magnitude in units of ``sqrt(1/2) / 511``, in the sign
+    that makes the largest positive.
     """
     largest = max(range(4), key=lambda i: abs(quaternion[i]))
     flip = quaternion[largest] < 0.0
@@ -80,7 +80,7 @@ def compress_quaternion(quaternion: Quaternion) -> int:
 def decompress_quaternion(word: int) -> Quaternion:
     """Return the unit quaternion (x, y, z, w) of 32 bits; inverse of `compress_quaternion`.
 
-    Bits of no unit quaternion leave the largest component NaN, as in the firmware.
+    Bits that are not a unit quaternion leave the largest component NaN, as in the firmware.
     """
     largest = word >> 30
     parts = []

@@ -1,7 +1,7 @@
-"""Model of a radio channel: how long a Crazyradio is busy with each packet; and vehicles on it.
+"""Model of a radio channel: the time that a Crazyradio needs for each packet; its vehicles.
 
 All vehicles of a channel share it. A packet to one vehicle is acknowledged, and the acknowledgement
-carries what the vehicle has to send; a broadcast is not.
+contains the vehicle's next packet; a broadcast is not acknowledged.
 
 Sources: nRF24L01+ product specification 1.0 (format of a packet, times); for the dongle the
 measurements in bitcraze/crazyradio2-firmware, issues 9 (2.5 ms for the setup requests before a
@@ -28,15 +28,15 @@ _OVERHEAD_BITS = 8 * (1 + 5 + 2) + 9  #: Preamble, address, check sum; packet co
 
 
 def air_time(data: int) -> float:
-    """Return how long a packet with so many bytes (0 to 32) is on air, s."""
+    """Return the time on air of a packet with a number of bytes (0 to 32), s."""
     if not 0 <= data <= 32:
-        raise ValueError(f"a radio packet holds 0 to 32 bytes; got {data}")
+        raise ValueError(f"a radio packet has 0 to 32 bytes; got {data}")
     return (_OVERHEAD_BITS + 8 * data) / BIT_RATE
 
 
 @dataclass
 class RadioChannel:
-    """The time that one dongle spends on its channel."""
+    """The schedule of one dongle on its channel."""
 
     #: Whether each change of the address or of the acknowledgement is a USB request of its own, as
     #: with the Crazyradio PA, and with cflib 0.1.34 for all. Otherwise they come with the packet
@@ -50,7 +50,7 @@ class RadioChannel:
     _address: int | None = None
 
     def unicast(self, time: float, address: int, data: int, answer: int) -> float:
-        """Send a packet of so many bytes from ``time`` (s) on; return when its answer is there, s.
+        """Send a packet of ``data`` bytes from ``time`` (s) on; return the time of its answer, s.
 
         The bytes of the answer come with the acknowledgement.
         """
@@ -59,7 +59,7 @@ class RadioChannel:
         return self._occupy(time, address, max(ROUND_TRIP, on_air))
 
     def broadcast(self, time: float, data: int) -> float:
-        """Send a packet to all vehicles; return when they have it, s."""
+        """Send a packet to all vehicles; return the time of its arrival, s."""
         self.broadcasts += 1
         return self._occupy(time, None, max(BROADCAST_GAP, TURNAROUND + air_time(data)))
 
@@ -98,7 +98,7 @@ class Usage:
 
 
 def usage(load: Load, channel: RadioChannel, duration: float = 1.0) -> Usage:
-    """Send a load on a channel for a while (s); frames go before packets to single vehicles."""
+    """Send a load on a channel for a duration (s); frames have priority over single packets."""
     frames = [i / load.pose_rate for i in range(round(duration * load.pose_rate))]
     polls = [
         (i / (load.polls * load.vehicles), i % load.vehicles)
@@ -118,7 +118,7 @@ def usage(load: Load, channel: RadioChannel, duration: float = 1.0) -> Usage:
     return Usage(channel.busy / duration, frame_delay, poll_delay)
 
 
-SPACING = 1.0  #: Between two vehicles, m.
+SPACING = 1.0  #: Distance between two vehicles (m).
 
 
 class RadioSwarm:
@@ -145,7 +145,8 @@ class RadioSwarm:
     def broadcast(self, time: float, datagram: bytes) -> dict[int, tuple[float, list[bytes]]]:
         """Send a packet to all from ``time`` (s) on.
 
-        Returns, for the address of each vehicle that has received it, when (s), and its answers.
+        Returns, by address of the vehicles that have received it, the time of arrival (s) and the
+        answers.
         """
         arrival = self.channel.broadcast(time, len(datagram))
         received = {}

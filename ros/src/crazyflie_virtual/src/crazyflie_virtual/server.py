@@ -29,7 +29,8 @@ from crazyflie_virtual.settings import FIRST_PORT, FaultSwitches, VehicleSetting
 from crazyflie_virtual.vehicle import VirtualVehicle
 
 Address = tuple[str, int]  #: Host and port.
-_BURST = 256  #: Datagrams taken in at one time, so that a flood does not stop everything else.
+#: Largest number of datagrams that are read at once, so that a flood does not block the rest.
+_BURST = 256
 _STOP_LIMIT = 2.0  #: Longest wait of `Server.stop` for the thread (s).
 
 
@@ -50,7 +51,7 @@ class Server(ABC):
 
     @abstractmethod
     def serve(self) -> None:
-        """Process what has arrived and is due, after a wait of 0.1 s at most."""
+        """Process datagrams and due work, after a wait of at most 0.1 s."""
 
     def run(self) -> None:
         """Serve until `stop`."""
@@ -83,19 +84,19 @@ def open_socket(host: str, port: int) -> socket.socket:
 
 
 def received(source: socket.socket) -> Iterator[tuple[bytes, Address]]:
-    """Yield (datagram, sender) for what has arrived at a socket."""
+    """Yield (datagram, sender) for all datagrams that have arrived at a socket."""
     for _ in range(_BURST):
         try:
             yield source.recvfrom(65536)
         except BlockingIOError:
             return
         except ConnectionError:
-            # Packets were sent before the port was open.
+            # Earlier packets were sent before the port was open.
             continue
 
 
 def send(source: socket.socket, datagram: bytes, receiver: Address) -> None:
-    """Send a datagram; one that the network does not take is one that is lost."""
+    """Send a datagram; it is lost if the network does not accept it."""
     with contextlib.suppress(OSError):
         source.sendto(datagram, receiver)
 
@@ -104,7 +105,7 @@ Item = tuple[bytes, Address]  #: Datagram, and its sender or receiver.
 
 
 class Channel:
-    """Datagrams on their way; ``random`` decides which are lost."""
+    """Datagrams in transit; ``random`` decides which are lost."""
 
     def __init__(self, faults: FaultSwitches, random: Random):
         self._faults = faults
@@ -118,19 +119,19 @@ class Channel:
             return
         due = time + max(faults.delay, 0.0)
         if self._on_the_way:
-            # Nothing overtakes, also when the delay has become shorter.
+            # Datagrams keep their order, even when the delay has become shorter.
             due = max(due, self._on_the_way[-1][0])
         self._on_the_way.append((due, item))
 
     def pop(self, time: float) -> list[Item]:
-        """Return what has arrived at ``time`` (s), oldest first."""
+        """Return the datagrams that have arrived at ``time`` (s), oldest first."""
         arrived = []
         while self._on_the_way and self._on_the_way[0][0] <= time:
             arrived.append(self._on_the_way.popleft()[1])
         return [] if self._faults.silence > 0.0 else arrived
 
     def next_arrival(self) -> float:
-        """Return when the next one arrives, s; infinity when there is none."""
+        """Return the time of the next arrival, s; infinity without one."""
         return self._on_the_way[0][0] if self._on_the_way else math.inf
 
 
@@ -160,7 +161,7 @@ def run_server(
     try:
         server.run()
     except KeyboardInterrupt:
-        # Ctrl-C is how it ends.
+        # Ctrl-C is the normal end.
         pass
 
 
@@ -169,10 +170,7 @@ _FORM = struct.Struct("<4sH32s14d")
 
 
 class Observation(NamedTuple):
-    """The truth about a vehicle at some moment, which local observers are sent.
-
-    Motion capture sees the vehicle this way, and tests do.
-    """
+    """The true state of a vehicle, which is sent to local observers: motion capture and tests."""
 
     #: body_id, name: those of the vehicle; the name has at most 31 bytes.
     body_id: int
@@ -199,7 +197,7 @@ class Observation(NamedTuple):
 
     @classmethod
     def decode(cls, datagram: bytes) -> "Observation | None":
-        """Return the observation in a datagram; None when it holds none."""
+        """Return the observation in a datagram, or None."""
         if len(datagram) != _FORM.size or not datagram.startswith(_MAGIC):
             return None
         _, body_id, name, time, *numbers = _FORM.unpack(datagram)
@@ -215,9 +213,9 @@ class Observation(NamedTuple):
 
 
 _TICK = 0.005  #: Longest time between two steps of the vehicle when no packet comes (s).
-#: Longest time simulated at once (s); beyond it the vehicle loses time, and not its link.
+#: Longest time that is simulated at once (s); beyond it the vehicle loses time, but keeps its link.
 _GREATEST_LAG = 0.25
-_NULL = b"\xff"  #: Packet of a scanner, which is no client.
+_NULL = b"\xff"  #: Packet of a scanner, which is not a client.
 
 
 class VehicleServer(Server):
@@ -255,7 +253,7 @@ class VehicleServer(Server):
     @override
     def serve(self) -> None:
         datagrams = list(received(self._socket))
-        # What has been received was sent before now.
+        # All received packets were sent before now.
         now = time.monotonic()
         self._process(now, datagrams)
         arrival = min(self._up.next_arrival(), self._down.next_arrival())
@@ -263,7 +261,7 @@ class VehicleServer(Server):
         select.select([self._socket], [], [], max(0.0, wake - time.monotonic()))
 
     def observe(self) -> Observation:
-        """Return the truth about the vehicle, as of now."""
+        """Return the present true state of the vehicle."""
         physics = self.vehicle.physics
         return Observation(
             self._body_id,
@@ -291,7 +289,7 @@ class VehicleServer(Server):
         for datagram, sender in self._up.pop(now):
             receiver: Address | None = sender
             if is_broadcast(datagram):
-                # As on a radio, what answers it goes to the client.
+                # As on a radio, answers go to the client.
                 receiver = self._client
             elif datagram[:1] != _NULL:
                 self._client = sender
@@ -300,7 +298,7 @@ class VehicleServer(Server):
                     self._down.push(now, (answer, receiver))
         for datagram, receiver in self._down.pop(now):
             send(self._socket, datagram, receiver)
-        # The vehicle moves in steps: it may be where it was at the last observation.
+        # The vehicle moves in steps: it may not have moved since the last observation.
         is_new = self.vehicle.time > self._observed
         if self._observer[1] and now >= self._next_observation and is_new:
             self._observed = self.vehicle.time
@@ -322,7 +320,6 @@ def virtual_crazyflie() -> None:
 
 
 def _number(port):
-    # 1, 2, ... for the ports that clients scan; in any case different for
-    # different ports, nearly.
+    # 1, 2, ... for the ports that clients scan; nearly always different for different ports.
     number = port - FIRST_PORT + 1 if port >= FIRST_PORT else port
     return number & 0x7FFF or 1

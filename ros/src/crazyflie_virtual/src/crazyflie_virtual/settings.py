@@ -12,11 +12,12 @@ class FaultSwitches:
     """Switches, which may be changed at any time."""
 
     loss: float = 0.0  #: Probability in [0, 1] with which a packet, either way, is lost.
-    delay: float = 0.0  #: Delay of each packet, each way (s).
-    #: Remaining time for which the link is silent (s). The vehicle's port stays open, and the
+    #: Delay of each packet in each direction (s). Remaining time for which the link is silent (s).
+    #: The vehicle's port stays open, and the
+    delay: float = 0.0
     #: vehicle continues its flight.
     silence: float = 0.0
-    low_battery: int = 0  #: Not 0: the battery is nearly empty. Emptying cannot be undone.
+    low_battery: int = 0  #: If not 0, the battery is nearly empty, which cannot be undone.
     motor_failure: int = 0  #: Number of the failed motor, 1 to 4; 0 for none.
     occluded: int = 0  #: Bit mask of the base stations that the Lighthouse deck does not see.
     smooth: float = 0.0  #: Radius of a patch of floor without texture (m).
@@ -41,8 +42,8 @@ _UDP_PORT = Integer(0, 65535)
 class VehicleSettings(Parameters):
     """Settings of a virtual vehicle; the live ones are its `FaultSwitches`."""
 
-    host: str = parameter(TEXT, "address to listen on", "127.0.0.1")
-    port: int = parameter(_UDP_PORT, "UDP port; 0 takes a free one, which is printed", FIRST_PORT)
+    host: str = parameter(TEXT, "address on which the vehicle listens", "127.0.0.1")
+    port: int = parameter(_UDP_PORT, "UDP port; 0 selects a free one, which is printed", FIRST_PORT)
     init_x: float = parameter(METRES, "initial position", 0.0, "init/x")
     init_y: float = parameter(METRES, "initial position", 0.0, "init/y")
     init_yaw: float = parameter(Number("rad"), "initial heading", 0.0, "init/yaw")
@@ -56,30 +57,33 @@ class VehicleSettings(Parameters):
     smooth_y: float = parameter(METRES, "the same", 0.0, "smooth/y")
     base_stations: int = parameter(Integer(1, 2), "of Lighthouse", 2)
     knows_stations: bool = parameter(
-        BOOLEAN, "the geometry of the base stations is on the vehicle", True
+        BOOLEAN, "store the geometry of the base stations on the vehicle", True
     )
     multiranger: bool = parameter(
-        BOOLEAN, "carry a Multi-ranger deck, which sees the ground and what is in `world`", False
+        BOOLEAN,
+        "carry a Multi-ranger deck, which sees the ground and the objects of `world`",
+        False,
     )
     world: str = parameter(
         Text(may_be_empty=True),
-        "a world file of crazyflie_world: what ranging sensors see; empty for the ground alone",
+        "world file of crazyflie_world for ranging sensors; empty for the ground alone",
         "",
     )
     auto_arm: bool = parameter(
         BOOLEAN,
-        "arm automatically, as a Crazyflie 2.1; else the client arms, as with brushless motors",
+        "arm automatically, like a Crazyflie 2.1; otherwise the client arms, as with brushless "
+        "motors",
         True,
     )
     sensor_noise: bool = parameter(BOOLEAN, "noise of gyroscope, accelerometer and barometer", True)
-    seed: int = parameter(Integer(0, 2**31 - 1), "of the noise, and of which packets are lost", 0)
+    seed: int = parameter(Integer(0, 2**31 - 1), "seed of the noise and of the packet loss", 0)
     model: str = parameter(
         VEHICLE_MODEL,
         "type of the vehicle, or model file; with `lag/roll`, its lags replace the attitude loops",
         "cf21",
     )
     mass_error: float = parameter(
-        _FRACTION, "how much heavier than nominal it is, as a fraction", 0.0
+        _FRACTION, "how much heavier than nominal the vehicle is, as a fraction", 0.0
     )
     thrust_error: float = parameter(
         _FRACTION, "how much more than nominal its rotors lift, as a fraction", 0.0
@@ -89,45 +93,49 @@ class VehicleSettings(Parameters):
     )
     protocol: int = parameter(
         Integer(11, 12),
-        "CRTP protocol version; 11 has no supervisor port (9), and its supervisor.info no flags of "
-        "the high-level commander",
+        "CRTP protocol version; 11 has no supervisor port (9), and no flags of the high-level "
+        "commander in supervisor.info",
         12,
     )
     address: int = parameter(Integer(0, 255), "last byte of the radio's address, E7E7E7E7xx", 0xE7)
     observer_host: str = parameter(
-        TEXT, "where the true pose is sent", "127.0.0.1", "observer/host"
+        TEXT, "host to which the true pose is sent", "127.0.0.1", "observer/host"
     )
     observer_port: int = parameter(
-        _UDP_PORT, "UDP port there; 0 sends nothing", OBSERVER_PORT, "observer/port"
+        _UDP_PORT, "UDP port on that host; 0 sends nothing", OBSERVER_PORT, "observer/port"
     )
     observer_rate: float = parameter(
         Number("Hz", minimum=1.0, maximum=500.0), "how often", 200.0, "observer/rate"
     )
     body_name: str = parameter(
         Text(may_be_empty=True),
-        "rigid body's name there; empty for one by port: cf1 for 19850, and so on",
+        "name of the rigid body there; empty for a name by port: cf1 for 19850, and so on",
         "",
         "observer/name",
     )
     body_id: int = parameter(
         Integer(0, 32767),
-        "rigid body's number there; 0 for one by port: 1 for 19850, and so on",
+        "number of the rigid body there; 0 for a number by port: 1 for 19850, and so on",
         0,
         "observer/id",
     )
     loss: float = parameter(
-        _PROBABILITY, "probability that a packet, either way, is lost", 0.0, "fault/loss", live=True
+        _PROBABILITY,
+        "probability that a packet is lost, in either direction",
+        0.0,
+        "fault/loss",
+        live=True,
     )
     delay: float = parameter(
         Number("s", minimum=0.0, maximum=10.0),
-        "of each packet, each way",
+        "delay of each packet, in each direction",
         0.0,
         "fault/delay",
         live=True,
     )
     silence: float = parameter(
         Number("s", minimum=0.0),
-        "for how long the link is silent from now on; the port stays open, the vehicle flies on",
+        "time for which the link is silent from now on; the port stays open, the vehicle flies on",
         0.0,
         "fault/silence",
         live=True,
@@ -160,5 +168,5 @@ class VehicleSettings(Parameters):
     )
 
     def switches(self) -> FaultSwitches:
-        """Return the fault switches as they are at the beginning."""
+        """Return the initial fault switches."""
         return FaultSwitches(**{name: getattr(self, name) for name in vars(FaultSwitches())})

@@ -1,4 +1,4 @@
-"""Tables of contents: what a client can log and set, with names and C types."""
+"""Tables of contents: variables and parameters for clients, with names and C types."""
 
 import math
 import struct
@@ -33,7 +33,7 @@ class NumberType:
         return struct.unpack("<" + self.format, data)[0]
 
     def convert(self, value: float) -> float:
-        """Return the value that is packed: limited, and whole where the type is whole."""
+        """Return the value as packed: limited, and an integer for integer types."""
         if self.is_float:
             largest = _LARGEST.get(self.format, math.inf)
             return value if math.isnan(value) else max(-largest, min(largest, value))
@@ -92,11 +92,11 @@ class Table:
         ]
         self._limits = limits
         self._index = {(group, name): i for i, (group, name, _) in enumerate(entries)}
-        #: Changes with the table: clients keep tables by it.
+        #: Checksum of the table, by which clients cache tables.
         self.crc = zlib.crc32(b"".join(self._items))
 
     def index(self, group: str, name: str) -> int | None:
-        """Return the number of an entry; None when there is none."""
+        """Return the number of an entry, or None."""
         return self._index.get((group, name))
 
     def answer(self, request: bytes) -> bytes | None:

@@ -85,34 +85,40 @@ class RigidBody(Body):
 class Bodies:
     """The bodies of one dictionary that are to be published."""
 
-    bodies: list[Body]  #: At least one.
-    unknown: list[str]  #: Entries that have no meaning, such as "rigid_bodies/1/odom".
+    bodies: list[Body]  #: The bodies; at least one.
+    unknown: list[str]  #: Unknown entries, such as "rigid_bodies/1/odom".
 
 
 class SingleMarkerParameters(OutputParameters):
     """An entry of ``single_markers``: a vehicle with one marker, and how it is published."""
 
     initial_position: Triple = parameter(
-        POSITION, "of the vehicle, in the frame of the coordinates, when the node starts"
+        POSITION,
+        "position of the vehicle at the start of the node, in the frame of the coordinates",
     )
     position: str | None = parameter(
         TOPIC, "topic of its position, such as the driver's `/cf1/external_position`", None
     )
     heading: str | None = parameter(
         TOPIC,
-        "read: the vehicle's own estimate of its yaw, such as the driver's `/cf1/heading`; poses "
-        "and tf need it",
+        "topic that is read: the vehicle's own estimate of its yaw, such as the driver's "
+        "`/cf1/heading`; needed for poses and tf",
         None,
     )
     offset: Triple = parameter(
-        POSITION, "from the marker to the vehicle, along the axes of the coordinates", (0.0,) * 3
+        POSITION,
+        "vector from the marker to the vehicle, along the axes of the coordinates",
+        (0.0,) * 3,
     )
     max_velocity: Triple = parameter(
-        ListOf(Number("m/s", above=0.0), 3), "along x, y and z", MotionLimits().max_velocity
+        ListOf(Number("m/s", above=0.0), 3),
+        "largest velocity along x, y and z",
+        MotionLimits().max_velocity,
     )
     max_acceleration: float = parameter(
         Number("m/s^2", above=0.0),
-        "that it keeps; with less a marker is told apart from others for longer while it is unseen",
+        "largest acceleration; with a lower one, an unseen marker is distinguished from others "
+        "for longer",
         MotionLimits().max_acceleration,
     )
 
@@ -143,14 +149,14 @@ class SingleMarker(Body):
 
 
 class RigidBodyDictionary(ParameterType):
-    """The dictionary ``rigid_bodies``; a refusal names all that is wrong with it."""
+    """The dictionary ``rigid_bodies``; a refusal names all errors."""
 
     label = "dictionary"
     key = "rigid_bodies"  #: The dictionary's name.
     #: entry_type, body_type: Types of an entry's parameters, and of its body.
     entry_type: type[OutputParameters] = RigidBodyParameters
     body_type: type[Body] = RigidBody
-    #: An entry has one of these parameters at least.
+    #: Parameters of which an entry has at least one.
     outputs: tuple[str, ...] = ("pose", "pose2d", "child_frame_id")
 
     @override
@@ -207,8 +213,8 @@ class SingleMarkerDictionary(RigidBodyDictionary):
             if math.dist(a, b) < SEPARATION:
                 complaints.append(
                     f"{second.key}/initial_position is {math.dist(a, b):.3g} m from that of "
-                    f"{first.key}; expected at least {SEPARATION:g} m, since markers are told "
-                    "apart by their places"
+                    f"{first.key}; expected at least {SEPARATION:g} m, since markers are "
+                    "distinguished by their places"
                 )
         if complaints:
             raise ValueError("; ".join(complaints))

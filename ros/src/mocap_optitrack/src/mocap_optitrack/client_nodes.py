@@ -1,4 +1,4 @@
-"""Nodes with the names of other packages for motion capture: each publishes all bodies it sees.
+"""Nodes with the names of other packages for motion capture: each publishes all visible bodies.
 
 Names, parameters, topics and frames are those of vicon_bridge, vrpn_client_ros and
 ros_vrpn_client, for launch files that start these.
@@ -41,7 +41,7 @@ class ClientNode(MocapNode):
     def use(self, backend: str, hostname: str) -> None:
         """Connect to a system when callbacks are registered."""
         self._known: dict[str, Mapping[str, Any] | None] = {}
-        # mypy takes each default for a missing argument.
+        # mypy treats each default as a missing argument.
         library = LibraryParameters(hostname=hostname)
         self._parameters = MocapParameters(  # type: ignore[call-arg]
             natnet=NatNetParameters(),  # type: ignore[call-arg]
@@ -56,9 +56,9 @@ class VrpnClientParameters(Parameters):
     server: str = parameter(TEXT, "host name or address of the VRPN server", "localhost")
     port: int = parameter(_PORT, "TCP port of the server", _VRPN_PORT)
     frame_id: str = parameter(FRAME, "frame of the coordinates", "world")
-    broadcast_tf: bool = parameter(BOOLEAN, "publish poses on /tf, too", True)
+    broadcast_tf: bool = parameter(BOOLEAN, "also publish poses on /tf", True)
     trackers: tuple[str, ...] | None = parameter(
-        ListOf(TEXT), "the trackers to publish; all without it", None
+        ListOf(TEXT), "trackers to publish; all by default", None
     )
 
 

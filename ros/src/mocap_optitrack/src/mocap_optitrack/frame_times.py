@@ -4,36 +4,36 @@ from collections import deque
 from enum import Enum
 from statistics import median
 
-_BUCKET = 0.25  #: s of local time whose shortest delay is kept as one figure.
+_BUCKET = 0.25  #: Local time whose shortest delay is stored as one figure (s).
 
 #: Buckets that make up the window: 5 s, in which clocks that differ by 50 ppm, a lot for quartz,
 #: drift apart by 0.25 ms.
 _BUCKETS = 20
 
-#: A new stream is only listened to until the shortest delays of two buckets in a row differ by less
-#: than this, s; or, on a bad network, until the window is full.
+#: Largest difference of the shortest delays of two consecutive buckets (s). A new stream is not
+#: published before; on a bad network, until the window is full.
 _AGREEMENT = 2e-3
 
 #: Largest rate of change of the offset (s/s). A velocity from stamps is wrong by this fraction at
 #: most, and stamps never run backwards; no quartz drifts as fast.
 _SLEW = 1e-3
 
-_JUMP = 0.1  #: A difference that no drift explains, s.
+_JUMP = 0.1  #: Smallest difference that drift does not explain (s).
 
-#: A message that was sent this long before the newest one, s, has not been overtaken: networks do
-#: not hold messages back for so long.
+#: Longest time by which networks delay a message (s): one that was sent longer before the newest
+#: one was not overtaken.
 _RESTART = 1.0
 
-#: Messages in a row that contradict what is known, until the clock is taken to be set.
+#: Number of consecutive contradicting messages after which the clock was set.
 _CONTRADICTION_LIMIT = 10
 
 
 class FrameOrder(Enum):
     """Order of a message among those before it, by its times."""
 
-    NEW = "new"  #: Sent after all others.
-    OLD = "old"  #: Sent with or before one that has come already: doubled, or overtaken on its way.
-    FOREIGN = "foreign"  #: Stamped by another clock: too old, or later than its arrival.
+    NEW = "new"  #: It was sent after all others.
+    OLD = "old"  #: It was sent with or before one that has come already: duplicated, or overtaken.
+    FOREIGN = "foreign"  #: It was stamped by another clock: too old, or later than its arrival.
     #: One of the clocks was set; learning restarts with this message.
     RESTART = "restart"
 
@@ -44,9 +44,8 @@ class ClockOffset:
     A message that is sent at ``s`` and arrives at ``a`` shows ``a - s = offset +
     delay``. Delays are positive, most of them small and a few large, so that the
     smallest difference of the last five seconds is the offset but for the
-    shortest delay, which on a wired network is a fraction of a millisecond. (A
-    mean would follow every busy moment.) What has been learned is applied
-    smoothly. Silence changes nothing.
+    shortest delay, which on a wired network is a fraction of a millisecond. (A mean would follow
+    every busy moment.) The estimate changes smoothly. Silence does not change it.
 
     A message that contradicts the others is dropped. Only when they keep coming has a
     clock been set, or the server been restarted, and learning restarts.
@@ -74,7 +73,7 @@ class ClockOffset:
         difference = arrival - sent
         order = self._classify(sent, difference)
         if order is not FrameOrder.NEW:
-            # The newest message again, however often, is no sign of another clock.
+            # Repetitions of the newest message do not show another clock.
             self._contradictions += sent != self._newest
             if self._contradictions < _CONTRADICTION_LIMIT:
                 return order
@@ -105,7 +104,7 @@ class ClockOffset:
         return moment + self._offset
 
     def _reset(self):
-        # Of each bucket: when it began, and its smallest difference.
+        # Begin and smallest difference of each bucket.
         self._window: deque[tuple[float, float]] = deque(maxlen=_BUCKETS)
         self._offset = None
         self._updated = 0.0
@@ -127,7 +126,7 @@ class ClockOffset:
         return self._offset is not None and self._shortest() > self._offset + _JUMP
 
     def _is_plausible(self):
-        # The last bucket is still open: it is not yet what it will be.
+        # The last bucket is still open, and its value preliminary.
         *closed, _ = self._window
         if len(closed) < 2:
             return False
@@ -142,18 +141,18 @@ class ClockOffset:
             self._window[-1] = (begin, min(smallest, difference))
 
 
-_INTERVALS = 50  #: Intervals whose median is the period of the stream.
-_LEARNING = 10  #: Intervals that must be known before they decide anything.
-_STALL = 5.0  #: Periods without a frame, after which the next one may have been waiting.
+_INTERVALS = 50  #: Number of intervals whose median is the period of the stream.
+_LEARNING = 10  #: Number of intervals that must be known before the median is used.
+_STALL = 5.0  #: Number of periods without a frame after which the next one may have been waiting.
 
 
 class ArrivalTimes:
     """Times of frames that come at a steady rate, from the moments at which they are read.
 
-    A reader that is stopped or starved finds the frames of the meantime in a buffer and reads
-    them at once: each would be as new as the moment. The frames were sent one period apart, so
-    that one that is read less than half a period after the last one was there already, and is
-    one period later than the last one. One that had to be waited for came when it was read.
+    A reader that was stopped or starved finds the missed frames in a buffer and reads them at once:
+    each would seem to be new. The frames were sent one period apart, so that a frame that is read
+    less than half a period after the last one had arrived before, one period after the last one. A
+    frame for which the reader has waited arrived when it was read.
 
     After a stall it is unknown, until the second frame comes, whether the stream or the reader has
     paused: the first one has no time.
@@ -192,6 +191,6 @@ class ArrivalTimes:
         else:
             self._time = min(moment, self._time + period)
         if self._time == moment:
-            # What is read from a buffer says nothing about the rate.
+            # Frames from a buffer give no information about the rate.
             self._intervals.append(interval)
         return self._time

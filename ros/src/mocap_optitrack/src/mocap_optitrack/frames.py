@@ -9,23 +9,23 @@ from crazyflie_model.angles import Quaternion, Triple
 class SeenBody(NamedTuple):
     """A rigid body in a frame."""
 
-    body_id: int | None  #: Number that the server streams the body under; None when it has none.
-    name: str | None  #: Name of the body on the server; None when it is not known.
+    body_id: int | None  #: Number of the body in the server's stream, or None.
+    name: str | None  #: Name of the body on the server; None if it is not known.
     position: Triple  #: m, in the server's coordinates.
     quaternion: Quaternion  #: Rotation from the body's axes to the server's coordinates.
-    #: Whether the cameras saw the body in this frame; otherwise the pose is an old one, or none.
+    #: Whether the cameras saw the body in this frame; otherwise the pose is old or undefined.
     is_tracked: bool
 
 
 class Frame(NamedTuple):
-    """All rigid bodies, and markers of none, at one moment."""
+    """All rigid bodies, and markers without a body, at one moment."""
 
     #: Time of exposure, s of the server's clock; None when the stream does not have it.
     exposure: float | None
     sent: float | None  #: Time of sending by the same clock (s); None like `exposure`.
     arrival: float  #: Time of reception by the local clock (s).
     bodies: tuple[SeenBody, ...]
-    #: Time that it had been on this machine by then (s); for streams without `exposure`.
+    #: Time that the frame had been on this machine by then (s); for streams without `exposure`.
     waited: float = 0.0
     #: Markers that the system has not assigned to a body, m, in the server's coordinates.
     points: tuple[Triple, ...] = ()
@@ -50,7 +50,7 @@ def to_z_up(up_axis: str, position: Triple, quaternion: Quaternion) -> tuple[Tri
 
 
 def normalized(quaternion: Quaternion) -> Quaternion | None:
-    """Return a measured quaternion with norm 1; None when it is no rotation."""
+    """Return a measured quaternion with norm 1; None if it is not a rotation."""
     norm = math.hypot(*quaternion)
     # Also false when a component is not a number.
     if not abs(norm - 1.0) < _NORM_TOLERANCE:

@@ -11,10 +11,10 @@ from mocap_optitrack.frames import SeenBody
 
 OK, WARN, ERROR = range(3)  #: Levels, as in diagnostic_msgs/DiagnosticStatus.
 
-#: Time after which a missing body is a fault (s): the first moments of a stream show nothing.
+#: Time after which a missing body is a fault (s): the first moments of a stream have no bodies.
 _GRACE = 2.0
 
-#: Bodies that are not configured and are remembered, so that a message can name them.
+#: Largest number of stored bodies that are not configured, so that a message can name them.
 _MOST_OTHERS = 10
 
 _TWO_SERVERS = "the server's clock keeps jumping: do two servers send to the same address?"
@@ -40,7 +40,7 @@ class Status(NamedTuple):
 
 
 class Health:
-    """Counts what happens between two reports; ``now`` is the time at the beginning, s.
+    """Counts events between two reports; ``now`` is the time at the beginning, s.
 
     Fewer frames a second than the first of ``rate_limits``, or more than the second, are a fault.
     """
@@ -57,7 +57,7 @@ class Health:
         self._rate_limits = rate_limits or (0.0, math.inf)
         self._bodies = {body.key: _BodyCount() for body in bodies}
         self._labels = {body.key: body.component for body in bodies}
-        self.stale_after = stale_after  #: For the reports to come.
+        self.stale_after = stale_after  #: Used from the next report on.
         self._server: str | None = None
         self._failure = "not connected so far"
         self._silence = "no frames"
@@ -67,7 +67,7 @@ class Health:
         self._begin_period(now)
 
     def add(self, body: Body) -> None:
-        """Report on a body, too."""
+        """Also report on a body."""
         self._bodies[body.key] = _BodyCount()
         self._labels[body.key] = body.component
         self._others.pop((None, body.key), None)
@@ -87,7 +87,7 @@ class Health:
         self._latencies.append(latency)
 
     def body(self, body: Body, now: float, is_tracked: bool, why: str = "") -> None:
-        """Count a configured body in a good frame; ``why`` it is not tracked, if that is known."""
+        """Count a configured body in a good frame; ``why`` is the reason if it is not tracked."""
         count = self._bodies[body.key]
         count.why = why
         count.frames += 1
@@ -109,7 +109,7 @@ class Health:
         self._silence = text
 
     def disconnected(self, failure: str) -> None:
-        """Record why there is no connection: what was seen before does not count."""
+        """Record why there is no connection: earlier observations are dropped."""
         self._server = None
         self._failure = failure
         self._stream_begin = None

@@ -18,7 +18,7 @@ from mocap_optitrack.frames import Frame, SeenBody
 from mocap_optitrack.source import Source, SourceError
 
 SYSTEMS = ("vicon", "qualisys", "vrpn")  #: Systems other than NatNet.
-_MARGIN = 2.0  #: Added to the worker's own limit of connecting, s.
+_MARGIN = 2.0  #: Time that is added to the worker's own limit of connecting (s).
 
 _CHUNK = 65536
 
@@ -26,15 +26,15 @@ _CHUNK = 65536
 class LibrarySource(Source):
     """A system that the motioncapture package knows, one of `SYSTEMS`.
 
-    The package says neither when a frame was taken nor which bodies are tracked. So frames have the
+    The package reports neither the time of a frame nor which bodies are tracked. So frames have the
     time of their arrival at the package, which `ArrivalTimes` estimates for those that have waited
-    there, and a body counts as tracked when its pose is not, to the last bit, the one it had in the
-    frame before: measurements of a body at rest differ by their noise, and a system that has lost a
-    body, or its cameras, repeats itself.
+    there. A body is treated as tracked if its pose differs from that of the previous frame:
+    measurements of a body at rest differ by their noise, and a system that has lost a body, or its
+    cameras, repeats the last pose to the last bit.
 
     ``host`` is name or address of the server; for VRPN also with a port, ``vicon:3884``.
-    ``clock()`` returns the local time, s. A package that tells no unlabelled markers is of no use
-    if ``needs_points``.
+    ``clock()`` returns the local time, s. With ``needs_points``, a package without unlabelled
+    markers is refused.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class LibrarySource(Source):
     def open(self) -> str:
         name, colon, port = self._host.partition(":")
         try:
-            # The package does not take names.
+            # The package does not accept names.
             address = socket.gethostbyname(name) + colon + port
         except OSError as error:
             text = f"motioncapture_config/hostname {self._host!r} is unknown: {error}"
@@ -85,10 +85,10 @@ class LibrarySource(Source):
         are_new = points != self._points
         self._points = points
         if time_of_arrival is None or not (are_new or any(body.is_tracked for body in bodies)):
-            # Some systems give frames whether they know anything new or not.
+            # Some systems send frames without new data.
             return None
         waited += moment - time_of_arrival
-        # What is repeated is not measured.
+        # Repeated poses are not measured ones.
         new = tuple((x, y, z) for x, y, z in points) if are_new else ()
         return Frame(None, None, arrival, tuple(bodies), waited, new)
 

@@ -5,12 +5,11 @@ output, one value a line: first, when it is connected, whether the package tells
 markers (not all versions do), then for every frame [moment, bodies, points], where moment is
 when the package returned it, s of time.monotonic(), bodies a list of [name, x, y, z, qx, qy, qz,
 qw] and points one of [x, y, z]; m and z up, as the system has them. When the package fails it
-writes {"error": text} and ends. Frames for which the pipe has no room
-are dropped: waiting for the reader would let frames grow old before they have a moment.
+writes {"error": text} and ends. Frames for which the pipe has no room are dropped: if the worker
+waited for the reader, frames would age before they get their time.
 
 Without a server the package may wait for ever, in C++ and with Python's interpreter
-lock held. So nothing in this process can limit it but a signal that kills, and
-nothing else should live in this process.
+lock held. So only a signal that kills can limit it, and nothing else should run in this process.
 """
 
 import contextlib
@@ -26,7 +25,7 @@ FRAME_LIMIT = 5.0  #: Longest wait for a frame (s).
 
 
 def main() -> int:
-    """Run until the system or the reader goes away; return the exit status."""
+    """Run until the system or the reader ends; return the exit status."""
     system, host = sys.argv[1:]
     # The package's own messages must not come between the lines.
     lines = _Lines(os.dup(sys.stdout.fileno()))
@@ -37,7 +36,7 @@ def main() -> int:
     try:
         _stream(system, host, lines)
     except BrokenPipeError:
-        # Who reads the lines has ended.
+        # The reader of the lines has ended.
         return 0
     except ImportError as error:
         text = "the motioncapture package (from PyPI; for x86-64 and Python up to 3.13) is missing"

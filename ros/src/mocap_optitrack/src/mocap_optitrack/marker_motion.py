@@ -1,4 +1,4 @@
-"""The motion of a reflecting marker, where it must be next, and which point of a frame it is."""
+"""The motion of a reflecting marker, its prediction, and its assignment to a point of a frame."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from crazyflie_model.angles import Triple
 
 Point = npt.NDArray[np.float64]  #: x, y, z in m, z up.
-GATE = 4.0  #: Standard deviations: of three normal variables together, 1 in 1000 is farther away.
+GATE = 4.0  #: Gate in standard deviations: for three normal variables, 1 in 1000 is farther away.
 
 #: Variance along each axis (m^2). OptiTrack states less than 0.3 mm; markers that some cameras see
 #: only in part have larger errors.
@@ -29,9 +29,10 @@ _BOX_MARGIN = GATE * (2.0 * _MEASUREMENT_VARIANCE) ** 0.5  #: Noise of two measu
 class MotionLimits(NamedTuple):
     """Limits of a vehicle's motion."""
 
-    #: Along each axis, m/s; those of crazyswarm2's dynamics configurations.
+    #: Largest velocity along each axis (m/s), as in crazyswarm2's dynamics configurations.
     max_velocity: Triple = (2.0, 2.0, 3.0)
-    max_acceleration: float = 8.0  #: m/s^2; three standard deviations of the filter's acceleration.
+    #: Largest acceleration (m/s^2): three standard deviations of the filter's.
+    max_acceleration: float = 8.0
 
 
 class MarkerMotion:
@@ -55,14 +56,14 @@ class MarkerMotion:
         return self._predicted(time - self.time)[0] + _MEASUREMENT_VARIANCE
 
     def radius(self, time: float) -> float:
-        """Return how far from its predicted position the marker may be, m."""
+        """Return the largest distance of the marker from its predicted position, m."""
         return GATE * float(self.variance(time) ** 0.5)
 
     def costs(self, time: float, points: Point) -> npt.NDArray[np.float64]:
-        """Return how unlikely the measurements (n, 3) are: -2 times the logarithm of their density.
+        """Return the costs of measurements (n, 3): -2 times the logarithm of their density.
 
-        They are relative to that of a measurement without error, and infinite beyond `GATE` and
-        where the marker would have needed more than its maximum velocity.
+        They are relative to a measurement without error, and infinite beyond `GATE` and where the
+        marker would exceed its maximum velocity.
         """
         dt, variance = time - self.time, self.variance(time)
         squares = np.sum((points - self.position - dt * self.velocity) ** 2, axis=1) / variance
@@ -97,7 +98,7 @@ class MarkerMotion:
         )
 
 
-#: Cost by which the second-best assignment has to be worse: it is less likely by exp(-3), or 1 in
+#: Least difference of cost to the second-best assignment, which is less likely by exp(-3), or 1 in
 #: 20.
 _AMBIGUITY = 6.0
 

@@ -20,8 +20,8 @@ from mocap_optitrack.marker_vehicle import (
 class MarkerTracker:
     """Assigns the unlabelled markers of frames to vehicles.
 
-    All markers have a track, those of no vehicle too: a reflection that was there before a vehicle
-    was lost is not taken for the vehicle. If vehicles keep their maximum velocities and
+    All markers have a track, also those without a vehicle: a reflection that was present before a
+    vehicle was lost is not mistaken for the vehicle. If vehicles keep their maximum velocities and
     accelerations and their markers are `SEPARATION` apart, no vehicle gets the marker of another:
     when two are possible, none is taken. A vehicle may be unseen in flight for ``hold_time`` (s);
     ``log(text)`` is called about each that is lost, and that is found again.
@@ -50,7 +50,7 @@ class MarkerTracker:
         """Return the measured positions (m) of the vehicles whose markers are in a frame.
 
         The vehicles are `UNSEEN` again when its time (s) is before the last one's. ``points`` are
-        its unlabelled markers, m, z up; those that are not finite are left out.
+        its unlabelled markers, m, z up; those that are not finite are ignored.
         """
         if time <= self._time:
             self._strangers = []
@@ -77,7 +77,7 @@ class MarkerTracker:
         }
 
     def reset_lost(self) -> list[str]:
-        """Expect the vehicles that are lost at their start points; return their names."""
+        """Expect the lost vehicles at their start points; return their names."""
         lost = [vehicle for vehicle in self._vehicles if vehicle.state is TrackState.LOST]
         for vehicle in lost:
             vehicle.forget()
@@ -121,7 +121,7 @@ class MarkerTracker:
                 vehicle.state = TrackState.LOST
                 x, y, z = vehicle.motion.measured
                 self._log(
-                    f"{vehicle.name} is lost: its marker was seen last at ({x:.2f}, {y:.2f}, "
+                    f"{vehicle.name} is lost: its marker was last seen at ({x:.2f}, {y:.2f}, "
                     f"{z:.2f}), {time - vehicle.motion.time:.1f} s ago"
                 )
 
@@ -133,7 +133,7 @@ class MarkerTracker:
         for vehicle in unsure:
             vehicle.state = TrackState.HELD
         if unsure:
-            # Their points may be those of markers that have been left out.
+            # Their points may belong to markers that were ignored.
             self._follow(cloud)
             return
         for row, column in pairs.items():

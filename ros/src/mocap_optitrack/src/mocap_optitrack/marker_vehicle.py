@@ -1,4 +1,4 @@
-"""A vehicle with one marker: what is known of it, and where it may be."""
+"""A vehicle with one marker: its track, and its possible places."""
 
 import math
 from enum import Enum
@@ -10,23 +10,24 @@ import numpy.typing as npt
 from crazyflie_model.angles import Triple
 from mocap_optitrack.marker_motion import MarkerMotion, MotionLimits, Point
 
-#: The markers of two vehicles are at least this far apart, m: a Crazyflie has 92 mm from motor to
-#: motor. So a gate of half of it has the marker of one vehicle at most.
+#: Least distance between the markers of two vehicles (m): a Crazyflie has 92 mm from motor to
+#: motor. So a gate of half of it contains the marker of at most one vehicle.
 SEPARATION = 0.1
 
 #: Largest distance of a marker from its vehicle's start point (m), unless another start point is
 #: nearer than three times as much.
 START_RADIUS = 0.25
 
-#: A marker that has been within so many m for so many s rests.
+#: Size of the region (m) and time (s) in which a resting marker stays.
 _REST_TIME, _REST_RADIUS = 0.5, 0.02
 _GROUND = 0.1  #: Largest height above its first place of a vehicle on the ground (m).
 
-#: A vehicle without poses has stopped after so many s, and is on the ground after so many s:
+#: Times after which a vehicle without poses has stopped, and is on the ground (s):
 #: crazyflie_takeoff's filter ends its motion and lets it sink.
 _STOP_TIME, _FALL_TIME = 1.0, 5.0
 
-#: Frames in which a marker has been seen that is taken for a vehicle's: reflections flash.
+#: Number of frames in which a marker must be seen before it is assigned to a vehicle: reflections
+#: flash.
 _LEAST_SIGHTINGS = 3
 #: Time after which an unseen marker of no vehicle is forgotten (s); one that `flashes`, at once.
 FORGET_TIME = 0.1
@@ -83,7 +84,7 @@ class Marker:
 
     @property
     def flashes(self) -> bool:
-        """Whether it has been seen in too few frames to be a vehicle's."""
+        """Whether it has been seen in too few frames to belong to a vehicle."""
         return self._sightings < _LEAST_SIGHTINGS
 
     @property
@@ -100,7 +101,7 @@ class TrackedVehicle:
     def __init__(self, config: MarkerVehicle, starts: npt.NDArray[np.float64]):
         self.name, self.start, self._limits = config
         distances = np.linalg.norm(starts - config.start, axis=1)
-        # The nearest is the vehicle's own.
+        # The nearest start point is the vehicle's own.
         nearest = np.sort(distances)[1] if len(starts) > 1 else math.inf
         self.start_radius = min(START_RADIUS, float(nearest) / 3.0)
         self.forget()
@@ -127,7 +128,7 @@ class TrackedVehicle:
         marker.motion.limits = self._limits
 
     def accepts(self, marker: Marker, time: float) -> bool:
-        """Return whether a marker may be taken for the vehicle's."""
+        """Return whether a marker may be assigned to the vehicle."""
         if marker.motion.time != time or not self.may_be(marker, time):
             return False
         if self.state is TrackState.HELD:

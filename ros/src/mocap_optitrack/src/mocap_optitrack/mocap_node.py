@@ -33,7 +33,7 @@ from mocap_optitrack.source import Receiver
 from mocap_optitrack.tracker import BodyPose, Tracker
 
 _REPORT_PERIOD = 1.0  #: Period of the diagnostics (s): REP 107 wants one report a second.
-_REPEAT = 5.0  #: The same warning comes at most this often, s.
+_REPEAT = 5.0  #: Shortest period of the same warning (s).
 
 #: Age up to which a heading is used (s): a gyroscope drifts by some degrees a minute, and the
 #: driver's headings come every 0.1 s.
@@ -41,7 +41,7 @@ MAX_HEADING_AGE = 2.0
 
 
 class MocapNode(Node):
-    """Publish where the rigid bodies of a motion capture system are, as topics and on tf."""
+    """Publish the poses of a motion capture system's rigid bodies on topics and on tf."""
 
     needed_in_flight = True
     pose_type: type = PoseStamped  #: Message type of the topics with poses.
@@ -50,7 +50,7 @@ class MocapNode(Node):
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(MocapParameters, self._reconfigure)
         for name in self._parameters.unknown:
-            handle.warn(f"parameter {handle.name}/{name} means nothing here")
+            handle.warn(f"parameter {handle.name}/{name} is unknown and has no effect")
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -79,7 +79,7 @@ class MocapNode(Node):
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         handle.timer(_REPORT_PERIOD, self._report, steady=True)
         handle.info(
-            f"looking for {parameters.backend}; axis {parameters.up_axis} of its stream points up"
+            f"connecting to {parameters.backend}; axis {parameters.up_axis} of its stream points up"
         )
         self._receiver = self.make_receiver(handle)
         self._receiver.start()
@@ -119,13 +119,13 @@ class MocapNode(Node):
             self._tracker.restart()
 
     def on_silence(self, text: str) -> None:
-        """Warn that nothing comes over a connection."""
+        """Warn that a connection is silent."""
         self._handle.warn(text, throttle=_REPEAT, key="silence")
         self._health.silent(text)
 
     def on_failure(self, text: str) -> None:
         """Warn that there is no connection."""
-        self._handle.warn(f"{text} (trying again)", throttle=_REPEAT)
+        self._handle.warn(f"{text} (retrying)", throttle=_REPEAT)
         self._health.disconnected(text)
 
     def on_frame(self, frame: Frame) -> None:
@@ -222,7 +222,7 @@ class MocapNode(Node):
         self._diagnostics.publish(DiagnosticArray(Header(stamp=self._handle.stamp()), reports))
         stream, *bodies = statuses
         for status in bodies:
-            # Without a stream no body is seen; that has been warned of.
+            # Without a stream no body is seen, for which a warning was logged.
             if status.level == ERROR and stream.level < ERROR:
                 text = f"{status.component}: {status.message}"
                 self._handle.warn(text, throttle=_REPEAT, key=status.component)
@@ -239,7 +239,7 @@ def _publishers(handle, bodies, output, message_type):
 
 
 def _private(topic):
-    # As with the node of this name in C++: a relative name is the node's own.
+    # A relative name is below the node's, as with the C++ node of this name.
     return topic if topic.startswith(("/", "~")) else "~" + topic
 
 

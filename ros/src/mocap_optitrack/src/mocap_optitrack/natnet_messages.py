@@ -1,9 +1,8 @@
 """NatNet messages: bytes to values, with the decoders of the natnet package.
 
 natnet's own client is not used: its receiving threads end at the first datagram
-they cannot decode, it hides the frequency of the server's clock, without which
-time stamps are worth nothing, and it needs the server's address, which multicast
-does not.
+they cannot decode, it hides the frequency of the server's clock, without which time stamps are
+useless, and it needs the server's address, which multicast does not.
 """
 
 import math
@@ -33,7 +32,7 @@ _CONNECTION = struct.Struct("<QHB4B")
 
 
 class DecodeError(Exception):
-    """A datagram is not what its header says."""
+    """A datagram does not match its header."""
 
 
 class ServerInfo(NamedTuple):
@@ -59,7 +58,7 @@ def request(number: int, text: str = "") -> bytes:
 def split(datagram: bytes) -> tuple[int, bytes]:
     """Return number and payload of a message, or raise `DecodeError`."""
     if len(datagram) < _HEADER.size:
-        raise DecodeError(f"a datagram of {len(datagram)} bytes is no NatNet message")
+        raise DecodeError(f"a datagram of {len(datagram)} bytes is not a NatNet message")
     number, length = _HEADER.unpack_from(datagram)
     payload = datagram[_HEADER.size :]
     if length != len(payload):
@@ -129,8 +128,8 @@ def _is_tracked(body):
 
 
 class _Buffer(PacketBuffer):
-    # natnet reads empty strings beyond the end, and allocates room for whatever count
-    # comes: with a broken datagram it would take hours, or all memory.
+    # natnet reads empty strings beyond the end, and allocates room for any count: a broken datagram
+    # would take hours, or all memory.
 
     def read_string(self, *args, **kwargs):
         self._require(1)
@@ -142,7 +141,7 @@ class _Buffer(PacketBuffer):
 
     def _require(self, size):
         if self.pointer + size > len(self.data):
-            raise ValueError(f"it goes on for {size} bytes beyond byte {self.pointer}")
+            raise ValueError(f"{size} bytes follow byte {self.pointer}")
 
 
 def _decode(message_type, payload, version):

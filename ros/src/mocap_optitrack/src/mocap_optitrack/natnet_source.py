@@ -52,7 +52,7 @@ def join_group(receiver: socket.socket, address: str, port: int, interface: str)
 
 
 _ANSWER_LIMIT = 2.0  #: Longest wait for an answer of the server (s).
-_ASK_AGAIN = 0.5  #: Datagrams get lost: from one request for an answer to the next, s.
+_ASK_AGAIN = 0.5  #: Period of requests until an answer comes (s), since datagrams get lost.
 _NAMES_AGAIN = 2.0  #: Interval of requests for the names of bodies (s).
 #: Without a frame for this long the server is asked again, s: after a restart it has no clients.
 _SILENCE = 0.5
@@ -69,9 +69,9 @@ class NatNetSource(Source):
     """A NatNet server, unicast or multicast as the server has it.
 
     UDP is not authenticated, and every machine in the network can send to the ports. Only datagrams
-    from the server's address count: the configured one, else that of the first server that answers,
-    else that of the first frame of the group. ``clock()`` returns the local time, s; ``warn(text)``
-    is called about every datagram that is dropped.
+    from the server's address are used: the configured one, else that of the first server that
+    answers, else that of the first frame of the group. ``clock()`` returns the local time, s;
+    ``warn(text)`` is called about every datagram that is dropped.
     """
 
     def __init__(
@@ -191,7 +191,7 @@ class NatNetSource(Source):
             if self._sender not in (None, sender[0]):
                 self._warn_of_sender(sender[0])
                 continue
-            # What is no answer is skipped; if nothing else comes, the caller says so.
+            # Other datagrams are skipped; if nothing else comes, the caller reports that.
             with contextlib.suppress(natnet.DecodeError):
                 number, payload = natnet.split(datagram)
                 if number == natnet.SERVER_INFO:
@@ -202,7 +202,7 @@ class NatNetSource(Source):
         return None
 
     def _silent_server(self):
-        # Frames can be had from a group without an answer of the server.
+        # A group has frames even if the server does not answer.
         parameters = self._parameters
         if parameters.version is not None and parameters.multicast_address is not None:
             return natnet.ServerInfo("a server that does not answer", parameters.version)
@@ -224,7 +224,7 @@ class NatNetSource(Source):
             raise SourceError(f"cannot send to the NatNet server at {', '.join(failures)}")
 
     def _find_group(self):
-        # What a server names counts; older ones do not tell how they send.
+        # The server's own values are used; older servers do not report them.
         info, parameters = self._info, self._parameters
         if info.is_multicast is False:
             return None
@@ -246,7 +246,7 @@ class NatNetSource(Source):
             self._send(natnet.CONNECT, "Ping")
 
     def _send(self, number, text=""):
-        # A network that is gone for a moment is no reason to give up: it is quiet then.
+        # A short failure of the network is treated as silence.
         with contextlib.suppress(OSError):
             self._commands.sendto(natnet.request(number, text), self._server)
 

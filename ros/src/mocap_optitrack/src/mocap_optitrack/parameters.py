@@ -85,19 +85,19 @@ class NatNetParameters(Parameters):
 
     server_address: str | None = parameter(
         TEXT,
-        "natnet: host name or address of the server, the only one that datagrams are taken from. "
-        "Without it the multicast group and this machine are asked, and the first answer decides",
+        "natnet: host name or address of the server; datagrams of others are ignored. Without it "
+        "the multicast group and this machine are asked, and the first answer is used",
         None,
     )
     local_address: str | None = parameter(
         IpAddress(),
-        "natnet: address of this machine in the cameras' network, the only one that datagrams are "
-        "received at. Without it, that of the interface that leads to the server",
+        "natnet: address of this machine in the cameras' network, the only one on which "
+        "datagrams are received. Without it, that of the interface that leads to the server",
         None,
     )
     multicast_address: str | None = parameter(
         IpAddress(multicast=True),
-        "natnet: group that frames are sent to, unless the server names one",
+        "natnet: group to which frames are sent, unless the server names one",
         None,
     )
     command_port: int = parameter(_PORT, "natnet: UDP port of the server", 1510)
@@ -138,7 +138,7 @@ class MocapParameters(Parameters):
     )
     hold_time: float = parameter(
         DURATION,
-        "a vehicle with one marker that is unseen in flight for longer is lost until it rests on "
+        "time in flight after which an unseen vehicle with one marker is lost, until it rests on "
         "the ground",
         0.5,
     )
@@ -148,13 +148,13 @@ class MocapParameters(Parameters):
     )
     stale_after: float = parameter(
         TIME_STEP,
-        "poses that are older on arrival are dropped, longer gaps are reported",
+        "largest age of poses on arrival, older ones are dropped; longer gaps are reported",
         0.2,
         live=True,
     )
     rate_limits: tuple[float, float] | None = parameter(
         ListOf(Number("Hz", minimum=0.0), 2),
-        "with fewer frames a second than the first, or more than the second, the diagnostics warn",
+        "lowest and highest number of frames per second; outside, the diagnostics warn",
         None,
     )
     natnet: NatNetParameters = group(NatNetParameters, "optitrack_config")
@@ -162,7 +162,7 @@ class MocapParameters(Parameters):
 
     @property
     def bodies(self) -> list[Body]:
-        """All that is published."""
+        """All published bodies."""
         return [body for group in self._groups for body in group.bodies]
 
     @property
@@ -172,7 +172,7 @@ class MocapParameters(Parameters):
 
     @property
     def unknown(self) -> list[str]:
-        """Entries without a meaning."""
+        """Unknown entries."""
         return [name for group in self._groups for name in group.unknown]
 
     @property

@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 from mocap_optitrack.frames import Frame
 
-_SILENCE = 1.0  #: A connection without a frame for this long is reported, s.
+_SILENCE = 1.0  #: Time without a frame after which a connection is reported (s).
 
-#: A connection without a frame for this long is opened again (s): the server may have moved, or a
-#: network interface may have forgotten its multicast groups.
+#: Time without a frame after which a connection is reopened (s): the server may have moved, or a
+#: network interface may have left its multicast groups.
 _RECONNECT_AFTER = 10.0
 
 _RETRY = 1.0  #: Time from a failure to the next attempt (s).
@@ -28,11 +28,11 @@ class Source(ABC):
 
     @abstractmethod
     def open(self) -> str:
-        """Connect, within a few seconds, and return to what; or raise `SourceError`."""
+        """Connect, within a few seconds, and return the server's name; or raise `SourceError`."""
 
     @abstractmethod
     def read(self, limit: float) -> Frame | None:
-        """Return the next frame; None if there is none within ``limit`` seconds or so.
+        """Return the next frame; None if none comes within about ``limit`` seconds.
 
         `SourceError`: the connection has ended.
         """
@@ -82,7 +82,7 @@ class Receiver:
         self._thread.start()
 
     def stop(self) -> None:
-        """End; returns after half a second even if the thread is still busy."""
+        """End the thread; returns after half a second even if it is still busy."""
         self._stopping.set()
         # The thread itself may be running the callbacks that end the node.
         if self._thread is not threading.current_thread():
@@ -97,7 +97,7 @@ class Receiver:
             except SourceError as error:
                 self._on_failure(str(error))
             except Exception:
-                # The thread must go on, whatever a system or a library raises.
+                # The thread must continue, whatever a system or a library raises.
                 self._on_failure(f"motion capture failed\n{traceback.format_exc()}")
             finally:
                 source.close()

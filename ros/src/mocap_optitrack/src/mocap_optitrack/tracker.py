@@ -1,4 +1,4 @@
-"""From a system's frames to the poses that are published."""
+"""Tracker: from a system's frames to published poses."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -27,7 +27,7 @@ _RESET = 1.0  #: Smallest step back of local time at the reset of a simulation (
 
 
 class BodyPose(NamedTuple):
-    """A body where the cameras saw it."""
+    """A body at its measured pose."""
 
     body: Body
     time: float  #: Time by the local clock (s).
@@ -38,10 +38,10 @@ class BodyPose(NamedTuple):
 class Tracker:
     """Finds the configured bodies in frames and drops what is invalid or stale.
 
-    A frame counts once: one that is not newer than the last one is dropped. So is one that is older
-    than ``stale_after`` (s) on arrival, or from the future, or from another server's clock. Of a
-    frame, bodies are dropped that were not tracked or whose pose is invalid. ``up_axis`` is the
-    stream's, see `frames.UP_AXES`; ``health`` counts events; ``hold_time`` (s) and ``log`` are
+    A frame is used once: one that is not newer than the last one is dropped. So is one that is
+    older than ``stale_after`` (s) on arrival, or from the future, or from another server's clock.
+    Bodies of a frame that were not tracked, or whose pose is invalid, are dropped. ``up_axis`` is
+    the stream's, see `frames.UP_AXES`; ``health`` counts events; ``hold_time`` (s) and ``log`` are
     those of a `MarkerTracker`.
     """
 
@@ -61,13 +61,13 @@ class Tracker:
         self._by_number = {str(int(body.key)): body for body in bodies if body.name is None}
         self._by_name = {body.name: body for body in bodies if body.name is not None}
         self._up_axis = up_axis
-        self.stale_after = stale_after  #: For the frames to come.
+        self.stale_after = stale_after  #: Used from the next frame on.
         self._health = health
         self._newest = self._arrival = -math.inf
         self._clock = ClockOffset()
 
     def add(self, body: Body) -> None:
-        """Find a body by its name, too."""
+        """Also find a body by its name."""
         self._by_name[body.key] = body
 
     def restart(self) -> None:
@@ -81,10 +81,10 @@ class Tracker:
     def process(self, frame: Frame) -> list[BodyPose]:
         """Return the poses of a frame, all of one time that is later than the last frame's.
 
-        There are none during the first half second of a server, in which its clock is learned.
+        The result is empty during the first half second of a server, in which its clock is learned.
         """
         if frame.arrival < self._arrival - _RESET:
-            # Simulated time begins again.
+            # Simulated time was restarted.
             self._newest = -math.inf
             self._clock = ClockOffset()
         self._arrival = frame.arrival
@@ -146,7 +146,7 @@ class Tracker:
         return self._clock.to_local(frame.exposure)
 
     def _configured(self, body):
-        # Systems without numbers may well call a body "1".
+        # In systems without numbers, a body may be named "1".
         number = body.name if body.body_id is None else str(body.body_id)
         return self._by_number.get(number) or self._by_name.get(body.name)
 

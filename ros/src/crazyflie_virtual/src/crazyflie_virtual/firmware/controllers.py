@@ -1,8 +1,8 @@
 """The cascade of PID controllers: position and velocity, 100 Hz, attitude and rates, 500 Hz.
 
 In the heading frame, errors of the position set a velocity, and errors of the velocity set roll,
-pitch and thrust. Errors of the attitude set body rates, and errors of the rates set what the mixer
-adds to and takes from the thrust of the motors. Structure and gains are those of the Crazyflie
+pitch and thrust. Errors of the attitude set body rates, and errors of the rates set the differences
+of the motors' thrust in the mixer. Structure and gains are those of the Crazyflie
 2.1's firmware (2024, controller PID); `crazyflie_model.inner_loops` has the inner loops without the
 firmware's modes, parameters and log variables.
 """
@@ -28,9 +28,9 @@ from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Setpoint
 class FirmwarePid:
     """PID with feed-forward; the derivative is that of the measurement.
 
-    ``gains`` hold to begin with: a client may change them. ``dt`` is the time between two updates,
-    s; ``kff`` the output per desired value; ``output_limit`` that of the output's magnitude, 0 for
-    none.
+    ``gains`` are the initial gains, which a client may change. ``dt`` is the time between two
+    updates, s; ``kff`` the output per desired value; ``output_limit`` that of the output's
+    magnitude, 0 for none.
     """
 
     def __init__(self, gains: Gains, dt: float, kff: float = 0.0, output_limit: float = 0.0):
@@ -46,19 +46,19 @@ class FirmwarePid:
         self.out_p = self.out_i = self.out_d = self.out_ff = 0.0
 
     def reset(self) -> None:
-        """Forget integral and last measurement."""
+        """Reset integral and last measurement."""
         self._integral = 0.0
         self._last = None
 
     def update(self, desired: float, measured: float, error: float | None = None) -> float:
-        """Return the output; ``error`` replaces a difference that has to be wrapped."""
+        """Return the output; ``error`` replaces a difference that must be wrapped."""
         self.desired = desired
         if error is None:
             error = desired - measured
         slope = 0.0 if self._last is None else (measured - self._last) / self._dt
         self._last = measured
         self.out_p, self.out_i, self.out_d, self._integral = terms(
-            # It has the attributes of Gains, but clients change them.
+            # The object has the attributes of Gains, but clients change them.
             self,  # type: ignore[arg-type]
             error,
             self._integral,
@@ -74,7 +74,7 @@ class FirmwarePid:
 
 
 def constrain(value: float, low: float, high: float) -> float:
-    """Return ``value`` limited to [low, high]; ``low`` for what is no number, as C's fmaxf does."""
+    """Return ``value`` limited to [low, high]; ``low`` for NaN, as C's fmaxf does."""
     return high if value > high else value if value >= low else low
 
 
@@ -84,7 +84,7 @@ def wrap_degrees(angle: float) -> float:
 
 
 class AttitudeController:
-    """From desired attitude or rates to the outputs about the three axes."""
+    """Controllers from desired attitude or rates to the outputs about the three axes."""
 
     def __init__(self) -> None:
         self.roll = FirmwarePid(TILT, PERIOD)  #: roll, pitch, yaw: deg to deg/s.
@@ -98,24 +98,24 @@ class AttitudeController:
         self.yaw_max_delta = 0.0
 
     def reset(self) -> None:
-        """Forget integrals and last measurements."""
+        """Reset integrals and last measurements."""
         rates = (self.roll_rate, self.pitch_rate, self.yaw_rate)
         for pid in (self.roll, self.pitch, self.yaw, *rates):
             pid.reset()
 
     def desired_rates(self, estimate: Estimate, roll: float, pitch: float, yaw: float) -> Triple:
-        """Return the body rates (deg/s) that lead to an attitude (deg)."""
+        """Return the body rates (deg/s) for a desired attitude (deg)."""
         yaw_error = wrap_degrees(yaw - estimate.yaw)
         return (
             self.roll.update(roll, estimate.roll),
             self.pitch.update(pitch, estimate.pitch),
-            # What is measured is taken next to what is desired, or the
-            # derivative would jump where the heading wraps.
+            # The measured heading is unwrapped to the desired one; otherwise the derivative would
+            # jump where the heading wraps.
             self.yaw.update(yaw, yaw - yaw_error, yaw_error),
         )
 
     def outputs(self, rates: Triple, gyro: Triple) -> Triple:
-        """Return the outputs about roll, pitch and yaw that lead to body rates, PWM.
+        """Return the outputs about roll, pitch and yaw for desired body rates, PWM.
 
         Rates desired and measured (``gyro``) are in deg/s, pitch in the firmware's sign.
         """
@@ -152,15 +152,15 @@ class PositionController:
         )
         self.roll_limit = self.pitch_limit = 20.0  #: deg.
         self.vx_max = self.vy_max = self.vz_max = 1.0  #: m/s.
-        #: thrust_base, thrust_min: PWM: what hovers, about, and the least that is given. What the
-        #: first lacks to the vehicle's hover, the integral of the climb controller adds.
+        #: thrust_base, thrust_min: Approximate thrust of hover, and least thrust (PWM). The
+        #: integral of the climb controller adds the difference to the vehicle's hover.
         self.thrust_base = 36000
         self.thrust_min = 20000
         #: Estimate in the heading frame, for the log.
         self.body_x = self.body_y = self.body_vx = self.body_vy = 0.0
 
     def reset(self) -> None:
-        """Forget integrals and last measurements."""
+        """Reset integrals and last measurements."""
         for pid in (self.x, self.y, self.z, self.vx, self.vy, self.vz):
             pid.reset()
 

@@ -1,4 +1,4 @@
-"""Positioning decks: what they measure of the true pose, and where they fail.
+"""Positioning decks: their measurements of the true pose, and their failures.
 
 Figures are of the order that Bitcraze's documentation and users report; they are not those of a
 device.
@@ -27,22 +27,22 @@ _ATTITUDE_DEVIATION = 0.003  #: Deviation of all decks (rad).
 _LIGHTHOUSE_DEVIATIONS = (0.006, 0.0015)
 _LOCO_DEVIATION = 0.03  #: Deviation of a position by Loco with ultra-wideband ranging, m.
 
-#: A position by optical flow departs from the true one by this much per square root of the way, m.
+#: Drift of a position by optical flow, per square root of the distance flown (m).
 _DRIFT = 0.015
 
 #: Process noise of a velocity that is not measured, m^2/s^3: 0.5 m/s after 1 s.
 _UNMEASURED = 0.25
 
 #: Places of the base stations (m), which look at the middle of the floor; one for each that
-#: `VehicleSettings.base_stations` may count.
+#: `VehicleSettings.base_stations` allows.
 _STATIONS = ((-2.0, 1.5, 2.2), (2.0, 1.0, 2.4))
 
 #: Places of the Lighthouse deck's four sensors on the vehicle (m).
 _SENSORS = tuple((x, y, 0.0) for x in (-0.015, 0.015) for y in (0.0075, -0.0075))
 
 _ANGLE_DEVIATION = 1e-4  #: Deviation of an angle that a sensor measures (rad).
-_ANGLE_PERIOD = 2  #: Calls of `PositioningDeck.measure` from one set of angles to the next.
-_ANGLES = 10  #: Type of the packet that carries them.
+_ANGLE_PERIOD = 2  #: Number of calls of `PositioningDeck.measure` per set of angles.
+_ANGLES = 10  #: Type of the packet that contains the angles.
 _GEOMETRY, _CALIBRATION = struct.Struct("<12f?"), struct.Struct("<14fI?")
 
 
@@ -62,9 +62,9 @@ GEOMETRIES = [
 
 
 def lighthouse_pages(settings: VehicleSettings) -> dict[int, bytes]:
-    """Return pages of the memory of base stations, by number, as they are at the beginning.
+    """Return the initial pages of the memory of base stations, by number.
 
-    The calibration comes with the light of a base station, its geometry from an earlier estimate.
+    A base station transmits its calibration; its geometry is from an earlier estimate.
     """
     if settings.positioning != LIGHTHOUSE:
         return {}
@@ -98,7 +98,7 @@ class PositioningDeck:
     #: a velocity which is not measured at present.
     unmeasured: float = 0.0
     received: int = 0  #: Bit mask of the base stations whose light the deck has received last.
-    sends_angles: int = 0  #: Not 0: the measured angles are sent to the client.
+    sends_angles: int = 0  #: If not 0, the measured angles are sent to the client.
 
     def __post_init__(self) -> None:
         kind = self.settings.positioning
@@ -144,7 +144,7 @@ class PositioningDeck:
         return angles
 
     def forget_drift(self) -> None:
-        """Measure by optical flow from the present estimate on: it has been set."""
+        """Restart the measurement by optical flow at the present estimate, which has been set."""
         self._is_drift_known = False
 
     def measure(self, dt: float) -> None:
@@ -169,7 +169,7 @@ class PositioningDeck:
         deviation = _LIGHTHOUSE_DEVIATIONS[len(active) - 1]
         position, quaternion = self._noisy(deviation), self.physics.quaternion
         if any(self.memory.page(i) != GEOMETRIES[i] for i in active):
-            # A base station is believed to be elsewhere, and so is the vehicle.
+            # The estimate of a base station's place is wrong, and so is that of the vehicle.
             frames = [frame for i in active if (frame := _frame(i, self.memory.page(i)))]
             places = [
                 [a + b for a, b in zip(rotate(attitude, position), origin, strict=True)]
@@ -210,7 +210,7 @@ class PositioningDeck:
         e, (x, y, z) = self.estimator.estimate, self.physics.position
         has_texture = self._has_texture(x, y)
         if not (has_texture and self._is_drift_known):
-            # What is flown on from here is measured, and not where here is.
+            # Only the motion from here on is measured, not the position of this point.
             self._drift = [e.x - x, e.y - y]
             self._is_drift_known = True
         if has_texture:

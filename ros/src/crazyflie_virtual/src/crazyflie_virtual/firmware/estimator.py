@@ -31,7 +31,8 @@ _RATE_NOISE = 1e-5  #: Process noise, rad^2/s: 0.1 rad/s, held for 1 ms each.
 _MOST_VARIANCE = 100.0
 #: Variance of the position, covariance, variance of the velocity (m^2, m^2/s, m^2/s^2).
 _FIRST_VARIANCES = (_MOST_VARIANCE, 0.0, 1.0)
-_FIRST_ATTITUDE_VARIANCE = 10.0  #: rad^2: the first measurement counts in full.
+#: Initial variance of the attitude (rad^2): the first measurement has full weight.
+_FIRST_ATTITUDE_VARIANCE = 10.0
 _LEAST_VARIANCE = 1e-12  #: Limit for measurements (m^2, rad^2): clients may set a deviation of 0.
 #: Time constant with which the attitude returns to the initial one at rest, s.
 _REVERSION_TIME = 10.0
@@ -106,7 +107,7 @@ class Estimator:
         q = _ACCELERATION_NOISE
         p += 2.0 * dt * m + dt * dt * v + q * dt**3 / 3.0
         m += dt * v + q * dt * dt / 2.0
-        # As in the firmware, it grows for as long as nothing is measured.
+        # As in the firmware, the variance grows as long as nothing is measured.
         v = min(v + q * dt, _MOST_VARIANCE)
         if p > _MOST_VARIANCE:
             p, m = _MOST_VARIANCE, 0.0
@@ -141,7 +142,7 @@ class Estimator:
         self.variance_attitude *= 1.0 - gain
 
     def correct_on_ground(self, dt: float) -> None:
-        """Correct towards the initial attitude, which a vehicle on the ground is near."""
+        """Correct towards the initial attitude, near which a vehicle on the ground is."""
         e = self._estimate
         z, w = math.sin(self.initial_yaw / 2.0), math.cos(self.initial_yaw / 2.0)
         if e.qz * z + e.qw * w < 0.0:
@@ -149,8 +150,8 @@ class Estimator:
         self._blend(0.0, 0.0, z, w, dt / _REVERSION_TIME)
 
     def _blend(self, x, y, z, w, gain):
-        # Towards another quaternion of the same sign; for small angles the
-        # straight line is the great circle.
+        # Towards another quaternion of the same sign; for small angles a straight line approximates
+        # the great circle.
         e = self._estimate
         e.qx, e.qy, e.qz, e.qw = normalized(
             e.qx + gain * (x - e.qx),
@@ -166,7 +167,7 @@ class Estimator:
         e.roll, e.pitch, e.yaw = math.degrees(roll), -math.degrees(pitch), math.degrees(yaw)
 
 
-EXTERNAL_AGE = 0.5  #: The deck measures only when there was no external measurement for so long, s.
+EXTERNAL_AGE = 0.5  #: Time without an external measurement after which the deck measures (s).
 
 
 class Localization:
@@ -202,5 +203,5 @@ class Localization:
         self._estimator.correct_attitude(*quaternion, self.attitude_deviation)
 
     def is_fed(self, time: float) -> bool:
-        """Return whether there has been an external measurement lately; ``time`` in s."""
+        """Return whether an external measurement is recent at ``time`` (s)."""
         return self.time is not None and time - self.time < EXTERNAL_AGE

@@ -13,7 +13,8 @@ from crazyflie_virtual.firmware.supervisor import Health, PowerMonitor, State, S
 from crazyflie_virtual.memory import MemoryTester
 from crazyflie_virtual.settings import FaultSwitches, VehicleSettings
 
-#: The first protocol in which the supervisor has a port and reports the high-level commander.
+#: First version of the protocol in which the supervisor has a port and reports the high-level
+#: commander.
 SUPERVISOR_PROTOCOL = 12
 #: Steps between two updates of position controller and high-level commander: 100 Hz.
 POSITION_STEPS = 5
@@ -25,7 +26,7 @@ _POSITION_PERIOD = POSITION_STEPS * STEP
 
 
 class Firmware:
-    """From packets to motor commands.
+    """The firmware, from packets to motor commands.
 
     The sensors measure ``physics``; ``faults`` are also firmware parameters of the group
     ``virtual``. ``failure`` is the assertion that has caused this restart: the firmware then does
@@ -41,7 +42,7 @@ class Firmware:
         self.hand = physics.hand
         self.protocol = settings.protocol
         self._steps = 0
-        self.time = 0.0  #: Since the start, s.
+        self.time = 0.0  #: Time since the start (s).
         self.console = Console(lambda: self.time)
         self.warn = self.console.warn
         self.estimate = Estimate()
@@ -73,7 +74,7 @@ class Firmware:
             self.console.write_line("SYS: The system resumed after a failed assert [WARNING]")
             self.console.write_line(f"SYS: {failure}; no flight before power is off and on")
             return
-        # The pre-flight checks have passed before a client can connect.
+        # The pre-flight checks pass before a client can connect.
         for _ in range(_STARTING_UPDATES):
             self._supervise()
         self.console.write_line("STAB: Ready to fly.")
@@ -123,7 +124,7 @@ class Firmware:
             self._warned_state = state
             self.console.write_line(f"CMD: setpoints have no effect: {state.value}")
         if not setpoint.is_finite:
-            self.warn("setpoint", "CMD: flies by a setpoint that is not a number")
+            self.warn("setpoint", "CMD: flying by a setpoint that is not a number")
 
     def client_state(self) -> SupervisorState:
         """Return the present state of supervisor and high-level commander as clients see it."""
@@ -137,7 +138,7 @@ class Firmware:
 
     def _correct_estimate(self):
         if not self.estimate.is_finite:
-            self.warn("estimate", "ESTKALMAN: the state is no number, resetting")
+            self.warn("estimate", "ESTKALMAN: the state is not a number, resetting")
             self.reset_estimation = 1
         if self.reset_estimation:
             self.reset_estimation = 0
@@ -158,7 +159,7 @@ class Firmware:
             self._warned_state = None
         self.info = self.client_state()
         if self.planner.state is TrajectoryState.DISABLED:
-            self.warn("planner", "HLC: gives no setpoints: what was asked for is not a number")
+            self.warn("planner", "HLC: no setpoints: a requested value is not a number")
         self.planner.block(not self.supervisor.can_fly)
 
     def _watch_power(self, voltage):

@@ -23,10 +23,11 @@ _AXES: tuple[Triple, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class MellingerController:
-    """From a setpoint and the estimate to the inputs of the mixer."""
+    """Controller from a setpoint and the estimate to the inputs of the mixer."""
 
     def __init__(self) -> None:
-        self.mass, self.mass_thrust = 0.027, 132000.0  #: kg, PWM/N.
+        #: Mass (kg), and motor command per force (PWM/N).
+        self.mass, self.mass_thrust = 0.027, 132000.0
         #: Gains of the position (N/m, N/(m s), N s/m), and limits of its integrals (m s).
         self.kp_xy, self.ki_xy, self.kd_xy, self.i_range_xy = 0.4, 0.05, 0.2, 2.0
         self.kp_z, self.ki_z, self.kd_z, self.i_range_z = 1.25, 1.5, 0.4, 0.4
@@ -40,7 +41,7 @@ class MellingerController:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the integrals."""
+        """Reset the integrals."""
         self._position_integral = self._attitude_integral = (0.0, 0.0, 0.0)
 
     def update(self, setpoint: Setpoint, estimate: Estimate, sensors: Sensors) -> tuple[float, ...]:
@@ -137,7 +138,7 @@ def _manual_axes(setpoint: Setpoint, yaw: float) -> tuple[Triple, ...]:
 
 
 def _axes_along(force: Triple, yaw: float) -> tuple[Triple, ...]:
-    # Up along the force, forward as near to the heading as that permits.
+    # The up axis is along the force; the forward axis is as near to the heading as that permits.
     up = _unit(force)
     left = _unit(_cross(up, (math.cos(yaw), math.sin(yaw), 0.0)))
     return _cross(left, up), left, up

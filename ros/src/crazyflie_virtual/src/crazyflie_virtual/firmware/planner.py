@@ -27,15 +27,14 @@ _UNITS = (_MILLI, _MILLI, _MILLI, _TENTH_DEGREE)  #: Units of x, y, z (m) and ya
 
 
 def read_compressed(memory: bytes) -> tuple[PolynomialPiece, ...]:
-    """Return the pieces of a compressed trajectory; ValueError if there is not even a start point.
+    """Return the pieces of a compressed trajectory; ValueError without a start point.
 
     The memory begins with the start point, 4 numbers of 16 bits: x, y, z in mm and yaw in tenths of
     a degree. Then segments: a byte with two bits for each axis' type of curve, x lowest; the
     duration in ms, 16 bits; the control points of x, of y, of z and of yaw. The first control point
-    is the last one before and is left out. It ends with a segment of no duration, or with the
-    memory.
-
-    At least one piece is returned: without any segment one of no duration, at the start point.
+    is the previous segment's last one and is omitted. The trajectory ends with a segment of no
+    duration, or with the memory. At least one piece is returned: without segments, one of no
+    duration at the start point.
     """
     if len(memory) < _START.size:
         raise ValueError("a compressed trajectory begins with 8 bytes")
@@ -62,9 +61,9 @@ def read_compressed(memory: bytes) -> tuple[PolynomialPiece, ...]:
 
 MEMORY_SIZE = 4096  #: Bytes of the trajectory memory.
 DEFINITIONS = 31  #: Trajectories that can be defined at one time.
-IN_MEMORY = 1  #: The location of trajectories.
+IN_MEMORY = 1  #: Location of trajectories: in the memory.
 POLYNOMIALS, COMPRESSED = 0, 1  #: Types of trajectories.
-REFUSED = 1  #: Returned by a command that the state does not permit.
+REFUSED = 1  #: Error number of a command that the state does not permit.
 _MIN_DURATION = 0.01  #: Shortest duration of a plan (s).
 #: Result of the firmware's arithmetic for a plan with infinite numbers.
 _NOT_A_NUMBER = PolynomialPiece(1.0, *[(math.nan,)] * 4)
@@ -76,10 +75,10 @@ _TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
 class TrajectoryState(Enum):
     """States of the planner; names as the firmware's TRAJECTORY_STATE."""
 
-    IDLE = 0  #: Holds the motors off.
+    IDLE = 0  #: The planner keeps the motors off.
     FLYING = 1
     LANDING = 2
-    DISABLED = 3  #: Gives no setpoints: a command contained a number that is not finite.
+    DISABLED = 3  #: No setpoints: a command contained a number that is not finite.
 
 
 ACTIVE = (TrajectoryState.FLYING, TrajectoryState.LANDING)  #: States with setpoints.
@@ -96,7 +95,7 @@ class Planner:
         self.state = TrajectoryState.IDLE
         self.blocked = False  #: Whether the vehicle cannot fly, and plans are refused.
         self.takeoff_speed = self.landing_speed = 0.5  #: Default of commands, m/s.
-        self.groups = 0  #: Groups of vehicles that this one belongs to, a bit each.
+        self.groups = 0  #: Groups to which this vehicle belongs, a bit each.
         self._definitions: dict[int, tuple[int, int, int, int]] = {}
         self._trajectory: Trajectory | None = None
         self._begin = 0.0
@@ -112,7 +111,7 @@ class Planner:
         return -math.inf if self._trajectory is None else self._begin + self._trajectory.duration
 
     def goal(self, time: float) -> Goal[float] | None:
-        """Return where the last plan is at ``time`` (s), at rest from its end on; None without."""
+        """Return the goal of the last plan at ``time`` (s), at rest from its end on, or None."""
         return None if self._trajectory is None else self._trajectory.evaluate(time - self._begin)
 
     def setpoint(self, time: float, estimate: Estimate) -> Setpoint | None:
@@ -147,7 +146,7 @@ class Planner:
         )
 
     def stop(self) -> int:
-        """Hold the motors off."""
+        """Keep the motors off."""
         self.state = TrajectoryState.IDLE
         return 0
 
@@ -208,17 +207,17 @@ class Planner:
         clockwise: bool,
     ) -> int:
         """Fly along a spiral; see `spiral_piece`. Radii are 0 at least, angles a turn at most."""
-        # In this order, what is no number stays none.
+        # This order of arguments keeps NaN.
         angle = min(max(angle, -2.0 * math.pi), 2.0 * math.pi)
         radii = (max(radii[0], 0.0), max(radii[1], 0.0))
         form = (angle, radii, ascent, max(duration, _MIN_DURATION), sideways, clockwise)
         return self._fly(time, TrajectoryState.FLYING, spiral_piece, self._last, *form)
 
     def define(self, trajectory_id: int, location: int, kind: int, offset: int, pieces: int) -> int:
-        """Define where a trajectory is; whether there is one shows at its start.
+        """Define the place of a trajectory; it is checked only at its start.
 
         Only `IN_MEMORY`, and `POLYNOMIALS` or `COMPRESSED`, can be flown. The offset in the memory
-        is in bytes; ``pieces`` has no meaning for one that is compressed.
+        is in bytes; ``pieces`` is ignored for a compressed one.
         """
         if trajectory_id >= DEFINITIONS:
             return errno.ENOEXEC
@@ -270,7 +269,7 @@ class Planner:
             raise ValueError("it is not defined")
         location, kind, offset, count = self._definitions[trajectory_id]
         if location != IN_MEMORY or kind not in (POLYNOMIALS, COMPRESSED):
-            raise ValueError(f"there are none of type {kind} at location {location}")
+            raise ValueError(f"no trajectory has type {kind} and location {location}")
         data = bytes(self.memory[offset:])
         if kind == COMPRESSED:
             return read_compressed(data), True

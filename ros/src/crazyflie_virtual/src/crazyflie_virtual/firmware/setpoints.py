@@ -25,7 +25,7 @@ _MANUAL = struct.Struct("<fffHB")
 class AttitudeDecoder:
     """Attitude setpoints, port 3, and their thrust lock.
 
-    Thrust counts only after one setpoint without thrust has come.
+    Thrust is enabled only after one setpoint without thrust has come.
     """
 
     def __init__(self) -> None:
@@ -39,11 +39,10 @@ class AttitudeDecoder:
         """Return the setpoint; None when the packet is not one.
 
         The packet has roll and pitch in deg or deg/s, yaw rate in deg/s, clockwise positive, and
-        thrust in PWM. ``priority`` is that of the present setpoint: the lock closes where there is
-        none.
+        thrust in PWM. ``priority`` is that of the present setpoint: without one, the lock closes.
         """
-        # The firmware does not check the size, and would continue with what an
-        # earlier packet has left in the memory behind a short one.
+        # The firmware does not check the size, and would read bytes of an earlier packet behind a
+        # short one.
         if len(data) < _ATTITUDE.size:
             return None
         roll, pitch, yaw_rate, thrust = _ATTITUDE.unpack_from(data)
@@ -61,7 +60,7 @@ class AttitudeDecoder:
 
 
 def decode_generic(data: bytes, time: float) -> Setpoint | None:
-    """Return a generic setpoint, port 7, of type and payload; None for a type that there is not.
+    """Return a generic setpoint, port 7, from type and payload; None for an unknown type.
 
     `FirmwareAssertionError`: the payload has a wrong size.
     """
@@ -106,7 +105,7 @@ class _FourFloats(NamedTuple):
     def decode_any_size(self, data: bytes) -> Setpoint:
         """Return the setpoint in a payload whose size the firmware does not check.
 
-        What is missing is 0 here; there it is what an earlier packet has left.
+        Missing bytes are 0 here; in the firmware they are those of an earlier packet.
         """
         return self.decode(data[: _FOUR.size].ljust(_FOUR.size, b"\0"))
 
@@ -193,11 +192,11 @@ class Commander:
         self.setpoint = Setpoint()
         #: `PRIORITY_DISABLE`, `PRIORITY_HIGHLEVEL` or `PRIORITY_CRTP`.
         self.priority = PRIORITY_DISABLE
-        #: Parameter that the firmware has without effect: the commander is on.
+        #: Parameter without effect, as in the firmware: the commander is always enabled.
         self.high_level_enabled = 1
 
     def stream(self, setpoint: Setpoint) -> None:
-        """Take a setpoint from the client."""
+        """Process a setpoint of the client."""
         self.setpoint = setpoint
         self.priority = PRIORITY_CRTP
         self._planner.stop()
@@ -208,12 +207,12 @@ class Commander:
         self._planner.tell_state(estimate)
 
     def update_from_planner(self, time: float, estimate: Estimate) -> None:
-        """Take the high-level commander's setpoint for ``time`` (s)."""
+        """Use the high-level commander's setpoint for ``time`` (s)."""
         setpoint = self._planner.setpoint(time, estimate)
         if setpoint is not None and self.priority <= PRIORITY_HIGHLEVEL:
             self.setpoint = setpoint
             self.priority = PRIORITY_HIGHLEVEL
 
     def age(self, time: float) -> float:
-        """Return how old the setpoint is at ``time``, s."""
+        """Return the age of the setpoint at ``time``, s."""
         return time - self.setpoint.time

@@ -1,4 +1,4 @@
-"""From setpoint and estimate to motor commands: the cascade of controllers and the mixer."""
+"""The cascade of controllers and the mixer: from setpoint and estimate to motor commands."""
 
 import math
 
@@ -28,12 +28,12 @@ class MotorOverride:
     """Motor commands set by parameter, for tests on the bench."""
 
     def __init__(self) -> None:
-        #: 0 for none, 1 for each motor its own command, 2 for that of motor 1 on all.
+        #: 0 to disable, 1 for a command of each motor, 2 for that of motor 1 on all.
         self.enable = 0
         self.m1 = self.m2 = self.m3 = self.m4 = 0  #: PWM.
 
     def commands(self) -> MotorCommands | None:
-        """Return the commands that hold, or None."""
+        """Return the commands in force, or None."""
         if self.enable == 1:
             return MotorCommands(*map(float, (self.m1, self.m2, self.m3, self.m4)))
         return MotorCommands(*(float(self.m1),) * 4) if self.enable else None
@@ -52,12 +52,12 @@ class Stabilizer:
         self.idle_thrust = idle_thrust  #: Least command of an armed motor, PWM.
         self.roll = self.pitch = self.yaw = 0.0  #: Desired attitude, deg.
         self.roll_rate = self.pitch_rate = self.yaw_rate = 0.0  #: Desired body rates, deg/s.
-        #: Desired roll and pitch (rad, nose down) and yaw rate (rad/s): what a body follows that
-        #: has lags in place of attitude loops.
+        #: Desired roll and pitch (rad, nose down) and yaw rate (rad/s): commands of a body that has
+        #: lags in place of attitude loops.
         self.desired: Triple = (0.0, 0.0, 0.0)
         #: Inputs of the mixer, PWM.
         self.thrust = self.command_roll = self.command_pitch = self.command_yaw = 0.0
-        self.requested = self.commands = OFF  #: Before and after their limits.
+        self.requested = self.commands = OFF  #: Motor commands before and after their limits.
         self._automatic = (0.0, 0.0, 0.0)
         self._mode = Modes()
         self._last_controller = self.controller

@@ -56,7 +56,7 @@ class _Motion:
 class Setpoint(_Motion):
     """A setpoint; with all axes disabled and no thrust, the motors are off."""
 
-    mode: Modes = Modes()  #: Controllers are reset when it changes.
+    mode: Modes = Modes()  #: Mode of the setpoint; controllers are reset when it changes.
     velocity_body: bool = False  #: Whether the velocity is turned by the heading.
     #: roll_rate, pitch_rate, yaw_rate: deg/s, positive yaw rate is counter-clockwise.
     roll_rate: float = 0.0
@@ -73,7 +73,7 @@ class Setpoint(_Motion):
         return all(math.isfinite(part) for part in parts if isinstance(part, float))
 
     def leveled(self) -> "Setpoint":
-        """Return the setpoint made level, with the heading kept; height stays as it is."""
+        """Return a level setpoint with the same heading and height."""
         mode = self.mode._replace(
             x=DISABLED, y=DISABLED, roll=ABSOLUTE, pitch=ABSOLUTE, yaw=VELOCITY
         )

@@ -1,4 +1,4 @@
-"""The supervisor: may the motors run, and what overrides the setpoint. With the battery's states.
+"""The supervisor, which may stop the motors and override the setpoint; the battery's states.
 
 The states and the transitions between them are a table, as in the firmware:
 docs/functional-areas/supervisor of crazyflie-firmware explains the scheme. States, conditions and
@@ -41,19 +41,19 @@ class Condition(Flag):
     """Conditions of transitions; names as the firmware's SUPERVISOR_CB."""
 
     ARMED = auto()
-    IS_FLYING = auto()  #: Some motor ran within the last 2 s.
+    IS_FLYING = auto()  #: A motor has run within the last 2 s.
     IS_TUMBLED = auto()
     COMMANDER_WDT_WARNING = auto()  #: The setpoint is older than 0.5 s.
     COMMANDER_WDT_TIMEOUT = auto()  #: The setpoint is older than 2 s.
     EMERGENCY_STOP = auto()
-    CRASHED = auto()  #: Not recovered since the crash.
+    CRASHED = auto()  #: The vehicle has not been recovered since the crash.
     PREFLIGHT_TIMEOUT = auto()  #: Armed for `Supervisor.preflight_timeout`.
     LANDING_TIMEOUT = auto()  #: Landed for `Supervisor.landed_timeout`.
     ALWAYS = auto()
 
 
 class Transition(NamedTuple):
-    """Taken when any condition of ``when`` holds, or any of ``unless`` does not."""
+    """A transition, made when any condition of ``when`` holds, or any of ``unless`` does not."""
 
     to: State
     when: Condition = Condition(0)
@@ -62,7 +62,7 @@ class Transition(NamedTuple):
 
 _S, _C = State, Condition
 
-#: The first transition whose condition is met is taken, one in each update.
+#: Transitions, of which the first one whose condition is met is made, one in each update.
 TRANSITIONS: dict[State, tuple[Transition, ...]] = {
     _S.PRE_FL_CHECKS_NOT_PASSED: (
         Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP),
@@ -123,10 +123,11 @@ def next_state(state: State, conditions: Condition) -> State:
 
 
 EMERGENCY_WATCHDOG = 1.0  #: Longest time between watchdog messages, after the first one, s.
-LANDED_AFTER = 2.0  #: Time with the motors off after which the vehicle counts as landed (s).
-#: Accelerometer along up, g, below which the vehicle has tumbled, and after how long, s.
+#: Time with the motors off after which the vehicle has landed (s). Accelerometer reading along up
+#: below which the vehicle has tumbled (g), and duration of that (s).
+LANDED_AFTER = 2.0
 _TILTED, _UPSIDE_DOWN = (0.5, 1.0), (-0.2, 0.1)
-#: Accelerometer, g, below which in all axes the vehicle is falling and not tumbled.
+#: Accelerometer reading of all axes below which the vehicle is falling and not tumbled (g).
 _FREE_FALL = 0.1
 
 _RUNNING = (State.READY_TO_FLY, State.FLYING, State.LANDED, State.WARNING_LEVEL_OUT)
@@ -137,7 +138,7 @@ _IN_AIR = (State.FLYING, State.WARNING_LEVEL_OUT)
 class Supervisor:
     """Decides whether the motors may run; ``write_line(text)`` prints on the console.
 
-    With ``auto_arm`` it arms when the checks have passed, as a Crazyflie 2.1 does; otherwise the
+    With ``auto_arm`` it arms when the checks have passed, like a Crazyflie 2.1; otherwise the
     client arms, as with brushless motors.
     """
 
@@ -164,7 +165,7 @@ class Supervisor:
 
     @property
     def motors_may_run(self) -> bool:
-        """Whether the motors idle at least."""
+        """Whether the motors at least idle."""
         return self.state in _ARMED
 
     @property
@@ -276,14 +277,14 @@ class Supervisor:
         return lasted > _TILTED[1] or (sensors.acc_z < _UPSIDE_DOWN[0] and lasted > _UPSIDE_DOWN[1])
 
 
-ON_BATTERY, LOW = 0, 3  #: States; 1 and 2, charging and charged, do not occur.
+ON_BATTERY, LOW = 0, 3  #: States of the battery; 1 and 2, charging and charged, do not occur.
 _LOW_AFTER = 5.0  #: Time of low voltage until the state `LOW`, s.
 #: Voltage, V, at 0, 10, ... 90 % of charge [firmware: measured on the stock battery at 25 C].
 _LEVELS = OPEN_CIRCUIT_VOLTAGES[:-1]
 
 
 _MAX_SAG = 0.95  #: Largest sag of a good battery in its self test (V): health.c of the firmware.
-_LOAD = 1.0  #: Load of that test, over that of hover.
+_LOAD = 1.0  #: Load of that test over the load of hover.
 
 
 class Health:
@@ -291,14 +292,14 @@ class Health:
 
     def __init__(self, faults: FaultSwitches):
         self._faults = faults
-        self.motors_asked = self.battery_asked = 0  #: Not 0: the test is to begin.
+        self.motors_asked = self.battery_asked = 0  #: If not 0, the test begins.
         self.motors_passed = 0  #: Bit mask of the motors that have passed.
         self.battery_passed = 0
         self.battery_sag = 0.0  #: V.
         self.tests = 0  #: Number of tests that were done.
 
     def update(self) -> None:
-        """Do the tests that were asked for."""
+        """Carry out the requested tests."""
         if self.motors_asked:
             self.motors_asked = 0
             failed = self._faults.motor_failure
@@ -319,7 +320,7 @@ class PowerMonitor:
         self.level = 90  #: Charge as the firmware estimates it from the voltage, %.
         self.state = ON_BATTERY  #: `ON_BATTERY` or `LOW`.
         #: low_voltage, critical_voltage: V. The second has no effect: the default build does not
-        #: switch off.
+        #: switch itself off.
         self.low_voltage, self.critical_voltage = 3.2, 3.0
         self._good_time: float | None = None
 

@@ -2,14 +2,14 @@
 
 import pytest
 
-from crazyflie_driver.context import TRANSITIONS, ConnectionEvent, ConnectionState, VehicleContext
+from crazyflie_driver.vehicle_base import TRANSITIONS, BaseVehicle, ConnectionEvent, ConnectionState
 
 CONNECTING, SETTING_UP, READY, LOST, RESUMING, CLOSING, CLOSED = ConnectionState
 
 
 def make_vehicle():
     """Return a vehicle that has only a state."""
-    return VehicleContext(*[None] * 7, link_text="new")
+    return BaseVehicle(*[None] * 7, link_text="new")
 
 
 def after(*events):

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from crazyflie_driver.commands import LAND, STOP, TAKEOFF, Command, Need
-from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.flight_state import REPORT_LAG, FlightState
 from crazyflie_driver.jobs import Job
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import STEP, STEP_TIME, Charge, Next, Touchdown, landing_duration
 from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.setpoint_topics import Control, SetpointTopics
+from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.errors import AlreadyLandingError, CrazyflieError, LinkLostError, NoReplyError
 from crazyflie_link.high_level import HighLevel
 from crazyflie_link.supervisor import Supervisor
@@ -79,7 +79,7 @@ class FlightCommands:
     see `Touchdown`. So it does in landings of the service.
     """
 
-    _context: VehicleContext
+    _vehicle: BaseVehicle
     _log: LogTopics
     _setpoints: SetpointTopics
     _flight: FlightState
@@ -102,14 +102,14 @@ class FlightCommands:
     @property
     def is_high_level_flight_active(self) -> bool:
         """Whether the vehicle's log says that it flies on high-level commands."""
-        if self._context.gate.is_emergency or self._setpoints.is_streaming:
+        if self._vehicle.gate.is_emergency or self._setpoints.is_streaming:
             return False
         return self._flight.is_high_level(self._log.supervisor)
 
     def start(self) -> None:
         """Begin to feed the watchdog, once there is a flight."""
-        if self._context.server.emergency_watchdog:
-            self._context.handle.timer(_WATCHDOG_PERIOD, self._feed, steady=True)
+        if self._vehicle.server.emergency_watchdog:
+            self._vehicle.handle.timer(_WATCHDOG_PERIOD, self._feed, steady=True)
 
     def send(self, command: Command, response: Result) -> Future[Result]:
         """Submit a command, which follows the notice that setpoints stop if they were streamed.
@@ -122,12 +122,12 @@ class FlightCommands:
         def work(job: Job) -> Result:
             need = self._check(command, job)
             if need is Need.NOT_ADDRESSED:
-                _send(command, self._context.crazyflie.high_level.guarded(job.may_send))
+                _send(command, self._vehicle.crazyflie.high_level.guarded(job.may_send))
             elif need is not Need.ON_GROUND:
                 self._execute(command, job)
             return response
 
-        return self._context.jobs.submit(
+        return self._vehicle.jobs.submit(
             command.name, work, is_flight=True, urgent=command.ends_flight
         )
 
@@ -141,7 +141,7 @@ class FlightCommands:
             return self._check(command, job)
 
         what = f"checking {command.name}"
-        return self._context.jobs.submit(what, work, is_flight=True, urgent=command.ends_flight)
+        return self._vehicle.jobs.submit(what, work, is_flight=True, urgent=command.ends_flight)
 
     def notify(self, remain_valid_ms: int) -> None:
         """Announce that setpoints stop: at once on the ground, in flight with the next command."""
@@ -150,11 +150,11 @@ class FlightCommands:
             self._setpoints.notify_setpoints_stop(remain_valid_ms)
             return
         # Without a link nothing could be sent later, either.
-        self._context.crazyflie.link()
+        self._vehicle.crazyflie.link()
         self._pending_notify = remain_valid_ms
         if self._notify_timer is not None:
             self._notify_timer.stop()
-        self._notify_timer = self._context.handle.timer(NOTIFY_WINDOW, self._end_notify_window)
+        self._notify_timer = self._vehicle.handle.timer(NOTIFY_WINDOW, self._end_notify_window)
 
     def land(self, reason: Reason) -> Future[None]:
         """Land; the result of the future is None once the vehicle has accepted it.
@@ -164,7 +164,7 @@ class FlightCommands:
         """
         if self._reason is None:
             detail = self._log.battery.words() if reason is Reason.BATTERY else reason.words
-            self._context.error(f"{detail}: landing")
+            self._vehicle.error(f"{detail}: landing")
         if self._reason is not Reason.BATTERY:
             self._reason = reason
         landing = self._landing
@@ -173,7 +173,7 @@ class FlightCommands:
             # Beside a table it may be below 0: it never climbs.
             ground = 0.0 if height is None else min(0.0, height)
             duration = landing_duration(
-                height, self._context.server.landing_duration, self._reason.limit
+                height, self._vehicle.server.landing_duration, self._reason.limit
             )
             landing = self._landing = self._send_landing(
                 Command(LAND, lambda h: h.land(ground, duration), duration, height=ground)
@@ -203,10 +203,10 @@ class FlightCommands:
         elif not is_active and self._is_logged():
             self._reason = self._landing = None
             if not is_critical:
-                self._context.gate.handle(GateEvent.BATTERY_RECOVERED)
+                self._vehicle.gate.handle(GateEvent.BATTERY_RECOVERED)
         is_accepted = self._landing is not None and _is_accepted(self._landing)
         if is_accepted and self._reason is Reason.BATTERY:
-            self._context.gate.handle(GateEvent.BATTERY_CRITICAL)
+            self._vehicle.gate.handle(GateEvent.BATTERY_CRITICAL)
         touchdown = self._touchdown
         if touchdown is not None and (is_accepted or self._landing is None):
             self._descend(touchdown, is_active)
@@ -215,7 +215,7 @@ class FlightCommands:
         if self._notify_timer is not None:
             self._notify_timer.stop()
         if self._pending_notify is not None:
-            self._context.warn(
+            self._vehicle.warn(
                 "notify_setpoints_stop was not sent: the vehicle flies on setpoints, and would "
                 f"drop; no high-level command has come within {NOTIFY_WINDOW:g} s. It is sent "
                 "together with the next one"
@@ -224,8 +224,8 @@ class FlightCommands:
     # Checks before a command.
 
     def _check(self, command, job):
-        self._context.refuse_after_emergency()
-        command.send(self._context.crazyflie.high_level.dry_run())
+        self._vehicle.refuse_after_emergency()
+        command.send(self._vehicle.crazyflie.high_level.dry_run())
         if not self._is_addressed(command):
             return Need.NOT_ADDRESSED
         if not self._is_ready(command, job):
@@ -233,7 +233,7 @@ class FlightCommands:
         return Need.SETPOINTS_STOP if self._setpoints.is_streaming else Need.COMMAND
 
     def _is_addressed(self, command):
-        is_addressed = self._context.crazyflie.high_level.is_addressed(command.group_mask)
+        is_addressed = self._vehicle.crazyflie.high_level.is_addressed(command.group_mask)
         if is_addressed is None and self._setpoints.runs_motors:
             raise ServiceError(
                 f"{command.name} is for the groups {command.group_mask:#x}, and it is not known "
@@ -247,7 +247,7 @@ class FlightCommands:
             self._check_and_arm(job)
         elif command.name == LAND:
             if self._flight.is_on_ground():
-                self._context.info(
+                self._vehicle.info(
                     "land is not sent, the vehicle is on the ground: it would start its motors"
                 )
                 return False
@@ -277,7 +277,7 @@ class FlightCommands:
             raise ServiceError(f"no takeoff, {battery.words()}: charge or change it")
         if problem := self._flight.estimator_problem():
             raise ServiceError(f"no takeoff, the vehicle's estimate has not converged: {problem}")
-        supervisor = self._context.crazyflie.supervisor.guarded(job.may_send)
+        supervisor = self._vehicle.crazyflie.supervisor.guarded(job.may_send)
         state = self._state_once_armed(supervisor, job)
         if state is None:
             return
@@ -306,7 +306,7 @@ class FlightCommands:
 
     def _execute(self, command, job):
         job.check()
-        gate, handle = self._context.gate, self._context.handle
+        gate, handle = self._vehicle.gate, self._vehicle.handle
         begin = handle.time()
         number = gate.high_level(begin)
         if command.name != LAND:
@@ -331,7 +331,7 @@ class FlightCommands:
 
     def _prepare_sending(self, command, job):
         # In the thread that sends: what is sent next is the command itself.
-        if not job.may_send() or self._context.gate.is_emergency:
+        if not job.may_send() or self._vehicle.gate.is_emergency:
             return False
         if self._setpoints.is_streaming:
             try:
@@ -355,7 +355,7 @@ class FlightCommands:
             return may
 
         try:
-            return _send(command, self._context.crazyflie.high_level.guarded(may_send))
+            return _send(command, self._vehicle.crazyflie.high_level.guarded(may_send))
         except (NoReplyError, LinkLostError) as error:
             if command.ends_flight or not is_sent:
                 raise
@@ -368,7 +368,7 @@ class FlightCommands:
             self._unanswered = None
             if not self._shows(state, command, was_at_rest):
                 raise NoReplyError(f"{error}; the vehicle's state is: {state.words()}") from None
-            self._context.warn(f"{error}: the vehicle's state shows that it obeys")
+            self._vehicle.warn(f"{error}: the vehicle's state shows that it obeys")
             return True
 
     def _state_after(self, command, job, was_at_rest):
@@ -399,7 +399,7 @@ class FlightCommands:
     def _obeys(self, job):
         # Whether it carries out what was refused. If it is not heard, it is looked up again.
         command = self._unanswered
-        is_emergency = self._context.gate.is_emergency
+        is_emergency = self._vehicle.gate.is_emergency
         if command is None or is_emergency or self._setpoints.is_streaming:
             self._unanswered = None
             return False
@@ -414,7 +414,7 @@ class FlightCommands:
         look_up = self._look_up
         if look_up is None:
             if self._unanswered is not None:
-                self._look_up = self._context.jobs.submit("looking up a command", self._obeys)
+                self._look_up = self._vehicle.jobs.submit("looking up a command", self._obeys)
             return False
         if not look_up.done():
             return False
@@ -431,21 +431,21 @@ class FlightCommands:
 
     def _is_position_lost(self):
         positioning = self._log.positioning
-        return positioning is not None and positioning.is_lost(self._context.handle.time())
+        return positioning is not None and positioning.is_lost(self._vehicle.handle.time())
 
     def _is_logged(self):
         # Whether the log shows what was sent.
         is_sent = self._landing is None or self._landing.done()
-        return is_sent and self._context.handle.time() >= self._begin + _LOG_DELAY
+        return is_sent and self._vehicle.handle.time() >= self._begin + _LOG_DELAY
 
     def _is_under_way(self, landing):
         if not landing.done():
             return True
         is_going_on = _is_accepted(landing) and not self._setpoints.is_streaming
-        return is_going_on and self._context.handle.time() < self._end
+        return is_going_on and self._vehicle.handle.time() < self._end
 
     def _descend(self, touchdown, is_active):
-        log, now, height = self._log, self._context.handle.time(), self._log.height
+        log, now, height = self._log, self._vehicle.handle.time(), self._log.height
         is_over = not is_active and now >= touchdown.begin + _LOG_DELAY
         if is_over or self._setpoints.last_time > touchdown.begin:
             # The vehicle is down, or setpoints have taken the landing's place.
@@ -464,19 +464,19 @@ class FlightCommands:
             )
 
     def _send_landing(self, command):
-        self._begin = self._context.handle.time()
+        self._begin = self._vehicle.handle.time()
         self._end = self._begin + command.duration + _MARGIN
         return self.send(command, None)
 
     def _feed(self):
         # Also when the reply to the first command was lost.
         self._feeds_watchdog = self._feeds_watchdog or self.is_high_level_flight_active
-        context = self._context
-        if self._feeds_watchdog and not context.gate.is_emergency:
+        vehicle = self._vehicle
+        if self._feeds_watchdog and not vehicle.gate.is_emergency:
             try:
-                context.crazyflie.supervisor.feed_watchdog()
+                vehicle.crazyflie.supervisor.feed_watchdog()
             except CrazyflieError as error:
-                context.warn(f"watchdog not fed: {error}", 1.0, "watchdog")
+                vehicle.warn(f"watchdog not fed: {error}", 1.0, "watchdog")
 
 
 def _send(command: Command, high_level: HighLevel) -> bool:

@@ -3,9 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.setpoint_topics import SetpointTopics
+from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.errors import LinkLostError, NoReplyError
 from crazyflie_model.supervisor import SupervisorState
 
@@ -26,7 +26,7 @@ class FlightState:
     when it holds the motors off.
     """
 
-    _context: VehicleContext
+    _vehicle: BaseVehicle
     _log: LogTopics
     _setpoints: SetpointTopics
     _planned: float = -math.inf
@@ -38,7 +38,7 @@ class FlightState:
         Before protocol 12 the supervisor cannot be asked; very old firmware does not log it either.
         """
         try:
-            state = self._context.crazyflie.supervisor.read()
+            state = self._vehicle.crazyflie.supervisor.read()
         except NoReplyError:
             state = None
         return self._log.next_state(_LOGGED_STATE_LIMIT) if state is None else state
@@ -47,29 +47,29 @@ class FlightState:
         """Return why its positioning or Kalman filter is not ready; empty if unknown; blocks."""
         positioning = self._log.positioning
         if positioning is not None and (
-            problem := positioning.problem(self._context.handle.time())
+            problem := positioning.problem(self._vehicle.handle.time())
         ):
             return problem
         try:
-            estimator = self._context.crazyflie.parameters.values().get(_ESTIMATOR)
+            estimator = self._vehicle.crazyflie.parameters.values().get(_ESTIMATOR)
         except LinkLostError:
             return ""
         return self._log.variances.problem() if estimator == _KALMAN else ""
 
     def motion_sent(self) -> None:
         """Record that the planner is commanded to move."""
-        self._planned, self._plan_end = self._context.handle.time(), math.inf
+        self._planned, self._plan_end = self._vehicle.handle.time(), math.inf
 
     def end_accepted(self, duration: float) -> None:
         """Record that the planner stops the motors after a duration (s)."""
-        self._plan_end = self._context.handle.time() + duration
+        self._plan_end = self._vehicle.handle.time() + duration
 
     def is_at_rest(self) -> bool:
         """Return whether the planner is known to have no motion that has not ended."""
         state = self._log.supervisor
         if state is None or not state.reports_planner:
             return False
-        is_old = self._context.handle.time() - self._planned >= REPORT_LAG
+        is_old = self._vehicle.handle.time() - self._planned >= REPORT_LAG
         return is_old and not self.is_moving(state)
 
     def is_moving(self, state: SupervisorState) -> bool:
@@ -95,7 +95,7 @@ class FlightState:
         state = self.read()
         is_streamed = self._setpoints.runs_motors
         latest = max(self._planned, self._setpoints.last_time if is_streamed else -math.inf)
-        if state is None or self._context.handle.time() - latest < REPORT_LAG:
+        if state is None or self._vehicle.handle.time() - latest < REPORT_LAG:
             return False
         return not (self._may_move(state) or (is_streamed and SupervisorState.FLYING in state))
 
@@ -104,4 +104,4 @@ class FlightState:
         if state.reports_planner:
             return SupervisorState.HIGH_LEVEL_ACTIVE in state
         is_latest = self._planned >= self._setpoints.last_time
-        return is_latest and self._context.handle.time() < self._plan_end
+        return is_latest and self._vehicle.handle.time() < self._plan_end

@@ -11,11 +11,11 @@ from geometry_msgs.msg import Point, PoseStamped, Quaternion, Transform, Transfo
 from sensor_msgs.msg import Imu, MagneticField, Temperature
 from std_msgs.msg import Float32, Header, String
 
-from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.monitors import VARIANCES, VARIANCES_PERIOD_MS, Battery, Variances
 from crazyflie_driver.msg import GenericLogData, crtpPacket
 from crazyflie_driver.parameters import POSITIONING_TOPIC
 from crazyflie_driver.positioning import PERIOD_MS, SYSTEMS, Positioning, check_deck
+from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.log import PERIOD_STEP_MS, LogBlock, quaternion_from_compressed
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_model.units import GRAVITY
@@ -147,7 +147,7 @@ _OWN_PORTS = frozenset({0, 2, 4, 5, 8, 9, 15})
 class LogTopics:
     """Start a vehicle's log blocks and publish them."""
 
-    _context: VehicleContext
+    _vehicle: BaseVehicle
     _on_status: Callable[[], None]
     battery: Battery = field(init=False)
     rssi: float | None = None  #: Latest strength of the vehicle's reception (-dBm).
@@ -176,7 +176,7 @@ class LogTopics:
     _state_came: threading.Condition = field(default_factory=threading.Condition)
 
     def __post_init__(self) -> None:
-        server = self._context.server
+        server = self._vehicle.server
         self.battery = Battery(
             server.battery_low, server.battery_critical, server.battery_critical_time
         )
@@ -191,10 +191,10 @@ class LogTopics:
 
         Raises `CrazyflieError` if a custom block is not possible.
         """
-        parameters = self._context.parameters
+        parameters = self._vehicle.parameters
         if "packets" in parameters.topics:
             self._packets = self._publisher("packets", crtpPacket)
-        known = self._context.crazyflie.log.variables()
+        known = self._vehicle.crazyflie.log.variables()
         self._heading = self._publisher("heading", Float32)
         self._start_status(known, self._publisher("rssi", Float32))
         self._start_variances(known)
@@ -203,7 +203,7 @@ class LogTopics:
         selected = [topic for topic in STANDARD if topic.name in parameters.topics]
         groups, missing = packed(selected, known)
         for name, variables in missing.items():
-            self._context.warn(f"no topic {name}: the firmware has no " + ", ".join(variables))
+            self._vehicle.warn(f"no topic {name}: the firmware has no " + ", ".join(variables))
         for group in groups:
             self._start_standard(group)
         if parameters.enable_logging:
@@ -237,7 +237,7 @@ class LogTopics:
             header=port << 4 | _LINK | channel,
             data=data[:_MOST_DATA].ljust(_MOST_DATA, b"\0"),
         )
-        self._context.delivery.submit_data(publisher.publish, message)
+        self._vehicle.delivery.submit_data(publisher.publish, message)
 
     def _start_status(self, known, rssi_publisher):
         variables = tuple(variable for variable in STATUS_VARIABLES if variable in known)
@@ -248,16 +248,16 @@ class LogTopics:
         def deliver(_, values):
             latest = dict(zip(variables, values, strict=True))
             self._note_state(latest)
-            self._context.delivery.submit_data(self._note_status, latest, rssi_publisher)
+            self._vehicle.delivery.submit_data(self._note_status, latest, rssi_publisher)
 
-        self._context.crazyflie.add_log_block(
+        self._vehicle.crazyflie.add_log_block(
             LogBlock("status", STATUS_PERIOD_MS, variables, deliver)
         )
 
     def _start_variances(self, known):
         self.variances.is_logged = all(name in known for name in VARIANCES)
         if self.variances.is_logged:
-            self._context.crazyflie.add_log_block(
+            self._vehicle.crazyflie.add_log_block(
                 LogBlock("variances", VARIANCES_PERIOD_MS, VARIANCES, self._note_variances)
             )
 
@@ -265,8 +265,8 @@ class LogTopics:
         self.variances.add(values)
 
     def _start_positioning(self, source, known):
-        context, system = self._context, SYSTEMS[source]
-        check_deck(source, context.crazyflie.parameters.values())
+        vehicle, system = self._vehicle, SYSTEMS[source]
+        check_deck(source, vehicle.crazyflie.parameters.values())
         _, pose, *_ = STANDARD
         if missing := [name for name in (*system.variables, *pose.variables) if name not in known]:
             raise ServiceError(
@@ -274,37 +274,37 @@ class LogTopics:
                 "update the firmware"
             )
         positioning = self.positioning = Positioning(source)
-        publisher = context.handle.publisher(
-            f"{context.prefix}/{POSITIONING_TOPIC}", String, latch=True
+        publisher = vehicle.handle.publisher(
+            f"{vehicle.prefix}/{POSITIONING_TOPIC}", String, latch=True
         )
-        self._broadcast = context.handle.broadcast_transforms()
+        self._broadcast = vehicle.handle.broadcast_transforms()
 
         def follow():
-            text = positioning.problem(context.handle.time())
+            text = positioning.problem(vehicle.handle.time())
             if text != self._positioning_text:
                 if text and self._positioning_text == "":
-                    context.warn(text)
+                    vehicle.warn(text)
                 self._positioning_text = text
                 publisher.publish(String(text))
 
         def deliver(_, values):
-            positioning.update(context.handle.time(), values)
-            context.delivery.submit(follow)
+            positioning.update(vehicle.handle.time(), values)
+            vehicle.delivery.submit(follow)
 
-        context.crazyflie.add_log_block(
+        vehicle.crazyflie.add_log_block(
             LogBlock("positioning", PERIOD_MS, system.variables, deliver)
         )
-        context.handle.timer(PERIOD_MS / 1000.0, follow)
+        vehicle.handle.timer(PERIOD_MS / 1000.0, follow)
 
     def _publish_estimate(self, publisher, message):
         """Publish the vehicle's own estimate, as motion capture publishes a pose."""
         publisher.publish(message)
         assert self.positioning is not None
-        if self.positioning.is_lost(self._context.handle.time()):
+        if self.positioning.is_lost(self._vehicle.handle.time()):
             return
         pose = message.pose
         place = Vector3(pose.position.x, pose.position.y, pose.position.z)
-        frame = self._context.parameters.estimate_frame
+        frame = self._vehicle.parameters.estimate_frame
         transform = TransformStamped(message.header, frame, Transform(place, pose.orientation))
         self._broadcast([transform])
 
@@ -318,7 +318,7 @@ class LogTopics:
 
     def _note_status(self, latest, rssi_publisher):
         if "pm.vbat" in latest:
-            self.battery.update(latest["pm.vbat"], self._context.handle.time())
+            self.battery.update(latest["pm.vbat"], self._vehicle.handle.time())
         self.power_state = latest.get("pm.state")
         self.received_broadcasts = latest.get("radio.numRxBc", 0)
         self.received_unicasts = latest.get("radio.numRxUc", 0)
@@ -330,7 +330,7 @@ class LogTopics:
         if self.heading is not None:
             self._heading.publish(Float32(math.radians(self.heading)))
         # The Crazyradio's figure is the same, and comes without the firmware's help.
-        self.rssi = self._context.crazyflie.rssi
+        self.rssi = self._vehicle.crazyflie.rssi
         if self.rssi is None:
             self.rssi = latest.get("radio.rssi")
         if self.rssi is not None:
@@ -366,7 +366,7 @@ class LogTopics:
         # The field is called frequency, and is a period.
         period = block.frequency - block.frequency % PERIOD_STEP_MS
         if period != block.frequency:
-            self._context.warn(
+            self._vehicle.warn(
                 f"log block {block.topic_name}: its period is {block.frequency} ms; the firmware "
                 f"counts in steps of {PERIOD_STEP_MS} ms: it comes every {period} ms"
             )
@@ -376,25 +376,25 @@ class LogTopics:
         def deliver(time_ms, values):
             stamp = self._estimate_stamp(time_ms) if is_estimate else self._stamp(time_ms)
             if stamp is not None:
-                self._context.delivery.submit_data(publish, stamp, values)
+                self._vehicle.delivery.submit_data(publish, stamp, values)
 
-        self._context.crazyflie.add_log_block(LogBlock(name, period_ms, variables, deliver))
+        self._vehicle.crazyflie.add_log_block(LogBlock(name, period_ms, variables, deliver))
 
     def _publisher(self, name, message_type):
-        return self._context.handle.publisher(f"{self._context.prefix}/{name}", message_type)
+        return self._vehicle.handle.publisher(f"{self._vehicle.prefix}/{name}", message_type)
 
     def _stamp(self, time_ms):
-        if self._context.parameters.use_ros_time:
-            return self._context.handle.stamp()
+        if self._vehicle.parameters.use_ros_time:
+            return self._vehicle.handle.stamp()
         return genpy.Time(*divmod(time_ms * 1_000_000, 1_000_000_000))
 
     def _estimate_stamp(self, time_ms):
-        handle = self._context.handle
+        handle = self._vehicle.handle
         assert self.positioning is not None
         time = self.positioning.local_time(time_ms / 1000.0, handle.time())
         return None if time is None else handle.stamp(time)
 
     def _header(self, stamp, in_world):
-        context = self._context
-        frame = context.server.fixed_frame if in_world else context.parameters.frame
+        vehicle = self._vehicle
+        frame = vehicle.server.fixed_frame if in_world else vehicle.parameters.frame
         return Header(stamp=stamp, frame_id=frame)

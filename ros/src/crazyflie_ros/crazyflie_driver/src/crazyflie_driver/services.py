@@ -12,12 +12,12 @@ from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_driver.commands import SERVICE_TYPES, requested
-from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.jobs import Job
 from crazyflie_driver.parameter_mirror import ParameterMirror, parsed_name
 from crazyflie_driver.setpoint_gate import GateEvent
+from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
@@ -44,7 +44,7 @@ class VehicleServices:
     services takeoff and land as well.
     """
 
-    _context: VehicleContext
+    _vehicle: BaseVehicle
     _flight: FlightState
     _commands: FlightCommands
     _mirror: ParameterMirror
@@ -56,11 +56,11 @@ class VehicleServices:
         Their parameters are set before they start. They may also have been left by controllers that
         ended long ago: therefore the wait has a limit.
         """
-        context = self._context
-        names = context.handle.get_param(context.prefix or "/", _Controllers(), frozenset())
-        awaited = {f"{context.prefix}/{name}" for name in names}
+        vehicle = self._vehicle
+        names = vehicle.handle.get_param(vehicle.prefix or "/", _Controllers(), frozenset())
+        awaited = {f"{vehicle.prefix}/{name}" for name in names}
         end = time.monotonic() + CONTROLLER_LIMIT
-        while awaited and not context.is_closing() and time.monotonic() < end:
+        while awaited and not vehicle.is_closing() and time.monotonic() < end:
             awaited = {node for node in awaited if not self._is_ready(node)}
             if awaited:
                 time.sleep(CONTROLLER_PERIOD)
@@ -68,7 +68,7 @@ class VehicleServices:
     def _is_ready(self, node):
         offered = {
             service.rpartition("/")[2]
-            for service, owner in self._context.handle.service_nodes().items()
+            for service, owner in self._vehicle.handle.service_nodes().items()
             if owner == node
         }
         return _SHARED <= offered
@@ -98,11 +98,11 @@ class VehicleServices:
             "param_state": (srv.ParamState, self._state),
             "write_lighthouse": (srv.WriteLighthouse, self._write_lighthouse),
         }
-        if self._context.crazyflie.address.is_radio:
+        if self._vehicle.crazyflie.address.is_radio:
             jobs["reboot"] = Empty, self._reboot
         for name, (service_type, work) in jobs.items():
             services[name] = service_type, partial(self._on_job, name, service_type, work)
-        handle, prefix = self._context.handle, self._context.prefix
+        handle, prefix = self._vehicle.handle, self._vehicle.prefix
         nodes = handle.service_nodes()
         for name, (service_type, callback) in services.items():
             free = desired = f"{prefix}/{name}"
@@ -118,9 +118,9 @@ class VehicleServices:
             self._latch_emergency()
         except CrazyflieError as error:
             text = f"emergency stop may not have arrived, is sent when the link is back: {error}"
-            self._context.error(text)
+            self._vehicle.error(text)
             raise ServiceError(text) from None
-        self._context.error(
+        self._vehicle.error(
             "emergency stop; to fly again remove the vehicle, restart it and add it again"
         )
         return EmptyResponse()
@@ -139,7 +139,7 @@ class VehicleServices:
             raise ServiceError(f"size is {packet.size}; a packet has at most {len(data)} bytes")
         port, channel = packet.header >> 4, packet.header & 3
         try:
-            self._context.crazyflie.send_packet(port, channel, data[: packet.size])
+            self._vehicle.crazyflie.send_packet(port, channel, data[: packet.size])
         except CrazyflieError as error:
             raise ServiceError(str(error)) from None
         return srv.sendPacketResponse()
@@ -150,20 +150,20 @@ class VehicleServices:
         return self._commands.send(requested(name, request), service_type._response_class())
 
     def _on_arm(self, request):
-        context = self._context
+        vehicle = self._vehicle
 
         def work(_):
             try:
                 if request.data:
-                    context.refuse_after_emergency()
-                context.crazyflie.supervisor.arm(request.data)
+                    vehicle.refuse_after_emergency()
+                vehicle.crazyflie.supervisor.arm(request.data)
                 if request.data:
-                    context.gate.handle(GateEvent.FLIGHT_CALLED)
+                    vehicle.gate.handle(GateEvent.FLIGHT_CALLED)
             except (CrazyflieError, ServiceError) as error:
                 return SetBoolResponse(False, str(error))
             return SetBoolResponse(True, "armed" if request.data else "disarmed")
 
-        return context.jobs.submit("arming", work)
+        return vehicle.jobs.submit("arming", work)
 
     def _on_upload_trajectory(self, request):
         pieces = [
@@ -195,10 +195,10 @@ class VehicleServices:
 
     def _upload(self, name, response, upload):
         def work(job):
-            upload(self._context.crazyflie.trajectories.guarded(job.may_send), job.check)
+            upload(self._vehicle.crazyflie.trajectories.guarded(job.may_send), job.check)
             return response
 
-        return self._context.jobs.submit(name, work, is_flight=True)
+        return self._vehicle.jobs.submit(name, work, is_flight=True)
 
     def _on_job(self, name, service_type, work, request):
         def run(_: Job) -> Any:
@@ -208,11 +208,11 @@ class VehicleServices:
                 raise ServiceError(str(error)) from None
             return service_type._response_class() if response is None else response
 
-        return self._context.jobs.submit(name, run)
+        return self._vehicle.jobs.submit(name, run)
 
     def _recover(self, _):
-        self._context.refuse_after_emergency()
-        self._context.crazyflie.supervisor.recover()
+        self._vehicle.refuse_after_emergency()
+        self._vehicle.crazyflie.supervisor.recover()
 
     def _set_led_color(self, request):
         color = request.color
@@ -227,14 +227,14 @@ class VehicleServices:
 
     def _store(self, request):
         for name in map(parsed_name, request.params):
-            self._context.crazyflie.parameters.store(name)
+            self._vehicle.crazyflie.parameters.store(name)
 
     def _clear(self, request):
         for name in map(parsed_name, request.params):
-            self._context.crazyflie.parameters.clear(name)
+            self._vehicle.crazyflie.parameters.clear(name)
 
     def _state(self, request):
-        state = self._context.crazyflie.parameters.stored(parsed_name(request.param))
+        state = self._vehicle.crazyflie.parameters.stored(parsed_name(request.param))
         stored = math.nan if state.stored_value is None else state.stored_value
         return srv.ParamStateResponse(state.is_stored, state.default_value, stored)
 
@@ -246,15 +246,15 @@ class VehicleServices:
                 "write_lighthouse moves the vehicle's estimate: expected it on the ground (2 s "
                 f"after a landing); its state is: {words}"
             )
-        self._context.crazyflie.lighthouse.write_file(
-            request.file, self._context.crazyflie.parameters
+        self._vehicle.crazyflie.lighthouse.write_file(
+            request.file, self._vehicle.crazyflie.parameters
         )
 
     def _update_params(self, request):
         self._mirror.write(request.params)
 
     def _set_group_mask(self, request):
-        self._context.crazyflie.high_level.set_group_mask(request.groupMask)
+        self._vehicle.crazyflie.high_level.set_group_mask(request.groupMask)
 
     def _reboot(self, _):
         try:
@@ -265,14 +265,14 @@ class VehicleServices:
             raise ServiceError(
                 "no reboot: it is not known whether the vehicle flies, and it would fall; on the "
                 "ground, remove the vehicle and call `rosrun crazyflie_tools reboot --uri "
-                f"{self._context.parameters.uri}`"
+                f"{self._vehicle.parameters.uri}`"
             )
         if state & (SupervisorState.FLYING | SupervisorState.HIGH_LEVEL_ACTIVE):
             raise ServiceError(
                 "no reboot: the vehicle flies (until 2 s after a landing it says so) and would "
                 f"fall; its state is: {state.words()}"
             )
-        self._context.crazyflie.reboot()
+        self._vehicle.crazyflie.reboot()
 
 
 class _Controllers(ParameterType):

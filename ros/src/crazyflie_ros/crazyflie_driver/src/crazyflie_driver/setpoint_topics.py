@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 from geometry_msgs.msg import Point, PointStamped, PoseStamped, Quaternion, Twist, Vector3
 from std_msgs.msg import Empty
 
-from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import LIFT_LIMIT, MAX_TURN, LiftWatch
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
 from crazyflie_driver.setpoint_gate import GateEvent
+from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_model.limits import MAX_SETPOINT_PWM
@@ -115,7 +115,7 @@ class SetpointTopics:
     vehicle would be locked 2 s later.
     """
 
-    _context: VehicleContext
+    _vehicle: BaseVehicle
     _log: LogTopics
     #: The kind of command that the vehicle was sent last.
     control: Control = Control.HIGH_LEVEL
@@ -138,7 +138,7 @@ class SetpointTopics:
             self._subscribe(name, sender, self._on_setpoint)
         for name, sender in EXTERNAL.items():
             self._subscribe(name, sender, self._on_external)
-        self._context.handle.timer(_REST_PERIOD, self._end_stream_at_rest)
+        self._vehicle.handle.timer(_REST_PERIOD, self._end_stream_at_rest)
 
     @property
     def is_streaming(self) -> bool:
@@ -157,18 +157,18 @@ class SetpointTopics:
 
     def rate(self) -> float:
         """Return how many setpoints were sent in the last second."""
-        now = self._context.handle.time()
+        now = self._vehicle.handle.time()
         return sum(1 for time in self._times if now - time <= _RATE_WINDOW) / _RATE_WINDOW
 
     def can_land_autonomously(self) -> bool:
         """Return whether the vehicle's planner can land it, as far as its inputs show."""
         fed = self._external_time
-        is_fed = fed is not None and self._context.handle.time() - fed <= _RATE_WINDOW
+        is_fed = fed is not None and self._vehicle.handle.time() - fed <= _RATE_WINDOW
         return is_fed or self.control is not Control.THRUST
 
     def send_zero_thrust(self) -> None:
         """Send zero thrust a hundred times, and that setpoints stop; blocks."""
-        self._context.crazyflie.setpoints.send_zero_thrust()
+        self._vehicle.crazyflie.setpoints.send_zero_thrust()
         self._setpoints_stopped()
 
     def open_thrust_lock(self, state: SupervisorState | None) -> None:
@@ -178,7 +178,7 @@ class SetpointTopics:
         link was lost.
         """
         if state is None or SupervisorState.FLYING in state:
-            self._context.warn(
+            self._vehicle.warn(
                 "the vehicle may be flying: its thrust stays locked until a setpoint of zero "
                 "thrust comes"
             )
@@ -191,7 +191,7 @@ class SetpointTopics:
         The last setpoint still counts for some ms. At once means in the calling thread, which has
         to be the one that sends: see `Subsystem.guarded`.
         """
-        self._context.crazyflie.setpoints.notify_setpoints_stop(remain_valid_ms, at_once)
+        self._vehicle.crazyflie.setpoints.notify_setpoints_stop(remain_valid_ms, at_once)
         self._setpoints_stopped()
 
     def _setpoints_stopped(self):
@@ -207,7 +207,7 @@ class SetpointTopics:
         log, state = self._log, self._log.supervisor
         is_flying = None if state is None else SupervisorState.FLYING in state
         finding = self._lift.sample(
-            self._context.handle.time(), is_flying, log.height, log.vertical_speed
+            self._vehicle.handle.time(), is_flying, log.height, log.vertical_speed
         )
         if finding is None or state is None:
             return
@@ -221,12 +221,12 @@ class SetpointTopics:
             command += f", yaw {self._commanded_yaw:.0f} degrees"
         advice = "is it free, do all propellers turn, and is its own yaw commanded?"
         if finding.is_certain:
-            self._context.gate.handle(GateEvent.NOT_LIFTED)
+            self._vehicle.gate.handle(GateEvent.NOT_LIFTED)
             # Without a link, which its state shows, the firmware stops the motors.
             with contextlib.suppress(CrazyflieError):
                 self.notify_setpoints_stop()
             advice += " Its motors are stopped, since it might leap; pause the stream to try again"
-        self._context.warn(
+        self._vehicle.warn(
             f"was commanded to fly ({command}), and has not lifted off within {LIFT_LIMIT:g} s "
             f"({', '.join(words)}): {advice}"
         )
@@ -247,27 +247,27 @@ class SetpointTopics:
         self._high_level_end = moment
 
     def _subscribe(self, name, sender, callback):
-        topic = f"{self._context.prefix}/{name}"
-        self._context.handle.subscribe(topic, sender.message_type, partial(callback, name, sender))
+        topic = f"{self._vehicle.prefix}/{name}"
+        self._vehicle.handle.subscribe(topic, sender.message_type, partial(callback, name, sender))
 
     def _on_external(self, name, sender, message):
         if self._log.positioning is not None:
             # It may be the vehicle's own estimate: it would correct itself by itself.
-            self._context.warn(
+            self._vehicle.warn(
                 f"ignoring {name}: its positioning is {self._log.positioning.source}", 5.0, name
             )
             return
-        self._external_time = self._context.handle.time()
+        self._external_time = self._vehicle.handle.time()
         self._send(name, sender, message)
 
     def _on_setpoint(self, name, sender, message):
-        now = self._context.handle.time()
+        now = self._vehicle.handle.time()
         at_rest = name == CMD_STOP or (name == CMD_VEL and message.linear.z <= 0.0)
-        with self._context.gate.passing(now, at_rest) as refusal:
+        with self._vehicle.gate.passing(now, at_rest) as refusal:
             is_sent = not refusal and self._send(name, sender, message)
             if is_sent:
                 if name == CMD_STOP:
-                    self._context.gate.stop(now)
+                    self._vehicle.gate.stop(now)
                 self._times.append(now)
                 self.control, self._topic = _control(name, at_rest), name
         if refusal:
@@ -283,7 +283,7 @@ class SetpointTopics:
 
     def _send(self, name, sender, message):
         try:
-            sender.send(self._context.crazyflie, message)
+            sender.send(self._vehicle.crazyflie, message)
         except CrazyflieError as error:
             self._warn(f"ignoring {name}: {error}", key=name)
             return False
@@ -292,26 +292,26 @@ class SetpointTopics:
     def _end_stream_at_rest(self):
         if (
             self.control is Control.ZERO_THRUST
-            and self._context.handle.time() - self._times[-1] > _REST
+            and self._vehicle.handle.time() - self._times[-1] > _REST
         ):
             # Without a link, which its state shows; it is tried again.
             with contextlib.suppress(CrazyflieError):
                 self.notify_setpoints_stop()
 
     def _warn(self, text, key):
-        self._context.warn(text, _THROTTLE, key)
+        self._vehicle.warn(text, _THROTTLE, key)
 
     def _cmd_vel(self, message):
         # The link's pitch is the negative of cmd_vel's, and cflib negates it; tests compare bytes.
         # In this order a NaN stays one, and is refused.
         thrust = min(max(message.linear.z, 0.0), MAX_SETPOINT_PWM)
-        parameters, state = self._context.parameters, self._log.supervisor
+        parameters, state = self._vehicle.parameters, self._log.supervisor
         if thrust > 0.0 and state is not None:
             if state & (SupervisorState.LOCKED | SupervisorState.CRASHED):
                 self._warn(f"cannot fly ({state.words()}): restart the vehicle", key="locked")
             elif SupervisorState.ARMED not in state:
                 self._warn(f"not armed, call {parameters.prefix}/arm", key="armed")
-        self._context.crazyflie.setpoints.attitude(
+        self._vehicle.crazyflie.setpoints.attitude(
             message.linear.y + parameters.roll_trim,
             message.linear.x + parameters.pitch_trim,
             message.angular.z,

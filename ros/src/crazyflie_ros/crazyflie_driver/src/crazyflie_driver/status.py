@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from std_msgs.msg import Bool, Header, String
 
-from crazyflie_driver.context import VehicleContext
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import Charge, battery_words
 from crazyflie_driver.parameters import (
@@ -17,6 +16,7 @@ from crazyflie_driver.parameters import (
     LinkLimits,
 )
 from crazyflie_driver.setpoint_topics import SetpointTopics
+from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.broadcast import Broadcaster
 from crazyflie_link.errors import LinkLostError
 from crazyflie_model.supervisor import SupervisorState
@@ -152,7 +152,7 @@ _MOST = 1 << 15  #: Packets in a second. The vehicle counts in 16 bits; more is 
 class StatusPublisher:
     """Publish the status of a vehicle, in words and typed, and whether it is connected."""
 
-    _context: VehicleContext
+    _vehicle: BaseVehicle
     _log: LogTopics
     _setpoints: SetpointTopics
     broadcaster: Broadcaster | None = None  #: Counts what is sent to all vehicles of its channel.
@@ -163,7 +163,7 @@ class StatusPublisher:
     _is_connected: bool = False
 
     def __post_init__(self) -> None:
-        handle, prefix = self._context.handle, self._context.prefix
+        handle, prefix = self._vehicle.handle, self._vehicle.prefix
         self._text = handle.publisher(f"{prefix}/{STATUS_TOPIC}", String, latch=True)
         self._typed = handle.publisher(
             f"{prefix}/{VEHICLE_STATUS_TOPIC}", VehicleStatus, latch=True
@@ -174,15 +174,15 @@ class StatusPublisher:
 
     def status(self) -> VehicleStatus:
         """Return what is known of the vehicle now."""
-        context, battery = self._context, self._log.battery
-        crazyflie, state = context.crazyflie, self._log.supervisor
+        vehicle, battery = self._vehicle, self._log.battery
+        crazyflie, state = vehicle.crazyflie, self._log.supervisor
         message = VehicleStatus(
-            header=Header(stamp=context.handle.stamp()),
+            header=Header(stamp=vehicle.handle.stamp()),
             link=_LINKS[crazyflie.state.value],
-            link_text=context.link_text,
+            link_text=vehicle.link_text,
             supervisor=int(state or 0),
             has_supervisor=state is not None,
-            is_emergency=context.gate.is_emergency,
+            is_emergency=vehicle.gate.is_emergency,
             battery=int(battery.charge),
             battery_voltage=_or_nan(battery.voltage),
             link_quality=math.nan,
@@ -192,7 +192,7 @@ class StatusPublisher:
             is_streamed=self._setpoints.is_streaming,
             setpoint_rate=self._setpoints.rate(),
             setpoints_ignored=self._setpoints.ignored,
-            are_setpoints_blocked=context.gate.is_blocking(context.handle.time()),
+            are_setpoints_blocked=vehicle.gate.is_blocking(vehicle.handle.time()),
             restarts=crazyflie.restarts,
             pm_state=_power_state(self._log.power_state),
             supervisor_info=int(state or 0),
@@ -222,7 +222,7 @@ class StatusPublisher:
         if before is None or message.text != before.text:
             self._text.publish(String(message.text))
         is_connected = message.link == VehicleStatus.CONNECTED
-        self.publish_connected(is_connected and self._context.is_ready())
+        self.publish_connected(is_connected and self._vehicle.is_ready())
 
     def publish_connected(self, is_connected: bool) -> None:
         """Publish whether the vehicle is connected, if that is new."""
@@ -237,7 +237,7 @@ class StatusPublisher:
             log.received_broadcasts,
             sent,
             log.received_unicasts,
-            self._context.crazyflie.sent,
+            self._vehicle.crazyflie.sent,
         )
         new = [(now - before) & 0xFFFF for now, before in zip(counts, self._counts, strict=True)]
         self._counts = counts

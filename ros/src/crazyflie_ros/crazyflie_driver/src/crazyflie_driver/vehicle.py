@@ -5,7 +5,6 @@ import threading
 import time
 from concurrent.futures import Future
 
-from crazyflie_driver.context import ConnectionEvent, ConnectionState, VehicleContext
 from crazyflie_driver.flight_commands import FlightCommands, Reason
 from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.jobs import Delivery, Job, Jobs
@@ -21,6 +20,7 @@ from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_gate import GateEvent, SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import StatusPublisher
+from crazyflie_driver.vehicle_base import BaseVehicle, ConnectionEvent, ConnectionState
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.transmission import REPLY_LIMIT
@@ -33,7 +33,7 @@ _LOOK_PERIOD = 0.1
 _REACTION_TIME = 0.3  #: Time after which the vehicle has begun to land, s.
 
 
-class DriverVehicle(VehicleContext):
+class DriverVehicle(BaseVehicle):
     """A vehicle that is being connected, is connected, or has lost its link.
 
     Calls that take time are jobs of the vehicle, so that no vehicle blocks another. Raises

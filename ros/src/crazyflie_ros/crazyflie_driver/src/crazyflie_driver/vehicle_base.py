@@ -59,8 +59,8 @@ TRANSITIONS: dict[tuple[ConnectionState, ConnectionEvent], ConnectionState] = {
 
 
 @dataclass(eq=False)
-class VehicleContext:
-    """What all parts of one vehicle share.
+class BaseVehicle:
+    """What all parts of one vehicle share; they are attributes of `DriverVehicle`.
 
     The handle is closed when the vehicle is removed. Calls that block on the vehicle are jobs. All
     threads of the vehicle use its state; ``link_text`` says why the link is in its own.

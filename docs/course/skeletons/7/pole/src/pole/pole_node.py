@@ -53,7 +53,8 @@ class PoleNode(Node):
         self._show(transform.translation)
 
     def _show(self, place):
-        # Step 2: publish the distance of place, and the marker, RED when it is near.
+        # Step 2: publish the distance of place, and the marker, RED when it is nearer than `near`.
+        # place has the fields x, y and z; Pole.distance takes a tuple of them.
         raise NotImplementedError("step 2")
 
     def _marker(self, colour):

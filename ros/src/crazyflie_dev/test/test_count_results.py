@@ -106,8 +106,8 @@ def test_rostest_that_did_not_even_start_failed(folder):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", "no XML"),
-        ("<testsuites><testsuite", "no XML"),
+        ("", "not XML"),
+        ("<testsuites><testsuite", "not XML"),
         ('<testsuites><testsuite tests="0" /></testsuites>', "no test ran"),
     ],
 )

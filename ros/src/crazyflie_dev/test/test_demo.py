@@ -53,7 +53,8 @@ def test_velocities_are_those_of_the_positions(moment):
     slope = (position(moment + step) - position(moment - step)) / (2.0 * step)
     reference = eight(moment)
     assert (reference.x_dot, reference.y_dot) == pytest.approx(slope[:2], abs=1e-6)
-    assert math.hypot(*slope) < 2.0  # What the controller lets a reference have, m/s.
+    # Largest velocity of a reference that the controller accepts (m/s).
+    assert math.hypot(*slope) < 2.0
 
 
 def turned(reference):
@@ -91,7 +92,7 @@ def test_the_nodes_fly_it_calmly(controller, dynamics, message):
     flown = np.array(controls[begin:])
     assert len(flown) > 550
     assert np.abs(np.diff(flown[:, :2], axis=0)).mean() < 0.01
-    # From the controller's first control on: the climb, too.
+    # From the controller's first control on, including the climb.
     flying = np.array([each for each in controls if each[3] > MIN_THRUST / 2.0])
     assert np.abs(flying[:, :2]).max() < MAX_TILT - 1e-6
     assert MIN_THRUST < flying[:, 3].min() and flying[:, 3].max() < MAX_THRUST

@@ -15,7 +15,7 @@ def test_vehicles_are_those_that_the_script_names(script, n):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["none.py"], "there is no file none.py"),
+        (["none.py"], "the file none.py does not exist"),
         ([__file__, "0"], "n is 0; expected one number of vehicles"),
         ([__file__, "2", "3"], "n is 2 3; expected one number"),
         ([__file__, "two"], "n is two; expected one number"),

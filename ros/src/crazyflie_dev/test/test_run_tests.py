@@ -96,7 +96,7 @@ def test_what_passes_alone_is_flaky_and_no_pass(run, tmp_path, arguments, expect
         "1 passed, 0 failed, 1 flaky",
         "FLAKY: package/pytest-flaky.xml: test_flaky.test_shy",
     ]
-    # Once beside others, three times alone.
+    # Once among others, three times alone.
     assert (tmp_path / "ran").read_text() == "xxxx"
     results = tmp_path / "build" / "test_results" / "package" / "pytest-flaky.xml"
     assert "beside others" in results.read_text()

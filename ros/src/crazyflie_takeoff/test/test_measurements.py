@@ -47,7 +47,7 @@ def test_a_position_is_known_for_half_a_second():
     assert position.value(10.25) is None
     assert "states on /state get 0.5 s old before the next" in position.explanation(10.25, "/state")
     assert "no state has come" in position.explanation(10.5, "/state")
-    # After a reset of the clock the age counts from there.
+    # After a reset of the clock the age is measured from there.
     assert position.value(2.0) == (1.0, 2.0, 3.0)
     assert position.value(2.25) is None
 

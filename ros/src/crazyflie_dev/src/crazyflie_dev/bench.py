@@ -17,7 +17,7 @@ from crazyflie_dev import bench_flights
 
 
 class Row(NamedTuple):
-    """A figure, which a function of `bench_flights` measures, and its goal."""
+    """A figure, measured by a function of `bench_flights`, and its goal."""
 
     flight: str  #: The function, with its argument, if it has one.
     name: str  #: A word for the command line, and the key of the value.
@@ -61,10 +61,10 @@ def environment_of(workspace: Path) -> dict[str, str]:
 def measure(
     rows: list[Row], reference: dict[str, str] | None = None, rounds: int = 1
 ) -> Iterator[dict[str, object]]:
-    """Measure, print each figure when it is there, and yield what is written to the file.
+    """Measure, print each figure when it is known, and yield the entries of the file.
 
-    With ``reference``, the environment of another workspace, each flight is measured there and
-    here in turns, and the ratio of the means is printed, too.
+    With ``reference``, the environment of another workspace, each flight is measured there and here
+    alternately, and the ratio of the means is also printed.
     """
     own = dict(os.environ)
     for flight, group in itertools.groupby(rows, lambda row: row.flight):
@@ -81,7 +81,7 @@ def measure(
                         measured.append(getattr(bench_flights, function)(*arguments))
         except bench_flights.NotMeasuredError as error:
             outcome = {"reason": str(error)}
-        # Whatever it is, the other figures can still be had.
+        # After any error, the other figures can still be measured.
         except Exception as error:
             reason = f"{type(error).__name__}: {error}"
             outcome = {"reason": reason, "failed": reason}
@@ -122,10 +122,14 @@ def main() -> int:
     names = ", ".join(row.name for row in ROWS)
     parser = argparse.ArgumentParser(prog="run bench", description=__doc__, epilog=f"rows: {names}")
     parser.add_argument("--out", type=Path, default=Path("out/bench.json"), help="JSON file")
-    parser.add_argument("--beside", type=Path, help="another workspace, measured in turns with it")
-    parser.add_argument("--rounds", type=int, default=1, help="how often each is measured (1)")
     parser.add_argument(
-        "row", nargs="*", help="rows whose names begin so, such as cpu (default: all)"
+        "--beside", type=Path, help="another workspace, measured alternately with this one"
+    )
+    parser.add_argument(
+        "--rounds", type=int, default=1, help="number of measurements of each figure (1)"
+    )
+    parser.add_argument(
+        "row", nargs="*", help="beginnings of rows' names, such as cpu (default: all)"
     )
     options = parser.parse_args()
     for word in options.row:
@@ -135,13 +139,14 @@ def main() -> int:
     reference = environment_of(options.beside) if options.beside else None
     print(f"{len(rows)} figures; data: {options.out}", flush=True)
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    # A shell's background job ignores it, and so would what is launched, and ended by it.
+    # A shell's background job ignores SIGINT, and so would the launched processes, which are ended
+    # by it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     results = []
     for result in measure(rows, reference, options.rounds):
         results.append(result)
         written = {"load of the last minutes": os.getloadavg(), "rows": results}
-        # What there is outlasts an interruption.
+        # Finished figures survive an interruption.
         options.out.write_text(json.dumps(written, indent=2) + "\n")
     return int(any("failed" in result for result in results))
 

@@ -1,6 +1,6 @@
 """Flights that are measured; each function returns values by the name of their row.
 
-The running graph is looked at from outside, as the operating system and another program see it.
+The running graph is observed from outside, by the operating system and another program.
 """
 
 import asyncio
@@ -37,12 +37,12 @@ _CALLER = "/bench"
 
 
 class NotMeasuredError(Exception):
-    """A figure cannot be had here; the text says why."""
+    """A figure cannot be measured here; the text says why."""
 
 
 @contextmanager
 def launched(file: str, *arguments: str, service: str = "/takeoff") -> Iterator[None]:
-    """Run a launch file of crazyflie_examples, without RViz, from when it offers a service on."""
+    """Run a launch file of crazyflie_examples, without RViz; enter when it offers a service."""
     launch = ["crazyflie_examples", file, "rviz:=false", *arguments]
     with tempfile.TemporaryDirectory() as folder, roslaunch(launch, Path(folder) / "log"):
         wait_for_service(service)
@@ -50,16 +50,16 @@ def launched(file: str, *arguments: str, service: str = "/takeoff") -> Iterator[
 
 
 def wait_for_service(name: str) -> None:
-    """Wait until a service is offered; `NotMeasuredError` if there is none after 60 s."""
+    """Wait until a service is offered; `NotMeasuredError` after 60 s."""
     end = time.monotonic() + _LIMIT
     while time.monotonic() < end:
-        # There may be no master yet.
+        # The master may not have started yet.
         try:
             if rosgraph.Master(_CALLER).lookupService(name):
                 return
         except (rosgraph.MasterError, OSError):
             time.sleep(0.002)
-    raise NotMeasuredError(f"there is no service {name} after {_LIMIT:g} s")
+    raise NotMeasuredError(f"no service {name} after {_LIMIT:g} s")
 
 
 def call(service: str, *request: str) -> None:
@@ -94,7 +94,7 @@ def cpu_load(processes: list[int]) -> float:
 
 
 def memory(processes: Iterable[int]) -> float:
-    """Return the memory of processes, MiB; what some share is divided among them (PSS)."""
+    """Return the memory of processes, MiB; shared memory is divided among them (PSS)."""
     return sum(psutil.Process(pid).memory_full_info().pss for pid in processes) / 2**20
 
 
@@ -144,10 +144,10 @@ def _look_at_clock() -> tuple[int, int]:
 
 
 def simulated() -> Figures:
-    """Measure how fast simulated time passes in a hover; /clock is heard at begin and end only."""
+    """Measure the speed of simulated time in a hover; /clock is received at begin and end only."""
     arguments = ["rviz:=false", "composed:=true", "sim_time:=true", "real_time_factor:=0"]
     launch = ["roslaunch", "--dump-params", "crazyflie_examples", "sw_hover.launch", *arguments]
-    # Not by roslaunch: programs that it starts beside the nodes listen to /clock, too.
+    # Not by roslaunch: programs that it starts in addition to the nodes also listen to /clock.
     with tempfile.TemporaryDirectory() as folder, master(Path(folder) / "master"):
         dumped = subprocess.run(launch, check=True, capture_output=True)
         subprocess.run(["rosparam", "load", "-"], input=dumped.stdout, check=True)
@@ -165,7 +165,7 @@ def simulated() -> Figures:
     return {"simulated_time": speed, "simulated_cpu": speed * DURATION / used}
 
 
-_SETTLING = 3.0  #: Until vehicles have a position, and, after a takeoff, hover, s.
+_SETTLING = 3.0  #: Time until vehicles have a position, and, after a takeoff, hover (s).
 
 
 def fleet(n: str) -> Figures:
@@ -181,7 +181,7 @@ def _flown_fleet(n: int, *arguments: str) -> Iterator[int]:
     with launched("sw_swarm.launch", f"n:={n}", *arguments, service="/all/takeoff"):
         process = process_of("/fleet")
         for thread in Path(f"/proc/{process}/task").iterdir():
-            # Some are there for a moment only.
+            # Some threads exist for a moment only.
             with contextlib.suppress(ProcessLookupError):
                 os.sched_setaffinity(int(thread.name), {0})
         time.sleep(_SETTLING)
@@ -192,14 +192,14 @@ def _flown_fleet(n: int, *arguments: str) -> Iterator[int]:
 
 _URL = "http://127.0.0.1:8642"
 _VEHICLES = 100
-_CLIMB = 0.5  #: Climb of all vehicles (m): of a fleet in hover a page is sent nothing.
-_LEAST_RATE = 15.0  #: Scenes that come in a s; the page sends 20 of vehicles in motion.
+_CLIMB = 0.5  #: Climb of all vehicles (m): for a hovering fleet a page receives nothing.
+_LEAST_RATE = 15.0  #: Least rate of scenes (1/s); the page sends 20 of moving vehicles.
 
 
 def dashboard() -> Figures:
-    """Measure the dashboard beside a fleet in motion: without a page, and with one.
+    """Measure the dashboard with a moving fleet: without a page, and with one.
 
-    The page is that of another computer: what drawing it costs is not the flight's.
+    The page represents that of another computer: its drawing does not load the flight's.
     """
     with _flown_fleet(_VEHICLES, "dashboard:=true"):
         wait_for_service("/dashboard/get_loggers")
@@ -234,7 +234,7 @@ class PageClient:
     """
 
     def __init__(self, url: str):
-        self.scenes = 0  #: Messages with the poses of all vehicles that have come.
+        self.scenes = 0  #: Received messages with the poses of all vehicles.
         self._url = url
         self._is_open, self._is_over = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._read()), daemon=True)
@@ -242,7 +242,7 @@ class PageClient:
     def __enter__(self) -> "PageClient":
         self._thread.start()
         if not self._is_open.wait(_LIMIT):
-            raise NotMeasuredError(f"{self._url} is no page of NiceGUI 3, or does not answer")
+            raise NotMeasuredError(f"{self._url} is not a page of NiceGUI 3, or does not answer")
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -250,7 +250,7 @@ class PageClient:
         self._thread.join(_LIMIT)
 
     async def _read(self) -> None:
-        # In Linux the niceness is a thread's.
+        # In Linux the niceness belongs to a thread.
         os.nice(_NICENESS)
         with urllib.request.urlopen(self._url, timeout=_LIMIT) as answer:
             (client_id,) = re.findall(r"'client_id': '([^']+)'", answer.read().decode())

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-#: Class name under which rostest notes that a test node ran. The tests of that node are in a file
-#: of their own, rosunit-NAME.xml, beside rostest's.
+#: Class name under which rostest notes that a test node ran. The tests of that node are in a
+#: separate file, rosunit-NAME.xml, next to rostest's.
 _ROSTEST = "rostest.runner.RosTest"
 
 
@@ -43,7 +43,7 @@ def cases(path: Path) -> Iterator[Case]:
     try:
         elements = list(ElementTree.parse(path).getroot().iter("testcase"))
     except (ElementTree.ParseError, OSError) as error:
-        yield Case(path, "", "", "failed", f"no XML: {error}")
+        yield Case(path, "", "", "failed", f"not XML: {error}")
         return
     if not elements:
         yield Case(path, "", "", "failed", "no test ran")
@@ -63,7 +63,7 @@ def cases(path: Path) -> Iterator[Case]:
 
 def results_of_nodes(report: Path) -> Iterator[Path]:
     """Yield the files of results that the test nodes of a rostest have left, from rostest's own."""
-    # What cannot be read is a failed test to `cases`.
+    # `cases` reports an unreadable file as a failed test.
     with contextlib.suppress(ElementTree.ParseError, OSError):
         for element in ElementTree.parse(report).getroot().iter("testcase"):
             if element.get("classname") == _ROSTEST:
@@ -77,9 +77,9 @@ def _results_of_node(report, name):
 
 
 def summarize(folder: Path, results: Iterable[Case], is_strict: bool = True) -> bool:
-    """Print failed and flaky tests and the sums; tell whether some passed and none failed.
+    """Print failed and flaky tests and the sums; return whether some passed and none failed.
 
-    If it is strict, a flaky one has failed.
+    If it is strict, a flaky test has failed.
     """
     results = list(results)
     for case in results:

@@ -27,7 +27,7 @@ EIGHT_DURATION = 6.0
 #: degrees that a control may have.
 EIGHT_SCALE = 0.8
 REFERENCE_PERIOD = (
-    0.01  #: That of the controller, so that its reference moves as its state does (s).
+    0.01  #: Period of the controller, so that its reference moves as its state does (s).
 )
 
 SETTLING = 0.5  #: Time from the end of the figure eight to the landing (s).
@@ -38,7 +38,7 @@ ARGUMENTS = ("controller:=position_velocity_yaw", "dynamics:=coupled_7d", "recor
 
 REFERENCE, STATUS = "/ref/position_velocity_yaw", "/in_flight_flight_status"
 
-LIMIT = 30.0  #: The longest that a part of the flight may take, s; a takeoff takes six.
+LIMIT = 30.0  #: Timeout of a part of the flight (s); a takeoff takes 6 s.
 
 
 def eight(moment: float) -> PositionVelocityYawState:
@@ -55,18 +55,18 @@ def eight(moment: float) -> PositionVelocityYawState:
 
 
 def say_if_busy(load: float, processors: int) -> None:
-    """Print what a load (programs that run or want to) means for a flight in real time."""
+    """Warn if the load (running and waiting programs) is too high for a flight in real time."""
     if load > processors:
         print(
-            f"this computer is too busy: {load:.1f} programs want its {processors} processors, and "
-            "the flight may be a bad one; ./run demo sim_time:=true real_time_factor:=0 does not "
+            f"this computer is too busy: {load:.1f} programs share its {processors} processors, "
+            "and the flight may be bad; ./run demo sim_time:=true real_time_factor:=0 does not "
             "depend on that",
             file=sys.stderr,
         )
 
 
 def fly_and_land() -> None:
-    """Fly on the master that runs."""
+    """Fly on the running master."""
     process = begin("demo")
     handle = process.handle("/figure_eight")
     references = handle.publisher(REFERENCE, PositionVelocityYawStateStamped)
@@ -151,7 +151,7 @@ def report(recording: Path, folder: Path, log: Path) -> int:
 
 
 def main() -> int:
-    """Fly as the command line asks; return the exit status."""
+    """Fly by the command line; return the exit status."""
     parser = argparse.ArgumentParser(prog="run demo", description=__doc__)
     parser.add_argument(
         "--out", type=Path, default=Path("out"), help="folder for report, data, log"

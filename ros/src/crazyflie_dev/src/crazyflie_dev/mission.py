@@ -26,7 +26,7 @@ _DEFAULT_COUNT = 5  #: Number of vehicles of a script that names none.
 
 
 def vehicles_of(script: str) -> int:
-    """Return how many vehicles a script needs: the highest k of the names cfk in its text."""
+    """Return the number of vehicles of a script: the highest k of the names cfk in its text."""
     numbers = [int(number) for number in re.findall(r"\bcf([1-9][0-9]*)\b", script)]
     return max(numbers, default=_DEFAULT_COUNT)
 
@@ -36,8 +36,8 @@ def fly(script: list[str], n: int, folder: Path, launch_arguments: list[str]) ->
     folder.mkdir(parents=True, exist_ok=True)
     log, recordings = folder / "swarm.log", folder / "recordings"
     rviz = "true" if os.environ.get("DISPLAY") else "false"
-    # By simulated time in step with the clock: a busy computer flies more slowly, but as well. As
-    # fast as it goes, the recording would lack messages.
+    # In simulated time at real speed: on a busy computer the flight is slower, but as good. At full
+    # speed, the recording would lack messages.
     arguments = [
         *("crazyflie_examples", "sw_swarm.launch", f"n:={n}", "sim_time:=true", f"rviz:={rviz}"),
         *("record:=true", f"record_folder:={recordings}"),
@@ -91,9 +91,9 @@ def draw_from_above(flights: list[Flight]) -> Figure:
 
 
 def main() -> int:
-    """Fly what the command line names; return the exit status."""
+    """Fly the script on the command line; return the exit status."""
     arguments = sys.argv[1:]
-    # What stands behind -- is the script's own.
+    # Arguments behind -- belong to the script.
     cut = arguments.index("--") if "--" in arguments else len(arguments)
     parser = argparse.ArgumentParser(prog="run mission", description=__doc__)
     parser.add_argument("script", type=Path, metavar="FILE.py", help="see crazyflie_mission_api")
@@ -104,7 +104,7 @@ def main() -> int:
     options = parser.parse_args(arguments[:cut])
     script = options.script
     if not script.is_file():
-        parser.error(f"there is no file {script}; expected a mission script")
+        parser.error(f"the file {script} does not exist; expected a mission script")
     launch_arguments = [each for each in options.n if ":=" in each]
     numbers = [each for each in options.n if ":=" not in each] or [vehicles_of(script.read_text())]
     if len(numbers) > 1 or not str(numbers[0]).isdecimal() or int(numbers[0]) < 1:

@@ -21,7 +21,7 @@ from crazyflie_reports.bag_report import PAGE
 IMAGES = Path(__file__).resolve().parents[5] / "docs" / "images"
 
 _REPORT_SIZE = (1200, 872)
-_CHROMIUM_LIMIT = 60.0  #: The longest that Chromium may take, s.
+_CHROMIUM_LIMIT = 60.0  #: Timeout of Chromium (s).
 _TAKEOFF = "rosservice call /takeoff"  #: The line that the demo prints when it takes off.
 
 WIDTH, HEIGHT = 1000, 420
@@ -121,7 +121,7 @@ def _motion(pixels, repeat):
 
 
 def fly(folder: Path) -> list[Line]:
-    """Fly the demo into a folder; return what it prints, without the names of folders above.
+    """Fly the demo into a folder; return its output, without the names of folders above.
 
     `subprocess.CalledProcessError`: the flight failed.
     """
@@ -152,7 +152,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="render_demo", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder of the flight")
     parser.add_argument("--images", type=Path, default=IMAGES, help="folder (%(default)s)")
-    parser.add_argument("--time", type=float, default=12.2, help="of the replay, s (%(default)s)")
+    parser.add_argument(
+        "--time", type=float, default=12.2, help="moment of the replay, s (%(default)s)"
+    )
     options = parser.parse_args()
     folder = options.out.resolve()
     try:
@@ -163,7 +165,7 @@ def main() -> int:
         (options.images / "demo.svg").write_text(animation(lines, np.column_stack(columns)))
         render_report(folder / PAGE, options.images / "flight_report.png", options.time)
     except FileNotFoundError as error:
-        print(f"{error.filename} is not there (Debian package chromium?)", file=sys.stderr)
+        print(f"{error.filename} does not exist (Debian package chromium?)", file=sys.stderr)
         return 1
     except (subprocess.SubprocessError, ValueError) as error:
         print(f"no picture: {error}", file=sys.stderr)

@@ -73,7 +73,7 @@ def material_of(model: Path, name: str) -> list[float]:
 
 
 class Scene:
-    """RViz's picture of the flight on a display, and what should be on it.
+    """RViz's picture of the flight on a display, and its expected content.
 
     ``description`` is the folder of crazyflie_description, which has the colours.
     """

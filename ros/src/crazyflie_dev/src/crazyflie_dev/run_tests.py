@@ -1,12 +1,12 @@
-"""Run the tests of the built workspace with ctest; repeat by itself what has failed.
+"""Run the tests of the built workspace with ctest; repeat failed ones alone.
 
 python3 -m crazyflie_dev.run_tests ros/build [--all]
 
-A test that fails beside others and passes three times alone is flaky: it does not count as passed.
+A test that fails among others and passes three times alone is flaky: it does not count as passed.
 With ``--all`` it fails the run, without, it is named only: a flight in real time may lack the
-processor on a shared machine, and who changes something else is not to wait for its cause.
-What ctest has printed and the files of results in ``test_results`` are those of the first
-run; the repetitions write theirs below ``test_repeats``.
+processor on a shared machine, and who changes something else is not to wait for its cause. What
+ctest has printed and the files of results in ``test_results`` are those of the first run; the
+repetitions write theirs below ``test_repeats``.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from pathlib import Path
 from crazyflie_dev.count_results import Case, cases, results_of_nodes, summarize
 
 LONG = "long"  #: Label of ctest and marker of pytest for the tests that ``--all`` adds.
-REPEATS = 3  #: Number of passes alone with which a failed test counts as flaky.
+REPEATS = 3  #: Number of passes alone after which a failed test is flaky.
 MOST_REPEATED = 10  #: If more tests have failed, something is broken, and none is repeated.
 LIMIT = 900  #: Longest time of one repetition (s).
 
@@ -41,7 +41,7 @@ class Program:
         """Its files of results: its own and, of a rostest, those of the test nodes."""
         report = Path(self.command[3])
         if not report.exists():
-            # So catkin notes that a program has died without results.
+            # Text by which catkin reports that a program has died without results.
             report = report.with_name(f"MISSING-{report.name}")
         yield report
         yield from results_of_nodes(report)

@@ -104,7 +104,7 @@ class Soak:
             reason = takeoff.exception()
             self.refused += reason is not None
             self.answered += reason is None
-            # What failed in the flight before is over; a second publisher is remembered for 5 s.
+            # Faults of the previous flight are over; a second publisher is remembered for 5 s.
             is_good = not self.watch.is_calm or reason is None or "two nodes" in str(reason)
             self.watch.check(is_good, f"refused without a fault: {reason}")
         for _ in range(self.random.randint(0, 3)):
@@ -116,7 +116,7 @@ class Soak:
             self.page.close()
         else:
             self._call("/land")
-        # What has not happened yet happens on the ground.
+        # Remaining faults happen on the ground.
         while not self._is_over:
             self._wait(_STEP)
         self._come_to_rest()
@@ -189,7 +189,7 @@ class Soak:
             if self.graph.time > end:
                 watch.check(False, f"not at rest: {watch.state}, {watch.height:.2f} m")
                 break
-        # Refused within 2 s of an emergency, and where there was none.
+        # Refused within 2 s of an emergency, and without one.
         self._wait(2.0)
         self.graph.call("/emergency_reset", EmptyRequest())
         self._wait(1.0)

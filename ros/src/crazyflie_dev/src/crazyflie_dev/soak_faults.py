@@ -149,7 +149,7 @@ def with_each(edit: Callable[[Any, Flight], None]) -> Callable[[Flight], Steps]:
     """Return a fault: ``edit(transform, flight)`` changes each transform on /tf."""
 
     def change(message, flight):
-        # Transforms are decoded whenever they are asked for, and have to be encoded again.
+        # Transforms are decoded at each access, and must be encoded again.
         changed = TFMessage(copy.deepcopy(message.transforms))
         for transform in changed.transforms:
             edit(transform, flight)

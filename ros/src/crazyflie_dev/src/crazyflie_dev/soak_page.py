@@ -85,7 +85,7 @@ class _GraphMaster(Master):
 
     @override
     def graph(self) -> Graph:
-        # What missions offer would be taken for two more vehicles, which have no state.
+        # Services of missions would look like two more vehicles without a state.
         own = [name for name in self._fake.services() if not name.startswith(MISSIONS)]
         services = dict.fromkeys(own, "/node")
         # With it no process is started that would offer it.

@@ -64,7 +64,7 @@ def operator(monkeypatch, tmp_path, capsys, own_cache):
 
 
 def test_the_geometry_is_measured_stored_and_checked(operator):
-    assert "geometry of no base station; expected at least one" in operator.fails("--check")
+    assert "no geometry of a base station; expected at least one" in operator.fails("--check")
     status, printed, error = operator.run(places=(*FLOOR, "q", FLOOR[0]))
     assert (status, error) == (0, "")
     assert "residual" in printed

@@ -1,4 +1,4 @@
-"""Whether poses are those of the vehicle: what its control commands, and how they respond to it.
+"""Checks whether poses are those of the vehicle, by their response to its control.
 
 A vehicle in flight does not come to rest within one pose and stay there to the last bit: measured
 poses have noise, and simulated vehicles get slower gradually. A frozen camera sends its last pose

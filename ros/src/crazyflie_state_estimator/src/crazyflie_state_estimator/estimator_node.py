@@ -39,8 +39,8 @@ class StateEstimatorParameters(Parameters):
     state_topic: str = parameter(TOPIC, "where states go", name="topics/state")
     acts_on_arrival: bool = parameter(
         BOOLEAN,
-        "answer a new pose as soon as it comes, at most one every `time_step`, and do not wait for "
-        "the next time step",
+        "answer a new pose at once, at most one every `time_step`, instead of at the next time "
+        "step",
         False,
         "act_on_arrival",
     )
@@ -56,13 +56,13 @@ class StateEstimatorParameters(Parameters):
     )
     max_speed: float = parameter(
         Number("m/s", above=0.0),
-        "poses that a vehicle can reach only faster than this are rejected",
+        "largest plausible speed: poses that require a higher one are rejected",
         MAX_SPEED,
         "pose/max_speed",
     )
     max_tilt: float = parameter(
         Number("rad", above=0.0),
-        "a vehicle that is tilted more than this has crashed",
+        "tilt above which a vehicle has crashed",
         CRASH_TILT,
         "pose/max_tilt",
     )

@@ -63,7 +63,7 @@ class _Prediction:
 
 
 class PoseGate:
-    """Rejects poses that a vehicle of ``max_speed`` (m/s) cannot have flown to, and counts them.
+    """Rejects and counts poses that a vehicle of ``max_speed`` (m/s) cannot have reached.
 
     In flight, poses are accepted again at the position that the control predicts from the last good
     pose, or if they move as the control demands; poses that stay at one place are not.

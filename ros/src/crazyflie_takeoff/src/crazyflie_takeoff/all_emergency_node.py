@@ -16,7 +16,10 @@ class AllEmergencyParameters(Parameters):
     """Parameters of `AllEmergencyNode`."""
 
     topic: str = parameter(
-        TOPIC, "what every takeoff control filter reads", "/all/emergency", "topics/all_emergency"
+        TOPIC,
+        "topic that every takeoff control filter reads",
+        "/all/emergency",
+        "topics/all_emergency",
     )
     service: str = parameter(SERVICE, "stops all vehicles", "/all/emergency", "srv/all_emergency")
 

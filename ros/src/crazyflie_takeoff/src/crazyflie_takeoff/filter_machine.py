@@ -48,8 +48,8 @@ class FilterState(enum.IntEnum):
 class Event(enum.Enum):
     """Event that can change the state of the filter."""
 
-    TAKEOFF_CONTROL = enum.auto()  # From the takeoff server.
-    COMMANDED_CONTROL = enum.auto()  # From the controller, while it is selected.
+    TAKEOFF_CONTROL = enum.auto()  # A control of the takeoff server.
+    COMMANDED_CONTROL = enum.auto()  # A control of the controller, while it is selected.
     FIRST_STATE = enum.auto()  # The first state of a filter that starts in flight.
     TICK = enum.auto()  # Time has passed.
     OBJECTION = enum.auto()  # Controls must not be passed on any more.

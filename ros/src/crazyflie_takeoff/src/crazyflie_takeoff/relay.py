@@ -49,8 +49,8 @@ class Relay:
         self._time = math.nan
         self._command = self._allowed_command = self._passed = MOTORS_OFF
         self._takeoff = MOTORS_OFF
-        # Of the controls that have passed unchanged since the last `flush`: the last one, the time
-        # for which they have flown (s), and the integral of their vertical thrust (m/s).
+        # Summary of the controls that have passed unchanged since the last `flush`: the last one,
+        # the time for which they have flown (s), and the integral of their vertical thrust (m/s).
         self._unchanged: Any = None
         self._duration = self._impulse = 0.0
 

@@ -63,10 +63,13 @@ class TakeoffServerParameters(FlightTopicParameters):
         TOPIC, "by default the name of in_flight + `_status`", None, "topics/status"
     )
     state_topic: str | None = parameter(
-        TOPIC, "where the vehicle is; without it nothing is known", None, "topics/state"
+        TOPIC, "states of the vehicle; without them its position is unknown", None, "topics/state"
     )
     battery_topic: str | None = parameter(
-        TOPIC, "the battery's voltage; without it none is watched", None, "topics/battery"
+        TOPIC,
+        "voltage of the battery; without it the battery is not monitored",
+        None,
+        "topics/battery",
     )
     connected_topic: str | None = parameter(
         TOPIC,
@@ -109,11 +112,11 @@ class TakeoffServerParameters(FlightTopicParameters):
         live=True,
     )
     battery_low: float = parameter(
-        Number("V", minimum=0.0), "with less /takeoff is refused", 3.2, "battery/low"
+        Number("V", minimum=0.0), "voltage below which /takeoff is refused", 3.2, "battery/low"
     )
     battery_critical: float = parameter(
         Number("V", minimum=0.0),
-        "with less in flight the vehicle is landed",
+        "voltage below which the vehicle is landed in flight",
         3.0,
         "battery/critical",
     )

@@ -52,7 +52,7 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
         TOPIC, "the controller's control", name="topics/commanded_control"
     )
     final_control_topic: str = parameter(
-        TOPIC, "the one that is passed on", name="topics/final_control"
+        TOPIC, "the control that is passed on", name="topics/final_control"
     )
     state_topic: str | None = parameter(
         TOPIC, "where the vehicle is; without it the limits are not watched", None, "topics/state"
@@ -72,7 +72,7 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
     )
     recovery: float = parameter(
         DURATION,
-        "how long it may then stay away before the descent, while no state comes, either",
+        "time until the descent after that, while no state comes either",
         1.5,
         "loss/return_limit",
     )
@@ -86,16 +86,16 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
         5.0,
         "loss/descent_limit",
     )
-    floor: float = parameter(METRES, "lower is below the ground", -0.5, "limits/floor")
+    floor: float = parameter(METRES, "lowest z; lower is below the ground", -0.5, "limits/floor")
     outside: float = parameter(
-        Number("m", minimum=0.0), "further outside the geofence is too far", 0.5, "limits/outside"
+        Number("m", minimum=0.0), "largest distance outside the geofence", 0.5, "limits/outside"
     )
     climb: float = parameter(
-        Number("m/s", above=0.0), "controls do not climb faster", 3.0, "limits/climb"
+        Number("m/s", above=0.0), "largest speed of a climb by controls", 3.0, "limits/climb"
     )
     height: float = parameter(
         Number("m", above=0.0),
-        "controls do not climb higher above the ground",
+        "largest height above the ground of a climb by controls",
         10.0,
         "limits/height",
     )

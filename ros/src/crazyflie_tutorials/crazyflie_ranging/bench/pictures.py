@@ -24,7 +24,7 @@ from crazyflie_world.shapes import Box
 from crazyflie_world.world import World
 
 SIDES = ("front", "back", "left", "right")
-STEP = 0.05  #: Between two moments, s.
+STEP = 0.05  #: Period of the simulation (s).
 SPREAD = 0.47  #: Angle of the sensors' cones (rad).
 
 VEHICLE, OBJECT, CONE, GREY = "#0b62b0", "#e07b00", "#7fb2e5", "#7a7a7a"
@@ -34,8 +34,7 @@ VEHICLE, OBJECT, CONE, GREY = "#0b62b0", "#e07b00", "#7fb2e5", "#7a7a7a"
 class Moment:
     """The vehicle, its sensors and the world at a moment."""
 
-    time: float  #: s since the takeoff.
-    #: x, y: Position of the vehicle (m).
+    time: float  #: Time since the takeoff (s). x, y: Position of the vehicle (m).
     x: float
     y: float
     ranges: dict[str, float]  #: Reading of each sensor (m).
@@ -77,7 +76,7 @@ class Flight:
 
 
 def draw_room(axes: Axes, moment: Moment) -> None:
-    """Draw what a moment looks like from above."""
+    """Draw a moment as seen from above."""
     for each in moment.world.objects:
         colour = OBJECT if each.path is not None else "#c9c5bb"
         if isinstance(each, Box):
@@ -127,7 +126,7 @@ def panes() -> tuple[Figure, Axes, Axes, Axes]:
 
 
 def follow_object(path: Path) -> None:
-    """Fly behind the box for one round of its path, and draw it."""
+    """Follow the box for one round of its path, and draw it."""
     flight = Flight("follow_object.launch", takeoff="false")
     moments = [flight.watch() for _ in range(round(34.0 / STEP))]
     figure, room, top, bottom = panes()
@@ -158,7 +157,7 @@ def follow_object(path: Path) -> None:
 
 
 def obstacle_stop(path: Path) -> None:
-    """Ask for 0.5 m/s ahead all the time, and draw where the vehicle stops."""
+    """Command 0.5 m/s ahead all the time, and draw where the vehicle stops."""
     flight = Flight("teleop_with_obstacle_stop.launch", joy="false")
     moments = []
     for _ in range(round(8.0 / STEP)):
@@ -185,7 +184,7 @@ def obstacle_stop(path: Path) -> None:
 def main() -> None:
     """Fly and draw."""
     parser = argparse.ArgumentParser(description="Draw flights with range sensors.")
-    parser.add_argument("folder", type=Path, help="where the pictures go, such as docs/images")
+    parser.add_argument("folder", type=Path, help="folder of the pictures, such as docs/images")
     folder = parser.parse_args().folder
     follow_object(folder / "follow_object.png")
     obstacle_stop(folder / "obstacle_stop.png")

@@ -82,7 +82,7 @@ def test_stops_within_150_ms_of_the_last_reading(follower, offset):
         follower.advance(0.01)
     assert commanded(follower) == (0.0, 0.0)
     assert any(twist.linear.x > 0.0 for twist in follower.published("/cmd_vel"))
-    assert "nothing comes on /range/front" in follower.logged("warn")[-1]
+    assert "no message on /range/front" in follower.logged("warn")[-1]
 
 
 def test_flies_on_with_readings_at_the_sensors_pace(follower):

@@ -45,7 +45,7 @@ def test_the_first_one_is_there_and_can_be_removed():
 def test_another_one_is_where_it_was_wanted(second):
     assert second == "crazyflie1"
     assert state_of(second) == pytest.approx((2.0, 1.0, 0.0), abs=0.01)
-    with pytest.raises(rospy.ServiceException, match="there is a vehicle crazyflie1 already"):
+    with pytest.raises(rospy.ServiceException, match="the vehicle crazyflie1 exists already"):
         call("/spawn", SpawnVehicle, "crazyflie1", 0.0, 0.0)
 
 

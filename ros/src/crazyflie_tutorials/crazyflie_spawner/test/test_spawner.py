@@ -69,7 +69,7 @@ def test_names(name):
 
 @pytest.mark.parametrize("name", ["7", "a/b", "/a", "~a", "a b", "a-b", "_a", "ä", "a\n"])
 def test_no_names(name):
-    with pytest.raises(RefusalError, match="is no name of a vehicle; expected letters"):
+    with pytest.raises(RefusalError, match="is not a name of a vehicle; expected letters"):
         vehicle_name(name, ())
 
 
@@ -114,10 +114,10 @@ def test_removing_is_answered_when_it_is_gone(simulation):
 @pytest.mark.parametrize(
     ("name", "x", "reason"),
     [
-        ("cf7", 0.0, "there is a vehicle cf7 already"),
-        ("theirs", 0.0, "there is a vehicle theirs already, which was not spawned here"),
-        ("cf 8", 0.0, "'cf 8' is no name of a vehicle"),
-        ("cf8", math.nan, r"the place is \(nan, 0\); expected finite numbers"),
+        ("cf7", 0.0, "the vehicle cf7 exists already"),
+        ("theirs", 0.0, "the vehicle theirs exists already, and was not spawned here"),
+        ("cf 8", 0.0, "'cf 8' is not a name of a vehicle"),
+        ("cf8", math.nan, r"the position is \(nan, 0\); expected finite numbers"),
     ],
 )
 def test_refusals(simulation, name, x, reason):
@@ -131,14 +131,14 @@ def test_refusals(simulation, name, x, reason):
 
 def test_a_vehicle_that_is_not_there_cannot_be_removed(simulation):
     simulation.spawn("cf7")
-    with pytest.raises(ServiceError, match="no vehicle 'cf8' was spawned; there are: cf7"):
+    with pytest.raises(ServiceError, match="no vehicle 'cf8' was spawned; spawned vehicles: cf7"):
         simulation.remove("cf8")
 
 
 def test_a_vehicle_that_ends_before_it_is_there(simulation):
     answer, vehicle = simulation.spawn("cf7")
     simulation.go("cf7", vehicle, status=1)
-    with pytest.raises(ServiceError, match=r"cf7 has ended before it was there \(status 1\)"):
+    with pytest.raises(ServiceError, match=r"cf7 ended before it was ready \(status 1\)"):
         answer.result()
     simulation.spawn("cf7")
 
@@ -146,7 +146,7 @@ def test_a_vehicle_that_ends_before_it_is_there(simulation):
 def test_a_vehicle_that_never_comes(simulation):
     answer, vehicle = simulation.spawn("cf7")
     simulation.process.advance(31.0)
-    with pytest.raises(ServiceError, match="cf7 was not there after 30 s"):
+    with pytest.raises(ServiceError, match="cf7 was not ready after 30 s"):
         answer.result()
     assert vehicle.is_ending
     simulation.go("cf7", vehicle)

@@ -192,7 +192,7 @@ def test_without_states_it_hovers():
     flight.for_seconds(3.0)
     flight.speaks = False
     report = flight.until(SweepReport.HOVERING)
-    assert report.reason == "no state of the vehicle has come for 0.5 s"
+    assert report.reason == "no state of the vehicle has been received for 0.5 s"
     flight.for_seconds(3.0)
     assert flight.speed == 0.0
     flight.speaks = True
@@ -204,7 +204,7 @@ def test_a_landing_ends_the_sweep():
     flight.until(SweepReport.SWEEPING)
     flight.publish_status(FlightStatus.DESCENDING)
     assert flight.report.state == SweepReport.FAILED
-    assert flight.report.reason == "the flight was ended: the vehicle is landed"
+    assert flight.report.reason == "the flight was ended: the vehicle is being landed"
     count = len(flight.process.published("/ref"))
     flight.for_seconds(3.0)
     assert len(flight.process.published("/ref")) == count

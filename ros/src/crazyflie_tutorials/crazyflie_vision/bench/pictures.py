@@ -1,4 +1,4 @@
-"""Pictures of what vehicles see, and of a flight after a ball.
+"""Pictures from vehicles' cameras, and of a flight after a ball.
 
     python3 ros/src/crazyflie_tutorials/crazyflie_vision/bench/pictures.py docs/images
 
@@ -20,7 +20,7 @@ from std_srvs.srv import EmptyRequest
 from crazyflie_utils.testing import launch_files
 from crazyflie_vision.images import to_array
 
-STEP = 0.1  #: Between two moments, s.
+STEP = 0.1  #: Period of the simulation (s).
 
 VEHICLE, TARGET, GREY = "#0b62b0", "#e07b00", "#7a7a7a"
 
@@ -39,7 +39,7 @@ class Flight:
         self._lookup = self._process.handle("/pictures").listen_to_transforms()
 
     def advance(self, duration: float) -> None:
-        """Advance (s); images that are not needed any more are dropped."""
+        """Advance by a duration (s); old images are dropped."""
         for _ in range(round(duration / STEP)):
             self._process.advance(STEP)
             for topic, publisher in self._process.transport.publishers.items():
@@ -51,12 +51,12 @@ class Flight:
         return to_array(self._process.published(topic)[-1])
 
     def place(self, frame: str) -> NDArray[np.float64]:
-        """Return where a frame is in the world, m."""
+        """Return the position of a frame in the world, m."""
         place = self._lookup("world", frame).transform.translation
         return np.array([place.x, place.y, place.z])
 
     def targets(self) -> NDArray[np.float64]:
-        """Return what was seen since the takeoff: rows of time (s), x, y (pixels)."""
+        """Return the targets since the takeoff: rows of time (s), x, y (pixels)."""
         rows = [
             (each.header.stamp.to_sec() - self.begin, each.point.x, each.point.y)
             for each in self._process.published("/target")
@@ -115,7 +115,7 @@ def follow_face(folder: Path) -> None:
 
 
 def basics(folder: Path) -> None:
-    """Write what the camera and the four filters show, side by side."""
+    """Write the images of the camera and the four filters, side by side."""
     flight = Flight("basics.launch")
     flight.advance(1.0)
     topics = ("/camera/image_raw", *(f"/{name}/image" for name in FILTERS))
@@ -132,7 +132,7 @@ FILTERS = ("grey", "blur", "edges", "threshold")
 def main() -> None:
     """Draw all of them."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("folder", type=Path, help="where the pictures go, such as docs/images")
+    parser.add_argument("folder", type=Path, help="folder of the pictures, such as docs/images")
     folder = parser.parse_args().folder
     follow_ball(folder)
     follow_face(folder)

@@ -108,7 +108,7 @@ def test_a_bad_cascade_is_named(tmp_path, content):
     file = tmp_path / "cascade.xml"
     if content is not None:
         file.write_text(content)
-    with pytest.raises(OSError, match=r"cascade\.xml is no cascade; .* opencv-data"):
+    with pytest.raises(OSError, match=r"cascade\.xml is not a cascade; .* opencv-data"):
         FaceDetector(str(file))
 
 

@@ -240,7 +240,7 @@ def test_bad_images_are_dropped(bad):
         (EdgesNode, {"low": 200.0}, "low is 200; expected <= high, 120"),
         (ThresholdNode, {"level": 256}, "level is 256; expected an integer from 0 to 255"),
         (ColourTrackerNode, {"hue_upper": 200}, "expected an integer from 0 to 179"),
-        (FaceDetectorNode, {"cascade": "/no.xml"}, "/tracker/cascade: /no.xml is no cascade"),
+        (FaceDetectorNode, {"cascade": "/no.xml"}, "/tracker/cascade: /no.xml is not a cascade"),
         (FollowNode, {"distance": 0.0}, "distance is 0.0; expected a finite number > 0 (m)"),
         (CameraNode, {"camera": "/no.yaml"}, "/no.yaml: cannot be read"),
     ],
@@ -257,7 +257,7 @@ def test_a_picture_that_is_none_is_named(files, tmp_path):
     (tmp_path / "world.yaml").write_text((CONFIG / "face.yaml").read_text())
     fake = FakeProcess()
     assert not fake.launch(CameraNode(), "/camera", files)
-    assert f"{tmp_path}/face.jpg is no picture that can be read" in fake.logged("error")[0]
+    assert f"{tmp_path}/face.jpg is not a picture that can be read" in fake.logged("error")[0]
 
 
 CLASSES = {

@@ -67,18 +67,18 @@ def test_a_missing_camera_is_named(device):
     fake = FakeProcess()
     assert not fake.launch(WebcamNode(), "/camera", {"device": device})
     (error,) = fake.logged("error")
-    assert f"parameter /camera/device: there is no camera {device}" in error
-    assert "there are: " in error
+    assert f"parameter /camera/device: the camera {device} does not exist" in error
+    assert "available: " in error
 
 
 @pytest.mark.parametrize(
     ("name", "content", "expected"),
     [
-        ("none.avi", None, "there is no camera, video, picture or folder"),
-        ("bad.avi", "x", "is no video that can be read"),
-        ("bad.png", "x", "is no picture that can be read"),
-        ("none.png", None, "is no picture that can be read"),
-        ("", None, "there are no pictures (.bmp, .jpeg, .jpg, .png) in"),
+        ("none.avi", None, "is not a camera, video, picture or folder"),
+        ("bad.avi", "x", "is not a video that can be read"),
+        ("bad.png", "x", "is not a picture that can be read"),
+        ("none.png", None, "is not a picture that can be read"),
+        ("", None, "no pictures (.bmp, .jpeg, .jpg, .png) in"),
     ],
 )
 def test_bad_files_are_named(tmp_path, name, content, expected):

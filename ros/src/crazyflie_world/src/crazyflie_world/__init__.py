@@ -1,1 +1,1 @@
-"""A room from a file: shapes and their paths, rays that meet them, a node that shows them."""
+"""A room from a file: shapes and their paths, ray casting, and a node that shows them."""

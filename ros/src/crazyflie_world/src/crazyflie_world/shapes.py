@@ -1,8 +1,8 @@
-"""Solid shapes in a room, the paths of those that move, and where rays enter them.
+"""Solid shapes in a room, the paths of moving ones, and their intersections with rays.
 
 All shapes are convex, so that a ray is within a shape from one distance to another;
-those of a box, a cylinder and a ball are the common part of simpler ones, such as the
-space between two parallel planes (Kay and Kajiya, Ray Tracing Complex Scenes, 1986).
+a box, a cylinder and a ball are intersections of simpler ones, such as the space between two
+parallel planes (Kay and Kajiya, Ray Tracing Complex Scenes, 1986).
 """
 
 import math
@@ -25,7 +25,7 @@ class Path(Parameters):
     """The position of an object over time; as declared in a world file."""
 
     def position(self, time: float) -> Position:
-        """Return where it is ``time`` seconds after it began; until then it waits there."""
+        """Return the position ``time`` seconds after the begin; before that, the first position."""
         raise NotImplementedError
 
 
@@ -34,8 +34,8 @@ class Circle(Path):
 
     centre: Position = parameter(POSITION, "of the circle")
     radius: float = parameter(Number("m", above=0.0), "of the circle")
-    period: float = parameter(TIME_STEP, "of one round")
-    phase: float = parameter(Number("rad"), "where it begins, from the x axis", 0.0)
+    period: float = parameter(TIME_STEP, "duration of one round")
+    phase: float = parameter(Number("rad"), "angle of the begin, from the x axis", 0.0)
     clockwise: bool = parameter(BOOLEAN, "direction, as seen from above", False)
 
     @override
@@ -47,12 +47,14 @@ class Circle(Path):
 
 
 class Waypoints(Path):
-    """Straight from point to point, each at its time."""
+    """Straight lines from point to point, each at its time."""
 
     points: tuple[tuple[float, ...], ...] = parameter(
         ListOf(ListOf(FINITE, 4)), "[time, x, y, z], s and m"
     )
-    repeat: bool = parameter(BOOLEAN, "begin again after the last; otherwise stay there", True)
+    repeat: bool = parameter(
+        BOOLEAN, "begin again after the last point; otherwise stay there", True
+    )
 
     @override
     def complaints(self) -> Iterator[str]:
@@ -79,7 +81,8 @@ class Waypoints(Path):
 Colour = tuple[float, float, float]  #: Red, green, blue, each from 0 to 1.
 COLOUR = ListOf(Number(minimum=0.0, maximum=1.0), 3)  #: Type of a parameter that is a `Colour`.
 Vectors = NDArray[np.float64]  #: Shape (..., 3).
-#: Distances at which rays enter and leave, shape (...,); the first is larger where they miss.
+#: Distances at which rays enter and leave, shape (...,); the first is larger for rays that miss the
+#: shape.
 Interval = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 WALL_COLOUR = (0.85, 0.85, 0.8)
@@ -89,11 +92,11 @@ WALL_COLOUR = (0.85, 0.85, 0.8)
 class Shape:
     """Attributes of all solid shapes."""
 
-    #: No two objects of a world have the same; for those that move it is that of their tf frame.
+    #: Unique name in a world; that of the tf frame of a moving object.
     name: str
     centre: Position  #: x, y, z in the world's frame, m.
     colour: Colour = (0.5, 0.5, 0.5)
-    path: Path | None = None  #: Path of the centre; None for a shape that stands.
+    path: Path | None = None  #: Path of the centre; None for a fixed shape.
 
     @property
     def size(self) -> Position:
@@ -101,10 +104,11 @@ class Shape:
         raise NotImplementedError
 
     def interval(self, origins: Vectors, directions: Vectors) -> Interval:
-        """Return how far along rays the shape begins and ends, in lengths of the directions.
+        """Return the distances at which rays enter and leave the shape.
 
-        Origins (m) and directions, of shape (..., 3), are in the world's frame; no direction is 0.
-        Both distances are negative for what is behind the origin.
+        They are in lengths of the directions. Origins (m) and directions, of shape (..., 3), are in
+        the world's frame; no direction is 0. Both distances are negative for a shape behind the
+        origin.
         """
         raise NotImplementedError
 
@@ -113,7 +117,7 @@ class Shape:
         return replace(self, centre=centre)
 
     def at(self, time: float) -> Self:
-        """Return the shape as it is ``time`` seconds after paths begin."""
+        """Return the shape ``time`` seconds after paths begin."""
         return self if self.path is None else self.moved_to(self.path.position(time))
 
 
@@ -123,8 +127,7 @@ class Box(Shape):
 
     extent: Position  #: Along its own x, y and z, m.
     yaw: float = 0.0  #: Rotation about the vertical (rad).
-    #: File of what is to be seen on its front, the side that looks along its own x; empty for
-    #: nothing.
+    #: File of the picture on its front, the side that looks along its own x; empty for none.
     picture: str = ""
 
     @property
@@ -170,7 +173,7 @@ class Ball(Shape):
 
     @property
     def size(self) -> Position:
-        """Three times the diameter."""
+        """The diameter, three times."""
         return (2.0 * self.radius,) * 3
 
     def interval(self, origins: Vectors, directions: Vectors) -> Interval:
@@ -200,11 +203,10 @@ def wall(
 def cast(
     shapes: tuple[Shape, ...], origins: ArrayLike, directions: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return how far away what rays meet first is, m, and its index; infinite and -1 for nothing.
+    """Return distance (m) and index of the first object on rays; infinite and -1 without one.
 
     Origins and directions, of shape (..., 3), are in the world's frame; one origin may serve all.
-    Directions have the length 1, or else distances are in their lengths. Within a shape the
-    distance is 0.
+    Distances are in lengths of the directions. Within a shape the distance is 0.
     """
     origins, directions = np.broadcast_arrays(
         np.asarray(origins, dtype=float), np.asarray(directions, dtype=float)
@@ -220,7 +222,8 @@ def cast(
 
 
 def _between(origins, directions, half):
-    # For each axis, the space between two planes; a ray along them is within for ever, or never.
+    # For each axis, the space between two planes; a ray parallel to them is always inside, or
+    # never.
     with np.errstate(all="ignore"):
         one, other = (-half - origins) / directions, (half - origins) / directions
     along = directions == 0.0

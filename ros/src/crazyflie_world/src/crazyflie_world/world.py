@@ -1,4 +1,4 @@
-"""A room: its floor, and objects that stand or move in it."""
+"""A room: its floor, and its fixed or moving objects."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,12 +18,12 @@ TEXTURES = ("plain", "checkers", "speckles")  #: Textures of floors.
 class Floor(Parameters):
     """The floor: the plane z = 0, with its middle in the origin; as in a world file."""
 
-    size: tuple[float, float] = parameter(ListOf(Number("m", above=0.0), 2), "along x and y")
-    texture: str = parameter(Text(TEXTURES), "what a camera sees of it", "plain")
+    size: tuple[float, float] = parameter(ListOf(Number("m", above=0.0), 2), "size along x and y")
+    texture: str = parameter(Text(TEXTURES), "texture for cameras", "plain")
     colour: Colour = parameter(COLOUR, "red, green, blue", (0.6, 0.6, 0.6))
 
     def solid(self) -> Box:
-        """Return it as a box without thickness."""
+        """Return the floor as a box without thickness."""
         return Box(name=FLOOR, centre=(0.0, 0.0, 0.0), extent=(*self.size, 0.0), colour=self.colour)
 
 
@@ -31,9 +31,9 @@ class Floor(Parameters):
 class World:
     """A floor and objects, at one moment."""
 
-    frame: str  #: The tf frame of all positions.
+    frame: str  #: tf frame of all positions.
     floor: Floor
-    objects: tuple[Shape, ...] = ()  #: Walls are boxes.
+    objects: tuple[Shape, ...] = ()  #: Objects; walls are boxes.
 
     @property
     def solids(self) -> tuple[Shape, ...]:
@@ -53,11 +53,11 @@ class World:
         raise KeyError(name)
 
     def at(self, time: float) -> Self:
-        """Return the world as it is ``time`` seconds after paths begin."""
+        """Return the world ``time`` seconds after paths begin."""
         return replace(self, objects=tuple(each.at(time) for each in self.objects))
 
     def placed(self, centres: Mapping[str, Position]) -> Self:
-        """Return the world with some objects elsewhere, name -> centre (m)."""
+        """Return the world with some objects at other places, name -> centre (m)."""
         return replace(
             self,
             objects=tuple(
@@ -69,7 +69,7 @@ class World:
     def cast(
         self, origins: ArrayLike, directions: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        """Return how far away the first of the `solids` is along rays, and which it is.
+        """Return distance and index of the first of the `solids` on rays.
 
         See `shapes.cast`.
         """

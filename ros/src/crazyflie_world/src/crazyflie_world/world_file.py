@@ -60,17 +60,17 @@ class _Name(ParameterType):
 class _ObjectParameters(Parameters):
     """Parameters of all objects but walls."""
 
-    name: str = parameter(_Name(), "no other object has it")
+    name: str = parameter(_Name(), "unique name")
     colour: tuple[float, float, float] = parameter(COLOUR, "red, green, blue", (0.5, 0.5, 0.5))
     centre: tuple[float, float, float] | None = parameter(
-        POSITION, "of an object that does not move", None
+        POSITION, "centre of an object that does not move", None
     )
 
-    #: Its arguments are these parameters and a path.
+    #: Class of the shape, whose arguments are these parameters and a path.
     shape_type: ClassVar[type[Shape]]
 
     def shape(self, path: Path | None) -> Shape:
-        """Return the shape, at the beginning of its path if it has one."""
+        """Return the shape, at the beginning of its path if any."""
         centre = self.centre if path is None else path.position(0.0)
         return self.shape_type(**{**vars(self), "centre": centre, "path": path})
 
@@ -80,9 +80,9 @@ class BoxParameters(_ObjectParameters):
 
     shape_type = Box
     extent: tuple[float, float, float] = parameter(
-        ListOf(_LENGTH, 3), "along its x, y and z", name="size"
+        ListOf(_LENGTH, 3), "size along its own x, y and z", name="size"
     )
-    yaw: float = parameter(_ANGLE, "turned about the vertical", 0.0)
+    yaw: float = parameter(_ANGLE, "rotation about the vertical", 0.0)
     picture: str = parameter(
         TEXT, "file of a picture on its front, which looks along its own x", ""
     )
@@ -100,18 +100,18 @@ class BallParameters(_ObjectParameters):
     """A ball."""
 
     shape_type = Ball
-    radius: float = parameter(_LENGTH, "of the ball")
+    radius: float = parameter(_LENGTH, "radius of the ball")
 
 
 class WallParameters(Parameters):
     """A wall that stands on the floor."""
 
-    name: str = parameter(_Name(), "no other object has it")
+    name: str = parameter(_Name(), "unique name")
     colour: tuple[float, float, float] = parameter(COLOUR, "red, green, blue", WALL_COLOUR)
-    start: tuple[float, float] = parameter(_PLACE, "where it begins, x and y", name="from")
-    end: tuple[float, float] = parameter(_PLACE, "where it ends, x and y", name="to")
-    height: float = parameter(_LENGTH, "above the floor", 2.5)
-    thickness: float = parameter(_LENGTH, "half of it to each side", 0.1)
+    start: tuple[float, float] = parameter(_PLACE, "begin, x and y", name="from")
+    end: tuple[float, float] = parameter(_PLACE, "end, x and y", name="to")
+    height: float = parameter(_LENGTH, "height above the floor", 2.5)
+    thickness: float = parameter(_LENGTH, "thickness, half to each side", 0.1)
 
     @override
     def complaints(self) -> Iterator[str]:
@@ -119,7 +119,7 @@ class WallParameters(Parameters):
             yield f"from and to are both {list(self.start)}; expected two points (m)"
 
     def shape(self) -> Box:
-        """Return what is declared."""
+        """Return the declared object."""
         return wall(self.name, self.start, self.end, self.height, self.thickness, self.colour)
 
 
@@ -145,7 +145,7 @@ PATHS: dict[str, type[Path]] = {"circle": Circle, "waypoints": Waypoints}  #: Pa
 def load(path: str | FilePath) -> World:
     """Return the world in a file.
 
-    `ParameterError` is about everything that is wrong in it: file, line and what was expected.
+    `ParameterError` names all errors: file, line and what was expected.
     """
     file = yaml_file.load(path)
     settings = file.read(WorldParameters, extra_keys=("objects",))
@@ -178,16 +178,16 @@ def _object(entry: Entry) -> Shape:
     path = _path(entry["path"]) if "path" in entry else None
     parameters = entry.read(OBJECTS[kind], extra_keys=("type", "path"))
     if (parameters.centre is None) == (path is None):
-        raise entry.error("has a centre and a path, or none of them; expected one of them")
+        raise entry.error("has both a centre and a path, or neither; expected one of them")
     return _with_picture(parameters.shape(path), entry)
 
 
 def _with_picture(shape: Shape, entry: Entry) -> Shape:
-    # Its name is relative to the file in which it stands.
+    # The picture's name is relative to the world file.
     if not isinstance(shape, Box) or not shape.picture:
         return shape
     picture = entry.file.parent / shape.picture
-    # Unlike pathlib's, this takes a name that is too long for one.
+    # Unlike pathlib's, this accepts a name that is too long for a file.
     if not os.path.isfile(picture):
         raise entry["picture"].error(
             f"is {shown(shape.picture)}; expected a file; {shortened(str(picture))} is not one"

@@ -1,4 +1,4 @@
-"""ROS interface of a world: moves what has a path, and shows all in RViz."""
+"""ROS interface of a world: moves objects with a path, and shows all in RViz."""
 
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, TransformStamped, Vector3
 from std_msgs.msg import ColorRGBA
@@ -15,11 +15,11 @@ from crazyflie_world.world_file import WORLD_FILE
 
 _SHAPES = {Box: Marker.CUBE, Cylinder: Marker.CYLINDER, Ball: Marker.SPHERE}
 
-_FLOOR_THICKNESS = 0.001  #: m; without one, RViz would draw nothing.
+_FLOOR_THICKNESS = 0.001  #: Thickness of the floor (m); without it, RViz would draw nothing.
 
 
 def markers(world: World) -> MarkerArray:
-    """Return a marker for each solid; what moves is drawn in its own tf frame, and so moves."""
+    """Return a marker for each solid; a moving one is in its own tf frame."""
     return MarkerArray([_marker(each, world.frame) for each in world.solids])
 
 
@@ -38,7 +38,7 @@ def _marker(shape: Shape, frame: str) -> Marker:
 
 
 def pose(shape: Shape) -> Pose:
-    """Return where a shape is and how it is turned, in the world's frame."""
+    """Return the pose of a shape in the world's frame."""
     yaw = shape.yaw if isinstance(shape, Box) else 0.0
     return Pose(Point(*shape.centre), Quaternion(*quaternion_from_rpy(0.0, 0.0, yaw)))
 
@@ -48,14 +48,14 @@ class WorldNodeParameters(Parameters):
 
     world: World = parameter(WORLD_FILE, "the world, a YAML file")
     markers_topic: str = parameter(
-        TOPIC, "for RViz, latched", "world/markers", name="topics/markers"
+        TOPIC, "markers for RViz, latched", "world/markers", name="topics/markers"
     )
     poses_topic: str = parameter(
-        TOPIC, "below it, each moving object has NAME/pose", "world", name="topics/poses"
+        TOPIC, "namespace of the moving objects' poses, NAME/pose", "world", name="topics/poses"
     )
     flight_status_topic: str | None = parameter(
         TOPIC,
-        "the takeoff server's: paths begin when a vehicle flies; by default at once",
+        "flight status of the takeoff server: paths begin when a vehicle flies; by default at once",
         None,
         name="topics/flight_status",
     )
@@ -65,11 +65,11 @@ class WorldNodeParameters(Parameters):
         None,
         name="topics/flight_state",
     )
-    time_step: float = parameter(TIME_STEP, "between two poses", 0.02)
+    time_step: float = parameter(TIME_STEP, "period of the poses", 0.02)
 
 
 class WorldNode(Node):
-    """Show a world in RViz; move what has a path, on /tf and as poses."""
+    """Show a world in RViz; move objects with a path, on /tf and as poses."""
 
     def __init__(self) -> None:
         self._begin: float | None = None
@@ -116,7 +116,7 @@ class WorldNode(Node):
             self._poses[each.name].publish(message)
             transform = TransformStamped(header=message.header, child_frame_id=each.name)
             transform.transform.translation = Vector3(*each.centre)
-            # A frame as the world's: markers are turned in it.
+            # The frame is parallel to the world's: markers are rotated in it.
             transform.transform.rotation = Quaternion(w=1.0)
             transforms.append(transform)
         self._broadcast(transforms)

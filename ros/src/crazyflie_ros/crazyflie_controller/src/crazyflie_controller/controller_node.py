@@ -21,7 +21,7 @@ _DESCENT_LIMIT = 7.0  #: Longest descent at a shutdown, s: the process is killed
 class ControllerParameters(PoseParameters):
     """Parameters of `ControllerNode`."""
 
-    frequency: float = parameter(Number("Hz", above=0.0), "setpoints a second", 50.0)
+    frequency: float = parameter(Number("Hz", above=0.0), "rate of setpoints", 50.0)
     pid_x: PidParameters = group(PidParameters, "PIDs/X")
     pid_y: PidParameters = group(PidParameters, "PIDs/Y")
     pid_z: PidParameters = group(PidParameters, "PIDs/Z")
@@ -73,7 +73,7 @@ class ControllerNode(Node):
     @override
     def prepare_shutdown(self) -> None:
         """Land before the process ends."""
-        # On the ground, or landing already.
+        # Refused on the ground, or if the vehicle is landing already.
         with contextlib.suppress(RefusalError):
             self._flight.land()
         self._flight.land_within(_DESCENT_LIMIT)
@@ -99,7 +99,7 @@ class ControllerNode(Node):
         frame = message.header.frame_id.lstrip("/")
         if frame not in ("", world_frame):
             self._handle.warn(
-                f"a goal names the frame {frame}; it is taken as one in {world_frame}",
+                f"a goal names the frame {frame}; it is used as a goal in {world_frame}",
                 throttle=5.0,
             )
         q = message.pose.orientation

@@ -24,7 +24,7 @@ LIFT_OFF_EXCESS = TAKEOFF_RATE * (6.0 * LIFT_OFF_HEIGHT * HOVER_PWM / (GRAVITY *
 With a thrust that grows at a constant rate it climbs by g rate t^3 / (6 hover), so that
 the time since it left the ground depends on its weight by the cube root only."""
 
-HOVER_HEIGHT = 0.5  #: Height above the start at which a vehicle hovers before the first goal, m.
+HOVER_HEIGHT = 0.5  #: Height above the start at which a vehicle hovers before the first goal (m).
 DESCENT_SPEED = 0.3  #: Speed of a landing, m/s.
 
 #: Depth of a landing's last goal below the start, m, so that the vehicle touches down with the

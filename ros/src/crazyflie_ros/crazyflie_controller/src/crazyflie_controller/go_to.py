@@ -1,4 +1,4 @@
-"""From where a vehicle is and where it should be to the setpoint that takes it there, by PIDs."""
+"""PID controllers from a vehicle's pose and its goal to a setpoint."""
 
 from typing import NamedTuple
 
@@ -59,7 +59,7 @@ class SaturatedPid:
 
     @parameters.setter
     def parameters(self, parameters: PidParameters) -> None:
-        # The integral of Z carries the vehicle's weight: its part in the output has to stay.
+        # The integral of Z carries the vehicle's weight: its part in the output must be kept.
         output = self._parameters.ki * self._integral
         self._parameters = parameters
         self.reset(output)
@@ -117,9 +117,9 @@ class Setpoint(NamedTuple):
 class GoToController:
     """Four PID controllers on the error in the vehicle's heading frame (ahead, to the left, up).
 
-    The tilt is left out on purpose: to a vehicle that leans ahead, a goal far below would seem to
-    lie ahead, and make it lean even more. Parameters are by `AXES`; outputs are pitch, roll, thrust
-    and yaw rate of `Setpoint`, from errors in m and rad.
+    The tilt is ignored on purpose: for a vehicle that is tilted forward, a goal far below would
+    seem to be ahead, and tilt it even more. Parameters are by `AXES`; outputs are pitch, roll,
+    thrust and yaw rate of `Setpoint`, from errors in m and rad.
     """
 
     def __init__(self, parameters: dict[str, PidParameters]):
@@ -132,7 +132,7 @@ class GoToController:
         return self._pids[2].parameters.max_output
 
     def reconfigure(self, parameters: dict[str, PidParameters]) -> None:
-        """Set gains and limits; the integrals' parts in the setpoint stay.
+        """Set gains and limits; the integrals' parts in the setpoint are kept.
 
         They change as little as the new limits allow, and vanish where ki is 0.
         """
@@ -140,13 +140,13 @@ class GoToController:
             pid.parameters = parameters[axis]
 
     def reset(self, thrust: float) -> None:
-        """Set all integrals to zero but that of Z, which gives ``thrust`` (PWM)."""
+        """Set all integrals to zero except that of Z, which gives ``thrust`` (PWM)."""
         for pid, output in zip(self._pids, (0.0, 0.0, thrust, 0.0), strict=True):
             pid.reset(output)
         self.restart_derivatives()
 
     def restart_derivatives(self) -> None:
-        """Compute no rate of change with the next error, which does not continue the last one."""
+        """Skip the rate of change at the next error, which does not continue the last one."""
         self._error = None
 
     def update(self, pose: HeadingPose, goal: HeadingPose, interval: float) -> Setpoint:

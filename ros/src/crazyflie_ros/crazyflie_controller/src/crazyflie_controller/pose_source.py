@@ -21,7 +21,7 @@ class PoseParameters(WorldFrameParameters):
 
 
 class PoseSource:
-    """The latest pose of a vehicle; a warning while there is none."""
+    """The latest pose of a vehicle; logs a warning without a pose."""
 
     def __init__(self, handle: NodeHandle, parameters: PoseParameters):
         self._handle = handle

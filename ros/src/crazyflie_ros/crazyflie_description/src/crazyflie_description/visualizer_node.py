@@ -55,9 +55,9 @@ def circle(
     return [(x + radius * math.cos(a), y + radius * math.sin(a), z) for a in angles]
 
 
-PERIOD = 0.05  #: Between two looks at the vehicle's pose, s.
-SPACING = 0.01  #: Between two points of the path, m.
-CAPACITY = 2000  #: Points of the path that are kept: at least 20 m of flight.
+PERIOD = 0.05  #: Period of the lookups of the vehicle's pose (s).
+SPACING = 0.01  #: Distance between two points of the path (m).
+CAPACITY = 2000  #: Largest number of stored points of the path: at least 20 m of flight.
 
 PATH_COLOUR = ColorRGBA(0.05, 0.45, 0.90, 1.0)
 REFERENCE_COLOUR = ColorRGBA(0.00, 0.55, 0.30, 1.0)
@@ -72,12 +72,12 @@ _LABEL_HEIGHT = 0.075
 class VisualizerParameters(Parameters):
     """Parameters of `VisualizerNode`."""
 
-    fixed_frame: str = parameter(FRAME, "frame in which it is drawn", name="frames/fixed")
+    fixed_frame: str = parameter(FRAME, "frame of the markers", name="frames/fixed")
     robot_frame: str = parameter(FRAME, "frame of the vehicle", name="frames/robot")
     reference_topic: str = parameter(TOPIC, "where references come from", name="topics/reference")
     has_yaw: bool = parameter(
         BOOLEAN,
-        "references are PositionVelocityYawStateStamped, and not PositionVelocityStateStamped",
+        "references are PositionVelocityYawStateStamped instead of PositionVelocityStateStamped",
         False,
         "reference/yaw",
     )
@@ -87,8 +87,8 @@ class VisualizerParameters(Parameters):
 class VisualizerNode(Node):
     """Publish a vehicle's path and reference as markers.
 
-    Every message holds the whole picture and the topic is latched, so that an
-    RViz that is started late shows all of it.
+    Every message contains all markers and the topic is latched, so that an RViz that is started
+    late shows everything.
     """
 
     def __init__(self) -> None:
@@ -161,8 +161,8 @@ class VisualizerNode(Node):
     def _marker(self, name, shape, colour):
         marker = Marker(ns=name, type=shape, color=colour)
         marker.header.frame_id = self._parameters.fixed_frame
-        # The time 0 asks for the latest transform, so that RViz draws markers
-        # with any fixed frame at once, also after simulated time was reset.
+        # With time 0, RViz uses the latest transform, so that it draws markers with any fixed frame
+        # at once, even after simulated time was reset.
         marker.header.stamp = genpy.Time()
         marker.pose.orientation.w = 1.0
         marker.scale.x = _LINE_WIDTH

@@ -29,7 +29,7 @@ from crazyflie_tools.program import make_parser, run
 
 #: Largest distance between the rays of two base stations to one sensor (m): cflib's limit.
 MAX_RESIDUAL = 0.01
-#: Largest distance of the vehicle's own estimate from where it is (m).
+#: Largest error of the vehicle's own estimate (m).
 MAX_POSITION_ERROR = 0.05
 #: Largest error of the distance from the origin to the x axis' position, as a fraction: that
 #: distance, by the size of the deck, is known to a few percent.
@@ -124,10 +124,10 @@ def measure(vehicle: crazyflie_link.Crazyflie, path: Path) -> None:
 def solve(
     samples: list[dict[int, LighthouseBsVectors]],
 ) -> tuple[dict[int, LighthouseBsGeometry], str]:
-    """Return the geometry by the angles at each position, and how good it is, in words.
+    """Return the geometry from the angles at each position, and its quality in words.
 
     The first position is the origin, the second on the x axis, the others on the floor. Raises
-    `ValueRangeError` where the positions are too few, or do not fit.
+    `ValueRangeError` if the positions are too few, or inconsistent.
     """
     if len(samples) < len(_POSITIONS):
         raise ValueRangeError(
@@ -150,7 +150,7 @@ def solve(
 
 
 def _judge(solution: LighthouseGeometrySolution) -> tuple[str, str]:
-    # Returns a problem, if there is one, and figures.
+    # Returns a problem, if any, and figures.
     if not (solution.progress_is_ok and solution.has_converged):
         reasons = (
             solution.general_failure_info,
@@ -162,7 +162,7 @@ def _judge(solution: LighthouseGeometrySolution) -> tuple[str, str]:
     places = np.array([sample.pose.translation for sample in solution.samples])
     worst = max(solution.samples, key=lambda sample: sample.error_distance)
     residual = worst.error_distance
-    # As if the size of the deck were known, and not the distance on the x axis.
+    # Scaled as if the size of the deck were known, not the distance on the x axis.
     poses = [sample.pose for sample in solution.samples]
     *_, scale = LighthouseSystemScaler.scale_diagonals(
         solution.bs_poses, poses, solution.samples, float(np.linalg.norm(_SENSORS[3] - _SENSORS[0]))
@@ -199,14 +199,15 @@ def _judge(solution: LighthouseGeometrySolution) -> tuple[str, str]:
 
 
 def check(vehicle: crazyflie_link.Crazyflie) -> None:
-    """Check the vehicle's geometry where it stands: how its rays meet, and its own estimate.
+    """Check the vehicle's geometry at its position: the residual of its rays, and its own estimate.
 
-    Raises `CrazyflieError` if it has none, sees no base station of it, or one of both is off.
+    Raises `CrazyflieError` if it has no geometry, sees no base station of it, or one of both is
+    wrong.
     """
     geometries, _ = vehicle.lighthouse.read()
     if not geometries:
         raise RefusedError(
-            "the vehicle has the geometry of no base station; expected at least one: measure it, "
+            "the vehicle has no geometry of a base station; expected at least one: measure it, "
             "or store one with --file"
         )
     rays = []
@@ -220,7 +221,7 @@ def check(vehicle: crazyflie_link.Crazyflie) -> None:
         raise RefusedError(f"geometry of base stations {_numbers(geometries)}; none is seen")
     if len(rays) == 1:
         estimate = _estimate(vehicle)
-        print(f"estimate ({_text(estimate)}) m; not checked, which takes two base stations")
+        print(f"estimate ({_text(estimate)}) m; not checked, which requires two base stations")
         return
     position, residual = LighthouseCrossingBeam.position_max_distance_all_permutations(rays)
     print(f"residual {1000.0 * residual:.1f} mm (at most {1000.0 * MAX_RESIDUAL:g})")
@@ -246,7 +247,7 @@ def _seen(vehicle, fewest):
     if not angles:
         raise NoAnswerError(
             f"no base station seen; expected {fewest} or more: are they on, in sight of the deck, "
-            "and of the kind that lighthouse.systemType says?"
+            "and of the type in lighthouse.systemType?"
         )
     if len(angles) < fewest:
         raise NoAnswerError(
@@ -257,7 +258,7 @@ def _seen(vehicle, fewest):
 
 
 def _estimate(vehicle: crazyflie_link.Crazyflie) -> Vector:
-    # The mean of the vehicle's estimate at rest; what it was before a new geometry is forgotten.
+    # Returns the mean of the vehicle's estimate at rest; earlier estimates are forgotten.
     readings: queue.SimpleQueue[tuple[float, ...]] = queue.SimpleQueue()
     if "kalman.resetEstimation" in vehicle.parameters.types():
         vehicle.parameters.write("kalman.resetEstimation", 1)

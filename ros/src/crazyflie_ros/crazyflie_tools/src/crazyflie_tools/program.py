@@ -1,4 +1,4 @@
-"""What all tools share: arguments, a time limit, exit statuses, messages."""
+"""Common parts of all tools: arguments, a time limit, exit statuses, messages."""
 
 import argparse
 import math
@@ -11,8 +11,8 @@ from crazyflie_link.address import Address
 from crazyflie_link.errors import AddressError, CrazyflieError
 
 FINE, FAILED = 0, 1  #: Exit statuses; argparse's own for wrong usage is 2.
-DEFAULT_URI = "radio://0/80/2M/E7E7E7E7E7"  #: Address that a vehicle has when it is new.
-LIMIT = 40.0  #: When to give up, s: later than a connection does by itself.
+DEFAULT_URI = "radio://0/80/2M/E7E7E7E7E7"  #: Address of a new vehicle.
+LIMIT = 40.0  #: Timeout (s), longer than that of a connection.
 
 
 def make_parser(
@@ -38,7 +38,7 @@ def make_parser(
             type=seconds,
             default=LIMIT,
             metavar="SECONDS",
-            help="when to give up; by default %(default)g",
+            help="time limit; by default %(default)g",
         )
     return parser
 
@@ -64,9 +64,9 @@ def _address(text):
 def run(name: str, work: Callable[[], None], limit: float | None, interrupted: int = FAILED) -> int:
     """Do the work of a tool and return its exit status.
 
-    ``work()`` prints what was asked for, or raises `CrazyflieError`. When it does not end within
-    the limit (s) the process ends at once: it may hang in the driver of a USB device. After Ctrl-C
-    the status is ``interrupted``.
+    ``work()`` prints its result, or raises `CrazyflieError`. When it does not end within the limit
+    (s) the process ends at once: it may hang in the driver of a USB device. After Ctrl-C the status
+    is ``interrupted``.
     """
     outcome: list[int] = []
     worker = threading.Thread(
@@ -76,10 +76,10 @@ def run(name: str, work: Callable[[], None], limit: float | None, interrupted: i
     try:
         worker.join(limit)
         if not worker.is_alive():
-            # Without an outcome: a bug of the tool, whose traceback is on stderr.
+            # No outcome means a bug of the tool, whose traceback is on stderr.
             return outcome[0] if outcome else FAILED
         status = FAILED
-        _print_error(name, f"not done within {limit:g} s: gave up")
+        _print_error(name, f"not done within {limit:g} s")
     except KeyboardInterrupt:
         status = interrupted
         if interrupted != FINE:

@@ -1,6 +1,6 @@
 """The tools: each parses its arguments, by default the process's, and returns its exit status.
 
-What needs cflib is imported when the arguments are right, or where they depend on it.
+Modules that need cflib are imported when the arguments are valid, or where they depend on it.
 """
 
 import argparse
@@ -85,7 +85,7 @@ def _get_param(vehicle, options):
 
 def set_param(arguments: list[str] | None = None) -> int:
     """Set a parameter of a vehicle."""
-    parser = make_parser("setParam", "Set a parameter of a vehicle, and print what it confirms.")
+    parser = make_parser("setParam", "Set a parameter of a vehicle, and print the confirmed value.")
     parser.add_argument("name", type=_name, metavar="GROUP.NAME", help="such as ring.effect")
     parser.add_argument(
         "value", type=_number, metavar="VALUE", help="a number; one like -1e-3 only after --"
@@ -122,7 +122,7 @@ def console(arguments: list[str] | None = None) -> int:
         type=seconds,
         default=math.inf,
         metavar="SECONDS",
-        help="when to end; by default at Ctrl-C",
+        help="time after which to end; by default at Ctrl-C",
     )
     options = parser.parse_args(arguments)
     limit = LIMIT + options.duration if math.isfinite(options.duration) else None

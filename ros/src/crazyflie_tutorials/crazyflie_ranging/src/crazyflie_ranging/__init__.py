@@ -1,1 +1,1 @@
-"""Range sensors, simulated or on a deck; what follows an object, and what stops before one."""
+"""Range sensors, simulated or on a deck; following an object, and stopping before one."""

@@ -1,4 +1,4 @@
-"""Range sensors on a vehicle: their YAML file, and what simulated ones measure."""
+"""Range sensors on a vehicle: their YAML file, and the measurements of simulated ones."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,7 +18,7 @@ from crazyflie_world.world import World
 
 LASER, ULTRASONIC = "laser", "ultrasonic"  #: Types of sensors.
 
-#: Directions of sensors: roll, pitch, yaw that turn the body's x axis there (rad).
+#: Directions of sensors: roll, pitch, yaw that turn the body's x axis to them (rad).
 DIRECTIONS: dict[str, Triple] = {
     "front": (0.0, 0.0, 0.0),
     "back": (0.0, 0.0, math.pi),
@@ -30,23 +30,25 @@ DIRECTIONS: dict[str, Triple] = {
 
 
 class RangeSensor(Parameters):
-    """A sensor that measures the distance to what is nearest in a cone, as in a sensor file."""
+    """A sensor that measures the distance to the nearest object in a cone, as in a sensor file."""
 
-    type: str = parameter(Text((LASER, ULTRASONIC)), "how it measures")
+    type: str = parameter(Text((LASER, ULTRASONIC)), "kind of radiation")
     name: str = parameter(TOPIC, "its topic")
-    frame_id: str = parameter(FRAME, "its tf frame; the x axis is the axis of the cone")
-    direction: str = parameter(Text(tuple(DIRECTIONS)), "where it looks")
-    position: Triple = parameter(POSITION, "where it is, in the body's frame", (0.0, 0.0, 0.0))
-    min_range: float = parameter(Number("m", minimum=0.0), "nothing nearer is measured")
-    max_range: float = parameter(Number("m", above=0.0), "nor anything farther away")
+    frame_id: str = parameter(FRAME, "tf frame of the sensor; the x axis is the axis of the cone")
+    direction: str = parameter(Text(tuple(DIRECTIONS)), "direction of the sensor")
+    position: Triple = parameter(POSITION, "position in the body's frame", (0.0, 0.0, 0.0))
+    min_range: float = parameter(Number("m", minimum=0.0), "shortest distance that is measured")
+    max_range: float = parameter(Number("m", above=0.0), "longest distance that is measured")
     spread_angle: float = parameter(
-        Number("rad", minimum=0.0, maximum=math.pi), "of its cone, from edge to edge"
+        Number("rad", minimum=0.0, maximum=math.pi), "angle of the cone, from edge to edge"
     )
     desired_frequency: float = parameter(
-        Number("Hz", above=0.0, maximum=100.0), "how often it measures"
+        Number("Hz", above=0.0, maximum=100.0), "rate of measurements"
     )
-    noise: float = parameter(Number("m", minimum=0.0), "standard deviation, if simulated", 0.0)
-    rays: int = parameter(Integer(1, 1000), "in its cone, if simulated", 13)
+    noise: float = parameter(
+        Number("m", minimum=0.0), "standard deviation of the noise, if simulated", 0.0
+    )
+    rays: int = parameter(Integer(1, 1000), "number of rays in the cone, if simulated", 13)
     variable: str | None = parameter(
         Text(), "log variable of the firmware, mm; without it range.NAME", None
     )
@@ -58,18 +60,18 @@ class RangeSensor(Parameters):
 
     @property
     def log_variable(self) -> str:
-        """Log variable of the firmware, which has the distance in mm."""
+        """Log variable of the firmware with the distance (mm)."""
         return self.variable or f"range.{self.name}"
 
     @property
     def attitude(self) -> Quaternion:
-        """Of its frame in the body's."""
+        """Rotation of its frame in the body's."""
         return quaternion_from_rpy(*DIRECTIONS[self.direction])
 
     def reading(self, distance: float) -> float:
-        """Return what the sensor reports at a distance (m): infinity beyond its range.
+        """Return the sensor's reading at a distance (m).
 
-        What is nearer than its range is negative infinity, as in REP 117.
+        It is infinity beyond the sensor's range and negative infinity below it, as in REP 117.
         """
         if distance > self.max_range:
             return math.inf
@@ -79,7 +81,7 @@ class RangeSensor(Parameters):
 def load(path: str | Path) -> tuple[RangeSensor, ...]:
     """Return the sensors in a file, which has a list ``sensors``.
 
-    `ParameterError` names everything that is wrong in it: file, line and what was expected.
+    `ParameterError` names all errors: file, line and what was expected.
     """
     file = yaml_file.load(path)
     sensors: list[RangeSensor] = []
@@ -100,7 +102,7 @@ def load(path: str | Path) -> tuple[RangeSensor, ...]:
         except ParameterError as error:
             complaints += error.complaints
     if not sensors and not complaints:
-        complaints += file["sensors"].error("is empty; expected a sensor or more").complaints
+        complaints += file["sensors"].error("is empty; expected at least one sensor").complaints
     if complaints:
         raise ParameterError(*complaints)
     return tuple(sensors)

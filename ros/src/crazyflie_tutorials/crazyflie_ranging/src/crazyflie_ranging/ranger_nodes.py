@@ -25,7 +25,7 @@ class RangerParameters(Parameters):
 
     sensors: tuple[RangeSensor, ...] = parameter(SENSOR_FILE, "the sensors, a YAML file")
     ranges_topic: str = parameter(
-        TOPIC, "below it, each sensor has its topic", "range", name="topics/ranges"
+        TOPIC, "namespace of the sensors' topics", "range", name="topics/ranges"
     )
     robot_frame: str = parameter(FRAME, "tf frame of the vehicle", "crazyflie", "frames/robot")
 
@@ -74,10 +74,10 @@ class DeckRangerParameters(RangerParameters):
 
     variables: tuple[str, ...] = parameter(
         ListOf(TEXT),
-        "of the log block in their order, as in the driver's parameter",
+        "variables of the log block in their order, as in the driver's parameter",
         name="genericLogTopic_ranges_Variables",
     )
-    log_topic: str = parameter(TOPIC, "of the log block", "crazyflie/ranges", "topics/log")
+    log_topic: str = parameter(TOPIC, "rate of the log block", "crazyflie/ranges", "topics/log")
 
     @override
     def complaints(self) -> Iterator[str]:
@@ -90,7 +90,7 @@ class DeckRangerParameters(RangerParameters):
 
 
 class DeckRangerNode(Node):
-    """Publish what the sensors on a vehicle's deck measure."""
+    """Publish the measurements of the sensors on a vehicle's deck."""
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -131,18 +131,18 @@ class DeckRangerNode(Node):
 class SimulatedRangerParameters(RangerParameters):
     """Parameters of `SimulatedRangerNode`."""
 
-    world: World = parameter(WORLD_FILE, "what the sensors see, a YAML file")
+    world: World = parameter(WORLD_FILE, "world that the sensors see, a YAML file")
     silence: float = parameter(
-        TIME_STEP, "when a pose is older, nothing is published that rests on it", 0.5
+        TIME_STEP, "largest age of a pose; with an older one, no reading is published", 0.5
     )
-    seed: int = parameter(Integer(0, 2**31 - 1), "of the noise", 0)
+    seed: int = parameter(Integer(0, 2**31 - 1), "seed of the noise", 0)
     enabled: bool = parameter(
-        BOOLEAN, "measure; false: silent, as sensors that have failed", True, live=True
+        BOOLEAN, "whether sensors measure; false: silent, like failed sensors", True, live=True
     )
 
 
 class SimulatedRangerNode(Node):
-    """Measure distances to what is in a world, where /tf says that the vehicle is."""
+    """Measure distances to the objects of a world from the vehicle's pose on /tf."""
 
     def __init__(self) -> None:
         self._stamps: dict[int, genpy.Time] = {}
@@ -182,7 +182,7 @@ class SimulatedRangerNode(Node):
         except TransformError as error:
             self._handle.warn(f"no ranges: {error}", throttle=5.0)
             return
-        # What rests on a pose is said once.
+        # A missing pose is logged once.
         if self._stamps.get(numbers[0]) == robot.header.stamp:
             return
         self._stamps[numbers[0]] = robot.header.stamp

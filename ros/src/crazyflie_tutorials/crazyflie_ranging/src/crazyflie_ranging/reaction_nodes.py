@@ -29,16 +29,18 @@ class LatestRanges:
             self._readings[name] = (message.range, self._handle.time())
 
     def reading(self, name: str, age: float) -> float | None:
-        """Return what a sensor said in the last ``age`` seconds, m; None if it was silent."""
+        """Return a sensor's reading of the last ``age`` seconds, m; None if it was silent."""
         reading, time = self._readings.get(name, (math.nan, -math.inf))
         return reading if self._handle.time() - time <= age else None
 
 
 class SilenceParameters(Parameters):
-    """Times of both nodes: a sensor is silent, and velocities are published."""
+    """Times of both nodes: timeout of a sensor, and period of velocities."""
 
-    silence: float = parameter(TIME_STEP, "so long after its last reading a sensor is silent", 0.15)
-    time_step: float = parameter(TIME_STEP, "between two velocities", 0.02)
+    silence: float = parameter(
+        TIME_STEP, "time after the last reading from which a sensor is silent", 0.15
+    )
+    time_step: float = parameter(TIME_STEP, "period of the velocities", 0.02)
 
     @override
     def complaints(self) -> Iterator[str]:
@@ -48,7 +50,7 @@ class SilenceParameters(Parameters):
 
     @property
     def reading_age(self) -> float:
-        """Age up to which a reading counts (s): a velocity holds until the next one."""
+        """Largest age of a valid reading (s): a velocity holds until the next one."""
         return self.silence - self.time_step
 
 
@@ -56,8 +58,8 @@ class FollowObjectParameters(SilenceParameters, ObjectFollower):
     """Parameters of `FollowObjectNode`."""
 
     front_topic: str = parameter(TOPIC, "the sensor in front", "range/front", "topics/front")
-    left_topic: str = parameter(TOPIC, "the one at the left", "range/left", "topics/left")
-    right_topic: str = parameter(TOPIC, "the one at the right", "range/right", "topics/right")
+    left_topic: str = parameter(TOPIC, "the sensor at the left", "range/left", "topics/left")
+    right_topic: str = parameter(TOPIC, "the sensor at the right", "range/right", "topics/right")
     cmd_vel_topic: str = parameter(TOPIC, "where velocities go", "cmd_vel", "topics/cmd_vel")
 
 
@@ -97,7 +99,7 @@ class FollowObjectNode(Node):
         )
         if front is None:
             topic = self._handle.resolve(self._parameters.front_topic)
-            self._handle.warn(f"standing still: nothing comes on {topic}", throttle=5.0)
+            self._handle.warn(f"standing still: no message on {topic}", throttle=5.0)
             self._publisher.publish(Twist())
             return
         speed, yaw_dot = self._parameters.velocity(front, left, right)
@@ -111,23 +113,26 @@ class ObstacleStopParameters(SilenceParameters, ObstacleStop):
         TOPIC, "velocities in the heading frame, m/s and rad/s", "cmd_vel_in", "topics/cmd_vel_in"
     )
     out_topic: str = parameter(
-        TOPIC, "the same as far as they lead to no obstacle", "cmd_vel", "topics/cmd_vel_out"
+        TOPIC,
+        "the velocities, limited so that the vehicle stops before obstacles",
+        "cmd_vel",
+        "topics/cmd_vel_out",
     )
     ranges_topic: str = parameter(
-        TOPIC, "below it, each direction has its sensor", "range", name="topics/ranges"
+        TOPIC, "namespace of the sensors, one for each direction", "range", name="topics/ranges"
     )
     directions: tuple[str, ...] = parameter(
         ListOf(Text(tuple(AXES))),
-        "that are guarded; a silent sensor stops all motion there",
+        "guarded directions; a silent sensor stops all motion in its direction",
         ("front", "back", "left", "right", "up"),
     )
     command_silence: float = parameter(
-        TIME_STEP, "so long after the last velocity, zero is published once", 0.5
+        TIME_STEP, "time after the last velocity after which zero is published once", 0.5
     )
 
 
 class ObstacleStopNode(Node):
-    """Pass velocities on as far as they lead to no obstacle."""
+    """Pass velocities on, limited so that the vehicle stops before obstacles."""
 
     def __init__(self) -> None:
         self._command: Velocity | None = None
@@ -167,7 +172,7 @@ class ObstacleStopNode(Node):
         self._publish(self._command)
 
     def _on_timer(self):
-        # Obstacles come nearer also between two commands.
+        # Obstacles also come nearer between two commands.
         if self._command is None:
             return
         if self._handle.time() - self._command_time > self._parameters.command_silence:

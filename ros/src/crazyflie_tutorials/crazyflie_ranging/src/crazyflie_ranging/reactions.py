@@ -14,10 +14,11 @@ _DISTANCE = Number("m", above=0.0)
 
 
 class ObjectFollower(Parameters):
-    """Follows what is in front: at full speed ahead or back, or not at all.
+    """Follows the object in front: at full speed ahead or back, or not at all.
 
-    Nearer than ``back_off`` it backs off; beyond ``follow``, up to ``lost``, it follows; else it
-    stands still. What is not in front, but up to ``lost`` away at one side only, it turns to.
+    It backs off from an object nearer than ``back_off``, follows one beyond ``follow``, up to
+    ``lost``, and otherwise stands still. It turns to an object that is not in front, but at one
+    side only, up to ``lost`` away.
     """
 
     scale_linear: float = parameter(
@@ -25,18 +26,22 @@ class ObjectFollower(Parameters):
     )
     scale_angular: float = parameter(
         Number("rad/s", minimum=0.0),
-        "yaw rate to what is at one side and not in front; 0: no turning",
+        "yaw rate towards an object at one side and not in front; 0: no turning",
         0.0,
         live=True,
     )
     back_off: float = parameter(
-        _DISTANCE, "backs off from what is nearer", 0.3, "distances/back_off", live=True
+        _DISTANCE,
+        "distance below which the vehicle backs off",
+        0.3,
+        "distances/back_off",
+        live=True,
     )
     follow: float = parameter(
-        _DISTANCE, "follows what is farther away", 0.6, "distances/follow", live=True
+        _DISTANCE, "distance above which the vehicle follows", 0.6, "distances/follow", live=True
     )
     lost: float = parameter(
-        _DISTANCE, "but not what is beyond this", 2.0, "distances/lost", live=True
+        _DISTANCE, "distance above which the object is lost", 2.0, "distances/lost", live=True
     )
 
     @override
@@ -52,7 +57,7 @@ class ObjectFollower(Parameters):
     ) -> tuple[float, float]:
         """Return the velocity ahead (m/s) and the yaw rate (rad/s, counter-clockwise).
 
-        Distances are in m: infinite where there is nothing, None where a sensor is silent.
+        Distances are in m: infinite without an object, None if the sensor is silent.
         """
         if front < self.back_off:
             return -self.scale_linear, 0.0
@@ -77,20 +82,26 @@ AXES: dict[str, tuple[str, int]] = {
 
 
 class ObstacleStop(Parameters):
-    """Limits velocities to what comes to rest at a distance from every obstacle."""
+    """Limits velocities so that the vehicle comes to rest at a distance from every obstacle."""
 
     distance: float = parameter(
-        Number("m", above=0.0), "nearer to an obstacle, nothing leads towards it", 0.5, live=True
+        Number("m", above=0.0),
+        "distance from an obstacle below which no motion towards it is permitted",
+        0.5,
+        live=True,
     )
     deceleration: float = parameter(
-        Number("m/s^2", above=0.0), "with which the vehicle brakes before that", 0.5, live=True
+        Number("m/s^2", above=0.0),
+        "deceleration with which the vehicle brakes before that",
+        0.5,
+        live=True,
     )
-    reaction: float = parameter(DURATION, "that it flies on until it brakes", 0.3, live=True)
+    reaction: float = parameter(DURATION, "reaction time before the vehicle brakes", 0.3, live=True)
 
     def speed(self, clearance: float) -> float:
         """Return the largest speed (m/s) towards an obstacle that is ``clearance`` (m) away.
 
-        The one with which reaction and braking together take v t + v^2 / (2 a).
+        At this speed, reaction and braking together take v t + v^2 / (2 a).
         """
         if math.isinf(clearance) and clearance > 0.0:
             return math.inf
@@ -99,15 +110,15 @@ class ObstacleStop(Parameters):
         return math.sqrt(delay**2 + 2.0 * self.deceleration * gap) - delay
 
     def limit(self, velocity: Velocity, clearances: Mapping[str, float | None]) -> Velocity:
-        """Return a velocity (heading frame) as far as it leads to no obstacle.
+        """Return a velocity (heading frame), limited so that the vehicle stops before obstacles.
 
-        ``clearances`` are those of the guarded directions, m; None, where the sensor is silent,
-        permits no motion.
+        ``clearances`` are those of the guarded directions, m; None, for a silent sensor, permits no
+        motion.
         """
         for direction, clearance in clearances.items():
             axis, sign = AXES[direction]
             most = 0.0 if clearance is None else self.speed(clearance)
-            # + 0.0: not -0.0, for those who read it.
+            # Adding 0.0 turns -0.0 into 0.0, for readers.
             limited = sign * min(sign * getattr(velocity, axis), most) + 0.0
             velocity = replace(velocity, **{axis: limited})
         return velocity

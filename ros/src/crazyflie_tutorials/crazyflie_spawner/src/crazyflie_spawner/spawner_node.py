@@ -29,18 +29,18 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 def vehicle_name(wanted: str, taken: Container[str]) -> str:
     """Return the name of a vehicle, its namespace and its tf frame.
 
-    Without a wanted one it is the first free one of crazyflie1, crazyflie2, ... `RefusalError`: the
-    wanted one is no name, or another vehicle has it.
+    By default it is the first free name of crazyflie1, crazyflie2, ... `RefusalError`: the
+    requested text is not a name, or another vehicle has it.
     """
     if not wanted:
         return next(name for k in itertools.count(1) if (name := f"crazyflie{k}") not in taken)
     if not _NAME.fullmatch(wanted):
         raise RefusalError(
-            f"{wanted!r} is no name of a vehicle; expected letters, digits and underscores, the "
+            f"{wanted!r} is not a name of a vehicle; expected letters, digits and underscores, the "
             "first a letter"
         )
     if wanted in taken:
-        raise RefusalError(f"there is a vehicle {wanted} already")
+        raise RefusalError(f"the vehicle {wanted} exists already")
     return wanted
 
 
@@ -48,10 +48,10 @@ END_LIMIT = 15.0  #: Time after which nodes that roslaunch has not ended are kil
 
 
 class VehicleProcess:
-    """A vehicle that is started, with arguments of roslaunch, when the object is made."""
+    """A vehicle that is started, with arguments of roslaunch, when the object is created."""
 
     def __init__(self, arguments: list[str]):
-        # A session of its own: its nodes get no Ctrl-C but that of `end`, and are killed together.
+        # A session of its own: its nodes receive Ctrl-C only from `end`, and are killed together.
         self._process = subprocess.Popen(
             ["roslaunch", *arguments], stdin=subprocess.DEVNULL, start_new_session=True
         )
@@ -73,23 +73,29 @@ class VehicleProcess:
             self._process.send_signal(signal.SIGINT)
 
 
-PERIOD = 0.2  #: Between two checks of the vehicles, s of the machine's clock.
+PERIOD = 0.2  #: Period of the checks of the vehicles (s of the machine's clock).
 
 
 class SpawnerParameters(Parameters):
     """Parameters of `SpawnerNode`."""
 
-    spawn_service: str = parameter(SERVICE, "a vehicle appears", "spawn", "srv/spawn")
-    remove_service: str = parameter(SERVICE, "a vehicle disappears", "remove", "srv/remove")
-    vehicle: str = parameter(
-        Text(may_be_empty=True), "name of one that is there from the beginning, at (0, 0)", ""
+    spawn_service: str = parameter(SERVICE, "service that adds a vehicle", "spawn", "srv/spawn")
+    remove_service: str = parameter(
+        SERVICE, "service that removes a vehicle", "remove", "srv/remove"
     )
-    package: str = parameter(TEXT, "of the launch file", "crazyflie_spawner", "launch/package")
-    file: str = parameter(TEXT, "that starts a vehicle", "vehicle.launch", "launch/file")
+    vehicle: str = parameter(
+        Text(may_be_empty=True), "name of a vehicle that is spawned at the start, at (0, 0)", ""
+    )
+    package: str = parameter(
+        TEXT, "package of the launch file", "crazyflie_spawner", "launch/package"
+    )
+    file: str = parameter(
+        TEXT, "launch file that starts a vehicle", "vehicle.launch", "launch/file"
+    )
     fixed_frame: str = parameter(FRAME, "tf frame of the world", "world", "frames/fixed")
-    simulator_dt: float = parameter(TIME_STEP, "of the simulators", 0.01)
+    simulator_dt: float = parameter(TIME_STEP, "node class of the simulators", 0.01)
     start_limit: float = parameter(
-        Number("s", above=0.0), "a vehicle that takes longer to be there is taken down", 30.0
+        Number("s", above=0.0), "time after which a vehicle that is not ready is removed", 30.0
     )
 
 
@@ -98,7 +104,7 @@ class Vehicle:
     """A vehicle that was spawned."""
 
     process: VehicleProcess
-    ticks_left: int  #: Timer periods left until it has to be ready.
+    ticks_left: int  #: Number of timer periods until it must be ready.
     spawning: "Future[SpawnVehicleResponse]"  #: Reply of the spawn service.
     is_ready: bool = False  #: Whether its takeoff service is offered.
     #: Replies of the remove service.
@@ -137,9 +143,9 @@ class SpawnerNode(Node):
         name = vehicle_name(request.name, self._vehicles)
         if not (math.isfinite(request.x) and math.isfinite(request.y)):
             place = f"({request.x:g}, {request.y:g})"
-            raise ServiceError(f"the place is {place}; expected finite numbers (m)")
+            raise ServiceError(f"the position is {place}; expected finite numbers (m)")
         if self._takeoff(name) in self._handle.service_nodes():
-            raise ServiceError(f"there is a vehicle {name} already, which was not spawned here")
+            raise ServiceError(f"the vehicle {name} exists already, and was not spawned here")
         return self._spawn(name, request.x, request.y)
 
     def _spawn(self, name, x, y):
@@ -163,7 +169,9 @@ class SpawnerNode(Node):
         vehicle = self._vehicles.get(request.name)
         if vehicle is None:
             known = ", ".join(sorted(self._vehicles)) or "none"
-            raise ServiceError(f"no vehicle {request.name!r} was spawned; there are: {known}")
+            raise ServiceError(
+                f"no vehicle {request.name!r} was spawned; spawned vehicles: {known}"
+            )
         future: Future[RemoveVehicleResponse] = Future()
         vehicle.removing.append(future)
         vehicle.process.end()
@@ -184,11 +192,11 @@ class SpawnerNode(Node):
         if self._takeoff(name) in services:
             vehicle.is_ready = True
             vehicle.spawning.set_result(SpawnVehicleResponse(name))
-            self._handle.info(f"{name} is there")
+            self._handle.info(f"{name} is ready")
         elif vehicle.ticks_left <= 0:
             limit = self._parameters.start_limit
             vehicle.spawning.set_exception(
-                ServiceError(f"{name} was not there after {limit:g} s, and is taken down")
+                ServiceError(f"{name} was not ready after {limit:g} s, and is removed")
             )
             # No caller waits for this removal, but the vehicle has not ended by itself.
             vehicle.removing.append(Future())
@@ -198,10 +206,10 @@ class SpawnerNode(Node):
         vehicle = self._vehicles.pop(name)
         if not vehicle.spawning.done():
             vehicle.spawning.set_exception(
-                ServiceError(f"{name} has ended before it was there (status {status}); see its log")
+                ServiceError(f"{name} ended before it was ready (status {status}); see its log")
             )
         if vehicle.removing:
-            self._handle.info(f"{name} is gone")
+            self._handle.info(f"{name} was removed")
         else:
             self._handle.warn(f"{name} has ended by itself (status {status})")
         for future in vehicle.removing:

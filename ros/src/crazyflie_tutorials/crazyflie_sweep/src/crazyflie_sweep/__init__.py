@@ -1,1 +1,1 @@
-"""A mission that sweeps an area in lanes, at velocities that a service gives."""
+"""A mission that sweeps an area in lanes, at velocities from a service."""

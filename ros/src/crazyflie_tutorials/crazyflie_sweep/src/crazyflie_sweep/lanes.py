@@ -28,7 +28,7 @@ class Segment(ABC):
 class Line(Segment):
     """A straight piece between two different points.
 
-    A lane sweeps the area; other pieces only lead somewhere.
+    A lane sweeps the area; other pieces only connect lanes.
     """
 
     def __init__(self, begin: Point, end: Point, is_lane: bool = True):
@@ -44,7 +44,7 @@ class Line(Segment):
         return self._point(s), self._direction
 
     def distance(self, point: Point) -> float:
-        """Return how far a point is from the line between its ends, m."""
+        """Return the distance of a point from the line between its ends, m."""
         offset = (p - b for p, b in zip(point, self.begin, strict=True))
         along = sum(o * u for o, u in zip(offset, self._direction, strict=True))
         return math.dist(point, self._point(min(max(along, 0.0), self.length)))
@@ -80,7 +80,7 @@ class Arc(Segment):
 
 
 class LanePath:
-    """Segments, one behind the other; at least one."""
+    """Consecutive segments; at least one."""
 
     def __init__(self, segments: Sequence[Segment]):
         self.segments = tuple(segments)
@@ -88,7 +88,7 @@ class LanePath:
 
     @property
     def length(self) -> float:
-        """Of all segments, m."""
+        """Length of all segments (m)."""
         return self._begins[-1]
 
     def segment_at(self, s: float) -> Segment:
@@ -108,7 +108,7 @@ class LanePath:
 def lane_offsets(width: float, lane_width: float) -> list[float]:
     """Return the distances of lanes from one side of a strip, m.
 
-    They are as many as are needed, and equally far apart: at most ``lane_width``.
+    They are equally spaced, at most ``lane_width`` apart, and as few as possible.
     """
     count = max(1, math.ceil(width / lane_width - _SLACK))
     spacing = width / count
@@ -118,8 +118,8 @@ def lane_offsets(width: float, lane_width: float) -> list[float]:
 def sweep(area: Area, lane_width: float, height: float) -> LanePath:
     """Return the path that sweeps an area: along x, an arc, back along x, and so on.
 
-    Lanes are at most ``lane_width`` (m) apart. The arcs are outside of the area: they reach half
-    the distance of two lanes beyond its ends.
+    Lanes are at most ``lane_width`` (m) apart. The arcs are outside the area: they extend beyond
+    its ends by half the distance of two lanes.
     """
     ys = [area.y_min + offset for offset in lane_offsets(area.y_max - area.y_min, lane_width)]
     segments: list[Segment] = []
@@ -135,7 +135,7 @@ def sweep(area: Area, lane_width: float, height: float) -> LanePath:
 
 
 def reversed_path(path: LanePath) -> LanePath:
-    """Return the same path from its end to its begin."""
+    """Return the reversed path."""
     return LanePath([_reversed(segment) for segment in reversed(path.segments)])
 
 

@@ -1,4 +1,4 @@
-"""ROS interface of the sweep: takes off, flies the lanes, lands, reports, and shows it in RViz."""
+"""ROS interface of the sweep: takeoff, lanes, landing, report, and markers for RViz."""
 
 import random
 
@@ -34,7 +34,7 @@ COVERED_COLOUR = ColorRGBA(0.15, 0.65, 0.35, 0.75)
 UNCOVERED_COLOUR = ColorRGBA(0.75, 0.78, 0.82, 0.6)
 LANE_COLOUR = ColorRGBA(0.9, 0.45, 0.05, 1.0)
 
-_SPACING = 0.05  #: Between the points with which lanes and arcs are drawn, m.
+_SPACING = 0.05  #: Distance between the points with which lanes and arcs are drawn (m).
 
 _LINE_WIDTH = 0.015
 _TEXT_SIZE = 0.2
@@ -42,7 +42,7 @@ _THICKNESS = 0.002
 
 
 def markers(sweeper: Sweeper, frame: str) -> MarkerArray:
-    """Return the cells on the ground, the lanes and the share that is covered."""
+    """Return the cells on the ground, the lanes and the covered fraction."""
     coverage = sweeper.coverage
     array = []
     for name, covered, colour in (
@@ -72,23 +72,23 @@ def markers(sweeper: Sweeper, frame: str) -> MarkerArray:
 def _marker(name, shape, colour, frame):
     marker = Marker(ns=name, type=shape, color=colour)
     marker.header.frame_id = frame
-    # The time 0 asks for the latest transform, also after simulated time was reset.
+    # With time 0, RViz uses the latest transform, even after simulated time was reset.
     marker.header.stamp = genpy.Time()
     marker.pose.orientation.w = 1.0
     return marker
 
 
-TIME_STEP = 0.02  #: Between two references, s.
-ASK_PERIOD = 0.1  #: Between two questions for a velocity, s.
-REPORT_PERIOD = 0.5  #: Between two reports, and pictures for RViz, s.
-STATE_LIMIT = 0.5  #: Without a state for so long, s, the reference stands still.
-FLIGHT_LIMIT = 120.0  #: The longest that takeoff or landing may take, s of the machine's clock.
+TIME_STEP = 0.02  #: Period of the references (s).
+ASK_PERIOD = 0.1  #: Period of the calls for a velocity (s).
+REPORT_PERIOD = 0.5  #: Period of reports, and of markers for RViz (s).
+STATE_LIMIT = 0.5  #: Time without a state after which the reference stands still (s).
+FLIGHT_LIMIT = 120.0  #: Timeout of takeoff and landing (s of the machine's clock).
 #: States in which a sweep may begin.
 IDLE = (SweepReport.WAITING, SweepReport.DONE, SweepReport.FAILED)
 
 
 class SweepNode(Node):
-    """Sweep an area in lanes, at velocities that a service gives; hover when it does not."""
+    """Sweep an area in lanes, at velocities from a service; hover without a velocity."""
 
     def __init__(self) -> None:
         self._state = SweepReport.WAITING
@@ -153,7 +153,7 @@ class SweepNode(Node):
         if self._state not in IDLE:
             return TriggerResponse(False, f"a sweep is under way: {self._state}")
         if not self._knows_position():
-            return TriggerResponse(False, "no state of the vehicle has come")
+            return TriggerResponse(False, "no state of the vehicle has been received")
         self._start()
         return TriggerResponse(True, "")
 
@@ -180,9 +180,9 @@ class SweepNode(Node):
 
     def _sweep(self):
         if self._position is None:
-            self._finish("no state of the vehicle has come")
+            self._finish("no state of the vehicle has been received")
             return
-        # The reply of takeoff may come before the flight status.
+        # The response of takeoff may come before the flight status.
         self._flight_state = FlightStatus.FLYING
         self._sweeper = Sweeper(self._parameters, self._position)
         self._source = VelocitySource(
@@ -224,7 +224,7 @@ class SweepNode(Node):
     def _on_flight_status(self, status):
         self._flight_state = status.state
         if status.state != FlightStatus.FLYING and self._is_sweeping():
-            self._finish(f"the flight was ended: {status.reason or 'the vehicle is landed'}")
+            self._finish(f"the flight was ended: {status.reason or 'the vehicle is being landed'}")
 
     def _on_state(self, message):
         state = message.state
@@ -262,10 +262,10 @@ class SweepNode(Node):
             reason = f"{service}: {reason}"
         if not self._knows_position():
             velocity = None
-            reason = f"no state of the vehicle has come for {STATE_LIMIT:g} s"
+            reason = f"no state of the vehicle has been received for {STATE_LIMIT:g} s"
         if not reason:
             if self._state == SweepReport.HOVERING:
-                self._handle.info("the sweep goes on")
+                self._handle.info("the sweep continues")
             self._set_state(SweepReport.SWEEPING)
         elif self._state != SweepReport.HOVERING or reason != self._reason:
             self._handle.warn(f"hovering: {reason}", throttle=1.0)
@@ -324,13 +324,16 @@ class VelocityServerParameters(Parameters):
     """Parameters of `VelocityServerNode`."""
 
     random_service: str = parameter(
-        SERVICE, "two random velocities in an interval", "velocity", "srv/velocity"
+        SERVICE, "service with two random velocities in an interval", "velocity", "srv/velocity"
     )
     oscillator_service: str = parameter(
-        SERVICE, "the oscillator's velocity at a position", "oscillator", "srv/oscillator"
+        SERVICE,
+        "service with the oscillator's velocity at a position",
+        "oscillator",
+        "srv/oscillator",
     )
     seed: int | None = parameter(
-        Integer(0, 2**32 - 1), "of the random velocities; without it each run has others", None
+        Integer(0, 2**32 - 1), "seed of the random velocities; without it each run differs", None
     )
 
 

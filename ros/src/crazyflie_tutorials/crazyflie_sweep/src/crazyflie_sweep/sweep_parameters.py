@@ -24,10 +24,10 @@ _SPEED = Number("m/s", above=0.0)
 class Area(Parameters):
     """The rectangle to sweep, along the axes of the fixed frame."""
 
-    x_min: float = parameter(METRES, "the area begins here, in the fixed frame", -1.5)
-    x_max: float = parameter(METRES, "and ends here", 1.5)
-    y_min: float = parameter(METRES, "the first lane is next to it", -1.5)
-    y_max: float = parameter(METRES, "the last lane is next to it", 1.5)
+    x_min: float = parameter(METRES, "begin of the area, in the fixed frame", -1.5)
+    x_max: float = parameter(METRES, "end of the area", 1.5)
+    y_min: float = parameter(METRES, "side of the first lane", -1.5)
+    y_max: float = parameter(METRES, "side of the last lane", 1.5)
 
 
 class SpeedLimits(Parameters):
@@ -35,20 +35,22 @@ class SpeedLimits(Parameters):
 
     min: float = parameter(_SPEED, "least speed on lanes", 0.1)
     max: float = parameter(_SPEED, "largest speed on lanes", 0.7)
-    turn: float = parameter(_SPEED, "on arcs, and to the first lane", 0.25)
-    acceleration: float = parameter(Number("m/s^2", above=0.0), "largest along the way", 0.5)
+    turn: float = parameter(_SPEED, "speed on arcs, and to the first lane", 0.25)
+    acceleration: float = parameter(
+        Number("m/s^2", above=0.0), "largest acceleration along the path", 0.5
+    )
 
 
 class CoverageGoal(Parameters):
-    """Criterion by which the area is covered."""
+    """Criterion for the coverage of the area."""
 
-    swath: float = parameter(_WIDTH, "diameter of what the vehicle covers at a time", 0.7)
+    swath: float = parameter(_WIDTH, "diameter of the disc that the vehicle covers", 0.7)
     cell: float = parameter(_WIDTH, "width of the cells that are counted", 0.1)
     goal: float = parameter(
-        Number(above=0.0, maximum=1.0), "share of the area that must be covered", 0.99
+        Number(above=0.0, maximum=1.0), "fraction of the area that must be covered", 0.99
     )
     max_passes: int = parameter(
-        Integer(1, 100), "how often the lanes are flown, there and back, to get there", 2
+        Integer(1, 100), "largest number of flights along the lanes, there and back, until then", 2
     )
 
 
@@ -56,8 +58,8 @@ class Plan(Parameters):
     """Area, lanes, speeds and coverage of a sweep."""
 
     area: Area = group(Area, "area")
-    lane_width: float = parameter(_WIDTH, "largest distance of two lanes", 0.5)
-    height: float = parameter(_WIDTH, "of the lanes, above the ground", 1.0)
+    lane_width: float = parameter(_WIDTH, "largest distance between two lanes", 0.5)
+    height: float = parameter(_WIDTH, "height of the lanes above the ground", 1.0)
     speed: SpeedLimits = group(SpeedLimits, "speed")
     coverage: CoverageGoal = group(CoverageGoal, "coverage")
 
@@ -77,29 +79,35 @@ class SweepParameters(Plan):
     """Parameters of `SweepNode`."""
 
     velocity_limit: float = parameter(
-        TIME_STEP, "how long an answer of the velocity service may be used", 0.5, "velocity/limit"
+        TIME_STEP,
+        "time for which an answer of the velocity service is valid",
+        0.5,
+        "velocity/limit",
     )
     velocity_most: float = parameter(
-        Number(above=0.0), "an answer that is not > 0 and <= this is nonsense", 3.0, "velocity/most"
+        Number(above=0.0), "largest valid answer; it must also be > 0", 3.0, "velocity/most"
     )
     start: bool = parameter(
-        BOOLEAN, "begin as soon as there is a vehicle; otherwise `~start` is waited for", True
+        BOOLEAN, "begin as soon as a vehicle is present; otherwise wait for `~start`", True
     )
-    fixed_frame: str = parameter(FRAME, "of the area", "world", "frames/fixed")
+    fixed_frame: str = parameter(FRAME, "frame of the area", "world", "frames/fixed")
     takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
     land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
     velocity_service: str = parameter(
-        SERVICE, "position in, velocity out", "oscillator", "srv/velocity"
+        SERVICE, "service with the velocity for a position", "oscillator", "srv/velocity"
     )
-    state_topic: str = parameter(TOPIC, "where states come from", name="topics/state")
+    state_topic: str = parameter(TOPIC, "states of the vehicle", name="topics/state")
     reference_topic: str = parameter(TOPIC, "where references go", name="topics/reference")
     flight_status_topic: str = parameter(
-        TOPIC, "the takeoff server's", "in_flight_flight_status", "topics/flight_status"
+        TOPIC,
+        "flight status of the takeoff server",
+        "in_flight_flight_status",
+        "topics/flight_status",
     )
     flight_state_topic: str | None = parameter(
         TOPIC, "text of a takeoff server without flight status", None, "topics/flight_state"
     )
-    report_topic: str = parameter(TOPIC, "how the sweep stands", "~report", "topics/report")
+    report_topic: str = parameter(TOPIC, "status of the sweep", "~report", "topics/report")
     velocity_topic: str = parameter(
         TOPIC, "speed of the reference, as `Vel` linear", "~velocity", "topics/velocity"
     )

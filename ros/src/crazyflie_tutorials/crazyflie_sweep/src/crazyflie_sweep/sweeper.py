@@ -1,4 +1,4 @@
-"""A sweep as it is flown: its reference, its coverage of the area, its tracking error."""
+"""A sweep: its reference, its coverage of the area, its tracking error."""
 
 import math
 
@@ -11,7 +11,7 @@ from crazyflie_sweep.velocities import OSCILLATOR_BEGIN, OSCILLATOR_END, OSCILLA
 
 
 class Coverage:
-    """Cells of an area that a sensor has passed over, which sees a disc of diameter ``swath`` (m).
+    """Cells of an area over which a sensor has passed; it sees a disc of diameter ``swath`` (m).
 
     ``cell`` is the largest width of a cell, m.
     """
@@ -27,7 +27,7 @@ class Coverage:
     def add(self, position: Point) -> bool:
         """Cover the cells whose middle is in the disc around a position; return whether any is new.
 
-        A position at a time is enough while they are much less apart than the disc is wide.
+        Single positions suffice if they are much closer together than the disc's diameter.
         """
         x, y, _ = position
         is_near = (self._x - x) ** 2 + (self._y - y) ** 2 <= self._radius**2
@@ -37,7 +37,7 @@ class Coverage:
 
     @property
     def share(self) -> float:
-        """Share of the cells that are covered, 0 to 1."""
+        """Fraction of covered cells, 0 to 1."""
         return float(self._is_covered.mean())
 
     def middles(self, covered: bool) -> NDArray[np.float64]:
@@ -52,30 +52,29 @@ def _middles(least, most, cell):
     return least + width * (np.arange(count) + 0.5), width
 
 
-_NEAR = 0.01  #: A vehicle that is nearer to the first lane, m, is there.
+_NEAR = 0.01  #: Distance from the first lane at which a vehicle has arrived (m).
 
 
 class Sweeper:
     """Moves a reference along lanes and arcs, and measures the vehicle that follows it.
 
-    Velocities on lanes come from a service that knows the interval [2, 9] only, so
-    lanes are scaled to it: positions and velocities by the same factor. ``start`` is the position
-    of the vehicle.
+    Velocities on lanes come from a service for the interval [2, 9] only, so lanes are scaled to it:
+    positions and velocities by the same factor. ``start`` is the position of the vehicle.
     """
 
     def __init__(self, plan: Plan, start: Point):
         self._plan = plan
-        #: Through the area, without the path to its begin.
+        #: Path through the area, without the path to its begin.
         self.lanes = sweep(plan.area, plan.lane_width, plan.height)
         self._scale = (plan.area.x_max - plan.area.x_min) / OSCILLATOR_LENGTH
         self.coverage = Coverage(plan.area, plan.coverage.cell, plan.coverage.swath)
-        #: The largest distance of the vehicle from the lane that it was on, m.
+        #: Largest distance of the vehicle from its lane (m).
         self.max_lane_distance = 0.0
         self.speed = 0.0  #: Speed of the reference (m/s).
         self._passes = 1
         self._s = 0.0
         self._path = self._with_approach(start)
-        #: Whether the reference is at rest at the end: the area is covered, or cannot be.
+        #: Whether the reference is at rest at the end: the area is covered, or cannot be covered.
         self.is_done = False
 
     @property
@@ -94,14 +93,14 @@ class Sweeper:
         return segment if isinstance(segment, Line) and segment.is_lane else None
 
     def service_position(self, x: float) -> float:
-        """Return what stands for the position ``x`` (m) in the service's interval."""
+        """Return the position ``x`` (m) scaled to the service's interval."""
         scaled = OSCILLATOR_BEGIN + (x - self._plan.area.x_min) / self._scale
         return min(max(scaled, OSCILLATOR_BEGIN), OSCILLATOR_END)
 
     def advance(self, dt: float, velocity: float | None) -> None:
         """Move the reference for ``dt`` seconds.
 
-        ``velocity`` is the service's, in its units, and counts on lanes; None stops the reference
+        ``velocity`` is the service's, in its units, and is used on lanes; None stops the reference
         everywhere.
         """
         limits = self._plan.speed
@@ -112,7 +111,7 @@ class Sweeper:
         else:
             target = limits.turn
         change = limits.acceleration * dt
-        # So that the reference comes to rest at the end and does not stop dead there.
+        # The reference comes to rest at the end instead of stopping abruptly.
         left = max(self._path.length - self._s, 0.0)
         target = min(target, max(math.sqrt(2.0 * limits.acceleration * left), change))
         self.speed += min(max(target - self.speed, -change), change)

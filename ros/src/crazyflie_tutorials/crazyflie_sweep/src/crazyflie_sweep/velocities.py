@@ -1,4 +1,4 @@
-"""Velocities by service: of an oscillator or at random, and for how long an answer is valid."""
+"""Velocities by service: of an oscillator or at random, and the validity of an answer."""
 
 import math
 import random
@@ -16,7 +16,7 @@ def oscillator_velocity(x: float) -> float:
 
     It is slow at both ends and fast in the middle: vel = 0.1 + 2 sin(pi x / 7 - 2 pi / 7), from an
     exercise of the course Robot Programming with ROS (C. T. Recchiuto, Genova). The summand 0.1
-    makes it leave its ends. `RefusalError`: ``x`` is outside of 2 to 9, or no number.
+    makes it leave its ends. `RefusalError`: ``x`` is outside 2 to 9, or not a number.
     """
     if not OSCILLATOR_BEGIN <= x <= OSCILLATOR_END:
         raise RefusalError(f"x is {x:g}; expected {OSCILLATOR_BEGIN:g} to {OSCILLATOR_END:g}")
@@ -34,9 +34,9 @@ def random_velocities(least: float, most: float, source: random.Random) -> tuple
 
 
 class VelocitySource:
-    """The last velocity that a service has answered, which may be used for ``limit`` (s).
+    """The last velocity from a service, which is valid for ``limit`` (s).
 
-    One that is not > 0 and <= ``most`` is nonsense. ``start`` is the time of the first call, s.
+    It must be > 0 and <= ``most``. ``start`` is the time of the first call, s.
     """
 
     def __init__(self, limit: float, most: float, start: float):
@@ -45,11 +45,11 @@ class VelocitySource:
         self._velocity: float | None = None
         self._time = start
         self._failure = ""
-        #: Why there is no velocity; empty while the first answer may still come in time.
+        #: Reason why there is no velocity; empty while the first answer may still come in time.
         self.reason = ""
 
     def answer(self, velocity: float, time: float) -> None:
-        """Take an answer that has come at ``time`` (s)."""
+        """Process an answer that has come at ``time`` (s)."""
         if 0.0 < velocity <= self._most:
             self._velocity, self._time, self._failure = velocity, time, ""
         else:
@@ -61,8 +61,8 @@ class VelocitySource:
         self._failure = reason
 
     def velocity(self, time: float) -> float | None:
-        """Return the velocity to use at ``time`` (s); None for none, and `reason` says why."""
-        # After a reset of the clock the age counts from there.
+        """Return the velocity to use at ``time`` (s), or None; `reason` says why."""
+        # After a reset of the clock the age is measured from there.
         self._time = min(self._time, time)
         is_late = time - self._time > self._limit
         if is_late:

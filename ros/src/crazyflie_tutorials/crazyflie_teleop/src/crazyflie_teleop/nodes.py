@@ -19,15 +19,15 @@ from crazyflie_utils.parameters.types import BOOLEAN, SERVICE, TIME_STEP, TOPIC,
 class CircleParameters(Parameters):
     """Parameters of `CircleNode`."""
 
-    cmd_vel_topic: str = parameter(TOPIC, "where velocities go", "cmd_vel", "topics/cmd_vel")
-    time_step: float = parameter(TIME_STEP, "between two velocities", 0.1)
-    radius: float = parameter(Number("m", above=0.0), "of the circle", 0.5, live=True)
-    speed: float = parameter(Number("m/s", above=0.0), "along the circle", 0.3, live=True)
+    cmd_vel_topic: str = parameter(TOPIC, "topic of the velocities", "cmd_vel", "topics/cmd_vel")
+    time_step: float = parameter(TIME_STEP, "period of the velocities", 0.1)
+    radius: float = parameter(Number("m", above=0.0), "radius of the circle", 0.5, live=True)
+    speed: float = parameter(Number("m/s", above=0.0), "speed along the circle", 0.3, live=True)
     clockwise: bool = parameter(BOOLEAN, "direction, as seen from above", True, live=True)
 
 
 class CircleNode(Node):
-    """Publish the velocity of a circle, over and over."""
+    """Publish the velocity of a circle repeatedly."""
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -52,19 +52,19 @@ class CircleNode(Node):
         self._publisher.publish(self._twist)
 
 
-FLIGHT_LIMIT = 120.0  #: The longest that takeoff or landing may take, s of the machine's clock.
+FLIGHT_LIMIT = 120.0  #: Timeout of takeoff and landing (s of the machine's clock).
 
 
 class JoyVelocityParameters(JoyVelocity):
     """Parameters of `JoyVelocityNode`."""
 
     joy_topic: str = parameter(TOPIC, "a joystick, or a keyboard", "joy", "topics/joy")
-    cmd_vel_topic: str = parameter(TOPIC, "where velocities go", "cmd_vel", "topics/cmd_vel")
+    cmd_vel_topic: str = parameter(TOPIC, "topic of the velocities", "cmd_vel", "topics/cmd_vel")
     takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
     land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
     emergency_service: str | None = parameter(
         SERVICE,
-        "stops the motors, such as the driver's; without it one lands",
+        "stops the motors, such as the driver's; without it the vehicle lands",
         None,
         "srv/emergency",
     )
@@ -74,7 +74,7 @@ class JoyVelocityParameters(JoyVelocity):
 
 
 class JoyVelocityNode(Node):
-    """Publish a velocity for every message of a joystick; when it falls silent, so does this."""
+    """Publish a velocity for every message of a joystick; without messages, publish nothing."""
 
     def __init__(self) -> None:
         self._pressed: set[int] = set()
@@ -121,13 +121,15 @@ class JoyVelocityNode(Node):
         future.add_done_callback(on_reply)
 
 
-PERIOD = 0.5  #: Between two checks whether the service is offered, s of the machine's clock.
+PERIOD = 0.5  #: Period of the checks whether the service is offered (s of the machine's clock).
 
 
 class TakeoffCallerParameters(Parameters):
     """Parameters of `TakeoffCallerNode`."""
 
-    service: str = parameter(SERVICE, "is called once, when it is there", "/takeoff", "srv/takeoff")
+    service: str = parameter(
+        SERVICE, "service that is called once, when it is offered", "/takeoff", "srv/takeoff"
+    )
 
 
 class TakeoffCallerNode(Node):
@@ -150,7 +152,7 @@ class TakeoffCallerNode(Node):
 
     def _on_reply(self, reply):
         if reply.exception() is None:
-            self._handle.info("the vehicle flies")
+            self._handle.info("the vehicle is flying")
         else:
             self._handle.error(str(reply.exception()))
 

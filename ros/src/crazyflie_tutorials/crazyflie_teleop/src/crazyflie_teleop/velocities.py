@@ -22,12 +22,12 @@ AXIS_NUMBER = Integer(0, 63)  #: Number of an axis or a button of sensor_msgs/Jo
 
 
 class AxisParameters(Parameters):
-    """Numbers of axes, from 0, as crazyflie_demo's keyboard and gamepads have them."""
+    """Numbers of axes, from 0, as on gamepads and crazyflie_demo's keyboard."""
 
     forward: int = parameter(AXIS_NUMBER, "flies ahead", 4)
-    left: int = parameter(AXIS_NUMBER, "flies to the left", 3)
+    left: int = parameter(AXIS_NUMBER, "axis of the velocity to the left", 3)
     up: int = parameter(AXIS_NUMBER, "rises", 1)
-    turn: int = parameter(AXIS_NUMBER, "turns to the left", 0)
+    turn: int = parameter(AXIS_NUMBER, "axis of the yaw rate to the left", 0)
 
 
 class JoyVelocity(Parameters):
@@ -35,13 +35,13 @@ class JoyVelocity(Parameters):
 
     axes: AxisParameters = group(AxisParameters, "axes")
     horizontal: float = parameter(
-        Number("m/s", above=0.0), "speed of a full deflection", 0.5, "speed/horizontal", live=True
+        Number("m/s", above=0.0), "speed at full deflection", 0.5, "speed/horizontal", live=True
     )
     vertical: float = parameter(
-        Number("m/s", above=0.0), "speed of a full deflection", 0.3, "speed/vertical", live=True
+        Number("m/s", above=0.0), "speed at full deflection", 0.3, "speed/vertical", live=True
     )
     yaw_dot: float = parameter(
-        Number("rad/s", above=0.0), "yaw rate of a full deflection", 1.0, "speed/yaw_dot", live=True
+        Number("rad/s", above=0.0), "yaw rate at full deflection", 1.0, "speed/yaw_dot", live=True
     )
 
     def velocity(self, deflections: Sequence[float]) -> Velocity:

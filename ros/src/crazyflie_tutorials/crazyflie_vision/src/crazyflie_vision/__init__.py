@@ -1,1 +1,1 @@
-"""Seeing: a simulated camera and a webcam, image filters, trackers, and following."""
+"""Vision: a simulated camera and a webcam, image filters, trackers, and following."""

@@ -1,4 +1,4 @@
-"""A camera without distortion: its numbers, how directions become pixels, and its noise.
+"""A camera without distortion: its parameters, its projection, and its noise.
 
 Pixels are counted from the middle of the one at the upper left, x to the right and y down. The
 optical frame of a camera looks along z, with x to the right and y down (REP 103).
@@ -19,21 +19,23 @@ from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import DURATION, METRES, Integer, Number
 
-#: Takes the optical frame of a camera that looks ahead to forward, left, up.
+#: Rotation from the optical frame of a camera that looks ahead to forward, left, up.
 OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
 class MountParameters(Parameters):
     """The place of a camera on a vehicle."""
 
-    x: float = parameter(METRES, "ahead of the vehicle's middle", 0.03)
-    y: float = parameter(METRES, "to the left of it", 0.0)
+    x: float = parameter(METRES, "position ahead of the vehicle's centre", 0.03)
+    y: float = parameter(METRES, "position to the left of the centre", 0.0)
     z: float = parameter(METRES, "above it", 0.01)
     pitch: float = parameter(
-        Number("deg", minimum=-90.0, maximum=90.0), "how far it looks down", 0.0
+        Number("deg", minimum=-90.0, maximum=90.0), "angle by which the camera looks down", 0.0
     )
     yaw: float = parameter(
-        Number("deg", minimum=-180.0, maximum=180.0), "how far it looks to the left", 0.0
+        Number("deg", minimum=-180.0, maximum=180.0),
+        "angle by which the camera looks to the left",
+        0.0,
     )
 
 
@@ -43,22 +45,24 @@ class CameraParameters(Parameters):
     width: int = parameter(Integer(16, 4096), "columns of the image", 320)
     height: int = parameter(Integer(16, 4096), "rows of the image", 240)
     fov: float = parameter(
-        Number("deg", minimum=10.0, maximum=150.0), "between the left and the right edge", 75.0
+        Number("deg", minimum=10.0, maximum=150.0),
+        "angle between the left and the right edge",
+        75.0,
     )
-    rate: float = parameter(Number("Hz", above=0.0, maximum=200.0), "images a second", 30.0)
+    rate: float = parameter(Number("Hz", above=0.0, maximum=200.0), "rate of images", 30.0)
     noise: float = parameter(
         Number(minimum=0.0, maximum=100.0),
         "standard deviation of each of a pixel's values, which are from 0 to 255",
         2.0,
     )
-    latency: float = parameter(DURATION, "from the exposure to the message", 0.03)
+    latency: float = parameter(DURATION, "time from the exposure to the message", 0.03)
     mount: MountParameters = group(MountParameters, "mount")
 
 
 def load(path: str | Path) -> CameraParameters:
     """Return the parameters in a camera's YAML file.
 
-    `ParameterError` names everything that is wrong in it: file, line and what was expected.
+    `ParameterError` names all errors: file, line and what was expected.
     """
     return yaml_file.load(path).read(CameraParameters)
 
@@ -74,7 +78,7 @@ class Pinhole:
 
     @classmethod
     def with_fov(cls, width: int, height: int, fov: float) -> "Pinhole":
-        """Return the one that sees ``fov`` (deg) from the left to the right edge of its image."""
+        """Return the camera whose image has the horizontal field of view ``fov`` (deg)."""
         return cls(width, height, 0.5 * width / math.tan(math.radians(fov) / 2.0))
 
     @property
@@ -102,7 +106,7 @@ class Pose:
 
 
 def optical_pose(mount: MountParameters) -> Pose:
-    """Return where the optical frame of a mounted camera is in the vehicle's frame."""
+    """Return the pose of a mounted camera's optical frame in the vehicle's frame."""
     turned = Rotation.from_euler("ZY", [mount.yaw, mount.pitch], degrees=True).as_matrix()
     return Pose(turned @ OPTICAL, np.array([mount.x, mount.y, mount.z]))
 
@@ -113,9 +117,9 @@ _MARGIN = 64
 class PixelNoise:
     """Normally distributed noise, the same for every pixel and colour.
 
-    Drawn once, on a larger image, of which every image (width, height in pixels) gets another part:
-    random numbers for every pixel of every image would take longer than drawing it. ``deviation``
-    is the standard deviation of a value from 0 to 255.
+    The noise is drawn once, on a larger image, of which every image (width, height in pixels) gets
+    another part: random numbers for every pixel of every image would take longer than rendering the
+    image. ``deviation`` is the standard deviation of a value from 0 to 255.
     """
 
     def __init__(self, width: int, height: int, deviation: float, seed: int = 0):

@@ -33,26 +33,26 @@ _EARLY = 1e-6
 class CameraNodeParameters(Parameters):
     """Parameters of `CameraNode`."""
 
-    world: World = parameter(WORLD_FILE, "what there is to be seen, a YAML file")
+    world: World = parameter(WORLD_FILE, "world that the camera sees, a YAML file")
     camera: CameraParameters = parameter(
         File(load, "a camera's YAML file"), "the camera, a YAML file"
     )
     vehicle_frame: str = parameter(
-        FRAME, "what the camera is mounted on", "crazyflie", name="frames/vehicle"
+        FRAME, "frame on which the camera is mounted", "crazyflie", name="frames/vehicle"
     )
     camera_frame: str = parameter(
         FRAME, "the camera's optical frame", "crazyflie/camera", name="frames/camera"
     )
     image_topic: str = parameter(TOPIC, "images", "camera/image_raw", name="topics/image")
     info_topic: str = parameter(
-        TOPIC, "with each image: what the camera is", "camera/camera_info", name="topics/info"
+        TOPIC, "parameters of the camera, with each image", "camera/camera_info", name="topics/info"
     )
 
 
 class CameraNode(Node):
-    """Publish what a camera on a vehicle would see of a world.
+    """Publish the images of a camera on a vehicle in a world.
 
-    Where the vehicle and what moves in the world are is asked of tf.
+    The poses of the vehicle and of moving objects come from tf.
     """
 
     needed_in_flight = True
@@ -81,7 +81,7 @@ class CameraNode(Node):
         self._lookup = handle.listen_to_transforms()
         handle.timer(1.0 / parameters.camera.rate, self._expose)
         if parameters.camera.latency > 0.0:
-            # From then on it delivers as often as it exposes, later by the latency.
+            # From then on, images are delivered at the rate of exposures, later by the latency.
             self._wait = handle.timer(parameters.camera.latency, self._begin_delivery)
 
     def _begin_delivery(self):

@@ -16,10 +16,8 @@ from crazyflie_vision.images import ImageNode, to_message
 class FilterParameters(Parameters):
     """Parameters that all filters have."""
 
-    image_topic: str = parameter(
-        TOPIC, "images to work on", "camera/image_raw", name="topics/image"
-    )
-    result_topic: str = parameter(TOPIC, "where results go", "~image", name="topics/result")
+    image_topic: str = parameter(TOPIC, "input images", "camera/image_raw", name="topics/image")
+    result_topic: str = parameter(TOPIC, "resulting images", "~image", name="topics/result")
 
 
 class FilterNode(ImageNode):
@@ -34,7 +32,7 @@ class FilterNode(ImageNode):
         self.watch(handle, self._parameters.image_topic)
 
     def apply(self, image: filters.Image) -> filters.Image:
-        """Return what the filter makes of an image; see `filters`."""
+        """Return the filtered image; see `filters`."""
         raise NotImplementedError
 
     @override
@@ -54,11 +52,13 @@ class GreyNode(FilterNode):
 class ThresholdParameters(FilterParameters):
     """Parameters of `ThresholdNode`."""
 
-    level: int = parameter(Integer(0, 255), "what is brighter becomes white", 128, live=True)
+    level: int = parameter(
+        Integer(0, 255), "brightness above which pixels become white", 128, live=True
+    )
 
 
 class ThresholdNode(FilterNode):
-    """Publish black and white."""
+    """Publish images in black and white."""
 
     parameters_type = ThresholdParameters
     _parameters: ThresholdParameters
@@ -83,13 +83,13 @@ class OddInteger(Integer):
         return f"an odd integer from {self.minimum} to {self.maximum} ({self.unit})"
 
 
-KERNEL = OddInteger(1, 99, "pixels")  #: Size of a square with a pixel in its middle.
+KERNEL = OddInteger(1, 99, "pixels")  #: Size of a square with a pixel at its centre.
 
 
 class BlurParameters(FilterParameters):
     """Parameters of `BlurNode`."""
 
-    size: int = parameter(KERNEL, "of the square that becomes one pixel", 9, live=True)
+    size: int = parameter(KERNEL, "size of the square that is averaged for a pixel", 9, live=True)
 
 
 class BlurNode(FilterNode):
@@ -109,9 +109,11 @@ _GRADIENT = Number(minimum=0.0, maximum=5000.0)
 class EdgesParameters(FilterParameters):
     """Parameters of `EdgesNode`."""
 
-    low: float = parameter(_GRADIENT, "an edge goes on above this gradient", 40.0, live=True)
-    high: float = parameter(_GRADIENT, "an edge begins above this gradient", 120.0, live=True)
-    size: int = parameter(KERNEL, "of the square that is blurred before", 3, live=True)
+    low: float = parameter(_GRADIENT, "gradient above which an edge continues", 40.0, live=True)
+    high: float = parameter(_GRADIENT, "gradient above which an edge begins", 120.0, live=True)
+    size: int = parameter(
+        KERNEL, "size of the square by which the image is blurred first", 3, live=True
+    )
 
     @override
     def complaints(self) -> Iterator[str]:
@@ -120,7 +122,7 @@ class EdgesParameters(FilterParameters):
 
 
 class EdgesNode(FilterNode):
-    """Publish where brightness changes."""
+    """Publish the edges of images."""
 
     parameters_type = EdgesParameters
     _parameters: EdgesParameters

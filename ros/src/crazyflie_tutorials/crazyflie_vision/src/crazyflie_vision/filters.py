@@ -15,7 +15,7 @@ Image = NDArray[Any]
 def grey(image: Image) -> Image:
     """Return the brightness of a coloured image: 0.299 red + 0.587 green + 0.114 blue.
 
-    The weights are those of ITU-R BT.601, by which eyes see green brighter than blue.
+    The weights are those of ITU-R BT.601: to the eye, green is brighter than blue.
     """
     return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
 
@@ -32,8 +32,8 @@ def edges(image: Image, low: float, high: float, size: int) -> Image:
     """Return where brightness changes: 255 on an edge, elsewhere 0, shape (height, width).
 
     Canny, A Computational Approach to Edge Detection, 1986. A pixel of the coloured image whose
-    gradient is above ``high`` begins an edge, which goes on over pixels above ``low``. The image is
-    blurred before, see `blur`, since noise has edges, too.
+    gradient is above ``high`` begins an edge, which continues over pixels above ``low``. The image
+    is blurred first, see `blur`, since noise also has edges.
     """
     return cv2.Canny(blur(grey(image), size), low, high)
 

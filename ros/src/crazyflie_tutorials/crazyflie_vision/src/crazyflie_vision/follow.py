@@ -1,4 +1,4 @@
-"""Following what a camera sees: it stays in the middle of the image, and at a distance."""
+"""Following a target, which is kept in the middle of a camera's image, and at a distance."""
 
 import math
 
@@ -17,32 +17,36 @@ class GainParameters(Parameters):
     """Gains from errors to velocities."""
 
     forward: float = parameter(
-        _GAIN, "velocity ahead over what is missing in distance", 1.5, live=True
+        _GAIN, "velocity ahead over the error of the distance", 1.5, live=True
     )
-    up: float = parameter(_GAIN, "velocity upwards over what is missing in height", 1.5, live=True)
+    up: float = parameter(_GAIN, "velocity upwards over the error of the height", 1.5, live=True)
     turn: float = parameter(_GAIN, "yaw rate over the angle to the target", 2.5, live=True)
 
 
 class SpeedParameters(Parameters):
     """Limits of the velocities."""
 
-    forward: float = parameter(_SPEED, "ahead, and back", 0.5, live=True)
-    up: float = parameter(_SPEED, "upwards, and down", 0.3, live=True)
-    turn: float = parameter(Number("rad/s", minimum=0.0), "to either side", 1.0, live=True)
+    forward: float = parameter(_SPEED, "largest velocity ahead and back", 0.5, live=True)
+    up: float = parameter(_SPEED, "largest velocity up and down", 0.3, live=True)
+    turn: float = parameter(
+        Number("rad/s", minimum=0.0), "largest yaw rate to either side", 1.0, live=True
+    )
 
 
 class TargetFollower(Parameters):
     """A proportional controller from a target in an image to a velocity."""
 
-    distance: float = parameter(_LENGTH, "to be kept to the target", 1.0, live=True)
-    radius: float = parameter(_LENGTH, "of the target; half the width of a face", 0.12, live=True)
+    distance: float = parameter(_LENGTH, "distance to the target", 1.0, live=True)
+    radius: float = parameter(
+        _LENGTH, "radius of the target; half the width of a face", 0.12, live=True
+    )
     gains: GainParameters = group(GainParameters, "gains")
     limits: SpeedParameters = group(SpeedParameters, "limits")
 
     def velocity(
         self, target: Target, focal_length: float, centre: tuple[float, float]
     ) -> Velocity:
-        """Return the velocity, in the heading frame, that brings a target to its place.
+        """Return the velocity, in the heading frame, towards the place before a target.
 
         The depth follows from the target's radius (> 0), since radius / depth is the same in the
         image as in the world. Focal length and ``centre``, the place of the optical axis (cx, cy),

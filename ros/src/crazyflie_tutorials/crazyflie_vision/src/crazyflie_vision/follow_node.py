@@ -17,14 +17,14 @@ class FollowParameters(TargetFollower):
     """Parameters of `FollowNode`."""
 
     silence: float = parameter(
-        TIME_STEP, "after so long without a target the vehicle stops", 0.12, live=True
+        TIME_STEP, "time without a target after which the vehicle stops", 0.12, live=True
     )
-    time_step: float = parameter(TIME_STEP, "between two velocities", 0.02)
+    time_step: float = parameter(TIME_STEP, "period of the velocities", 0.02)
     target_topic: str = parameter(
-        TOPIC, "what is seen: x, y and, as z, radius in pixels", "target", name="topics/target"
+        TOPIC, "the target: x, y and, as z, radius in pixels", "target", name="topics/target"
     )
     info_topic: str = parameter(
-        TOPIC, "what the camera is", "camera/camera_info", name="topics/info"
+        TOPIC, "parameters of the camera", "camera/camera_info", name="topics/info"
     )
     cmd_vel_topic: str = parameter(
         TOPIC, "velocities in the heading frame", "cmd_vel", name="topics/cmd_vel"
@@ -34,7 +34,7 @@ class FollowParameters(TargetFollower):
 class FollowNode(Node):
     """Publish the velocity that keeps a target in the middle and at a distance.
 
-    Without a target it is zero.
+    Without a target the velocity is zero.
     """
 
     needed_in_flight = True
@@ -85,7 +85,7 @@ class FollowNode(Node):
             return
         if self._focal_length == 0.0:
             topic = self._handle.resolve(self._parameters.info_topic)
-            self._handle.warn(f"there is a target, but nothing on {topic}", throttle=5.0)
+            self._handle.warn(f"a target is received, but no message on {topic}", throttle=5.0)
             return
         target = Target(point.x, point.y, point.z)
         self._velocity = self._parameters.velocity(target, self._focal_length, self._centre)

@@ -16,7 +16,7 @@ SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")  #: Suffixes of pictures in a folde
 class FrameSource:
     """Images, one after the other."""
 
-    is_live: ClassVar[bool] = False  #: Whether images come in their own time.
+    is_live: ClassVar[bool] = False  #: Whether images come at the source's own rate.
 
     def read(self) -> NDArray[Any]:
         """Return the next image, shape (height, width, 3): blue, green, red.
@@ -27,10 +27,10 @@ class FrameSource:
 
 
 class Webcam(FrameSource):
-    """A camera, which is waited for: its number or path, such as "0" or "/dev/video0".
+    """A camera, by its number or path, such as "0" or "/dev/video0".
 
-    Width and height (pixels) and rate (1/s) are asked for, and the camera does what it can. OSError
-    if it cannot be used; the text says which cameras there are.
+    Width, height (pixels) and rate (1/s) are requested; the camera may deliver others. OSError if
+    it cannot be used; the text names the available cameras.
     """
 
     is_live = True
@@ -40,7 +40,7 @@ class Webcam(FrameSource):
         self._capture = cv2.VideoCapture(int(device) if device.isdecimal() else device)
         if not self._capture.isOpened():
             present = ", ".join(sorted(map(str, Path("/dev").glob("video*")))) or "none"
-            raise OSError(f"there is no camera {device}, or it is in use; there are: {present}")
+            raise OSError(f"the camera {device} does not exist, or is in use; available: {present}")
         self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, width)
         self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, height)
         self._capture.set(cv2.CAP_PROP_FPS, rate)
@@ -54,13 +54,13 @@ class Webcam(FrameSource):
 
 
 class Video(FrameSource):
-    """A video file, over and over; OSError if OpenCV cannot read it."""
+    """A video file, in a loop; OSError if OpenCV cannot read it."""
 
     def __init__(self, path: Path):
         self._path = path
         self._capture = cv2.VideoCapture(str(path))
         if not self._capture.isOpened():
-            raise OSError(f"{path} is no video that can be read")
+            raise OSError(f"{path} is not a video that can be read")
 
     @override
     def read(self) -> NDArray[Any]:
@@ -74,7 +74,7 @@ class Video(FrameSource):
 
 
 class Pictures(FrameSource):
-    """A picture, or all of a folder in the order of their names, over and over.
+    """A picture, or all of a folder in the order of their names, in a loop.
 
     OSError: the folder has no picture, or one cannot be read.
     """
@@ -83,7 +83,7 @@ class Pictures(FrameSource):
         paths = sorted(path.iterdir()) if path.is_dir() else [path]
         images = [load_picture(str(each)) for each in paths if each.suffix.lower() in SUFFIXES]
         if not images:
-            raise OSError(f"there are no pictures ({', '.join(SUFFIXES)}) in {path}")
+            raise OSError(f"no pictures ({', '.join(SUFFIXES)}) in {path}")
         self._images = itertools.cycle(images)
 
     @override
@@ -100,4 +100,4 @@ def open_source(device: str, width: int, height: int, rate: float) -> FrameSourc
         return Pictures(path)
     if path.is_file():
         return Video(path)
-    raise OSError(f"there is no camera, video, picture or folder {device!r}")
+    raise OSError(f"{device!r} is not a camera, video, picture or folder")

@@ -22,11 +22,11 @@ _BRIDGE = CvBridge()
 def to_array(message: Image) -> NDArray[np.uint8]:
     """Return the pixels of an image, shape (height, width, 3): blue, green, red.
 
-    ValueError: it has an encoding that has no such meaning, or too little data.
+    ValueError: its encoding has no such colours, or its data are too short.
     """
     what = f"an image of {message.width} x {message.height}, {message.encoding!r}"
     if message.width == 0 or message.height == 0:
-        raise ValueError(f"{what}: it is empty")
+        raise ValueError(f"{what}: the image is empty")
     try:
         return _BRIDGE.imgmsg_to_cv2(message, COLOUR)
     except (CvBridgeError, TypeError, cv2.error) as error:

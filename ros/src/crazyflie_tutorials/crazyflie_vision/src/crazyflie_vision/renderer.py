@@ -1,8 +1,8 @@
-"""The image that a camera has of a world: flat faces, plain or with a picture on them.
+"""The image of a world in a camera: flat faces, plain or with a picture on them.
 
-Everything is drawn into a buffer that knows how near each pixel is (Catmull, A Subdivision
-Algorithm for Computer Display of Curved Surfaces, 1974). It holds the inverse of the depth,
-which on a plane is linear in the pixel's coordinates.
+Everything is drawn into a buffer with the depth of each pixel (Catmull, A Subdivision Algorithm for
+Computer Display of Curved Surfaces, 1974). It contains the inverse depth, which on a plane is
+linear in the pixel's coordinates.
 """
 
 import math
@@ -20,7 +20,7 @@ from crazyflie_world.world import Floor, World
 
 Image = NDArray[np.uint8]  #: Rows, columns and, for colour, blue, green, red.
 LIGHT = np.array([-0.36, 0.28, 0.89])  #: Direction to the light, length 1.
-AMBIENT = 0.6  #: Share of the brightness that a face has when no light falls on it.
+AMBIENT = 0.6  #: Fraction of the brightness of a face without direct light.
 
 CYLINDER_SIDES = 20
 
@@ -32,7 +32,7 @@ _LARGEST_TEXTURE = 2048
 
 @dataclass(frozen=True)
 class Face:
-    """A flat convex polygon that is seen from one side."""
+    """A flat convex polygon that is visible from one side."""
 
     #: Shape (n, 3). Counter-clockwise as seen from outside, m, world frame.
     corners: NDArray[np.float64]
@@ -49,7 +49,7 @@ class Face:
 
     @property
     def shade(self) -> float:
-        """Share of the colour's brightness."""
+        """Fraction of the colour's brightness."""
         return brightness(float(self.normal @ LIGHT))
 
 
@@ -80,10 +80,10 @@ def face_of(floor: Floor) -> Face:
 
 @cache
 def load_picture(path: str) -> Image:
-    """Return the picture in a file; OSError if there is none that OpenCV can read."""
+    """Return the picture in a file; OSError if OpenCV cannot read it."""
     picture = cv2.imread(path, cv2.IMREAD_COLOR)
     if picture is None:
-        raise OSError(f"{path} is no picture that can be read")
+        raise OSError(f"{path} is not a picture that can be read")
     return picture
 
 
@@ -131,7 +131,7 @@ def _texture(floor):
     scale = min(_TEXELS_PER_METRE, _LARGEST_TEXTURE / max(floor.size))
     columns, rows = (max(round(length * scale), 1) for length in floor.size)
     if floor.texture == "checkers":
-        # Lines between tiles go through the origin, the middle of the floor.
+        # Lines between tiles pass through the origin, the middle of the floor.
         x = np.floor((np.arange(columns) - columns / 2.0) / scale / TILE).astype(int)
         y = np.floor((np.arange(rows) - rows / 2.0) / scale / TILE).astype(int)
         light = np.where((x + y[:, None]) % 2 == 0, 1.0, 0.75)
@@ -142,7 +142,7 @@ def _texture(floor):
 
 
 NEAR = 0.02  #: Distance from the camera's plane below which nothing is drawn (m).
-SKY = (225.0, 215.0, 205.0)  #: Blue, green, red of where nothing is.
+SKY = (225.0, 215.0, 205.0)  #: Background colour: blue, green, red.
 
 _SUBPIXEL_BITS = 4
 
@@ -164,13 +164,13 @@ class Renderer:
         self._still = [each for each in world.objects if each.path is None]
         self._still_faces = [face for each in self._still for face in faces_of(each)]
         for each in world.moving:
-            # Its pictures are kept, or complained about, now.
+            # Pictures are loaded now, so that errors are reported now.
             faces_of(each)
 
     def render(self, pose: Pose, moving: Iterable[Shape] = ()) -> Image:
         """Return the image from a pose of the optical frame in the world, see `Image`.
 
-        ``moving`` are the objects that move, where they are now.
+        ``moving`` are the moving objects at their present positions.
         """
         camera = self._camera
         self._image = np.full((camera.height, camera.width, 3), SKY, dtype=np.uint8)
@@ -216,7 +216,7 @@ class Renderer:
         self._put(patch, mask.view(bool), inverse_depth, colours)
 
     def _warped(self, face, corners, corner, shape):
-        # From texels to the plane, to the optical frame, to pixels of the patch.
+        # Transformation from texels to the plane, to the optical frame, to pixels of the patch.
         rows, columns = face.texture.shape[:2]
         lower_left, _, upper_right, upper_left = corners
         plane = np.stack(

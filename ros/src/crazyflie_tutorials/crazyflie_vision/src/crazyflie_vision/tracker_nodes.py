@@ -17,11 +17,9 @@ from crazyflie_vision.trackers import CASCADE, ColourBounds, FaceDetector, Targe
 class TrackerParameters(Parameters):
     """Parameters that all trackers have."""
 
-    image_topic: str = parameter(
-        TOPIC, "images to look at", "camera/image_raw", name="topics/image"
-    )
+    image_topic: str = parameter(TOPIC, "input images", "camera/image_raw", name="topics/image")
     target_topic: str = parameter(
-        TOPIC, "what is seen: x, y and, as z, radius in pixels", "target", name="topics/target"
+        TOPIC, "the target: x, y and, as z, radius in pixels", "target", name="topics/target"
     )
     debug_topic: str = parameter(
         TOPIC, "images with the target marked", "~image", name="topics/debug_image"
@@ -31,7 +29,7 @@ class TrackerParameters(Parameters):
 class TrackerNode(ImageNode):
     """Base class: a tracker has ``parameters_type``, and `find`.
 
-    A target is published with the stamp of its image; where nothing is found, nothing is.
+    A target is published with the stamp of its image; without a target, nothing is published.
     """
 
     _parameters: TrackerParameters
@@ -44,7 +42,7 @@ class TrackerNode(ImageNode):
         self.watch(handle, self._parameters.image_topic)
 
     def find(self, image: NDArray[Any]) -> Target | None:
-        """Return what is followed; None where it is not seen."""
+        """Return the target, or None if it is not seen."""
         raise NotImplementedError
 
     @override
@@ -61,12 +59,12 @@ class ColourTrackerParameters(ColourBounds, TrackerParameters):
     """Parameters of `ColourTrackerNode`."""
 
     smallest_area: float = parameter(
-        Number("pixels", minimum=1.0), "what is smaller is no target", 30.0, live=True
+        Number("pixels", minimum=1.0), "area of the smallest target", 30.0, live=True
     )
 
 
 class ColourTrackerNode(TrackerNode):
-    """Publish where the largest thing of a colour is."""
+    """Publish the place of the largest object of a colour."""
 
     parameters_type = ColourTrackerParameters
     _parameters: ColourTrackerParameters
@@ -84,12 +82,15 @@ class FaceDetectorParameters(TrackerParameters):
         Integer(20, 1000, "pixels"), "width of the smallest face", 30, live=True
     )
     neighbours: int = parameter(
-        Integer(1, 50), "finds that make a face; more of them, fewer mistakes", 4, live=True
+        Integer(1, 50),
+        "number of overlapping finds that make a face; more of them give fewer errors",
+        4,
+        live=True,
     )
 
 
 class FaceDetectorNode(TrackerNode):
-    """Publish where the largest face is."""
+    """Publish the place of the largest face."""
 
     parameters_type = FaceDetectorParameters
     _parameters: FaceDetectorParameters

@@ -1,4 +1,4 @@
-"""Targets in images: a thing of one colour, by the moments of its image; faces, by a cascade.
+"""Targets in images: an object of one colour, by the moments of its image; faces, by a cascade.
 
 Viola and Jones, Rapid Object Detection using a Boosted Cascade of Simple Features, 2001.
 """
@@ -20,7 +20,7 @@ _SUBPIXEL_BITS = 4
 
 @dataclass(frozen=True)
 class Target:
-    """A round thing in an image; all in pixels."""
+    """A round object in an image; all in pixels."""
 
     #: x, y: Its centre, from the middle of the upper left pixel, to the right and down.
     x: float
@@ -70,7 +70,7 @@ class ColourBounds(Parameters):
     value_upper: int = parameter(_BYTE, "likewise", 255, live=True)
 
     def mask(self, image: NDArray[Any]) -> NDArray[Any]:
-        """Return 255 where an image (blue, green, red) has such a colour, elsewhere 0."""
+        """Return 255 where an image (blue, green, red) has a colour in the range, elsewhere 0."""
         hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
         if self.hue_lower <= self.hue_upper:
             return self._between(hsv, self.hue_lower, self.hue_upper)
@@ -83,22 +83,22 @@ class ColourBounds(Parameters):
 
 
 def largest_blob(mask: NDArray[Any]) -> NDArray[Any]:
-    """Return a mask with the largest connected part of a mask only, grains of noise taken off."""
+    """Return a mask with the largest connected part of a mask only, without grains of noise."""
     opened = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8))
     count, labels, figures, _ = cv2.connectedComponentsWithStats(opened)
     if count == 1:
         return opened
-    # Label 0 is what is not in the mask.
+    # Label 0 is the background.
     largest = 1 + int(np.argmax(figures[1:, cv2.CC_STAT_AREA]))
     return np.where(labels == largest, np.uint8(255), np.uint8(0))
 
 
 def find(image: NDArray[Any], bounds: ColourBounds, smallest_area: float) -> Target | None:
-    """Return the largest thing of a colour in an image, as a disc with its centre and area.
+    """Return the largest object of a colour in an image, as a disc with its centre and area.
 
     With the moments m of its mask the centre is (m10 / m00, m01 / m00), and the area m00
-    (Hu, Visual Pattern Recognition by Moment Invariants, 1962). A thing of less than
-    ``smallest_area`` (pixels) is no target.
+    (Hu, Visual Pattern Recognition by Moment Invariants, 1962). An object of less than
+    ``smallest_area`` (pixels) is not a target.
     """
     moments = cv2.moments(largest_blob(bounds.mask(image)), binaryImage=True)
     area = moments["m00"]
@@ -116,7 +116,8 @@ class FaceDetector:
 
     ``smallest`` is the width of the smallest face, pixels; the time that it takes is about 1 /
     smallest^2. ``neighbours`` is the number of overlapping finds that make a face; more of them
-    miss more faces, and find fewer false ones. OSError: the file is not there, or holds no cascade.
+    miss more faces, and find fewer false ones. OSError: the file does not exist, or is not a
+    cascade.
     """
 
     def __init__(self, cascade: str = CASCADE, smallest: int = 24, neighbours: int = 4):
@@ -126,7 +127,7 @@ class FaceDetector:
         except cv2.error:
             is_loaded = False
         if not is_loaded:
-            raise OSError(f"{cascade} is no cascade; those of Debian are in opencv-data")
+            raise OSError(f"{cascade} is not a cascade; those of Debian are in opencv-data")
         self.smallest = smallest
         self.neighbours = neighbours
 

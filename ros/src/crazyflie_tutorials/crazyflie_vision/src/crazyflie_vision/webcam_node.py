@@ -20,23 +20,25 @@ class WebcamParameters(Parameters):
     """Parameters of `WebcamNode`."""
 
     device: str = parameter(
-        TEXT, "path of a camera, or its number; or of a video, picture or folder", "/dev/video0"
+        TEXT, "path or number of a camera; or path of a video, picture or folder", "/dev/video0"
     )
     width: int = parameter(_PIXELS, "of the images", 320)
     height: int = parameter(_PIXELS, "of the images", 240)
-    rate: float = parameter(Number("Hz", above=0.0, maximum=200.0), "images a second", 30.0)
+    rate: float = parameter(Number("Hz", above=0.0, maximum=200.0), "rate of images", 30.0)
     fov: float = parameter(
-        Number("deg", minimum=10.0, maximum=150.0), "between the left and the right edge", 60.0
+        Number("deg", minimum=10.0, maximum=150.0),
+        "angle between the left and the right edge",
+        60.0,
     )
     frame: str = parameter(FRAME, "the camera's optical frame", "camera", name="frames/camera")
     image_topic: str = parameter(TOPIC, "images", "camera/image_raw", name="topics/image")
     info_topic: str = parameter(
-        TOPIC, "with each image: what the camera is", "camera/camera_info", name="topics/info"
+        TOPIC, "parameters of the camera, with each image", "camera/camera_info", name="topics/info"
     )
 
 
 class WebcamNode(Node):
-    """Publish what a webcam sees; end when it is gone."""
+    """Publish the images of a webcam; end when it is disconnected."""
 
     needed_in_flight = True
 
@@ -58,7 +60,7 @@ class WebcamNode(Node):
         self._images = handle.publisher(parameters.image_topic, Image)
         self._infos = handle.publisher(parameters.info_topic, CameraInfo)
         if self._source.is_live:
-            # It waits for images, which a callback must not.
+            # The thread waits for images, which a callback must not do.
             threading.Thread(target=self._watch, daemon=True).start()
         else:
             handle.timer(1.0 / parameters.rate, self._on_timer)

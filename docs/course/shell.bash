@@ -21,13 +21,13 @@ else
   set -m  # a process group of its own: Ctrl-C in this terminal does not end the flight
   eval "$launch" >~/course.log 2>&1 &
   launched=$!
-  trap 'kill -INT -- -$launched; wait $launched 2>/dev/null' EXIT
+  trap 'kill -INT -- -$launched 2>/dev/null; wait $launched 2>/dev/null' EXIT
   for _ in {1..60}; do
     rostopic list >/dev/null 2>&1 && break
     sleep 0.5
   done
   echo "Launched: $launch"
-  echo "Its output is in ~/course.log. Type exit to stop it."
+  echo "Its output is in ~/course.log. To stop it, type fg and press Ctrl-C, or type exit."
   [ -z "${DISPLAY:-}" ] || echo "RViz starts near the vehicle: zoom out with the mouse wheel, turn the view with the left button."
 fi
 echo "The lesson: docs/course/${page##*/}"

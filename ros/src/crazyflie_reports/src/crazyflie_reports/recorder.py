@@ -42,7 +42,10 @@ def record(folder: Path, topics: str, ros_arguments: list[str]) -> int:
     (program,) = roslib.packages.find_node("rosbag", "record")[:1]
     command = [program, "--split", f"--size={MAX_SIZE}", "--lz4", "--tcpnodelay", "--quiet"]
     command += ["-e", topics, "-O", str(folder / "flight.bag")]
-    process = subprocess.Popen([*command, *ros_arguments], preexec_fn=lambda: os.nice(10))
+    # Its warnings are shown, and not a line for each topic.
+    process = subprocess.Popen(
+        [*command, *ros_arguments], stdout=subprocess.DEVNULL, preexec_fn=lambda: os.nice(10)
+    )
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, lambda number, frame: process.send_signal(signal.SIGINT))
     print(f"recording into {folder}", flush=True)

@@ -1,4 +1,4 @@
-"""What `simulate` takes and refuses, what it returns, and its README."""
+"""Arguments, refusals and results of `simulate`, and its README."""
 
 import math
 import re

@@ -31,7 +31,7 @@ FEATURES = {8: {"avx512f": True}, 4: {"avx2": True}, 2: {}}
 
 
 def fly():
-    """Return the states at the end of flights with errors of everything, compiled anew."""
+    """Return the final states of flights with all errors, compiled again."""
     program.clear()
     flights = simulate(
         quadrotor(np.linspace(-0.1, 0.1, 5)),

@@ -67,7 +67,7 @@ def vehicle(name, x, y=0.0, z=0.0, **details):
 
 
 class FakeDashboard:
-    """What pages call of a `Dashboard`: carries out commands at once, keeps what it was told."""
+    """The part of `Dashboard` that pages call: carries out commands at once, and records them."""
 
     def __init__(self):
         self.pages = PageControl()

@@ -1,4 +1,4 @@
-"""A dashboard on a fake process, beside vehicles that are services and poses only."""
+"""A dashboard on a fake process, with vehicles that are services and poses only."""
 
 from concurrent.futures import Future
 
@@ -132,14 +132,14 @@ class FakeFleet:
         self.process.advance(0.05)
 
     def find(self):
-        """Have the dashboard find all vehicles, with poses."""
+        """Make the dashboard find all vehicles, with poses."""
         self.process.advance(0.1)
         self.send_poses()
         self.process.advance(2.1)
         self.send_poses()
 
     def fly(self, **places):
-        """Have vehicles in flight, at places (m) by name."""
+        """Put vehicles into flight, at places (m) by name."""
         for name in self.names:
             self.report(name, FlightStatus.FLYING)
         self.send_poses(places=places)

@@ -68,7 +68,7 @@ def stopped(process):
 
 
 class Browser:
-    """What an operator does in one window of Chromium."""
+    """Actions of an operator in one window of Chromium."""
 
     def __init__(self, driver, url):
         self.driver, self.url = driver, url
@@ -122,7 +122,7 @@ class Browser:
         return f'.card[data-vehicle="{name}"]'
 
     def choose(self, *names):
-        """Choose vehicles by the boxes of their cards, beside those that are chosen."""
+        """Choose vehicles by the boxes of their cards, in addition to the chosen ones."""
         for name in names:
             wait_for(lambda name=name: self.find(f"{self.card(name)} input").click() or True, name)
             wait_for(lambda name=name: self.find(f"{self.card(name)}.chosen"), f"{name} chosen")

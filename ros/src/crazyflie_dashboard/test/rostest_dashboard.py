@@ -163,7 +163,7 @@ def test_a_takeoff_at_a_node_that_is_stopped_does_not_happen_when_it_goes_on(das
         refused = command(dashboard, operator, Action.TAKEOFF, ["cf2"])["cf2"]
     assert "has not been reached within" in refused
     wait_until(lambda: fresh(dashboard) == [*NAMES], "fresh vehicles", LIMIT)
-    # What the node would do is done before a takeoff that comes later.
+    # The node's work is done before a later takeoff.
     assert command(dashboard, operator, Action.TAKEOFF, ["cf3"]) == {"cf3": ""}
     wait_until(lambda: height(dashboard, "cf3") > 0.9, "cf3 up", LIMIT)
     assert height(dashboard, "cf2") < 0.05

@@ -102,7 +102,7 @@ def test_the_key_of_the_emergency_counts_right_after_loading_with_a_stopped_mast
     browser.has("on the ground", browser.card("cf1"))
     browser.press("Take off")
     browser.has("1 in flight")
-    # What a page plots is received for it alone: this ends, and begins, with the page.
+    # Plotted topics are received for one page only: the subscription begins and ends with the page.
     wait_for(lambda: dashboard.plots(dashboard.pages.pages[-1]), "plots")
     with stopped(rosgraph.Master("/dashboard").getPid()):
         browser.driver.get(browser.url)

@@ -156,7 +156,7 @@ BOX = {f"box/{side}/{axis}": x for side, x in (("min", -1.0), ("max", 2.0)) for 
 
 
 def add_topic(fleet, topic, kind):
-    """Have the dashboard see a topic more."""
+    """Add a topic to the dashboard's graph."""
     fleet.graph = Graph({**fleet.graph.topics, topic: kind}, services=fleet.graph.services)
     fleet.process.advance(2.1)
 

@@ -158,7 +158,7 @@ def test_a_mission_outlives_its_dashboard_and_the_next_one_stops_it(script, miss
     with pytest.raises(RefusalError, match="was stopped before"):
         third.stop()
     Path(mission.path + ".ground").touch()
-    # What it says after its dashboard has gone does not end it before it has landed.
+    # Output after its dashboard's end must not end the mission before it has landed.
     wait_until(lambda: Path(mission.path + ".landed").exists(), limit=LIMIT)
     wait_until(lambda: second.running == () == third.running, limit=LIMIT)
 

@@ -278,7 +278,7 @@ def test_parameters_right_and_wrong(browser, server):
     browser.select("node or vehicle", "/cf1/controller")
     row = '.parameter[data-name="K/gain"]'
     browser.has("float · 1/s · 0 to 2 · gain of the height", row)
-    # What was typed is sent on Enter, and not when the field is left.
+    # Typed text is sent on Enter, not when the field loses the focus.
     browser.enter(f"{row} input", "0.9")
     browser.find(".search input").click()
     browser.enter(f"{row} input", "0.75\n")
@@ -524,7 +524,7 @@ def test_the_emergency_is_in_a_window_of_any_size(browser, driver):
             assert driver.execute_script(f"return {top} !== null")
             assert browser.find(".scene").rect["height"] > 100
             assert browser.find('input[aria-label="height, m"]').rect["width"] > 30
-            # Nothing is beside the window.
+            # Nothing is outside the window.
             wide = "return document.documentElement.scrollWidth <= innerWidth"
             assert driver.execute_script(wide)
     finally:

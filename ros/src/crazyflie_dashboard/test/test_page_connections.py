@@ -94,7 +94,7 @@ def test_a_connection_that_is_lost_and_comes_back_moves_nothing_and_has_no_contr
     browser.press("Take off")
     browser.has("hovering", browser.card("cf1"))
     before = browser.text(".control").split()[1]
-    # What is clicked without a connection is sent when there is one again.
+    # Clicks without a connection are sent when the connection is back.
     land = browser.button("Land")
     driver.execute_script("window.socket.io.engine.close(); arguments[0].click()", land)
     browser.has("this page can only watch: no page has control")

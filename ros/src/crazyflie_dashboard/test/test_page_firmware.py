@@ -15,7 +15,7 @@ from crazyflie_utils.testing.fake_process import FakeProcess
 from crazyflie_utils.testing.fixtures import own_cache  # noqa: F401
 from crazyflie_virtual.testing import virtual_vehicle
 
-LIMIT = 60.0  # Of connecting, s, on a loaded machine.
+LIMIT = 60.0  # Timeout of connecting on a loaded machine (s).
 
 
 @pytest.fixture

@@ -92,7 +92,7 @@ def test_the_nodes_fly_it_calmly(controller, dynamics, message):
     flown = np.array(controls[begin:])
     assert len(flown) > 550
     assert np.abs(np.diff(flown[:, :2], axis=0)).mean() < 0.01
-    # From the controller's first control on, including the climb.
+    # Measured from the controller's first control on, including the climb.
     flying = np.array([each for each in controls if each[3] > MIN_THRUST / 2.0])
     assert np.abs(flying[:, :2]).max() < MAX_TILT - 1e-6
     assert MIN_THRUST < flying[:, 3].min() and flying[:, 3].max() < MAX_THRUST

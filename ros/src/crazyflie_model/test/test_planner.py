@@ -65,9 +65,9 @@ def test_the_turn_is_the_shorter_one():
 RADIUS = st.floats(0.0, 2.0)
 
 _SPIRAL_ERROR = 0.0176
-"""Part of the greater radius that the firmware's polynomial is beside the spiral, in the middle of
-a quarter of a turn that begins or ends on the axis: it has no jerk at its ends, and a spiral has.
-Found by calculation: 0.01755, and less for all other radii and angles."""
+"""Fraction of the greater radius by which the firmware's polynomial departs from the spiral, in the
+middle of a quarter of a turn that begins or ends on the axis: it has no jerk at its ends, and a
+spiral has. Found by calculation: 0.01755, and less for all other radii and angles."""
 
 
 def on_spiral(start, angle, radii, ascent, sideways, clockwise, s):

@@ -49,7 +49,7 @@ def test_nice_hover():
     assert lands(track)
 
 
-# What these examples call is tested without a master; one flight and its ends remain.
+# The calls of these examples are tested without a master; one flight and its ends remain.
 @pytest.mark.long
 def test_groups():
     track = fly("group_mask.py")

@@ -9,14 +9,14 @@ RADII = np.array([0.125, 0.125, 0.375])
 
 
 def avoid_each_other(swarm, radii=RADII, **settings):
-    """Let each vehicle avoid all."""
+    """Enable avoidance of all vehicles by each vehicle."""
     vehicles = swarm.allcfs.crazyflies
     for cf in vehicles:
         cf.enableCollisionAvoidance(vehicles, radii, **settings)
 
 
 def collisions(swarm, duration, radii=RADII):
-    """Let time pass (s); return whether ellipsoids have intersected."""
+    """Advance the time (s); return whether ellipsoids have intersected."""
     end = swarm.timeHelper.time() + duration
     found = False
     while swarm.timeHelper.time() < end - 1e-6:

@@ -1,4 +1,4 @@
-"""What scripts import, without ROS."""
+"""Imports of scripts, without ROS."""
 
 import subprocess
 import sys

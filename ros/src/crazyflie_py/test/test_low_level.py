@@ -89,7 +89,7 @@ def test_commands_follow_after_notify_setpoints_stop(caplog):
     swarm.timeHelper.sleep(0.4)
     one.notifySetpointsStop(remainValidMillisecs=200)
     swarm.timeHelper.sleep(1.0)
-    # The last setpoint counts for 0.2 s more.
+    # The last setpoint remains valid for 0.2 s.
     assert one.position() == pytest.approx([1.0, 0.3, 1.0])
     one.land(0.02, 1.0)
     swarm.timeHelper.sleep(1.0)

@@ -107,7 +107,7 @@ def test_vehicles_of_missions_have_all_commands_of_scripts(vehicle):
     }
     for script_name, name in commands.items():
         assert hasattr(Crazyflie, script_name)
-        # What the protocol only declares would do nothing.
+        # A method that only the protocol declares would do nothing.
         assert getattr(vehicle, name) is not getattr(MissionVehicle, name), name
 
 

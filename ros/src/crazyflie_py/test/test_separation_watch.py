@@ -56,7 +56,7 @@ class Connection:
 
 
 def fly(vehicles, duration, connection=None):
-    """Let time pass, s; return the warnings."""
+    """Advance the time, s; return the warnings."""
     connection = connection or Connection()
     watch = SeparationWatch(vehicles, [0.15] * len(vehicles), connection)
     for _ in range(round(duration / STEP)):

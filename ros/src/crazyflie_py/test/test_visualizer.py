@@ -39,7 +39,7 @@ def test_without_a_display_nothing_is_drawn():
 def test_a_display_that_does_not_answer_is_reported(monkeypatch, caplog, has_toolkit):
     monkeypatch.setenv("DISPLAY", ":9999")
     if has_toolkit:
-        # What matplotlib chooses then.
+        # The backend that matplotlib then chooses.
         matplotlib.use("agg")
     else:
         monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)

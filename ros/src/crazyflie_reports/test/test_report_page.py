@@ -49,7 +49,7 @@ def narrow():
 
 
 def open_report(browser, folder, bag, moment=5.0, *others):
-    """Show the report of a bag, and of others beside it, at a time of its replay (s)."""
+    """Show the report of a bag, and of additional ones, at a time of its replay (s)."""
     make([bag, *others], folder / "out")
     browser.get_log("browser")
     browser.get("about:blank")

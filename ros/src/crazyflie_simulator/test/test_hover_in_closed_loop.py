@@ -44,7 +44,7 @@ STIFF = lqr([0.1] * 4), (-0.5, 0.5, -10.0), (0.5, 0.5, 0.5)
 
 
 def errors(controller, duration, **options):
-    """Return the distance from the goal, 100 a second, after a take-off from beside it."""
+    """Return the distance from the goal, 100 a second, after a takeoff next to it."""
     gains, integrator, limits = controller
     feedback = IntegralStateFeedback(gains, HOVER, 6, integrator, limits)
     estimator = MotionEstimator(FiniteDifference(), FiniteDifference())

@@ -9,7 +9,7 @@ from crazyflie_simulator.simulator_node import IDLE_PERIOD, NearHoverSimulatorNo
 from crazyflie_utils import NodeHandle, TransformError
 from crazyflie_utils.node import Node
 
-#: What the machine of a fake process needs for a tick of a clock that is as fast as it can be, s.
+#: Time of a fake process for a tick of a clock at full speed (s).
 TICK = 1e-4
 
 
@@ -92,7 +92,7 @@ def test_errors_are_those_of_all_poses(error):
 
 @pytest.fixture
 def real_time(monkeypatch):
-    """Let a fake process be one in real time, for a simulator."""
+    """Run a fake process in real time, for a simulator."""
     monkeypatch.setattr(NodeHandle, "uses_sim_time", property(lambda handle: False))
 
 

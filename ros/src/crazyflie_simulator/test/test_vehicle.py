@@ -123,7 +123,7 @@ def test_a_vehicle_that_has_tipped_over_stops_its_motors_until_it_is_told_otherw
     assert vehicle.has_crashed
     assert vehicle.state[5] == pytest.approx(-1.1 * GRAVITY, rel=0.01)
     vehicle.recover()
-    # What was commanded before does not count any more.
+    # Earlier commands are no longer valid.
     vehicle.advance_to(1.3)
     assert vehicle.state[5] == pytest.approx(-1.2 * GRAVITY, rel=0.01)
     falling = vehicle.state[5]

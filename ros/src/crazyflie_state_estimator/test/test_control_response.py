@@ -57,7 +57,8 @@ def test_the_noise_is_that_about_a_straight_line():
     positions = rng.normal(0.0, 0.01, (5, 3)) + np.outer(np.arange(5), [0.1, -0.2, 0.3])
     monitor = fed(0.011, 6, positions=lambda k: positions[min(k, 4)])
     _, squares, *_ = np.polyfit(np.arange(5), positions, 1, full=True)
-    # Of 5 poses on 3 axes, less the line's 2 coefficients; averaged over 40 blocks.
+    # Degrees of freedom of 5 poses on 3 axes, less the line's 2 coefficients; averaged over 40
+    # blocks.
     variance = squares.sum() / (3 * (5 - 2))
     assert monitor._noise == pytest.approx(math.sqrt(1e-6 + (variance - 1e-6) / 40.0))
 

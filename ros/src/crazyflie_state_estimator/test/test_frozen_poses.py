@@ -269,6 +269,6 @@ def test_a_vehicle_that_is_lifted_for_long_is_not_on_the_ground():
     # Beyond 3 m/s^2 for 2.5 s it has made 0.25 m/s; 0.3 m/s lift any vehicle.
     assert not any(camera.show((0.0, 0.0, 0.0), (0.0, 0.0, 3.1), 2.5))
     assert camera.show((0.0, 0.0, 0.0), (0.0, 0.0, 3.1), 1.0)[-1]
-    # Elsewhere it begins anew.
+    # At another place it restarts.
     camera.show((0.0, 0.0, 0.001), (0.0, 0.0, 3.1))
     assert not any(camera.show((0.0, 0.0, 0.001), (0.0, 0.0, 3.1), 2.5))

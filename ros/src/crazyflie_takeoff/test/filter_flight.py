@@ -48,7 +48,7 @@ class Flight:
             self.vehicle.command(thrust - self.hover + G if thrust > 0.0 else 0.0)
 
     def run(self, duration):
-        """Let time pass; the controller keeps the vertical speed that it had."""
+        """Advance the time; the controller keeps its vertical speed."""
         for _ in range(round(duration * 100)):
             self.ticks += 1
             self.vehicle.advance(0.01)

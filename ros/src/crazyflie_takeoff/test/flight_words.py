@@ -1,4 +1,4 @@
-"""What was said in a network of processes, for the tests of whole flights."""
+"""The log of a network of processes, for the tests of whole flights."""
 
 
 def states(network):

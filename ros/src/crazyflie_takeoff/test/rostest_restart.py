@@ -39,9 +39,9 @@ def heard():
 
 
 def kill(node, heard):
-    """Let a node die in the middle of whatever it is doing; roslaunch starts another one.
+    """Kill a node at any moment; roslaunch restarts it.
 
-    What has been heard until then is forgotten.
+    Earlier messages are dropped.
     """
     uri = rosgraph.Master("/rostest_restart").lookupNode(node)
     _, _, pid = ServerProxy(uri).getPid("/rostest_restart")

@@ -194,7 +194,7 @@ class Network(FakeGraph):
         return self._processes[f"/{name}"]
 
     def advance_until(self, condition, limit=30.0):
-        """Let time pass until a condition holds."""
+        """Advance the time until a condition holds."""
         end = self.time + limit
         while not condition():
             assert self.time < end, "the condition never came true"

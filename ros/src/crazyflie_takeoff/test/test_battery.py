@@ -132,7 +132,7 @@ def test_the_time_below_a_level_begins_with_the_first_voltage_that_is_below():
         assert battery.charge(float(time)) is charge
 
 
-# What people are told.
+# Texts for the operator.
 
 
 def test_status_in_words():

@@ -94,7 +94,7 @@ def test_the_flight_state_tells_a_listening_filter_to_pass_the_controller():
     assert control_filter.commanded(0.0, "c1") is None
     control_filter.flight_state = FLYING
     assert control_filter.commanded(0.01, "c2") == "c2"
-    # What has waited is older by now than what has been passed on.
+    # The waiting control is older by now than the one that was passed on.
     assert control_filter.stop_listening(0.2) is None
 
 

@@ -1,4 +1,4 @@
-"""What a filter passes on of a control, and of whose; with a clock moved by hand."""
+"""Controls that a filter passes on, by their sender; with a clock moved by hand."""
 
 import math
 
@@ -131,7 +131,7 @@ def test_a_filter_that_was_stopped_once_does_not_say_so():
 @pytest.mark.parametrize(
     ("gap", "climb", "least", "most"),
     [
-        # 0.5 m/s within the longest gap; the speed that there is counts after 0.2 s.
+        # 0.5 m/s within the longest gap; after 0.2 s the present speed is included.
         (0.25, 0.0, -2.0, 2.0),
         (0.25, 0.25, -3.0, 1.0),
         (0.25, -0.25, -1.0, 3.0),
@@ -161,7 +161,7 @@ def test_a_gap_is_forgotten_in_two_seconds():
     gaps = RunGaps()
     gaps.run(1.0)
     gaps.run(9.0)
-    # A clock that steps further was set: it counts as 1 s.
+    # A clock that steps further was set: 1 s is used.
     assert gaps.longest == 1.0
     gaps.run(9.0)
     gaps.run(8.0)

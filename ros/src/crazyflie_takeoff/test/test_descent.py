@@ -70,7 +70,7 @@ def test_a_vehicle_that_does_not_descend_is_landed_all_the_same():
     flight.request(Event.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 1.0))
     assert clock.run_until(LANDING) == pytest.approx(1.0 / 0.3 + 3.0, abs=0.011)
-    # Zero thrust for at most two seconds until it counts as down.
+    # Zero thrust for at most two seconds until the vehicle is down.
     assert clock.run_until(ON_GROUND) == pytest.approx(1.0 / 0.3 + 6.0, abs=0.03)
     assert clock.thrusts()[-1][1] == 0.0
 

@@ -83,7 +83,7 @@ def test_a_call_for_all_is_repeated_for_a_second():
     assert len(process.published("/all/emergency")) == 1
     process.advance(0.5)
     assert len(process.published("/all/emergency")) == 11
-    # Another call begins anew.
+    # Another call restarts the time.
     process.call("/all/emergency", EmptyRequest())
     process.advance(3.0)
     assert len(process.published("/all/emergency")) == 11 + 20

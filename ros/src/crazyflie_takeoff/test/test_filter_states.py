@@ -30,7 +30,7 @@ class World:
         self.measured = self.machine.relay.measured
 
     def change(self, random):
-        """Let time pass, and facts change."""
+        """Advance the time, and change facts."""
         step = random.choice([0.01, 0.01, 1.0, 3.0, 9.0])
         self.machine.elapsed += step
         self.machine.silence = random.choice([0.0, 0.2])

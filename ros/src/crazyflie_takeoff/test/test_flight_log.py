@@ -1,4 +1,4 @@
-"""What a flight leaves in the log."""
+"""The log of a flight."""
 
 import pytest
 from flight_words import until_on_ground

@@ -34,7 +34,7 @@ class RogueNode(Node):
 
 
 def climb_of(network, duration):
-    """Let time pass; return how high the vehicle comes, m."""
+    """Advance the time; return the largest height of the vehicle, m."""
     top = network.vehicle.z
     for _ in range(round(duration / 0.05)):
         network.advance(0.05)

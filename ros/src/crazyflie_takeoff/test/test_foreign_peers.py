@@ -1,4 +1,4 @@
-"""Server or filter beside another implementation, which knows only the toggle."""
+"""Server or filter with another implementation, which has only the toggle."""
 
 import pytest
 from std_msgs.msg import Empty

@@ -82,7 +82,7 @@ def test_a_landing_that_begins_while_no_states_reach_the_server(network):
 
 
 def above_a_table(table, height, **parameters):
-    """Return a network that has taken off from a table, and flies beside it (heights in m)."""
+    """Return a network that has taken off from a table, and flies next to it (heights in m)."""
     network = HoverNetwork({**SERVER, "hover/z": table + 0.5, **parameters})
     network.vehicle.z = network.vehicle.ground = table
     network.take_off()

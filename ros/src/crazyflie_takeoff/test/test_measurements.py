@@ -89,7 +89,7 @@ def test_messages_are_on_time_after_the_wall_clock_was_set(step, is_under_way):
         assert delay.excess(stamp, wall + 1.0, 1.0) == 0.0
     for k in range(101, 300):
         excess = delay.excess(wall + 0.01 * k - 0.005, wall + 0.01 * k, 0.01 * k)
-        # Of a message that was stamped up to 0.05 s ahead, the age is learned.
+        # The age of a message that was stamped up to 0.05 s ahead is learned.
         assert excess < 0.051
     # One that is late now is noticed as before.
     assert delay.excess(wall + 3.0 - 0.605, wall + 3.0, 3.0) == pytest.approx(0.6, abs=0.06)
@@ -136,7 +136,7 @@ def test_what_has_flown_is_down_where_it_stays_without_enough_thrust():
     ground.measure(at(0.8), is_on_ground=False, in_flight=False)
     assert ground.has_touched_down(at(0.75))
     ground.measure(at(0.86), is_on_ground=False, in_flight=False)
-    # It may hover beside a table, as high as this.
+    # It may hover next to a table, at the table's height.
     assert not ground.has_touched_down(at(0.75))
     for thrust, speed in [(0.76, 0.0), (0.74, 0.1), (0.74, -0.1)]:
         for _ in range(100):
@@ -225,7 +225,7 @@ def test_a_complaint_has_to_last():
     assert [debounce.advance(0.25, "fast") for _ in range(3)] == ["", "", "fast"]
 
 
-# What ends a flight.
+# Faults that end a flight.
 
 
 def level(thrust):
@@ -240,7 +240,7 @@ def test_a_vehicle_that_is_to_land_has_to_come_down():
     watch = DescentWatch()
     said = [bool(watch.advance(0.25, 1.0)) for _ in range(8)]
     assert said == [False] * 7 + [True]
-    # Slowly is enough, and one that was in flight meanwhile begins anew.
+    # A slow motion is enough, and the time of a vehicle that was in flight meanwhile restarts.
     assert not any(watch.advance(0.25, 0.97 - 0.015 * k) for k in range(40))
     assert not any(watch.advance(0.25, height) for height in [None, *[1.0] * 7])
 
@@ -324,7 +324,7 @@ def test_so_many_changes_as_tolerated_are_a_handover():
         assert callers.complaint == ""
         callers.note(1.0 + 0.25 * k, name)
     assert callers.complaint == "two nodes publish controls, a and b; expected one"
-    # Half a second later is none beside another; 5 s later it is forgotten.
+    # Half a second later it is not a second one; 5 s later it is forgotten.
     callers.advance(6.25)
     assert callers.complaint != ""
     callers.advance(6.375)

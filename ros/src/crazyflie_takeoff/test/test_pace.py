@@ -92,7 +92,7 @@ def test_a_lost_control_is_noticed_in_time(moment):
     # First it fades what was passed on last.
     assert 0.05 < taken_over - last < 0.1
     assert "no control comes" in moment.last("/in_flight_filter")
-    # From then on every 10 ms.
+    # After that, every 10 ms.
     assert (
         len(moment.on("/control/final", taken_over)) >= round((moment.time - taken_over) * 100) - 1
     )

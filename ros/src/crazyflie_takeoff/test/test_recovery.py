@@ -1,4 +1,4 @@
-"""What a server that has just started concludes from the filter's report and the position."""
+"""Conclusions of a restarted server from the filter's report and the position."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What is passed on of one control: late ones, those of a landing, and what they teach."""
+"""Controls as passed on: late ones, those of a landing, and the hover that is learned from them."""
 
 from random import Random
 
@@ -154,7 +154,8 @@ def test_only_a_landing_that_is_seen_above_the_ground_has_to_come_down(state, z,
 
 # The short way.
 
-#: Of the thrust of hover, m/s^2: it is learned from the mean of the controls between two ticks.
+#: Tolerance of the thrust of hover (m/s^2), which is learned from the mean of the controls between
+#: two ticks.
 TOLERANCE = 0.002
 
 

@@ -101,7 +101,7 @@ def test_server_in_flight(network):
     [*itertools.product([0.02, 0.5, 0.99, 1.2, 3.0, 5.98], [0.3, 3.0]), (0.99, 2.01)],
 )
 def test_server_during_takeoff_when_the_height_is_known(seeing, moment, gap):
-    """What was begun ends on the ground, as softly as a landing."""
+    """An interrupted manoeuvre ends on the ground, as softly as a landing."""
     seeing.call("/takeoff")
     seeing.advance(moment)
     begun = seeing.time

@@ -1,4 +1,4 @@
-"""What the filter flies by itself: thrust of hover, braking."""
+"""Flight by the filter's own controls: thrust of hover, braking."""
 
 import math
 
@@ -43,7 +43,7 @@ def test_a_state_that_is_the_last_one_is_not_taken_again():
     safe = SafeControl(G, motion, 0.2, Setpoint(0.0, 0.0, 0.0, 16.0))
     thrusts = [safe.advance(0.01, motion, False).thrust for _ in range(3)]
     assert max(thrusts) == pytest.approx(G - MAX_BRAKING)
-    # A new one counts.
+    # A new one is used.
     slow = motion._replace(velocity=(0.0, 0.0, 0.0))
     assert safe.advance(0.01, slow, False).thrust > G - 1.0
 
@@ -127,7 +127,7 @@ def test_a_descent_gets_faster_up_to_its_speed():
     # 0.3 m/s^2 for 0.05 s; 0.4 m/s in the end.
     assert thrusts[:2] == pytest.approx([(0.2 - 0.015) / 0.3, (0.2 - 0.03) / 0.3])
     assert thrusts[-1] == pytest.approx(-0.2 / 0.3)
-    # A step that is too long counts as 0.05 s.
+    # For a step that is too long, 0.05 s is used.
     thrust = SafeControl(G, motion).advance(9.0, motion._replace(yaw=0.0), True).thrust
     assert thrust - G == pytest.approx((0.2 - 0.015) / 0.3)
 
@@ -136,7 +136,7 @@ def test_the_thrust_of_a_vehicle_that_does_not_sink_goes_down_further():
     motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
     safe = SafeControl(G, motion)
     thrusts = [safe.advance(0.05, motion._replace(yaw=0.0), True).thrust - G for _ in range(40)]
-    # From a target of 0.2 m/s on, by 4 m/s^2 in a second, to 0.4 g.
+    # The thrust decreases from a target of 0.2 m/s by 4 m/s^2 per second to 0.4 g.
     assert thrusts[12] == pytest.approx(-0.195 / 0.3)
     assert thrusts[13] == pytest.approx(-0.21 / 0.3 - 0.2)
     assert thrusts[-1] == pytest.approx(-0.4 * G)

@@ -156,7 +156,7 @@ def test_on_a_busy_computer_a_control_that_has_come_back_fades_in_all_the_same()
     assert passed.thrust == pytest.approx(own + 0.25 * (G + 2.0 - own), abs=0.05)
 
 
-# How often the filter has to run.
+# Required rate of the filter.
 
 
 def test_a_filter_that_has_little_to_do_is_nominal():
@@ -286,7 +286,7 @@ def test_whatever_happens_when(events):
 def check(control_filter, out):
     if isinstance(out, Setpoint):
         roll, pitch, yaw_dot, thrust = out
-        # What it passes on is limited in the range of controls.
+        # Controls that it passes on are limited to the range of controls.
         least = MIN_THRUST if control_filter.state is FilterState.PASSING else 0.5 * G
         assert thrust == 0.0 or least <= thrust <= 1.25 * G + 1e-9
         assert max(abs(roll), abs(pitch)) <= MAX_SAFE_TILT

@@ -1,4 +1,4 @@
-"""What the takeoff server on a fake process publishes and logs beside controls and references."""
+"""Status and log of the takeoff server on a fake process."""
 
 import pytest
 from lone_server import call, flying, launch, on_ground, states

@@ -1,4 +1,4 @@
-"""Tables are stepped row by row; the first row whose guard holds counts."""
+"""Tables are searched row by row; the first row whose guard holds is used."""
 
 import enum
 

@@ -1,4 +1,4 @@
-"""What the tests of this folder share: workspaces that are built once, and shells."""
+"""Fixtures of this folder: workspaces that are built once, and shells."""
 
 import pytest
 import workspaces

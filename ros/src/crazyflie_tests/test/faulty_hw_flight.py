@@ -28,7 +28,7 @@ from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils.testing.peer import wait_until
 from crazyflie_utils.testing.programs import free_port, running
 
-# A battery counts as nearly empty within a second, and a takeoff ends after a short hover.
+# A battery is nearly empty within a second, and a takeoff ends after a short hover.
 _PARAMETERS = {
     "/takeoff_server/duration/hover": 0.5,
     "/takeoff_server/battery/low": 3.45,
@@ -63,7 +63,7 @@ def end_the_emergency():
 
 
 def lose_the_link(flight, duration):
-    """Let the link be silent."""
+    """Silence the link."""
     begin = flight.observer.now
     flight.vehicle.words.clear()
     Client("/virtual_crazyflie", LIMIT).update_configuration({"fault/silence": duration})
@@ -79,11 +79,11 @@ def lose_the_link(flight, duration):
 
 
 def lose_motion_capture_for_a_moment(flight):
-    """Let motion capture be silent for 0.3 s."""
+    """Silence motion capture for 0.3 s."""
     begin = flight.observer.now
     motion_capture = Client("/virtual_mocap", LIMIT)
     motion_capture.update_configuration({"fault/silent": True})
-    # How long it is silent is what is tested, not a wait for anything.
+    # The duration of the silence is under test; it is not a wait.
     time.sleep(0.3)
     motion_capture.update_configuration({"fault/silent": False})
     flight.observer.hover(2.0)
@@ -94,7 +94,7 @@ def lose_motion_capture_for_a_moment(flight):
 
 
 def lose_motion_capture(flight):
-    """Let motion capture be silent until the vehicle is down."""
+    """Silence motion capture until the vehicle is down."""
     begin = rospy.get_time()
     motion_capture = Client("/virtual_mocap", LIMIT)
     motion_capture.update_configuration({"fault/silent": True})
@@ -139,7 +139,7 @@ def restart_the_firmware(flight):
 
 
 def empty_the_battery(flight):
-    """Let the battery be nearly empty."""
+    """Make the battery nearly empty."""
     begin = rospy.get_time()
     Client("/virtual_crazyflie", LIMIT).update_configuration({"fault/low_battery": True})
     flight.wait_for_ground()

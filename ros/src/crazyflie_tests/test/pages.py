@@ -52,7 +52,7 @@ class Block:
 
     @property
     def text(self) -> str:
-        """What is in the block."""
+        """Text of the block."""
         return "\n".join(self.lines)
 
     @property

@@ -37,7 +37,7 @@ def lines():
         for name, port in (("/frozen", frozen.getsockname()[1]), ("/dead", 1)):
             uri = f"http://127.0.0.1:{port}"
             rosgraph.Master(name).registerPublisher(f"{name}/topic", "std_msgs/Empty", uri)
-        # Beside the takeoff server one may publish references, not two.
+        # One node may publish references in addition to the takeoff server, not two.
         rosgraph.Master("/dead").registerPublisher(
             "/ref", ControlStamped._type, "http://127.0.0.1:1"
         )

@@ -54,7 +54,7 @@ class Terminal:
 
     @property
     def output(self) -> str:
-        """What the last command has printed so far, below what was typed."""
+        """Output of the last command so far, below the typed text."""
         return self._output
 
     @property

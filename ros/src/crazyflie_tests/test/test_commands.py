@@ -128,7 +128,7 @@ def test_commands_of_a_page(path, followed):
 @pytest.mark.long
 @pytest.mark.usefixtures("followed")
 def test_the_picture_of_the_graph_shows_the_graph_that_runs(workspace):
-    # Whatever graphviz has drawn anew when the page of the graph was tested.
+    # Drawings that graphviz has changed when the page of the graph was tested.
     drawn = workspace / "docs" / "images" / "sw_hover_graph.svg"
     shipped = TOP / "docs" / "images" / "sw_hover_graph.svg"
     # Some versions of graphviz give the whole drawing a title, too.

@@ -153,7 +153,7 @@ def test_packages_of_launch_files_and_manifests_are_in_the_list(name):
 @pytest.mark.parametrize("module", MODULES)
 def test_modules_that_are_imported_are_in_the_lists(module):
     file = debian_file(module)
-    # What is not from Debian is from the virtual environment, which has nothing else.
+    # Packages that are not from Debian are from the virtual environment, which has no others.
     assert file is None or owner(file) in installed_by_the_list()
 
 
@@ -189,7 +189,8 @@ FLIGHTS = {
         ],
     ),
 }
-"""A launch file -> sections of debian.txt that suffice, arguments, modules beside its nodes."""
+"""A launch file -> sections of debian.txt that suffice, arguments, modules in addition to its
+nodes."""
 
 
 @pytest.mark.parametrize("flight", FLIGHTS)
@@ -200,7 +201,7 @@ def test_a_flight_needs_no_other_section(flight):
     nodes, parameters = expand(launch_file, rviz=False, record=True, **arguments)
     for package in {node.package for node in nodes.values()} - own_packages():
         assert owner(SHARE / package / "package.xml") in brought
-    # A module that is None in sys.modules is one that is not installed. If Debian's package of a
+    # A module that is None in sys.modules is treated as not installed. If Debian's package of a
     # module that is in requirements.txt is not installed either, pip installs it.
     absent = [
         module

@@ -1,4 +1,4 @@
-"""What ``catkin_make install`` would install: everything that a user needs, no developer's tools.
+"""Files that ``catkin_make install`` would install: everything for users, no developer's tools.
 
 This reads what CMake has written for the built workspace; test_install_space.py installs a copy.
 """

@@ -9,7 +9,7 @@ from workspaces import FAST, FLY, INSTALLED, TOP, code_of, data_of, programs_of
 
 INSPECT = Path(__file__).with_name("inspect_install.py")
 
-# A copy of the workspace is built. What is installed is tested in test_install_rules.py; the
+# A copy of the workspace is built. The installed files are tested in test_install_rules.py; the
 # commands of the installation are those by which ./run makes the workspace that is tested.
 pytestmark = pytest.mark.long
 

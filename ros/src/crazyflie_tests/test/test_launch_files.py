@@ -213,7 +213,7 @@ def test_xacro_finds_packages(tmp_path):
     [("theirs/joy", True), ("theirs/other", False), ("own/install/share/joy", False)],
 )
 def test_stand_ins_give_way(tmp_path, place, is_there):
-    # What the top-level CMakeLists.txt does, in a workspace with one stand-in.
+    # The work of the top-level CMakeLists.txt, in a workspace with one stand-in.
     text = (TOP / "ros" / "src" / "CMakeLists.txt").read_text()
     loop = re.search(r"foreach\(name joy .*?endforeach\(\)", text, re.DOTALL).group()
     stand_in = tmp_path / "own" / "src" / "stand_ins" / "joy"
@@ -234,7 +234,7 @@ def test_stand_ins_give_way(tmp_path, place, is_there):
     assert (stand_in / "CATKIN_IGNORE").exists() == is_there
 
 
-# What crazyflie_ros's own launch files say, by their names, without what no stand-in reads.
+# Parameters of crazyflie_ros's own launch files, by name, without those that no stand-in reads.
 RVIZ = "-d $(find crazyflie_demo)/launch/{}.rviz"
 LINK = "0 0 0 0 0 0 1 /vicon/cf/cf /crazyflie/base_link 100"
 

@@ -22,15 +22,15 @@ FOLDERS = {
 #: Python package -> the catkin package that has it.
 OWNERS = {init.parent.name: name for name, f in FOLDERS.items() for init in f.glob("*/__init__.py")}
 
-#: Beside the node handle, the module with which users' own nodes command a vehicle.
+#: In addition to the node handle, the module with which users' own nodes command a vehicle.
 SPEAK_TO_ROSPY = {"crazyflie_utils", "crazyflie"}
 
 
 @pytest.fixture
 def sources(monkeypatch):
-    """Have packages found in the sources, where the devel space has stubs."""
+    """Find packages in the sources, since the devel space has stubs."""
     monkeypatch.setattr(sys, "path", [*map(str, FOLDERS.values()), *sys.path])
-    # What other tests have imported would be found there all the same.
+    # Modules that other tests have imported would still be found there.
     for name in [name for name in sys.modules if name.partition(".")[0] in OWNERS]:
         monkeypatch.delitem(sys.modules, name)
 
@@ -196,7 +196,7 @@ def test_a_circle_of_modules_is_found_even_for_types(two_floors):
 
 
 def test_a_node_loads_nothing_that_finds_packages():
-    """What looks for packages in the file system, and what brings it."""
+    """Modules that search for packages in the file system, and the modules that import them."""
     nodes = [
         "crazyflie_driver.server_node",
         "crazyflie_lqr.linear_feedback_node",

@@ -44,7 +44,7 @@ def my_workspace(tmp_path):
 def underlay(request):
     """Return the space below: this workspace, or a copy that is installed.
 
-    What is missing in the second is missing in test_install_rules.py.
+    A file that is missing in the second is also missing in test_install_rules.py.
     """
     if request.param == "devel":
         return TOP / "ros" / "devel"

@@ -48,7 +48,7 @@ def folder(tmp_path):
 
 
 def test_failures_make_the_status(run_test, folder):
-    # What passes afterwards does not hide it: neither a rostest's failure nor a unit test's.
+    # Later passes must not hide a failure, neither a rostest's nor a unit test's.
     passing = folder / "test_passing.py"
     status, printed = run_test(FAILING, passing)
     assert status == 1, printed

@@ -38,10 +38,10 @@ endfunction()
 # run_tests. catkin itself knows nose only.
 #
 # :param path: folder or file, relative to the package
-# :param APART: files of this folder that are tests of their own, which may run beside it
+# :param APART: files of this folder that are tests of their own, which may run in parallel with it
 # :param WORKERS: number of processes that share the files, if their tests mostly wait
 # :param CALCULATES: they hardly wait; they begin early, and leave the processors to whoever flies
-#     against the clock beside them
+#     against the clock in parallel with them
 function(crazyflie_add_pytest path)
   cmake_parse_arguments(pytest "CALCULATES" "WORKERS" "APART" ${ARGN})
   string(REPLACE "/" "_" name "${path}")
@@ -60,7 +60,7 @@ function(crazyflie_add_pytest path)
   endforeach()
   catkin_run_tests_target("pytest" "${name}" "pytest-${name}.xml" COMMAND "${command}")
   if(pytest_WORKERS)
-    # What waits most is to begin first, beside what needs most of the processors.
+    # Tests that mostly wait begin first, in parallel with those that need the processors most.
     math(EXPR cost "2000 + ${pytest_WORKERS}")
     _crazyflie_set_tests_properties("pytest_${name}$" COST ${cost})
   endif()
@@ -71,7 +71,7 @@ endfunction()
 
 # Say how many halves of a processor tests of this package need: 2 if they fly in several processes
 # against the clock, 3 or 4 if in many. Others count as one half, whether they compute or wait.
-# ``ctest -j`` then runs fewer beside them. It begins with them: it would start others of one half
+# ``ctest -j`` then runs fewer in parallel. It begins with them: it would start others of one half
 # whenever one half is free, and come to them at the end, when nothing else is left.
 #
 # :param halves: of a processor
@@ -80,7 +80,7 @@ function(crazyflie_busy_tests halves)
   _crazyflie_set_tests_properties("${ARGN}" PROCESSORS ${halves} COST ${halves}500)
 endfunction()
 
-# Say that tests of this package measure what other tests beside them would change.
+# Declare that tests of this package measure quantities that parallel tests would change.
 #
 # :param ARGN: what the names of the tests match, regular expressions
 function(crazyflie_lonely_tests)

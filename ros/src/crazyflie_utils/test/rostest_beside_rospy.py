@@ -21,7 +21,7 @@ from crazyflie_utils.testing.peer import LIMIT, wait_until
 
 @pytest.fixture(scope="module")
 def handle():
-    """Return a handle of a process; a second process object beside it changes nothing."""
+    """Return a handle of a process; a second process object changes nothing."""
     process = ros_process()
     server = tcpros_base._tcpros_server
     callback = server._tcp_server_callback

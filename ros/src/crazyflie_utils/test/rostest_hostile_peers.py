@@ -252,7 +252,7 @@ def test_a_subscriber_of_another_type_is_refused_and_named_once(handle, warnings
             assert b"datatype/md5sum" in stranger.recv(4096)
 
     def complaints():
-        # Beside what strangers of other tests are blamed for.
+        # In addition to the warnings about peers of other tests.
         return [text for text in warnings if "/wanted" in text]
 
     wait_until(complaints, "a complaint")

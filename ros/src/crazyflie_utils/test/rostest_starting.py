@@ -1,4 +1,4 @@
-"""What is announced while nodes are initialized, as the master and others see it."""
+"""Registrations during the initialization of nodes, as seen by the master and others."""
 
 import queue
 import xmlrpc.client

@@ -1,4 +1,4 @@
-"""What sourcing the workspace says about the network."""
+"""Network settings and messages of sourcing the workspace."""
 
 import subprocess
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What processes tell each other about flights."""
+"""Messages between processes about flights."""
 
 import signal
 import time

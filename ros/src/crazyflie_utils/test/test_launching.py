@@ -1,4 +1,4 @@
-"""What went wrong in a launch is told."""
+"""Errors of a launch are reported."""
 
 from crazyflie_utils.testing.launching import complaints
 

@@ -1,4 +1,4 @@
-"""What a process does about a ROS master that is gone, started anew, or does not know it."""
+"""Reaction of a process to a ROS master that has ended, restarted, or does not know it."""
 
 from types import SimpleNamespace
 

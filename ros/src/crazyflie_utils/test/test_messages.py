@@ -1,4 +1,4 @@
-"""What values look like in messages."""
+"""Values in messages."""
 
 import pytest
 from hypothesis import given

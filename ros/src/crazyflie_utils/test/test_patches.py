@@ -7,7 +7,7 @@ from crazyflie_utils.ros1 import patches
 
 @pytest.fixture
 def log(monkeypatch):
-    """Return the warnings; the table is looked at anew."""
+    """Return the warnings; the table is inspected again."""
     texts = []
     monkeypatch.setattr("rospy.logwarn", texts.append)
     monkeypatch.delenv(patches.SWITCH, raising=False)

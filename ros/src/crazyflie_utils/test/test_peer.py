@@ -1,4 +1,4 @@
-"""What a rostest has heard; the rest of the module is at work in all rostests."""
+"""Messages that a rostest has received; all rostests use the rest of the module."""
 
 import pytest
 from std_msgs.msg import Float64

@@ -1,4 +1,4 @@
-"""What a program says when a Python module is missing."""
+"""Message of a program when a Python module is missing."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the README shows works."""
+"""The README's examples work."""
 
 import os
 import re

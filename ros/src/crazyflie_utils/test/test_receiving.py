@@ -1,4 +1,4 @@
-"""What a publisher sends, cut into messages, without a master."""
+"""The data of a publisher, split into messages, without a master."""
 
 import io
 import socket

@@ -74,7 +74,7 @@ def test_unanswered_calls_do_not_pile_up(monkeypatch):
         assert isinstance(future.exception(timeout=20.0), ServiceError)
     assert "/slow has not answered 8 earlier calls" in str(futures[-1].exception())
     assert threading.active_count() <= before + 8
-    # A service that is alive is none the worse for it.
+    # A service that is alive is not affected.
     other = call("/other")
     answered.set()
     for thread in threading.enumerate():
@@ -168,7 +168,7 @@ def test_callbacks_subscribe_without_waiting_for_the_master(monkeypatch):
     subscriber = transport.subscribe("/a", String, print)
     assert not subscriber.has_publishers()
     subscriber.close()
-    # What comes after it, from wherever, does not overtake it.
+    # Later work, from any thread, does not overtake it.
     transport.is_in_callback = lambda: False
     transport.subscribe("/b", String, print)
     assert done == []

@@ -1,4 +1,4 @@
-"""What keeps a log from being flooded."""
+"""Limits against a flood of the log."""
 
 from crazyflie_utils.log import Throttle
 

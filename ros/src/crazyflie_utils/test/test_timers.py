@@ -77,7 +77,7 @@ def test_short_periods_that_a_process_begins_with_are_due_together(queue):
     ticks.clear()
     queue.run_due(1.305)
     assert "long" in ticks
-    # What is added later may be what a caller waits for.
+    # A caller may wait for work that is added later.
     queue.add(0.01, lambda: ticks.append("soon"), now=1.3337)
     queue.run_due(1.3436)
     assert "soon" not in ticks

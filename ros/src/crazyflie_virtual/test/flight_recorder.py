@@ -1,7 +1,7 @@
-"""Flights of a virtual vehicle beside those that were recorded of the firmware.
+"""Flights of a virtual vehicle, compared with recorded flights of the firmware.
 
-What has to be equal: the supervisor's states and their order, error numbers,
-answers. What may differ, and why:
+These must be equal: the supervisor's states and their order, error numbers, answers. What may
+differ, and why:
 
 * `MOMENT`: supervisor (40 ms), high-level commander (10 ms) and the log (20 ms) of
   the recorded vehicle run at phases of their own, and a command is on its way for
@@ -58,7 +58,7 @@ _SUPERVISOR_PERIOD = 0.04
 
 
 class Track:
-    """What a vehicle did, 100 times a second from a moment on."""
+    """Track of a vehicle, 100 times a second from a moment on."""
 
     def __init__(self, began):
         self.began = began
@@ -133,13 +133,13 @@ class Flight(Bench):
         return self.track
 
     def await_supervisor(self, before):
-        """Let time pass until the supervisor's next update is so far away, s."""
+        """Advance the time until the supervisor's next update is this far away, s."""
         period = round(_SUPERVISOR_PERIOD / STEP)
         while period - round(self.firmware.time / STEP) % period != round(before / STEP):
             self.run(STEP)
 
     def watch(self, duration, packet=None, period=0.02):
-        """Let time pass, while a packet is sent again and again; return the track."""
+        """Advance the time, while a packet is sent repeatedly; return the track."""
         samples = round(duration / _SAMPLE)
         for i in range(samples):
             if packet is not None and i % round(period / _SAMPLE) == 0:
@@ -196,9 +196,9 @@ class CommandedFlight(Flight):
         return [e.x, e.y, e.z, e.yaw]
 
     def follow(self, track, origin=(0.0, 0.0, 0.0, 0.0), near=NEAR, slack=0.0):
-        """Let time pass and compare with a recorded track: time, x, y, z, yaw from an origin.
+        """Advance the time and compare with a recorded track: time, x, y, z, yaw from an origin.
 
-        The times of the track are good to ``slack``, as a fraction: the nearest pose counts.
+        The times of the track are good to ``slack``, as a fraction: the nearest pose is compared.
         """
         begin = self.vehicle.time
         for time, *expected in track:
@@ -224,7 +224,7 @@ def circle(pieces=8, radius=0.5, period=4.0, height=0.6):
     data = b""
     for k in range(pieces):
         phase = w * k * duration
-        # Of exp(i (phase + w t)), by powers of t.
+        # Coefficients of exp(i (phase + w t)), by powers of t.
         terms = [w**n / math.factorial(n) for n in range(8)]
         sines = [a * math.sin(phase + n * math.pi / 2) for n, a in enumerate(terms)]
         cosines = [a * math.cos(phase + n * math.pi / 2) for n, a in enumerate(terms)]

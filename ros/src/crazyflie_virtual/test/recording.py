@@ -1,4 +1,4 @@
-"""What the real firmware did, as it was recorded: release 2026.08 in the loop, over cflib.
+"""Recorded behaviour of the real firmware: release 2026.08 in the loop, over cflib.
 
 A test that flies a scenario again has the scenario's name in it as a string, be it
 ``recorded("name")`` or a parameter; test_recorded_all.py sees to it that every

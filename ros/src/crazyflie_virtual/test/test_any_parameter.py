@@ -96,7 +96,7 @@ ACTIONS = st.lists(
 
 
 def is_alive(bench):
-    """Return whether an echo comes back; a vehicle that was switched off has to be on."""
+    """Return whether an echo comes back; a vehicle that was switched off is switched on first."""
     bench.ask(Port.LINK, 3, b"\xfe\x03")
     return [p.data for p in bench.ask(Port.LINK, 0, b"\x42")] == [b"\x42"]
 

@@ -24,13 +24,13 @@ LIMIT = 300.0
 
 
 class Expected(NamedTuple):
-    """What an example prints (regular expressions) and does.
+    """Output of an example (regular expressions), and its effect.
 
     Attributes
     ----------
     output : tuple of str
     peak : tuple of float
-        Within what the vehicle's greatest height is, m.
+        Range of the vehicle's greatest height, m.
     end : tuple of float, optional
         Where it is at the end, x and y, m.
     """
@@ -111,7 +111,7 @@ class Run(NamedTuple):
 
 
 def folder() -> pathlib.Path:
-    """Return where the examples are installed, beside cflib."""
+    """Return the folder of the examples, next to cflib."""
     cflib = importlib.util.find_spec("cflib")
     assert cflib is not None and cflib.origin is not None
     return pathlib.Path(cflib.origin).parent.parent / "examples"

@@ -1,4 +1,4 @@
-"""The wire protocol, step by step beside what the real firmware answered."""
+"""The wire protocol, compared step by step with the answers of the real firmware."""
 
 import math
 import struct

@@ -59,7 +59,7 @@ class _Connection:
 
 
 class _ConnectionWithPoints(_Connection):
-    """Of a version that tells unlabelled markers, one beside cf1."""
+    """A version that reports unlabelled markers, one of them next to cf1."""
 
     @property
     def pointCloud(self):  # noqa: N802

@@ -247,7 +247,7 @@ class Dashboard:
         return self._do(lambda: self._page(page).watch_image(topic, self._model.graph.topics))
 
     def image(self, page: int) -> bytes | str | None:
-        """Return the newest picture of the page's camera, as JPEG or PNG, or why there is none."""
+        """Return the newest picture of the page's camera, as JPEG or PNG, or the refusal."""
         state = self._open.get(page)
         return None if state is None else state.image
 

@@ -100,7 +100,7 @@ class Design:
 def design_gains(
     model: LinearModel, weights: Weights, sample_time: float = 0.0, delay: float = 0.0
 ) -> Design:
-    """Return the gains of least cost; `DesignError` if there are none, or inputs are unusable.
+    """Return the gains of least cost; `DesignError` without a solution, or for invalid inputs.
 
     Parameters
     ----------

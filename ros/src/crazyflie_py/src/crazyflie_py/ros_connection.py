@@ -74,8 +74,7 @@ def running_vehicles(handle: NodeHandle) -> list[str]:
 
     Raises
     ------
-    MissionError
-        There are none.
+    MissionError No vehicle is running.
     """
     end = time.monotonic() + _SEARCH_LIMIT
     while time.monotonic() < end:

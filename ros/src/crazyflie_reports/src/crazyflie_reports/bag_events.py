@@ -16,7 +16,7 @@ MERGE_TIME = 1.0  #: Time within which repetitions are one event (s).
 MAX_EVENTS = 20_000  #: Largest number of events of a bag; more are only counted.
 
 _WARN, _ERROR = 4, 8  # Levels of rosgraph_msgs/Log.
-_ROS2_LEVELS = {30: _WARN, 40: _ERROR, 50: _ERROR}  # Of rcl_interfaces/Log.
+_ROS2_LEVELS = {30: _WARN, 40: _ERROR, 50: _ERROR}  # Levels of rcl_interfaces/Log.
 
 
 class Kind(Enum):

@@ -244,8 +244,8 @@ def flights(
     """Yield the flights of a vehicle, from the events that concern it.
 
     ``states`` are times (s) and states of its flight, as the takeoff server has published them;
-    where there are none, the phases follow from in_flight, thrust and height. ``end`` is that of
-    the recording, s.
+    without them, the phases follow from in_flight, thrust and height. ``end`` is that of the
+    recording, s.
     """
     known = _phases(sorted(states), end) if states else _guessed(vehicle)
     lasting = (phases for phases in known if phases[-1].end > phases[0].start)

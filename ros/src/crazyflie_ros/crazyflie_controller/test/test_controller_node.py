@@ -113,7 +113,7 @@ def test_a_goal_is_seen_from_the_heading_of_the_vehicle():
     call(process, "takeoff")
     show(process, yaw=math.pi / 2)
     show(process, yaw=math.pi / 2, z=0.1)
-    # What is east of a vehicle that faces north is on its right.
+    # For a vehicle that faces north, east is to the right.
     assert last(process) == pytest.approx((0.0, 4.0, last(process)[2], 0.0), abs=1e-6)
 
 

@@ -207,7 +207,7 @@ def test_a_vehicle_without_poses_is_left_to_its_watchdog_until_they_come_again()
     begin = len(loop.setpoints)
     loop.run(HOLD_LIMIT + 0.2)
     silent = loop.setpoints[begin:]
-    # The last setpoint is repeated, then there are none.
+    # The last setpoint is repeated, then no more come.
     ticks = round(HOLD_LIMIT / PERIOD)
     assert set(silent[: ticks - 1]) == {loop.setpoints[begin - 1]}
     assert set(silent[ticks + 1 :]) == {None}

@@ -28,7 +28,7 @@ def launch(node_class=CmdVelTeleopNode, **parameters):
 
 
 def tilt(process, count=8, frame_id=REPEATED, **sticks):
-    """Have the joystick say where its sticks are, and a setpoint follow."""
+    """Send the joystick's axes, and wait for the setpoint."""
     axes = [0.0] * count
     for name, value in sticks.items():
         axes[{"pitch": PITCH, "roll": ROLL, "yaw": YAW, "thrust": THRUST}[name]] = value

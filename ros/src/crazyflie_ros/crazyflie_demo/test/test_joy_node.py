@@ -87,13 +87,13 @@ def test_an_unplugged_joystick_is_released_and_taken_up_again(fifo, monkeypatch)
         process.advance(0.2)
         assert states(process)[-1] == ([0.0, 1.0], [0, 0, 0, 1])
         with monkeypatch.context() as unplugged:
-            # What the kernel says of a joystick that is gone, and then of its file.
+            # Errors of the kernel for an unplugged joystick, and then for its file.
             unplugged.setattr("os.read", refuse(errno.ENODEV))
             process.advance(0.05)
             unplugged.setattr("os.open", refuse(errno.ENOENT))
             assert states(process)[-1] == ([0.0, 0.0], [0, 0, 0, 0])
             assert "lost" in process.logged("error")[0]
-            # It is silent as long as there is none.
+            # The node is silent without a joystick.
             count = len(states(process))
             process.advance(3.0)
             assert len(states(process)) == count

@@ -1,4 +1,4 @@
-"""What a joystick's bytes mean."""
+"""The meaning of a joystick's bytes."""
 
 import struct
 
@@ -63,7 +63,7 @@ def test_release_is_zero():
     joystick = Joystick()
     joystick.feed(axis(1, 32767) + button(1, 1) + b"\0\0\0")
     assert joystick.release() == ([0.0, 0.0], [0, 0])
-    # The part of an event from before counts no more.
+    # The earlier part of an event is dropped.
     assert joystick.feed(axis(0, -32767)) == [([1.0, 0.0], [0, 0])]
 
 

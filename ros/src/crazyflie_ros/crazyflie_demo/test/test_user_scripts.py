@@ -1,4 +1,4 @@
-"""What users' scripts import, from wherever they lie."""
+"""Imports of users' scripts, from any folder."""
 
 import inspect
 import subprocess

@@ -1,4 +1,4 @@
-"""What the launch files start, and that all of it can be initialized."""
+"""Nodes of the launch files, all of which can be initialized."""
 
 import re
 from pathlib import Path
@@ -64,7 +64,7 @@ def test_launch_files(file, flight, composed, classes):
 
 @pytest.mark.parametrize("wrong", ["world", "sensors"])
 def test_a_wrong_file_ends_the_launch(tmp_path, monkeypatch, wrong):
-    # So that they are as before, after the test.
+    # Restored after the test.
     monkeypatch.setenv("ROS_MASTER_URI", "")
     monkeypatch.setenv("ROS_IP", "")
     file, log = tmp_path / "wrong.yaml", tmp_path / "log"

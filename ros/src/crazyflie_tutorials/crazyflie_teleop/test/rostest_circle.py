@@ -36,7 +36,7 @@ def circle(flight):
 
 def test_is_a_circle_to_the_right_of_where_it_began(flight, circle):
     middle, _ = circle
-    # From (0, 0), looking along x, clockwise; off by what starting takes.
+    # A clockwise circle from (0, 0), looking along x, apart from the error of the start.
     assert middle == pytest.approx([0.0, -RADIUS], abs=0.2)
     distances = np.linalg.norm(flight[0][:, :2] - middle, axis=1)
     assert distances == pytest.approx(np.full_like(distances, RADIUS), abs=0.1)

@@ -14,7 +14,7 @@ from crazyflie_utils.testing import peer
 
 @dataclass
 class Flight:
-    """What is judged of a flight.
+    """Quality of a flight.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class Flight:
     pixel_errors : ndarray
         From the middle of the image to the target.
     distance_errors : ndarray
-        What was too far or too near, between vehicle and target, m.
+        Errors of the distance, between vehicle and target, m.
     path : ndarray, shape (n, 3)
         Where the vehicle was, m.
     height : float

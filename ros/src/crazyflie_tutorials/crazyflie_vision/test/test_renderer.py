@@ -1,4 +1,4 @@
-"""What is drawn is where the camera's geometry says."""
+"""Objects are drawn at the places given by the camera's geometry."""
 
 import math
 
@@ -116,7 +116,7 @@ def test_a_picture_is_upright_and_not_mirrored(tmp_path):
     corners = [image[row, column] for row in (90, 150) for column in (100, 220)]
     assert [np.argmax(each) for each in corners[:3]] == [0, 1, 2]
     assert corners[3].min() > 100
-    # From behind it is plain.
+    # The back is plain.
     back = render([poster], looking(yaw=math.pi, position=(2.0, 0.0, 1.0)))
     assert np.ptp(back[100:140, 120:200].reshape(-1, 3), axis=0).max() == 0
 

@@ -133,7 +133,7 @@ class VirtualVehicle:
         if settings.world:
             self.physics.world = world_file.load(settings.world)
         self.battery = Battery(settings.battery)
-        self.storage = Storage(settings)  #: What outlives a restart.
+        self.storage = Storage(settings)  #: Data that persist over a restart.
         self._steps = 0
         self._is_dead = False
         self._failure = ""

@@ -153,7 +153,7 @@ class Crazyflie:
     def position(self) -> NDArray[np.float64]:
         """Return the vehicle's position by tf, shape (3,), m in the fixed frame.
 
-        Raises `tf2_ros.TransformException` or `tf.Exception` when there was none for 10 s.
+        Raises `tf2_ros.TransformException` or `tf.Exception` if no position has come for 10 s.
         """
         deadline = time.monotonic() + _TF_LIMIT
         while True:

@@ -22,7 +22,7 @@ from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber
 
 Deliver = Callable[[Any], None]
 
-#: Messages that wait for a frozen process on one connection; of later ones the last counts.
+#: Messages that wait for a frozen process on one connection; of later ones only the last is kept.
 _MAX_WAITING = 100
 
 
@@ -144,7 +144,7 @@ class FakeGraph:
             if not process.is_frozen and process.name in self._processes:
                 process.move_to(time)
 
-    # What the transports need.
+    # Data of the transports.
 
     def publishes(self, topic: str, excluding: str) -> bool:
         """Return whether another process than ``excluding`` publishes a topic."""

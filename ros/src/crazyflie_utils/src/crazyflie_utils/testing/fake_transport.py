@@ -22,7 +22,7 @@ class _Record(ExternalPublisher):
 
     def publish(self, *messages: genpy.Message) -> None:
         for message in messages:
-            # What cannot be sent must fail here as it would on a wire.
+            # A message that cannot be serialized must fail here as it would on a wire.
             message.serialize(io.BytesIO())
             self.messages.append(message)
 
@@ -126,7 +126,7 @@ class FakeTransport(Transport):
     def call_service(
         self, name: str, service_type: type, request: Any, limit: float, start_limit: float
     ) -> Future[Any]:
-        """Call a service; fail when there is none, or when it does not answer in time."""
+        """Call a service; fail if it does not exist, or does not answer in time."""
         answer = self.find_service(name)(request)
         if answer.done() or self.machine_timers is None:
             return answer

@@ -19,7 +19,8 @@ _RANDOM = random.SystemRandom()  #: Processes of a test run have the same seed.
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
     """Return a UDP (or, with SOCK_STREAM, a TCP) port of this machine that is free now.
 
-    A program that asks for any port is not given it: it is none of Linux's ephemeral ports.
+    A program that requests any port does not get this one: it is not one of Linux's ephemeral
+    ports.
     """
     for port in _RANDOM.sample(_PORTS, len(_PORTS)):
         with socket.socket(socket.AF_INET, kind) as probe, contextlib.suppress(OSError):

@@ -20,8 +20,7 @@ _TEXT = "--text"
 def pytest_arguments(arguments: list[str]) -> list[str]:
     """Return the arguments of pytest for those that rostest gives.
 
-    rostest names a file for the results, in the way of gtest; with ``rostest -t``
-    there is none.
+    rostest names a file for the results, in the way of gtest; with ``rostest -t`` it names none.
     """
     converted = []
     for argument in arguments:

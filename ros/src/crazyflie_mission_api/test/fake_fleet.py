@@ -1,4 +1,4 @@
-"""A fake process in which fleets of missions fly, as fast as it goes."""
+"""A fake process in which fleets of missions fly, as fast as possible."""
 
 from crazyflie_mission_api import fleet
 from crazyflie_utils.testing import FakeProcess

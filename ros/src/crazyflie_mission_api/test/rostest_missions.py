@@ -1,4 +1,4 @@
-"""Missions of two simulated vehicles, as fast as it goes; they stand at y = -0.5 and 0.5 m."""
+"""Missions of two simulated vehicles, as fast as possible; they stand at y = -0.5 and 0.5 m."""
 
 import math
 import re

@@ -1,7 +1,7 @@
 """Flies the software example for hours while things go wrong, and watches what has to hold.
 
 The nodes and their parameters are those of sw_hover.launch, each node in a fake process of
-its own, so that it can be killed and frozen; time is moved by hand, as fast as it goes. Run
+its own, so that it can be killed and frozen; time is moved by hand, as fast as possible. Run
 ``python3 -m crazyflie_dev.soak --duration 3600 --seed 1``.
 """
 

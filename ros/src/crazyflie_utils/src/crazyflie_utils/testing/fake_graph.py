@@ -1,4 +1,4 @@
-"""A whole graph without ROS: processes that are killed, frozen and started again; time by hand."""
+"""A whole graph without ROS: processes can be killed, frozen and restarted; manual time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber
 
 Deliver = Callable[[Any], None]
 
-#: Messages that wait for a frozen process on one connection; of later ones only the last is kept.
+#: Largest number of messages that wait for a frozen process on one connection; of later ones only
+#: the last is kept.
 _MAX_WAITING = 100
 
 
@@ -34,10 +35,11 @@ class FakeGraph:
     """
 
     def __init__(self, parameters: dict[str, object], start: float = 100.0):
-        self.time = start  #: Now, s.
-        #: Faults of topics: ``fault(message)`` returns the messages that arrive in its place.
+        #: Present time (s). Faults of topics: ``fault(message)`` returns the messages that arrive
+        #: in its place.
+        self.time = start
         self.faults: dict[str, Callable[[Any], list[Any]]] = {}
-        #: Process and topic: messages that do not reach this process.
+        #: Pairs of process and topic whose messages do not reach this process.
         self.unheard: set[tuple[str, str]] = set()
         self.log: list[tuple[str, str]] = []  #: Level and text of what nodes have logged.
         self._wall_offset = 0.0
@@ -57,13 +59,13 @@ class FakeGraph:
             raise RuntimeError(f"{name} was not initialized: {self.log[-1:]}")
 
     def kill(self, name: str) -> None:
-        """Kill a process as SIGKILL does: it says nothing more."""
+        """Kill a process as SIGKILL does: it sends nothing more."""
         del self._processes[name]
         for publication in [each for each in self._latched if each[0] == name]:
             del self._latched[publication]
 
     def interrupt(self, name: str) -> None:
-        """Ask a process to prepare its end, as SIGINT and ``rosnode kill`` do; it goes on."""
+        """Ask a process to prepare its end, as SIGINT and ``rosnode kill`` do; it continues."""
         process = self._processes[name]
         process.prepare_shutdown({name: process.node})
 
@@ -90,14 +92,14 @@ class FakeGraph:
         """Return whether a process exists, frozen or not."""
         return name in self._processes
 
-    # The outside.
+    # Outside of the processes.
 
     def stamp(self) -> genpy.Time:
-        """Return the ROS time of now."""
+        """Return the present ROS time."""
         return genpy.Time.from_sec(self.time + self._wall_offset)
 
     def step_wall_clock(self, step: float) -> None:
-        """Set the wall clock of all processes forward, or back if ``step`` (s) is negative."""
+        """Step the wall clock of all processes forward, or back if ``step`` (s) is negative."""
         self._wall_offset += step
         for process in self._processes.values():
             process.clock.wall_offset = self._wall_offset
@@ -119,7 +121,7 @@ class FakeGraph:
         }
 
     def find_service(self, service: str) -> Callable[[Any], Future[Any]]:
-        """Return what serves calls of a service, of any process; those of a frozen one wait."""
+        """Return the function that serves calls of any service; calls to a frozen process wait."""
         for process in self._processes.values():
             serve = process.transport.services.get(service)
             if serve is not None:
@@ -131,7 +133,7 @@ class FakeGraph:
         return self.find_service(service)(request)
 
     def advance(self, duration: float) -> None:
-        """Move time forward (s), with a stop at every timer's deadline."""
+        """Advance the time (s), with a stop at every timer's deadline."""
         pass_time(duration, lambda: self.time, self._next_deadline, self._move_to)
 
     def _next_deadline(self):
@@ -163,7 +165,7 @@ class FakeGraph:
         )
 
     def latched(self, topic: str, excluding: str) -> list[Any]:
-        """Return what other processes than ``excluding`` have latched on a topic."""
+        """Return messages that processes other than ``excluding`` have latched on a topic."""
         return [
             message
             for (name, latched_topic), message in self._latched.items()
@@ -203,7 +205,7 @@ class _GraphProcess(FakeProcess):
         self.waiting: list[tuple[Deliver, Any]] = []
 
     def keep_call(self, serve: Callable[[Any], Future[Any]], request: Any) -> Future[Any]:
-        """Serve a call once the process goes on, unless its future is cancelled before."""
+        """Serve a call once the process continues, unless its future is cancelled before."""
         answer: Future[Any] = Future()
 
         def begin(request):
@@ -214,14 +216,14 @@ class _GraphProcess(FakeProcess):
         return answer
 
     def receive(self, deliver: Deliver, message: Any) -> None:
-        """Deliver a message, or keep it until the process goes on."""
+        """Deliver a message, or keep it until the process continues."""
         if self.is_frozen:
             same = [k for k, (other, _) in enumerate(self.waiting) if other is deliver]
             if len(same) == _MAX_WAITING:
                 del self.waiting[same[0]]
             self.waiting.append((deliver, message))
             return
-        # Whose turn it is to wake up at this moment is chance.
+        # The order of processes that wake up at one moment is random.
         if self.clock.time() != self.transport.graph.time:
             self.move_to(self.transport.graph.time)
         deliver(message)
@@ -245,7 +247,7 @@ class _Publication(ExternalPublisher):
 
 
 class _GraphTransport(FakeTransport):
-    """The outside world of one process: the others."""
+    """The outside world of one process: the other processes."""
 
     def __init__(self, name: str, graph: FakeGraph, parameters: dict[str, object]):
         super().__init__(parameters)

@@ -1,4 +1,4 @@
-"""A process without ROS, for unit tests: parameters in a dict, time by hand."""
+"""A process without ROS, for unit tests: parameters in a dict, time moved by hand."""
 
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -14,7 +14,8 @@ from crazyflie_utils.process import Process
 from crazyflie_utils.testing.fake_transport import FakeTransport
 from crazyflie_utils.timers import SteadyTimers, TimerQueue
 
-#: Period at which a timer of period 0 fires here (s); the machine fires it as often as it can.
+#: Period at which a timer of period 0 fires here (s); on a real machine it fires as often as
+#: possible.
 _SHORTEST_PERIOD = 1e-4
 
 
@@ -34,9 +35,9 @@ class FakeProcess(Process):
     """A process for tests: the real node handle, executor, timers and tf buffer.
 
     The parameters are full name to raw value, such as {"/simulator/time_step": 0.01}; a
-    ``transport`` takes the place of one with them. ``start`` is the time at the beginning, s, of
-    both clocks: ``clock`` is simulated time, and ``machine_clock`` that of the machine, by which
-    ``steady`` timers and the limits of calls go. `advance` moves both, `advance_machine` and
+    ``transport`` replaces one with these parameters. ``start`` is the time at the beginning, s, of
+    both clocks: ``clock`` is simulated time, and ``machine_clock`` that of the machine, for
+    ``steady`` timers and timeouts of calls. `advance` moves both, `advance_machine` and
     ``clock.set`` one of them. Stamps are those of ``clock`` plus its ``wall_offset`` (s): a change
     of it is a step of the wall clock.
     """
@@ -66,7 +67,7 @@ class FakeProcess(Process):
         for key, value in (parameters or {}).items():
             self.transport.parameters[f"{name}/{key}"] = value
         outcome: list[bool] = []
-        # As work: a latched message must wait until the node is complete.
+        # Queued as work: a latched message must wait until the node is complete.
         self.executor.submit(lambda: outcome.append(node.initialize(self.handle(name))))
         return outcome[0]
 
@@ -82,7 +83,7 @@ class FakeProcess(Process):
     def call(self, service: str, request: genpy.Message) -> genpy.Message | Future[genpy.Message]:
         """Call a service from outside; `ServiceError` if it refuses.
 
-        The response is a future when the service takes time: let it pass with `advance`.
+        The response is a future if the service takes time; `advance` lets the time pass.
         """
         answer = _named(self.transport.services, service, "service")(request)
         return answer.result() if answer.done() else answer
@@ -96,16 +97,16 @@ class FakeProcess(Process):
         return [text for logged_at, text in self.transport.log_records if logged_at == level]
 
     def advance(self, duration: float) -> None:
-        """Move both clocks forward (s), with a stop at every timer's deadline."""
+        """Advance both clocks (s), with a stop at every timer's deadline."""
         pass_time(duration, self.clock.time, self.next_deadline, self.move_to)
 
     def advance_machine(self, duration: float) -> None:
-        """Move the machine's clock forward (s), while simulated time is not published."""
+        """Advance the machine's clock (s), while simulated time is not published."""
         machine = self.machine_clock
         pass_time(duration, machine.time, self._machine_queue.next_deadline, machine.set)
 
     def next_deadline(self) -> float:
-        """Return when the next timer of either clock is due, in simulated time (s)."""
+        """Return the time at which the next timer of either clock is due, in simulated time (s)."""
         ahead = self.machine_clock.time() - self.clock.time()
         return min(self.next_simulated_deadline(), self._machine_queue.next_deadline() - ahead)
 
@@ -122,13 +123,13 @@ def pass_time(
     next_deadline: Callable[[], float],
     move_to: Callable[[float], None],
 ) -> None:
-    """Move ``time()`` on by a duration (s), with a stop at each deadline."""
+    """Advance ``time()`` by a duration (s), with a stop at each deadline."""
     end = time() + duration
     while time() < end:
         deadline = next_deadline()
         if deadline <= time():
             deadline = time() + _SHORTEST_PERIOD
-        # A deadline may be past the end by a rounding error: it is no step back then.
+        # A deadline may be past the end by a rounding error, which is not a step back.
         move_to(deadline if deadline < end + 1e-9 else end)
 
 

@@ -31,7 +31,7 @@ class _Record(ExternalPublisher):
 
 
 class FakeSubscriber(ExternalSubscriber):
-    """A subscription that asks and closes by functions."""
+    """A subscription whose queries and end are functions."""
 
     def __init__(self, is_published: Callable[[], bool], close: Callable[[], None]):
         self._is_published = is_published
@@ -47,12 +47,11 @@ class FakeSubscriber(ExternalSubscriber):
 
 
 class FakeTransport(Transport):
-    """An outside world that remembers everything and does nothing by itself.
+    """An outside world that records everything and does nothing by itself.
 
-    Every topic that is subscribed has publishers there, but for those in ``unpublished``.
+    Every subscribed topic has publishers there, except those in ``unpublished``.
     ``foreign_services`` are those of other processes, name -> node; ``dead_nodes`` do not answer.
-    ``machine_timers`` measure how long the calls of services take; without them, these have no
-    limit.
+    ``machine_timers`` limit the duration of service calls; without them, calls have no limit.
     """
 
     machine_timers: SteadyTimers | None = None
@@ -138,7 +137,7 @@ class FakeTransport(Transport):
         return reply
 
     def find_service(self, name: str) -> Callable[[Any], Future[Any]]:
-        """Return what serves calls of a service of this process."""
+        """Return the function that serves calls of a service of this process."""
         return self.services.get(name, refuse(name))
 
     def service_nodes(self) -> dict[str, str]:
@@ -146,7 +145,7 @@ class FakeTransport(Transport):
         return dict.fromkeys(self.services, "/this_process") | self.foreign_services
 
     def living_node(self, name: str) -> str | None:
-        """Return a process for nodes of ``foreign_services``, but for ``dead_nodes``."""
+        """Return a process for nodes of ``foreign_services``, except ``dead_nodes``."""
         lives = name in self.foreign_services.values() and name not in self.dead_nodes
         return "process 1 on elsewhere" if lives else None
 
@@ -161,7 +160,7 @@ class FakeTransport(Transport):
 
 
 def refuse(service: str) -> Callable[[Any], Future[Any]]:
-    """Return what answers the calls of a service that is not there."""
+    """Return the function that answers calls of a missing service."""
     refusal: Future[Any] = Future()
     refusal.set_exception(ServiceError(f"there is no service {service}"))
     return lambda request: refusal
@@ -174,7 +173,7 @@ def _give_up(answer, reply, text):
 
 
 def copy_outcome(answer: Future[Any], reply: Future[Any]) -> None:
-    """Give a reply the outcome of an answer, unless it has one, or the call was given up."""
+    """Complete a reply with the outcome of an answer, unless it is done or cancelled."""
     if reply.done() or answer.cancelled():
         return
     if answer.exception() is None:

@@ -1,11 +1,11 @@
-"""Fixtures that the tests of several packages have: a conftest.py imports what it needs."""
+"""Fixtures for the tests of several packages: a conftest.py imports those that it needs."""
 
 import faulthandler
 from collections.abc import Iterator
 
 import pytest
 
-_LIMIT = 120.0  #: The longest that a test may take, s.
+_LIMIT = 120.0  #: Timeout of a test (s).
 
 
 @pytest.fixture(autouse=True)

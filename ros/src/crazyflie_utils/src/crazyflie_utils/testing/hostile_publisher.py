@@ -1,12 +1,12 @@
-"""A publisher that behaves as none should, written on the bare protocol (TCPROS).
+"""A publisher that violates the rules, written on the bare protocol (TCPROS).
 
-It sends prepared bytes in one piece per millisecond, so that it is not what limits a flood.
-As a program it floods a topic from one line on its standard input to the next, and prints to how
-many subscribers it has sent how many messages a second:
+It sends prepared bytes in one piece per millisecond, so that it does not limit a flood. As a
+program it floods a topic from one line on its standard input to the next, and prints its number of
+subscribers and of messages per second:
 
     python3 -m crazyflie_utils.testing.hostile_publisher TOPIC TYPE RATE [CONTENT]
 
-CONTENT is the message in YAML, where "now" is a stamp, or how many transforms it has.
+CONTENT is the message in YAML, where "now" is a stamp, or its number of transforms.
 """
 
 import contextlib
@@ -37,8 +37,8 @@ _LIMIT = 10.0
 class HostilePublisher:
     """Announces a topic with the master, and sends its subscribers any bytes.
 
-    An md5sum takes the place of that of the type. While it is not ready, its header says that it is
-    no publisher.
+    ``md5sum`` replaces that of the type. While it is not ready, its header refuses the
+    subscription.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class HostilePublisher:
         }
         self._sockets: list[socket.socket] = []
         self.accepted = 0  #: Number of connections so far.
-        self.refused = 0  #: Number of them that came too early.
+        self.refused = 0  #: Number of connections that came too early.
         self._server = socket.create_server((_ADDRESS, 0))
         self._slave = SimpleXMLRPCServer((_ADDRESS, 0), logRequests=False)
         port = self._server.getsockname()[1]
@@ -91,7 +91,7 @@ class HostilePublisher:
         return len(self._sockets)
 
     def send(self, data: bytes) -> None:
-        """Send bytes to all subscribers; who hangs up is forgotten."""
+        """Send bytes to all subscribers; those that have hung up are dropped."""
         for each in tuple(self._sockets):
             try:
                 each.sendall(data)
@@ -136,7 +136,7 @@ def frame(message: genpy.Message) -> bytes:
 
 
 def crowd(count: int) -> TFMessage:
-    """Return the poses of so many other bodies, about 100 bytes each."""
+    """Return the poses of a number of other bodies, about 100 bytes each."""
     transforms = []
     for number in range(count):
         transform = TransformStamped(child_frame_id=f"body{number:03d}")

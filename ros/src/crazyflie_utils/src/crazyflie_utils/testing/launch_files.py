@@ -16,7 +16,7 @@ from crazyflie_utils.testing.fake_process import FakeProcess
 def expand(path: Path, **arguments: object) -> tuple[dict[str, Node], dict[str, object]]:
     """Return the nodes by full name, and the values of parameters by full name.
 
-    Names of anonymous nodes are without what makes them unique.
+    Names of anonymous nodes are without their unique suffix.
     """
     given = [f"{name}:={value}" for name, value in arguments.items()]
     config = ROSLaunchConfig()
@@ -28,7 +28,7 @@ def expand(path: Path, **arguments: object) -> tuple[dict[str, Node], dict[str, 
 
 
 def composed_nodes(parameters: dict[str, object]) -> dict[str, str]:
-    """Return what the parameters list for the composed process: class path by node name."""
+    """Return the nodes of the composed process in the parameters: class path by node name."""
     listed = "/composed/nodes/"
     return {
         name.removeprefix(listed): str(value)

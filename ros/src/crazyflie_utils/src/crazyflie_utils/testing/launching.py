@@ -21,11 +21,11 @@ _COMPLAINT = re.compile(r"\[(ERROR|FATAL)\]|RLException|process has died")
 
 
 class LaunchError(Exception):
-    """roslaunch has ended before anything ran; the text says what it complained of."""
+    """roslaunch ended before any node ran; the text has its errors."""
 
 
 def complaints(log: Path) -> list[str]:
-    """Return the lines of a roslaunch's output that say what is wrong."""
+    """Return the lines with errors in a roslaunch's output."""
     lines = [_COLOUR.sub("", line) for line in log.read_text(errors="replace").splitlines()]
     return [line for line in lines if _COMPLAINT.search(line)]
 
@@ -49,7 +49,7 @@ def roslaunch(arguments: list[str], log: Path) -> Iterator[subprocess.Popen[Any]
 
 @contextlib.contextmanager
 def master(log: Path) -> Iterator[None]:
-    """Run a master, and nothing else, for the time of a with block; its output goes to a log."""
+    """Run only a master for the time of a with block; its output goes to a log."""
     command = ["rosmaster", "--core", "-p", _set_master()]
     with (
         log.open("w") as output,

@@ -1,4 +1,4 @@
-"""A peer of the node under test, for rostests: it is plain rospy, as nodes of others are."""
+"""A peer of the node under test, for rostests: it uses plain rospy, like foreign nodes."""
 
 import contextlib
 import queue
@@ -32,7 +32,7 @@ class Received(queue.Queue[genpy.Message]):
         raise AssertionError(f"no such message within {LIMIT:g} s; the last one: {message}")
 
     def drain(self) -> list[genpy.Message]:
-        """Return all that have come so far; they are gone then."""
+        """Remove and return all messages that have come so far."""
         return [self.get() for _ in range(self.qsize())]
 
 
@@ -59,7 +59,7 @@ def exchange(
     answer_type: type[genpy.Message],
     accept: Callable[[genpy.Message], bool] = _anything,
 ) -> genpy.Message:
-    """Publish messages, by topic, again and again until an answer is accepted; return it.
+    """Publish messages, by topic, repeatedly until an answer is accepted; return it.
 
     Fails without one within `LIMIT`. The first messages may be lost before connections are made,
     and the node may answer some of them before it has received all.
@@ -72,7 +72,7 @@ def exchange(
         while time.monotonic() < end:
             for topic, message in messages.items():
                 _publishers[topic].publish(message)
-            # At a pace: an answer to each message must not become a flood.
+            # At a limited rate: answers to each message must not become a flood.
             pause = time.monotonic() + 0.01
             with contextlib.suppress(queue.Empty):
                 while (rest := pause - time.monotonic()) > 0.0:

@@ -12,7 +12,7 @@ from typing import Any
 #: Longest time until a program ends after each signal (s); roslaunch gives its nodes 15 s.
 _END_LIMIT = 60.0
 
-_PORTS = range(20000, 32768)  #: Above the usual ones of virtual vehicles.
+_PORTS = range(20000, 32768)  #: Ports above the usual ones of virtual vehicles.
 _RANDOM = random.SystemRandom()  #: Processes of a test run have the same seed.
 
 

@@ -35,7 +35,7 @@ def pytest_arguments(arguments: list[str]) -> list[str]:
 
 
 class InterruptIsFailure:
-    """Plugin of pytest: an interrupt fails the test that runs, and is the end of all.
+    """Plugin of pytest: an interrupt fails the running test, and ends the run.
 
     It also knows the marker of long tests.
 
@@ -44,11 +44,11 @@ class InterruptIsFailure:
     """
 
     def pytest_configure(self, config: pytest.Config) -> None:
-        """Declare the marker of what `./run tests` leaves out."""
+        """Declare the marker of tests that `./run tests` skips."""
         config.addinivalue_line("markers", "long: takes long; only in ./run tests --all")
 
     def pytest_sessionstart(self, session: pytest.Session) -> None:
-        """Take over the signal."""
+        """Install the signal handler."""
 
         def stop(*_):
             session.shouldfail = "interrupted"

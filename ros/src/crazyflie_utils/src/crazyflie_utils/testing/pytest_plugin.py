@@ -31,7 +31,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "workspace"))
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the marker of what `./run tests` leaves out."""
+    """Declare the marker of tests that `./run tests` skips."""
     config.addinivalue_line("markers", "long: takes long; only in ./run tests --all")
 
 

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-LIMIT = 60.0  #: The longest that a test waits for anything, s.
+LIMIT = 60.0  #: Timeout of a wait (s).
 
 
 def wait_until(

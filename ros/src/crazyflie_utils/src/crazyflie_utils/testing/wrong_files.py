@@ -14,7 +14,7 @@ _ODD = ("null", "[]", "{}", "-1", ".nan", "1e999", "x", "true", "2026-13-45", "&
 
 @st.composite
 def with_an_odd_word(draw: st.DrawFn, good: str) -> str:
-    """Draw a YAML text in which one word of a good one is another, which may fit or not."""
+    """Draw a YAML text in which one word of a valid one is replaced, which may be valid or not."""
     pieces = re.split(r"([\w.]+)", good)
     place = draw(st.integers(0, len(pieces) // 2 - 1)) * 2 + 1
     pieces[place] = draw(st.sampled_from(_ODD))
@@ -31,7 +31,7 @@ def assert_refused(load: Callable[[Path], object], file: Path, line: int, expect
 
 
 def assert_taken_or_refused(load: Callable[[Path], object], file: Path) -> None:
-    """Assert that ``load(file)`` raises nothing but what names the file."""
+    """Assert that ``load(file)`` raises only errors that name the file."""
     try:
         load(file)
     except ParameterError as error:

@@ -79,6 +79,7 @@ def test_step_4_the_deck_is_described():
     assert (front.min_range, front.max_range, front.spread_angle) == (0.05, 2.0, 0.3)
     assert (down.min_range, down.max_range, down.spread_angle) == (0.1, 3.0, 0.6)
     assert (front.desired_frequency, down.desired_frequency) == (25.0, 10.0)
+    assert (front.noise, down.noise) == (0.01, 0.02)
 
 
 def readings(*distances, count=40):

@@ -17,7 +17,7 @@ def test_shy():
     ran = Path(__file__).with_name("ran")
     count = len(ran.read_text()) if ran.exists() else 0
     ran.write_text("x" * (count + 1))
-    assert count > 0, "beside others"
+    assert count > 0, "among others"
 """
 
 BAD = """
@@ -41,7 +41,7 @@ report.parent.mkdir(parents=True, exist_ok=True)
 ran = Path(__file__).with_name("ran")
 is_first = not ran.exists()
 ran.touch()
-failure = "<failure message='beside others'/>" if is_first else ""
+failure = "<failure message='among others'/>" if is_first else ""
 check = f"<testcase classname='rostest_launch' name='test_shy'>{failure}</testcase>"
 node = "<testcase classname='rostest.runner.RosTest' name='testlaunch'/>"
 report.with_name("rosunit-launch.xml").write_text(f"<testsuite>{check}</testsuite>")
@@ -99,7 +99,7 @@ def test_what_passes_alone_is_flaky_and_no_pass(run, tmp_path, arguments, expect
     # Once among others, three times alone.
     assert (tmp_path / "ran").read_text() == "xxxx"
     results = tmp_path / "build" / "test_results" / "package" / "pytest-flaky.xml"
-    assert "beside others" in results.read_text()
+    assert "among others" in results.read_text()
 
 
 def test_a_check_of_a_rostest_that_passes_alone_is_flaky_once(run):

@@ -38,7 +38,7 @@ class Block:
         Where it begins.
     language : str
     comment : str
-        Of the HTML comment above it; empty if there is none.
+        Of the HTML comment above it; empty without one.
     lines : list of str
     excuse : str
         Why it is not run, as the text below says; empty if it does not.

@@ -104,12 +104,12 @@ def test_what_is_beside_a_flight_is_started_once_if_asked(path):
         for arg in ElementTree.parse(path).getroot().findall("arg")
         if not {"default", "value"} & set(arg.keys())
     }
-    beside = {"/recorder": "record", "/dashboard": "dashboard"}
+    optional = {"/recorder": "record", "/dashboard": "dashboard"}
     if path.name == "record.launch":
-        del beside["/dashboard"]
-    nodes, _ = launch_files.expand(path, **given, **dict.fromkeys(beside.values(), "true"))
+        del optional["/dashboard"]
+    nodes, _ = launch_files.expand(path, **given, **dict.fromkeys(optional.values(), "true"))
     found = [name for name in nodes if name.endswith(("/recorder", "/dashboard"))]
-    assert sorted(found) == sorted(beside)
+    assert sorted(found) == sorted(optional)
 
 
 @pytest.mark.parametrize("entry", DOCUMENTED)

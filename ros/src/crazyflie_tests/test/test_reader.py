@@ -1,4 +1,4 @@
-"""What a reader of the manual takes for what a page says is printed."""
+"""Comparison of a command's output with the output on a page of the manual."""
 
 from pathlib import Path
 

@@ -1,7 +1,7 @@
 """Flights of a virtual vehicle, compared with recorded flights of the firmware.
 
-These must be equal: the supervisor's states and their order, error numbers, answers. What may
-differ, and why:
+These must be equal: the supervisor's states and their order, error numbers, answers. These may
+differ:
 
 * `MOMENT`: supervisor (40 ms), high-level commander (10 ms) and the log (20 ms) of
   the recorded vehicle run at phases of their own, and a command is on its way for

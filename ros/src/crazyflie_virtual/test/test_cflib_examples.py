@@ -40,7 +40,7 @@ class Expected(NamedTuple):
     end: tuple[float, float] | None = None
 
 
-# What they call of cflib is called in test_cflib.py.
+# The methods of cflib that they call are tested in test_cflib.py.
 pytestmark = pytest.mark.long
 
 RUNNING = {
@@ -102,7 +102,7 @@ geos:
 
 
 class Run(NamedTuple):
-    """What came of an example; of each vehicle the greatest height and the last position."""
+    """Result of an example: for each vehicle the greatest height and the last position."""
 
     code: int | None
     output: str
@@ -160,7 +160,7 @@ def run_example(name: str, place: pathlib.Path) -> Run:
             code, output = done.returncode, done.stdout
         except subprocess.TimeoutExpired as error:
             code, output = None, _text(error.stdout)
-        # What was landed at the last moment comes to rest. Whether it does is for the test.
+        # A vehicle that was landed at the last moment must come to rest, which the test checks.
         with contextlib.suppress(AssertionError):
             wait_until(lambda: all(s.vehicle.physics.position[2] == 0.0 for s in servers))
         is_over.set()

@@ -1,4 +1,4 @@
-"""What a client does in vain is reported on the console, and no more than once a second."""
+"""Commands of a client without effect are reported on the console, at most once a second."""
 
 import struct
 

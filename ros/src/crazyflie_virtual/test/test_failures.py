@@ -1,4 +1,4 @@
-"""What cflib sees when something goes wrong, and the faults of the link in figures."""
+"""Faults as seen by cflib, and the faults of the link in figures."""
 
 import contextlib
 import signal

@@ -96,7 +96,7 @@ def test_the_end_of_a_frame(version, form, stamps):
     message = Encoder(version).frame(77, [], 1.5, 1.6, 1.7)
     end = struct.unpack(form, message[-struct.calcsize(form) :])
     assert end == (0, 0, 1.5, *stamps, 0, 0)
-    # Before it are the number, and counts, from 4.1 on with sizes; all are zero.
+    # The number and the counts precede it, from 4.1 on with sizes; all are zero.
     counts = {"2.9": 6, "3.1": 7, "4.1": 16}[version]
     assert len(message) == 4 + 4 + 4 * counts + struct.calcsize(form)
 

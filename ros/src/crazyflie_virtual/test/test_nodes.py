@@ -117,7 +117,7 @@ def test_switches_may_be_changed_while_it_runs(launch):
     process.transport.set_param("/node/fault", {"loss": 0.25, "motor_failure": 3})
     process.advance(1.0)
     assert (faults.loss, faults.motor_failure) == (0.25, 3)
-    # What a client has set meanwhile stays.
+    # Values that a client has set meanwhile are kept.
     faults.delay = 0.1
     process.advance(1.0)
     assert faults.delay == 0.1

@@ -360,7 +360,7 @@ def test_a_model_with_lags_follows_the_attitude_that_is_asked_for():
         physics.desired = (0.1, 0.0, 0.0) if k == 0 else (0.0, 0.1, 0.0)
         fly(physics, (HOVER_PWM,) * 4, lag)
         assert attitude(physics)[k] == pytest.approx(0.1 * share, rel=1e-3)
-        # What a gyroscope measures.
+        # The measurement of a gyroscope.
         assert physics.rates[k] == pytest.approx(0.1 * (1.0 - share) / lag, rel=0.03)
     physics = lagging()
     physics.desired = (0.0, 0.0, 0.5)

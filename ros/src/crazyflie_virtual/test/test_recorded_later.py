@@ -353,9 +353,9 @@ def test_compressed():
 
 
 def test_position_takeoff_turned():
-    """What the outputs about the vertical take from the thrust keeps it on the ground.
+    """The outputs about the vertical reduce the thrust, which keeps the vehicle on the ground.
 
-    It turns there by itself, twice as fast as the recorded one: the ground is another. When the
+    It turns there by itself, twice as fast as the recorded one: the ground differs. When the
     heading is given up, it jumps by the integral of the height.
     """
     firmware, flight = recorded("position_takeoff_turned"), CommandedFlight()

@@ -1,7 +1,7 @@
-"""Setpoints of all types, and packets that are none: the recorded flights, flown again.
+"""Setpoints of all types, and invalid packets: the recorded flights, flown again.
 
-The record does not say what was flown between two types. By the heights it was a
-position, and each type was flown for as long as is written next to it here.
+The record does not contain the setpoints between two types. By the heights it was a position, and
+each type was flown for as long as is written next to it here.
 """
 
 import math

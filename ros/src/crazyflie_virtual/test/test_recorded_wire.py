@@ -122,7 +122,7 @@ def test_parameters(client):
     firmware = recorded("parameters")
     assert list(steps) == list(firmware)
     answers = {name: step() for name, step in steps.items()}
-    # Of a short write the firmware stores what its buffer held behind it.
+    # For a short write, the firmware also stores the old bytes of its buffer.
     for column in (answers, firmware := dict(firmware)):
         column["read_after_short"] = [a[:10] for a in column["read_after_short"]]
     assert answers == firmware
@@ -212,7 +212,7 @@ def test_link(client):
     firmware = recorded("link")
     assert answers == {name: firmware[name] for name in answers}
     (release,) = text(ask(Port.PLATFORM, 1, b"\1"))
-    # What follows the release's name is the build's.
+    # The text after the release's name belongs to the build.
     assert release[1:].split()[0] == firmware["firmware"][0].split()[0]
     sizes = {p.data[2]: p.data[3:7] for i in range(7) for p in ask(Port.MEMORY, 0, bytes([2, i]))}
     for memory_type, size in firmware["memories"]:

@@ -22,7 +22,7 @@ class Hand:
         self.motors_run = False
 
     def run(self, duration):
-        """Let time pass; return the state."""
+        """Advance the time; return the state."""
         for _ in range(round(duration / PERIOD)):
             self.time += PERIOD
             x, y, z = self.force

@@ -47,7 +47,7 @@ class Bench:
         return answer.data
 
     def run(self, duration):
-        """Let time pass."""
+        """Advance the time."""
         end = self.vehicle.time + duration
         self.unsolicited += map(crtp.decode, self.vehicle.advance_to(end + 1e-9))
 

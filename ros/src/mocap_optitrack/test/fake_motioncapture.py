@@ -9,7 +9,7 @@ DONE = Path("done")
 """Appears in the working folder when a script is over."""
 
 SCRIPTS = {
-    # What frames show of "cf1" and "still": x of the position, or None for nothing.
+    # Positions of "cf1" and "still" in frames: x, or None if missing.
     "127.0.0.1": [(1.0, 5.0), (2.0, 5.0), (3.0, 6.0)],
     "127.0.0.2": [(1.0, 5.0), (1.0, 5.0), (1.0, 5.0)],
     "127.0.0.6": [(float(number), 5.0) for number in range(20000)],

@@ -29,7 +29,7 @@ def server(command_port=0, **options):
 
 
 def see(running, name="cf1"):
-    """Let a server see its bodies."""
+    """Make a server see its bodies."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for number, body in [(1, name), (7, "cf7")]:
             seen = Observation(

@@ -71,7 +71,7 @@ def wait_for_status(component, level, text=""):
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    """Run the node, and server and scene when it has said that there is none."""
+    """Run the node, and server and scene after it has reported that no server answers."""
     observer_port, port = free_port(), free_port()
     with mocap_launch(tmp_path_factory.mktemp("config"), config(port)):
         wait_for_status("stream", DiagnosticStatus.ERROR, f"UDP port {port}: is Motive running")

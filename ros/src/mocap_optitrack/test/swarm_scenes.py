@@ -63,7 +63,7 @@ def _rest_to_rest(fraction):
 
 
 class Cameras:
-    """What cameras show of markers: in any order, with noise, reflections and occlusions.
+    """Markers as seen by cameras: in any order, with noise, reflections and occlusions.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Score:
 
 
 def fly(flight, cameras, update):
-    """Let a tracker see a flight; return its score.
+    """Run a tracker on a flight; return its score.
 
     ``update(time, points)`` returns name -> position; vehicles are named by their numbers.
     """

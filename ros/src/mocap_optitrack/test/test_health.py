@@ -1,4 +1,4 @@
-"""What is reported of a stream, in every state it can be in."""
+"""Reports on a stream, in every state."""
 
 import pytest
 
@@ -19,7 +19,7 @@ def health():
 
 
 def stream(health, begin, end, *tracked, lost=(), latency=0.005):
-    """Let frames come at 100 Hz, in which bodies are tracked or not."""
+    """Process frames at 100 Hz, in which bodies are tracked or not."""
     for k in range(round(100 * begin), round(100 * end)):
         health.frame(0.01 * k, latency)
         for body in tracked:
@@ -182,7 +182,7 @@ def test_a_rate_outside_its_limits():
     health = Health(BODIES, 0.2, 0.0, rate_limits=(80.0, 120.0))
     health.connected("a server")
     stream(health, 0.5, 1.0, ONE, SEVEN)
-    # Of the first period only a part was streamed.
+    # Only a part of the first period was streamed.
     assert health.report(1.0)[0].level == OK
     stream(health, 1.0, 2.0, ONE, SEVEN)
     assert health.report(2.0)[0].level == OK

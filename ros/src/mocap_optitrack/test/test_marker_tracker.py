@@ -39,7 +39,7 @@ class Scene:
         return found
 
     def move(self, begin, end, speed, *others):
-        """Let a marker go straight, at a speed (m/s), beside others; return the last positions."""
+        """Move a marker straight, at a speed (m/s), among others; return the last positions."""
         steps = math.ceil(math.dist(begin, end) / speed * RATE)
         found = {}
         for fraction in np.linspace(0.0, 1.0, steps + 1)[1:]:

@@ -72,7 +72,7 @@ def body(number, name=None, is_tracked=True):
 
 
 def show(process, node, *bodies):
-    """Let a frame come."""
+    """Process a frame."""
     process.advance(0.01)
     node.on_frame(Frame(None, None, process.clock.time(), bodies))
 
@@ -178,7 +178,7 @@ def test_a_failure_is_warned_of_and_reported():
 
 
 def show_timed(process, node, wait=0.01):
-    """Let a frame come from a server whose clock is 100 s behind, just sent."""
+    """Process a frame, just sent by a server whose clock is 100 s behind."""
     process.advance(wait)
     now = process.clock.time()
     node.on_frame(Frame(now - 100.005, now - 100.0, now, (body(1),)))

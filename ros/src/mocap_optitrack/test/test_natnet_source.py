@@ -108,7 +108,7 @@ def test_a_unicast_server_is_sent_keep_alives(monkeypatch):
         while kept_alive < 3:
             source.read(0.01)
             request, sender = commands.recvfrom(100)
-            # From where it wants the frames.
+            # The socket on which it requests the frames.
             assert sender == client
             kept_alive += natnet.parse(request)[0] == natnet.KEEP_ALIVE
         source.close()

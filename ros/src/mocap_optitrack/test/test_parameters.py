@@ -1,4 +1,4 @@
-"""What mocap.yaml may hold."""
+"""Content of mocap.yaml."""
 
 import pytest
 

@@ -83,7 +83,7 @@ def start(**changes):
 
 
 def show(process, node, duration, *points):
-    """Let frames come for a while (s)."""
+    """Process frames for a duration (s)."""
     for _ in range(round(duration * RATE)):
         process.advance(1.0 / RATE)
         node.on_frame(Frame(None, None, process.clock.time(), (), points=points))

@@ -107,7 +107,7 @@ def timed(server_time, latency=0.03, network=0.001):
 
 
 def settled(one):
-    """Let a tracker learn the server's clock; return the server's time afterwards."""
+    """Make a tracker learn the server's clock; return the server's time afterwards."""
     for k in range(1, 100):
         one.process(timed(0.01 * k))
     return 1.0

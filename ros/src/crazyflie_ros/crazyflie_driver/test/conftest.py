@@ -128,7 +128,7 @@ def add_vehicle(server):
     """Return a vehicle that was added as cf1, with nothing that it was sent."""
     vehicle = server.make_vehicle()
     server.add(vehicle.uri)
-    # What ends the zero thrust after connecting.
+    # The packet that ends the zero thrust after connecting.
     vehicle.wait_for_packets(7, 1)
     vehicle.received.clear()
     return vehicle

@@ -40,7 +40,7 @@ def uri():
 
 @pytest.fixture(autouse=True)
 def fresh():
-    """Let each test find the parameters as a new master has them."""
+    """Reset the parameters to those of a new master for each test."""
     yield
     with contextlib.suppress(KeyError):
         rospy.delete_param("/cf1")

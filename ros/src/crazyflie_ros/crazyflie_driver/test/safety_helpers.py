@@ -23,7 +23,7 @@ TAKEOFF = TakeoffRequest(0, 1.0, Duration(2))
 
 
 def is_(vehicle, state):
-    """Have a vehicle be in a state, as it is asked and as it logs it; None for its own again."""
+    """Set the state that a vehicle reports and logs; None for its own again."""
     vehicle.flight.pin(state)
 
 
@@ -32,7 +32,7 @@ def position(server):
 
 
 def stream_position(server, vehicle):
-    """Have a vehicle fly on positions, and forget what it was sent."""
+    """Fly a vehicle on positions, and forget the packets so far."""
     position(server)
     vehicle.wait_for_packets(7, 0)
     vehicle.received.clear()

@@ -1,4 +1,4 @@
-"""What a voltage means."""
+"""The charge by a voltage."""
 
 import math
 

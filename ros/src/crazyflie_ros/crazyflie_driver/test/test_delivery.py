@@ -1,4 +1,4 @@
-"""What waits for the callbacks' turn, and what is dropped."""
+"""Work that waits for the callbacks' turn, and dropped data."""
 
 import queue
 import threading

@@ -57,7 +57,7 @@ def flight(streaming):
 
 
 def begin(server, vehicle):
-    """Have the vehicle fly on positions, with nothing that came before."""
+    """Fly the vehicle on positions, without earlier packets."""
     vehicle.answers.clear()
     vehicle.deaf.clear()
     is_(vehicle, FLYING)

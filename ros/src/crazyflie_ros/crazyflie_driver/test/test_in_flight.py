@@ -117,7 +117,7 @@ def test_a_landing_for_the_battery_that_fails_is_tried_again(server, vehicle):
 
 
 def loses_replies(vehicle, count):
-    """Have the vehicle lose its first replies to commands."""
+    """Lose the vehicle's first replies to commands."""
     left = [count]
 
     def lose(_):

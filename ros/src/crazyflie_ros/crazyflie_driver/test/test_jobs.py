@@ -56,7 +56,7 @@ def test_an_urgent_job_does_not_wait_and_ends_what_it_overtakes(jobs, slow):
         with pytest.raises(ServiceError, match="given up for land"):
             given_up.result(LIMIT)
     assert other.result(LIMIT) == "written"
-    # What comes later is another matter.
+    # Later jobs are not affected.
     assert jobs.submit("test", lambda _: "flown", is_flight=True).result(LIMIT) == "flown"
 
 

@@ -114,7 +114,7 @@ class Truth(Flight):
         return self.server.process.published("/cf1/status")[-1].data
 
     def touches_down(self):
-        """Let the vehicle land; return the speed at which it met the ground, m/s."""
+        """Land the vehicle; return the speed of the touchdown, m/s."""
         self.truth.clear()
         self.run(LIMIT, until=lambda: self.height < 0.02 and not self.motors_run)
         assert self.height < 0.02
@@ -200,7 +200,7 @@ class Beside(Truth):
 
 @pytest.fixture
 def beside(server):
-    """Return a flight beside the table."""
+    """Return a flight next to the table."""
     with virtual_vehicle(positioning="none") as (virtual, uri):
         flight = Beside(server, virtual, uri)
         flight.run(3.0)

@@ -48,7 +48,7 @@ def test_a_vehicle_that_is_removed_in_flight_lands_first(hovering):
 
 
 def test_a_landing_outlives_the_server(hovering):
-    """What is sent after the landing would stop the motors in the air."""
+    """A packet after the landing would stop the motors in the air."""
     server, vehicle = hovering
     is_(vehicle, HIGH_LEVEL)
     server.node.shutdown()

@@ -35,7 +35,7 @@ class Stream:
         return any(self.virtual.vehicle.board.firmware.stabilizer.commands)
 
     def run(self, duration, *messages):
-        """Let time go by, with these messages (topic, message) again and again."""
+        """Advance the time, with these messages (topic, message) repeatedly."""
         end = self.virtual.vehicle.time + duration
         while self.virtual.vehicle.time < end:
             self.server.process.advance(PERIOD)

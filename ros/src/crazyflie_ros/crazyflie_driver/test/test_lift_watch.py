@@ -19,7 +19,7 @@ class Attempt:
         self.begin = self.now
 
     def run(self, duration, told=GROUND + 0.5, is_flying=True, estimate=lambda time: (GROUND, 0.0)):
-        """Let time go by; ``estimate(time)`` returns height and speed since the beginning."""
+        """Advance the time; ``estimate(time)`` returns height and speed since the beginning."""
         begin = self.now
         for k in range(round(50 * duration)):
             self.now = begin + 0.02 * k

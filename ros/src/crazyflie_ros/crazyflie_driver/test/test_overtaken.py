@@ -1,4 +1,4 @@
-"""What was given up for an urgent command is not sent after it."""
+"""Commands that were cancelled for an urgent one are not sent after it."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""What was written to a vehicle is written again when it may have forgotten it."""
+"""Parameters that were written to a vehicle are written again when it may have lost them."""
 
 from types import SimpleNamespace
 
@@ -32,7 +32,7 @@ def test_settings_are_written_again_and_commands_are_not():
     assert firmware.written == []
     mirror.write(["ring/effect", "kalman/resetEstimation"])
     firmware.written.clear()
-    # What was set since, but not written, does not count.
+    # Values that were set since, but not written, are ignored.
     process.transport.set_param("/cf1/ring/effect", 8)
     mirror.reapply_parameters()
     assert firmware.written == [("ring.effect", 7)]

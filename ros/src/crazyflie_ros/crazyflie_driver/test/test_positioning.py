@@ -118,7 +118,7 @@ def test_the_estimate_is_on_tf_and_ends_when_no_base_station_is_seen(server):
         poses = server.process.published("/cf1/pose")
         assert poses[0].header.stamp == first.header.stamp
         assert server.process.published("/cf1/positioning")[-1].data == ""
-        # What comes as an external pose may be this very estimate.
+        # An external pose may be this very estimate.
         server.process.publish("/cf1/external_pose", PoseStamped())
         assert "ignoring external_pose" in server.process.logged("warn")[-1]
         virtual.switches.occluded = 3
@@ -134,7 +134,7 @@ def test_the_estimate_is_on_tf_and_ends_when_no_base_station_is_seen(server):
 
 
 def pass_time(server, condition):
-    """Let the driver's clock follow the machine's until a condition holds."""
+    """Make the driver's clock follow the machine's until a condition holds."""
     ahead = server.process.clock.time() - time.monotonic()
 
     def is_met():

@@ -233,7 +233,7 @@ def test_the_status_says_what_state_a_vehicle_is_in(server):
 
 
 def test_a_callback_that_takes_its_time_loses_no_link(server, vehicle):
-    """What comes over the link is heard all the same, replies to commands included."""
+    """Packets over the link are still received, including replies to commands."""
     vehicle.wait_for_packets(15, 0)
     crazyflie = server.node._vehicles[vehicle.uri].crazyflie
     written = []

@@ -239,7 +239,7 @@ def test_the_end_of_the_server_stops_all_motors(server):
     vehicles = [server.make_vehicle() for _ in range(3)]
     for k, vehicle in enumerate(vehicles):
         server.add(vehicle.uri, f"cf{k}")
-        # What ends the zero thrust after connecting.
+        # The packet that ends the zero thrust after connecting.
         vehicle.wait_for_packets(7, 1)
         vehicle.received.clear()
     process, node = server.process, server.node

@@ -148,7 +148,7 @@ def test_an_emergency_is_latched(server, vehicle):
     server.process.advance(1.0)
     (status,) = server.process.published("/diagnostics")[-1].status
     assert status.message.startswith("emergency stop")
-    # Only a vehicle that is added anew flies again.
+    # Only a vehicle that is added again flies again.
     server.remove(vehicle.uri)
     vehicle.flight.restart()
     server.add(vehicle.uri)

@@ -104,7 +104,7 @@ def test_base_stations_from_a_file(virtual, tmp_path):
     server.call("/cf9/write_lighthouse", base_stations(tmp_path / "two.yaml", 0, 3))
     assert struct.unpack_from("<3f", pages[3]) == (1.0, 2.0, 5.0)
     assert struct.unpack("<L?", pages[16 + 3][-5:]) == (1003, True)
-    # What was known of others is not valid any more.
+    # Data of other stations are no longer valid.
     server.call("/cf9/write_lighthouse", base_stations(tmp_path / "one.yaml", 0))
     assert [pages[number][-1] for number in range(4)] == [1, 0, 0, 0]
 

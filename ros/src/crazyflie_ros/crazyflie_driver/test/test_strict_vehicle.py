@@ -45,12 +45,12 @@ class Flight:
         return self.virtual.vehicle.time
 
     def wait(self, duration):
-        """Let the vehicle's time go by; no node sends anything."""
+        """Advance the vehicle's time; no node sends anything."""
         end = self.time + duration
         wait_until(lambda: self.time >= end, f"{duration} s of the vehicle's time", period=0.002)
 
     def run(self, duration, height=None, until=lambda: False):
-        """Let time go by, streaming positions if a height is given."""
+        """Advance the time, streaming positions if a height is given."""
         end, step = self.time + duration, PERIOD
         while (begin := self.time) < end and not until():
             self.server.process.advance(step)

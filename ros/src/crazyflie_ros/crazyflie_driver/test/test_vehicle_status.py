@@ -78,7 +78,7 @@ def test_the_fields_of_crazyswarm2(make_server):
     server.add(vehicle.uri)
     wait_for_words(server, "ready")
     server.process.advance(1.0)
-    # The vehicle counts in 16 bits.
+    # The vehicle's counters have 16 bits.
     vehicle.log.update({"radio.numRxBc": ("H", 7), "radio.numRxUc": ("H", 4)})
     driver = server.node._vehicles[vehicle.uri]
     wait_until(lambda: server.process.advance(0.01) or driver.log.received_broadcasts == 7)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""What a radio channel carries, and how far apart vehicles begin a broadcast command.
+"""Print the load of a radio channel, and the skew of vehicles that begin a broadcast command.
 
 Run it in a shell that has sourced the workspace:
 
@@ -26,11 +26,15 @@ SEEDS = 5
 
 
 def main() -> None:
-    """Measure as the command line asks, and print."""
+    """Measure by the command line, and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--vehicles", type=int, default=20, help="on the channel (20)")
-    parser.add_argument("--rate", type=float, default=100.0, help="of frames, Hz (100)")
-    parser.add_argument("--polls", type=float, default=20.0, help="of each vehicle, Hz (20)")
+    parser.add_argument(
+        "--vehicles", type=int, default=20, help="number of vehicles on the channel (20)"
+    )
+    parser.add_argument("--rate", type=float, default=100.0, help="rate of frames, Hz (100)")
+    parser.add_argument(
+        "--polls", type=float, default=20.0, help="rate of packets to each vehicle, Hz (20)"
+    )
     options = parser.parse_args()
     n = options.vehicles
     print(f"{n} vehicles, frames at {options.rate:g} Hz, packets to each at {options.polls:g} Hz")

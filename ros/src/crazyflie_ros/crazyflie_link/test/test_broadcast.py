@@ -98,7 +98,7 @@ def by_udp(tmp_path):
 
 
 def begin_together(broadcaster, links, awaited, command):
-    """Have all carry out a command that is shared by so many; return their errors."""
+    """Carry out a command that a number of vehicles share; return their errors."""
     shared = SharedCommand(broadcaster, awaited)
     with ThreadPoolExecutor(len(links)) as pool:
         calls = [pool.submit(command, link.high_level.broadcast(shared)) for link in links]
@@ -167,7 +167,7 @@ def test_a_broadcast_that_a_dongle_has_not_taken_is_withdrawn(bus, by_radio, mon
         radio.transmit([bytes([7 << 4, 0])])
     free.set()
     for vehicle in vehicles:
-        # What is sent after it has come.
+        # A packet that is sent afterwards has arrived.
         vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 2)
         assert vehicle.broadcasts == []
 

@@ -1,4 +1,4 @@
-"""What a vehicle's packets change, on a mock of its link."""
+"""Effects of a vehicle's packets, on a mock of its link."""
 
 from unittest.mock import patch
 

@@ -1,4 +1,4 @@
-"""What importing the package does to the process around it."""
+"""Effects of importing the package on the process."""
 
 import subprocess
 import sys

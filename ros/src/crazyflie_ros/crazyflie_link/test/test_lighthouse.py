@@ -1,4 +1,4 @@
-"""What is written to the memory of base stations, and stored, on a link without a vehicle."""
+"""Writing and storing the memory of base stations, on a link without a vehicle."""
 
 import struct
 from types import SimpleNamespace

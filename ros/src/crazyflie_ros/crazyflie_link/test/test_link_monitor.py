@@ -154,7 +154,7 @@ def restarts(*packets):
         ([(100, 0.0), (200, 0.1), (300, 0.2)], False),
         # Two blocks may overtake each other.
         ([(100, 0.0), (200, 0.1), (190, 0.1), (300, 0.2)], False),
-        # The clock begins anew every 4.66 h by itself.
+        # The clock wraps every 4.66 h.
         ([(WRAP_MS - 16, 0.0), (WRAP_MS + 5, 0.02), (WRAP_MS + 100, 0.1)], False),
         ([(60_000, 0.0), (60_100, 0.1), (900, 2.0)], True),
         ([(60_000, 0.0), (90_000, 30.0)], False),

@@ -47,7 +47,7 @@ def test_a_vehicle_that_is_heard_again_soon_needs_no_set_up(vehicle, make_link, 
     vehicle.received.clear()
     vehicle.is_frozen = True
     states.wait_for(LinkState.LOST)
-    # What has to be tried all the same.
+    # An attempt that must still be made.
     link.supervisor.emergency_stop()
     vehicle.is_frozen = False
     assert "is heard again" in states.wait_for(LinkState.CONNECTED)
@@ -111,7 +111,7 @@ def test_no_packet_ends_the_thread_that_receives(shared, packets):
 )
 def test_no_packet_ends_the_set_up_without_a_reason(packets):
     link = Link(Address.parse("udp://127.0.0.1:1"))
-    # What is asserted is that it raises nothing: that would end the thread that receives.
+    # It must raise nothing: an exception would end the receiving thread.
     for port, channel, data in packets:
         link.cflib.packet_received.call(packet(port, channel, data))
     link.close()

@@ -157,7 +157,7 @@ def test_a_guarded_subsystem_sends_only_what_it_may(vehicle, link):
     supervisor = link.supervisor.guarded(lambda: allowed[0])
     high_level.define_trajectory(3, range(132), 1)
     supervisor.arm()
-    # What is known is known to both.
+    # Both know the groups and trajectories.
     link.high_level.start_trajectory(3)
     vehicle.received.clear()
     allowed[0] = False

@@ -1,4 +1,4 @@
-"""What needs a Crazyradio, on mocks of cflib."""
+"""Functions that need a Crazyradio, on mocks of cflib."""
 
 import itertools
 import threading

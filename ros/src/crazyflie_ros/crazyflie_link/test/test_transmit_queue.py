@@ -31,7 +31,7 @@ class Radio:
         return lambda: self.sent.append(what)
 
     def let_go(self):
-        """Let everything be sent that waits, and return it."""
+        """Send all waiting packets, and return them."""
         done = threading.Event()
         self.queue.put_latest("end", done.set)
         self.free.set()

@@ -177,7 +177,7 @@ def test_a_refused_command_says_why(target, flying):
     target.answers[8, 0, 7] = b"\x07\x00\x00\x0c"
     with pytest.raises(RefusedError, match=r"takeoff command.*Cannot allocate memory, 12"):
         flying.high_level.take_off(1.0, 2.0)
-    # Without a code it is none.
+    # Without a code it is not a reply.
     target.answers[8, 0, 3] = b"\x03\x00\x00"
     flying.high_level.stop()
 

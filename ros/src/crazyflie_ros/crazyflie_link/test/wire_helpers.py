@@ -1,4 +1,4 @@
-"""What came over the link."""
+"""Packets that came over the link."""
 
 
 def only_packet(target, port, channel):

@@ -1,4 +1,4 @@
-"""A node that has the server add one vehicle, and ends."""
+"""A node that makes the server add one vehicle, and ends."""
 
 from concurrent.futures import Future
 

@@ -22,9 +22,9 @@ from crazyflie_utils import NodeHandle, ServiceError
 class Channel:
     """Broadcasts to vehicles on one channel, by the dongle of the address that it is made with.
 
-    Vehicles with links of other dongles are reached, too. External poses of vehicles on a
-    radio are packed, if they are as many as the parameters say; nobody acknowledges them, so those
-    of another dongle, which may be out of reach of this one, get their own.
+    Vehicles with links of other dongles are also reached. External poses of vehicles on a radio are
+    packed if the vehicles are as many as the parameters say; packed poses are not acknowledged, so
+    vehicles of another dongle, which may be out of reach of this one, get their own.
     """
 
     def __init__(self, address: Address, parameters: BroadcastParameters):
@@ -54,7 +54,7 @@ class Channel:
     def share(self, needs: Mapping[DriverVehicle, Need]) -> SharedCommand | None:
         """Return a command for all vehicles with the need for one; None if each gets its own.
 
-        A broadcast reaches every vehicle of the channel: each has to be known, and to need nothing
+        A broadcast reaches every vehicle of the channel: each must be known, and must need nothing
         else.
         """
         ready = [vehicle for vehicle in self.vehicles if needs.get(vehicle) is Need.COMMAND]
@@ -69,7 +69,7 @@ class Channel:
     def _share_poses(self):
         addresses = [vehicle.crazyflie.address for vehicle in self.vehicles]
         users = Counter(address.vehicle_id for address in addresses)
-        # Each vehicle on the channel takes the poses with its id, whatever dongle speaks to it.
+        # Each vehicle on the channel uses the poses with its id, from any dongle.
         packed = {
             vehicle: address.vehicle_id
             for vehicle, address in zip(self.vehicles, addresses, strict=True)
@@ -102,7 +102,7 @@ class AllVehicles:
     All checks for a single vehicle are made for each, before any is sent the command; a
     landing or stop is sent to all others when it fails for one. A radio channel gets one
     packet for all if each of its vehicles needs just that; otherwise each vehicle gets its own.
-    Every vehicle has to answer; one that has not received the broadcast is sent its own command.
+    Every vehicle must answer; one that has not received the broadcast is sent its own command.
     """
 
     def __init__(self, handle: NodeHandle, channels: Mapping[str, Channel]):
@@ -126,7 +126,7 @@ class AllVehicles:
         ready = [each for channel in channels for each in channel.vehicles if each.is_ready()]
         if not ready:
             raise ServiceError(f"{name} of all vehicles: none is connected; expected one or more")
-        # Begun here, in the order of the calls.
+        # Started here, in the order of the calls.
         checks = {vehicle: vehicle.commands.check(command) for vehicle in ready}
 
         def work(_: Job) -> Any:

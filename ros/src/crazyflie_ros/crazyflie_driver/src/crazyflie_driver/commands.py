@@ -1,4 +1,4 @@
-"""High-level commands: of which services they are, and how they are sent to one vehicle."""
+"""High-level commands: their services, and their transmission to one vehicle."""
 
 import enum
 from collections.abc import Callable
@@ -96,9 +96,10 @@ def requested(name: str, request: Any) -> Command:
 
 
 class Need(enum.Enum):
-    """Packets that a vehicle has to be sent for a command."""
+    """Packets that a vehicle needs for a command."""
 
     COMMAND = enum.auto()
     SETPOINTS_STOP = enum.auto()  #: The notice that setpoints stop, right before the command.
-    ON_GROUND = enum.auto()  #: None: a landing would start the motors of a vehicle that stands.
-    NOT_ADDRESSED = enum.auto()  #: None: the command is for other groups.
+    #: No packet: a landing would start the motors of a vehicle on the ground.
+    ON_GROUND = enum.auto()
+    NOT_ADDRESSED = enum.auto()  #: No packet: the command is for other groups.

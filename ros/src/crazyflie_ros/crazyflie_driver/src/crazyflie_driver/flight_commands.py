@@ -1,4 +1,4 @@
-"""High-level commands to one vehicle, and its landings, until it stands."""
+"""High-level commands to one vehicle, and its landings, until it is on the ground."""
 
 import enum
 import time
@@ -25,17 +25,18 @@ Result = TypeVar("Result")
 
 #: Time within which the notice that setpoints stop needs its command, s.
 NOTIFY_WINDOW = 0.5
-_WATCHDOG_PERIOD = 0.2  #: The firmware gives up after 1 s without being fed.
+#: Period of feeding the watchdog (s): the firmware stops the motors after 1 s without.
+_WATCHDOG_PERIOD = 0.2
 
 #: Time in which a vehicle arms itself, s. Firmware 2026.08 disarms and arms itself 3 s after a
 #: landing (0.16 s) and every 30 s on the ground (0.08 s).
 _REARMING = 0.5
 
-#: Time limit and period of the look-up of a vehicle that has not answered a command, s. It is heard
+#: Time limit and period of the checks of a vehicle that has not answered a command (s). It is heard
 #: again within 1 s, or gets a new link.
 _LOOK_UP_LIMIT, _LOOK_UP_PERIOD = 1.5, 0.05
 
-_MARGIN = 1.0  #: A vehicle that is active this long after its landing, s, lands again.
+_MARGIN = 1.0  #: Time after its landing at which a vehicle that is still active lands again (s).
 _LOG_DELAY = 0.5  #: Time after which the log shows the effect of a command, s.
 
 
@@ -45,11 +46,11 @@ class Reason(enum.Enum):
     #: At 3.0 V under the load of hover a cell of 250 mAh has some 4 % left, which is 15 s; 5 s of
     #: them have gone by before the charge is critical.
     BATTERY = "the battery is critical", 5.0
-    #: A process waits 10 s for a flight, and the last metre takes its time.
+    #: A process waits 10 s for a flight, and the last metre needs part of that.
     POSITIONING = "the vehicle's positioning is lost", 7.0
     SHUTDOWN = "the driver is to end", 7.0
     REMOVAL = "the vehicle is being removed", 7.0
-    #: Its caller believes that it failed.
+    #: The caller of the command was told that it failed.
     NO_ANSWER = "a command that was refused as not answered is carried out", 7.0
 
     @property
@@ -70,13 +71,13 @@ class FlightCommands:
     In flight the firmware stops its motors at the notice that setpoints stop, unless a command
     follows at once: so the notice is sent together with the command, which was checked before.
 
-    A command that has a vehicle move and is not answered is looked up: the vehicle's state decides
-    whether it is a success. If the vehicle is not heard, it is a failure, and the vehicle is landed
-    should it obey when it is heard again.
+    For a command that moves a vehicle and is not answered, the vehicle's state decides whether it
+    is a success. If the vehicle is not heard, the command fails, and the vehicle is landed if it is
+    found to obey when it is heard again.
 
     No command may replace a landing of the driver's own. The firmware lands at a height and stops
-    the motors there, also without a link. With a link the vehicle sinks further until it stands:
-    see `Touchdown`. So it does in landings of the service.
+    the motors there, also without a link. With a link the vehicle sinks further until it is on the
+    ground: see `Touchdown`. The same holds for landings of the service.
     """
 
     _vehicle: BaseVehicle
@@ -92,8 +93,8 @@ class FlightCommands:
     # A command that was not answered and was refused to its caller; it may still be carried out.
     _unanswered: Command | None = None
     _look_up: Future[bool] | None = None
-    # Of a landing of the driver's own: why, its latest command, when that was sent and when it
-    # should have been carried out, s.
+    # A landing of the driver's own: its reason, its latest command, and the times at which that was
+    # sent and should have been carried out (s).
     _reason: Reason | None = None
     _landing: Future[None] | None = None
     _begin: float = 0.0
@@ -170,7 +171,7 @@ class FlightCommands:
         landing = self._landing
         if landing is None or not self._is_under_way(landing):
             height = self._log.height
-            # Beside a table it may be below 0: it never climbs.
+            # Next to a table it may be below 0: it never climbs.
             ground = 0.0 if height is None else min(0.0, height)
             duration = landing_duration(
                 height, self._vehicle.server.landing_duration, self._reason.limit

@@ -1,4 +1,4 @@
-"""Whether a vehicle flies, and by its high-level commander."""
+"""Decides whether a vehicle flies, and whether by its high-level commander."""
 
 import math
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ class FlightState:
     """Distinguish flights by the high-level commander from other states with FLYING.
 
     FLYING holds until 2 s after the motors have stopped, and a landing that is commanded then
-    starts them again: a flight needs HIGH_LEVEL_ACTIVE, too. Of firmware that does not report it
-    (before protocol 12), what was sent last decides: when the planner was commanded to move, and
-    when it holds the motors off.
+    starts them again: a flight needs HIGH_LEVEL_ACTIVE, too. For firmware that does not report it
+    (before protocol 12), the last commands decide: when the planner was commanded to move, and when
+    it keeps the motors off.
     """
 
     _vehicle: BaseVehicle
@@ -100,7 +100,7 @@ class FlightState:
         return not (self._may_move(state) or (is_streamed and SupervisorState.FLYING in state))
 
     def _may_move(self, state):
-        # Whether the planner may give the motors anything to do.
+        # Whether the planner may run the motors.
         if state.reports_planner:
             return SupervisorState.HIGH_LEVEL_ACTIVE in state
         is_latest = self._planned >= self._setpoints.last_time

@@ -15,8 +15,9 @@ from crazyflie_utils import NodeHandle, ServiceError
 
 Result = TypeVar("Result")
 
-MOST_JOBS = 64  #: Jobs that may be queued.
-#: Data that may be queued; more are dropped. A vehicle logs some 300 packets a second.
+#: Largest number of queued jobs. Largest number of queued data; more are dropped. A vehicle logs
+#: some 300 packets a second.
+MOST_JOBS = 64
 MAX_WAITING = 1000
 
 

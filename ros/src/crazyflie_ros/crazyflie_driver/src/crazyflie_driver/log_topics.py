@@ -24,8 +24,8 @@ from crazyflie_utils.topics import Publisher
 
 #: Periods of imu and pose, and of the other topics, ms: those of the C++ driver.
 FAST_MS, SLOW_MS = 10, 100
-_MOST_VARIABLES = 6  #: Variables of four bytes that fit in a log packet's 26 bytes.
-_UNKNOWN = -1.0  #: First element of a covariance: there is no such measurement (sensor_msgs/Imu).
+_MOST_VARIABLES = 6  #: Number of four-byte variables that fit in a log packet's 26 bytes.
+_UNKNOWN = -1.0  #: First element of the covariance of a missing measurement (sensor_msgs/Imu).
 
 
 class StandardTopic(NamedTuple):
@@ -211,7 +211,7 @@ class LogTopics:
                 self._start_custom(block)
 
     def forget_state(self) -> None:
-        """Forget the state and the variances: those from before a loss are not those of now."""
+        """Forget the state and the variances: those from before a loss are outdated."""
         self.supervisor = None
         self.variances.clear()
 

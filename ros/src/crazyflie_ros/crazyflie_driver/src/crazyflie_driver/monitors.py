@@ -121,12 +121,12 @@ def _excess(window):
     )
 
 
-LIFT_LIMIT = 2.0  #: Time in which a vehicle has to lift off, s.
-MIN_CLIMB = 0.15  #: Setpoints that are lower above the ground do not ask for a flight, m.
-MAX_RISE = 0.05  #: A vehicle on the ground estimates no more above it, m.
+LIFT_LIMIT = 2.0  #: Time in which a vehicle must lift off (s).
+MIN_CLIMB = 0.15  #: Least height of setpoints above the ground that command a flight (m).
+MAX_RISE = 0.05  #: Largest estimated height of a vehicle on the ground (m).
 MAX_TURN = 10.0  #: Largest turn from the heading on the ground to the commanded one, degrees.
 
-MAX_REST_SPEED = 0.1  #: A vehicle on the ground estimates no more, m/s.
+MAX_REST_SPEED = 0.1  #: Largest estimated vertical speed of a vehicle on the ground (m/s).
 
 
 class NoLift(NamedTuple):
@@ -204,7 +204,8 @@ class LiftWatch:
 
 
 LANDING_SPEED = 0.5  #: Mean speed of a landing, m/s.
-STEP, STEP_TIME = (0.5, 1.5)  #: Way (m) and duration (s) of a descent below the expected ground.
+#: Distance (m) and duration (s) of a descent below the expected ground.
+STEP, STEP_TIME = (0.5, 1.5)
 MAX_DEPTH = 3.0  #: The descents go no further below it, m.
 #: The next descent begins this long before one ends, and the firmware stops the motors with it, s.
 LEAD = 0.4
@@ -228,7 +229,7 @@ class Next(enum.Enum):
 
     NOTHING = enum.auto()
     DESCENT = enum.auto()  #: A descent by `STEP`: no ground was met.
-    STOP = enum.auto()  #: The motors stop: the vehicle stands.
+    STOP = enum.auto()  #: The motors stop: the vehicle is on the ground.
 
 
 class Touchdown:
@@ -261,7 +262,7 @@ class Touchdown:
             return Next.NOTHING
         if self._stands(now, height, speed, target):
             return Next.STOP
-        # Higher up something else has taken the landing's place.
+        # If the vehicle is higher, another command has replaced the landing.
         goes_on = self._ground - MAX_DEPTH <= height - STEP < self._ground
         return Next.DESCENT if goes_on and now >= self._end - LEAD else Next.NOTHING
 

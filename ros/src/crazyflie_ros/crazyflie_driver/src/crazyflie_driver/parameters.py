@@ -120,7 +120,8 @@ class CrazyflieServerParameters(SafetyParameters):
 STATUS_TOPIC = "status"  #: Topic with the state of a vehicle in words.
 #: The same with more details, as crazyflie_msgs/VehicleStatus.
 VEHICLE_STATUS_TOPIC = "vehicle_status"
-POSITIONING_TOPIC = "positioning"  #: Topic with why its own estimate cannot be flown by.
+#: Topic with the reason why its own estimate cannot be used for flight.
+POSITIONING_TOPIC = "positioning"
 CONNECTED_TOPIC = "connected"  #: Topic with whether the driver is connected to a vehicle.
 
 

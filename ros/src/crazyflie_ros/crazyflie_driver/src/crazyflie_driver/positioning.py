@@ -14,15 +14,15 @@ SOURCES = (MOCAP, LIGHTHOUSE, FLOW, LOCO)
 PERIOD_MS = 100  #: Period at which the state of the decks is logged, ms.
 MAX_AGE = 0.5  #: A state of the decks that is older, s, is not known.
 
-#: A problem that lasts longer, s, ends the flight: no more poses are published, and the nodes that
-#: fly the vehicle by them react as to the loss of motion capture.
+#: Duration of a problem after which the flight ends (s): no more poses are published, and the nodes
+#: that fly the vehicle by them react as to the loss of motion capture.
 PATIENCE = 0.5
 
 #: Largest standard deviation of the filter: position by Lighthouse and Loco (m), horizontal
 #: velocity by optical flow (m/s). A converged filter has less than half of the least of them.
 MAX_DEVIATIONS = {LIGHTHOUSE: 0.05, LOCO: 0.15, FLOW: 0.1}
 
-#: Reading of the Flow deck's ranging sensor where nothing is in its reach, mm.
+#: Reading of the Flow deck's ranging sensor without an object in its range (mm).
 OUT_OF_REACH = 32000
 
 Values = Mapping[str, float]
@@ -83,7 +83,7 @@ class System:
     deck: str
     parameters: tuple[str, ...]  # One of them is not 0 where the deck is there.
     variables: tuple[str, ...]  # Log variables that show the state.
-    problem: Callable[[Values], str]  # What is wrong with the state; empty if nothing is.
+    problem: Callable[[Values], str]  # Returns the fault of the state; empty without a fault.
 
 
 _POSITION = ("kalman.varX", "kalman.varY", "kalman.varZ")
@@ -126,7 +126,7 @@ class Positioning:
     _clock: ClockOffset = field(default_factory=ClockOffset)
     _problem: str = "the state of its positioning has not come"
     _time: float = -math.inf
-    _good: float = -math.inf  # When there was no problem, last.
+    _good: float = -math.inf  # Last time without a problem.
 
     def update(self, now: float, values: Sequence[float]) -> None:
         """Record the values of the system's variables."""

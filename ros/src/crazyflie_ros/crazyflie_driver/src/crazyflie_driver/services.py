@@ -36,8 +36,8 @@ _SOLID_COLOR = 7  #: The firmware's ring.effect for a given color.
 class VehicleServices:
     """Announce a vehicle's services and carry them out.
 
-    What blocks on the vehicle is a job, where landing and stopping supersede what was asked
-    before; all else is done at once.
+    Calls that block on the vehicle are jobs, of which landing and stopping supersede earlier ones;
+    all others are done at once.
 
     rosmaster gives a name to the node that registers it last, and callers of the other node get an
     error about md5 sums. A controller in the vehicle's namespace, such as crazyflie_controller, has

@@ -1,11 +1,11 @@
-"""Whether setpoints may be sent: after a lost link, or without a liftoff, a stream is blocked."""
+"""Blocks of a stream of setpoints: after a lost link, without a liftoff, and others."""
 
 import contextlib
 import enum
 import threading
 from collections.abc import Iterator
 
-#: A stream that goes on after a pause of this length, s, was restarted on purpose.
+#: Length of a pause (s) after which a stream was restarted on purpose.
 STREAM_PAUSE = 1.0
 
 #: Time after a high-level command or cmd_stop in which setpoints are not sent, s. Each topic has a
@@ -15,7 +15,7 @@ OVERLAP = 0.5
 
 
 class Block(enum.Flag):
-    """Why setpoints are not sent; several can hold, and the first one is named."""
+    """Reasons for which setpoints are not sent; several can hold, and the first one is named."""
 
     EMERGENCY = enum.auto()
     REMOVAL = enum.auto()
@@ -44,22 +44,22 @@ class GateEvent(enum.Enum):
 _NONE = Block(0)
 _ON_TRIAL = Block.UNCONFIRMED | Block.LANDED | Block.NOT_LIFTED
 
-#: Event -> (blocks that have to hold, blocks that begin, blocks that end).
+#: Event -> (blocks that must hold, blocks that begin, blocks that end).
 TRANSITIONS = {
     GateEvent.EMERGENCY_STOP: (_NONE, Block.EMERGENCY, _NONE),
     GateEvent.REMOVAL: (_NONE, Block.REMOVAL, _NONE),
     # The vehicle lands.
     GateEvent.BATTERY_CRITICAL: (_NONE, Block.BATTERY, _NONE),
-    # On the ground, where the voltage comes back by itself: the old stream has it fly no more.
+    # On the ground, where the voltage recovers: the old stream must not start another flight.
     GateEvent.BATTERY_RECOVERED: (Block.BATTERY, Block.LANDED, Block.BATTERY),
     GateEvent.LINK_LOST: (_NONE, Block.LINK_LOST, Block.UNCONFIRMED),
     # The vehicle may have been restarted, or its battery been changed, and be in a hand.
     GateEvent.LINK_BACK: (Block.LINK_LOST, Block.UNCONFIRMED, Block.LINK_LOST),
     # The vehicle reports a flight, as it does with thrust on the ground, too.
     GateEvent.FLIGHT_REPORTED: (_NONE, _NONE, Block.UNCONFIRMED),
-    # A call has the vehicle fly.
+    # A service call makes the vehicle fly.
     GateEvent.FLIGHT_CALLED: (_NONE, _NONE, _ON_TRIAL),
-    # Setpoints were to have it fly, and it has not lifted off.
+    # Setpoints have commanded a flight, and the vehicle has not lifted off.
     GateEvent.NOT_LIFTED: (_NONE, Block.NOT_LIFTED, _NONE),
     # After a pause, or with zero thrust.
     GateEvent.STREAM_BEGUN: (_NONE, _NONE, _ON_TRIAL),
@@ -115,7 +115,7 @@ class SetpointGate:
             return self._commands
 
     def resume(self, command: int) -> None:
-        """Let setpoints pass again after a command (its number) failed, unless one has followed."""
+        """Allow setpoints again after a command (its number) failed, unless one has followed."""
         with self._lock:
             if command == self._commands:
                 self._high_level_since = None
@@ -139,7 +139,7 @@ class SetpointGate:
     def refusal(self, now: float, is_zero: bool) -> str:
         """Return why a setpoint must not be sent; empty if it may.
 
-        A zero has the motors stand still.
+        A zero stops the motors.
         """
         with self._lock:
             before, self._latest = self._latest, now

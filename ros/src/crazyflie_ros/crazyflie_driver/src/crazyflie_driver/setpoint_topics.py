@@ -111,8 +111,8 @@ class SetpointTopics:
     """Subscribe to a vehicle's setpoints and pass them on, as long as that is allowed.
 
     Nothing is repeated: when messages stop coming, the firmware's watchdogs act, after 0.5 s and
-    2 s. But when the last one had the motors stand still, "setpoints stop" is sent: otherwise the
-    vehicle would be locked 2 s later.
+    2 s. But if the last one stopped the motors, "setpoints stop" is sent: otherwise the vehicle
+    would be locked 2 s later.
     """
 
     _vehicle: BaseVehicle
@@ -147,7 +147,7 @@ class SetpointTopics:
 
     @property
     def runs_motors(self) -> bool:
-        """Whether the latest of them has the motors run."""
+        """Whether the latest of them runs the motors."""
         return self.control in (Control.THRUST, Control.REFERENCE)
 
     @property
@@ -188,7 +188,7 @@ class SetpointTopics:
     def notify_setpoints_stop(self, remain_valid_ms: int = 0, at_once: bool = False) -> None:
         """Announce that setpoints stop, so that the vehicle accepts high-level commands.
 
-        The last setpoint still counts for some ms. At once means in the calling thread, which has
+        The last setpoint remains valid for some ms. At once means in the calling thread, which has
         to be the one that sends: see `Subsystem.guarded`.
         """
         self._vehicle.crazyflie.setpoints.notify_setpoints_stop(remain_valid_ms, at_once)
@@ -199,10 +199,10 @@ class SetpointTopics:
         self._lift.end()
 
     def check_lift(self) -> None:
-        """End a stream that has the vehicle fly, while it stays on the ground.
+        """End a stream that commands a flight, while the vehicle stays on the ground.
 
         The firmware's integrators wind up then, and the vehicle would leap. "Setpoints stop" ends
-        that; what is streamed then is blocked until it has paused.
+        that; the stream is then blocked until it has paused.
         """
         log, state = self._log, self._log.supervisor
         is_flying = None if state is None else SupervisorState.FLYING in state
@@ -252,7 +252,7 @@ class SetpointTopics:
 
     def _on_external(self, name, sender, message):
         if self._log.positioning is not None:
-            # It may be the vehicle's own estimate: it would correct itself by itself.
+            # It may be the vehicle's own estimate, which must not be fed back.
             self._vehicle.warn(
                 f"ignoring {name}: its positioning is {self._log.positioning.source}", 5.0, name
             )
@@ -303,7 +303,7 @@ class SetpointTopics:
 
     def _cmd_vel(self, message):
         # The link's pitch is the negative of cmd_vel's, and cflib negates it; tests compare bytes.
-        # In this order a NaN stays one, and is refused.
+        # This order keeps a NaN, which is refused.
         thrust = min(max(message.linear.z, 0.0), MAX_SETPOINT_PWM)
         parameters, state = self._vehicle.parameters, self._log.supervisor
         if thrust > 0.0 and state is not None:

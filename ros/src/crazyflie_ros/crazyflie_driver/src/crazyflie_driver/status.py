@@ -22,7 +22,8 @@ from crazyflie_link.errors import LinkLostError
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import VehicleStatus
 
-_FEW_PACKETS = 10  #: With fewer packets in a second the share that is received means nothing.
+#: Least number of packets in a second for a meaningful fraction of received ones.
+_FEW_PACKETS = 10
 
 _DEFAULTS = LinkLimits.from_mapping({})
 
@@ -38,7 +39,7 @@ _BLOCKED = "setpoints are ignored since the link was lost: pause them, or call a
 
 
 def findings(status: VehicleStatus, limits: LinkLimits = _DEFAULTS) -> list[tuple[int, str]]:
-    """Return (level, text) of everything that is not as it should be, worst first."""
+    """Return (level, text) of all faults, worst first."""
     found = []
     error, warn = DiagnosticStatus.ERROR, DiagnosticStatus.WARN
     if status.is_emergency:
@@ -79,7 +80,7 @@ def _link_faults(status, limits):
 
 
 def words(status: VehicleStatus) -> str:
-    """Return what state a vehicle is in and why, such as "flying: on setpoints"."""
+    """Return the state of a vehicle and its reason, such as "flying: on setpoints"."""
     state = SupervisorState(status.supervisor)
     if status.is_emergency:
         return _EMERGENCY
@@ -145,7 +146,9 @@ _LINKS = {name: value for value, name in LINK_NAMES.items()}
 
 #: Fields of which a change is published at once.
 _STATES = ("text", "link", "supervisor", "has_supervisor", "is_emergency", "battery", "is_streamed")
-_MOST = 1 << 15  #: Packets in a second. The vehicle counts in 16 bits; more is its restart.
+#: Largest number of packets in a second. The vehicle's counters have 16 bits; a larger difference
+#: is a restart.
+_MOST = 1 << 15
 
 
 @dataclass(eq=False)
@@ -155,7 +158,8 @@ class StatusPublisher:
     _vehicle: BaseVehicle
     _log: LogTopics
     _setpoints: SetpointTopics
-    broadcaster: Broadcaster | None = None  #: Counts what is sent to all vehicles of its channel.
+    #: Sender to all vehicles of its channel, which counts broadcasts.
+    broadcaster: Broadcaster | None = None
     # Counts of received and sent broadcasts, received and sent unicasts; and in the last period.
     _counts: tuple[int, ...] = (0, 0, 0, 0)
     _in_period: tuple[int, ...] = (0, 0, 0, 0)
@@ -173,7 +177,7 @@ class StatusPublisher:
         handle.timer(PERIOD, self._repeat)
 
     def status(self) -> VehicleStatus:
-        """Return what is known of the vehicle now."""
+        """Return the present status of the vehicle."""
         vehicle, battery = self._vehicle, self._log.battery
         crazyflie, state = vehicle.crazyflie, self._log.supervisor
         message = VehicleStatus(
@@ -214,7 +218,7 @@ class StatusPublisher:
         return message
 
     def publish(self) -> None:
-        """Publish what is new."""
+        """Publish the status if it has changed."""
         message = self.status()
         before, self._published = self._published, message
         if any(getattr(message, name) != getattr(before, name, None) for name in _STATES):
@@ -225,7 +229,7 @@ class StatusPublisher:
         self.publish_connected(is_connected and self._vehicle.is_ready())
 
     def publish_connected(self, is_connected: bool) -> None:
-        """Publish whether the vehicle is connected, if that is new."""
+        """Publish whether the vehicle is connected, if that has changed."""
         if is_connected != self._is_connected:
             self._is_connected = is_connected
             self._connected.publish(Bool(is_connected))

@@ -209,7 +209,7 @@ class DriverVehicle(BaseVehicle):
             if not self._has_landed(end):
                 return
         elif is_flying and not setpoints.is_streaming:
-            # It has landed less than 2 s ago, and is not locked by silence; or another client
+            # It has landed less than 2 s ago, and is not locked by the silence; or another client
             # flies it.
             return
         # Otherwise the vehicle would be locked 2 s after the last setpoint.

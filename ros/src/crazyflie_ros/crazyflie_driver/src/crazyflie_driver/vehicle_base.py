@@ -1,4 +1,4 @@
-"""What all parts of one vehicle share, and the states of its connection."""
+"""Common data of all parts of one vehicle, and the states of its connection."""
 
 import enum
 import threading
@@ -60,7 +60,7 @@ TRANSITIONS: dict[tuple[ConnectionState, ConnectionEvent], ConnectionState] = {
 
 @dataclass(eq=False)
 class BaseVehicle:
-    """What all parts of one vehicle share; they are attributes of `DriverVehicle`.
+    """Common data of all parts of one vehicle, which are attributes of `DriverVehicle`.
 
     The handle is closed when the vehicle is removed. Calls that block on the vehicle are jobs. All
     threads of the vehicle use its state; ``link_text`` says why the link is in its own.
@@ -94,7 +94,7 @@ class BaseVehicle:
             return self.state
 
     def is_ready(self) -> bool:
-        """Return whether topics and services are there; also while the link is lost."""
+        """Return whether topics and services exist; also while the link is lost."""
         return self.state in (ConnectionState.READY, ConnectionState.LOST, ConnectionState.RESUMING)
 
     def is_closing(self) -> bool:

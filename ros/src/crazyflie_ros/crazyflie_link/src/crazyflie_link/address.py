@@ -27,13 +27,14 @@ EXPECTED = (
 _HIGHEST_CHANNEL = 125
 _DEFAULT_ADDRESS = "E7E7E7E7E7"  #: Address of new vehicles, for URIs without one.
 _HIGHEST_PORT = 65535
-_SERIAL_LENGTH = 10  #: cflib takes so many digits for a serial number, fewer for a dongle's number.
+#: Number of digits that cflib treats as a serial number; fewer are a dongle's number.
+_SERIAL_LENGTH = 10
 _THIS_MACHINE = "127.0.0.1"
 
 
 @dataclass(frozen=True)
 class Address:
-    """A vehicle's address as cflib takes it, known to be well formed: radio, udp, tcp or usb."""
+    """A vehicle's address in cflib's form, known to be well formed: radio, udp, tcp or usb."""
 
     uri: str
     scheme: str
@@ -45,7 +46,7 @@ class Address:
 
     @property
     def channel(self) -> str:
-        """Name of what vehicles share that a broadcast reaches: channel and rate, whatever dongle.
+        """Name of the group of vehicles that a broadcast reaches: channel and rate, for any dongle.
 
         Vehicles on UDP are on one channel; any other is alone on its own.
         """
@@ -64,7 +65,7 @@ class Address:
     def key(self) -> str:
         """An address that is the same for all spellings of addresses that lead to one vehicle.
 
-        The dongle and what follows a question mark do not count. Names of hosts are not looked up:
+        The dongle and the text after a question mark are ignored. Names of hosts are not looked up:
         one other than localhost differs from its number.
         """
         parts = self._parts
@@ -111,7 +112,7 @@ def _host_key(host: str) -> str:
     if host.lower() in ("localhost", "localhost.localdomain"):
         return _THIS_MACHINE
     try:
-        # Also short forms such as 127.1; this asks no name server.
+        # Accepts short forms such as 127.1; no name server is asked.
         number = ipaddress.ip_address(socket.inet_aton(host))
     except OSError:
         return host.lower().rstrip(".")

@@ -68,7 +68,7 @@ class Broadcaster:
         self._queue.put_latest(stream, lambda: self._transmit(make()))
 
     def close(self) -> None:
-        """Send nothing any more."""
+        """Stop sending."""
         self._queue.close()
         if self._radio is not None:
             self._radio.close()
@@ -118,12 +118,12 @@ class SharedCommand:
                 self._end = now + READY_TIME
             self._awaited -= 1
             if self._awaited == 0 and now < self._end:
-                # Later each vehicle has been sent its own, and would obey twice.
+                # Later than that, each vehicle has received its own command, and would obey twice.
                 self._broadcaster.send([command], end=self._end)
 
 
 class CommandRecorder:
-    """Stands for cflib's Crazyflie: what is sent to it is the attribute `sent`."""
+    """Replaces cflib's Crazyflie: the attribute `sent` has the packet."""
 
     def __init__(self, link: Link):
         self.platform = link.cflib.platform

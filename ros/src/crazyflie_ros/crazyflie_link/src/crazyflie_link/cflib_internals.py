@@ -41,7 +41,7 @@ PRIVATE_NAMES = (
     "cflib.crtp.radiodriver:RadioManager._radios",
     "cflib.crtp.radiodriver:_RadioCommands.SEND_PACKET",
     "cflib.crtp.radiodriver:_RadioDriverThread._sp",
-    # The name by which it makes its dongles.
+    # The name by which cflib creates its dongles.
     "cflib.crtp.radiodriver:_SharedRadio.Crazyradio",
     "cflib.crtp.radiodriver:_SharedRadio._lock",
     "cflib.crtp.radiodriver:_SharedRadio._radio",
@@ -54,8 +54,8 @@ PRIVATE_NAMES = (
 #: Every vehicle listens to it as well as to its own address (crazyflie2-nrf-firmware).
 BROADCAST_ADDRESS = (0xFF, 0xE7, 0xE7, 0xE7, 0xE7)
 
-#: Between two broadcast packets, s: a vehicle hands one on to its main processor at 1 Mbit/s, with
-#: 37 bytes of 10 bits in 0.37 ms; crazyflie_cpp keeps the same distance.
+#: Time between two broadcast packets (s): a vehicle passes one to its main processor at 1 Mbit/s,
+#: with 37 bytes of 10 bits in 0.37 ms; crazyflie_cpp uses the same time.
 PACKET_GAP = 0.0005
 
 #: Time limit of a broadcast in the dongle, s; cflib gives a packet 1 s.
@@ -158,9 +158,9 @@ class RadioBroadcast:
         self._instance: radiodriver._SharedRadioInstance | None = None
 
     def transmit(self, packets: Sequence[bytes]) -> None:
-        """Send packets, before all that waits for the dongle; blocks until they are sent.
+        """Send packets, before all others that wait for the dongle; blocks until they are sent.
 
-        Raises `OSError` if the dongle is not there, or does not react.
+        Raises `OSError` if the dongle is missing, or does not react.
         """
         try:
             if self._instance is None:
@@ -176,7 +176,7 @@ class RadioBroadcast:
                 commands.not_empty.notify()
             instance._rsp_queue.get(timeout=_DONGLE_LIMIT)
         except queue.Empty:
-            # A dongle that goes on later must not send it then.
+            # A dongle that continues later must not send it then.
             with commands.mutex, contextlib.suppress(ValueError):
                 commands.queue.remove(command)
             self.close()
@@ -203,7 +203,7 @@ CLOSE_LIMIT = 1.0  #: Time limit for the driver when a link ends, s.
 
 _log = logging.getLogger(__name__)
 
-# cflib logs what it also reports, with tracebacks; we report it in other words.
+# cflib also logs, with tracebacks, the errors that it reports; this package reports them itself.
 if logging.getLogger("cflib").level == logging.NOTSET:
     logging.getLogger("cflib").setLevel(logging.CRITICAL)
 
@@ -305,10 +305,10 @@ class SafeCrazyflie(CflibCrazyflie):
         try:
             super().send_packet(pk, expected_reply, resend, timeout)
         except Exception as error:
-            # Not every error comes while it is taken.
+            # The lock is not held at every error.
             with contextlib.suppress(RuntimeError):
                 self._send_lock.release()
-            # Without a link it was closed on purpose meanwhile.
+            # Without a link, it was closed on purpose meanwhile.
             if self.link is not None:
                 self._on_error(f"cannot send: {error}")
 
@@ -359,7 +359,7 @@ class SafeCrazyflie(CflibCrazyflie):
 
 
 def _run(work, limit):
-    # Waits for it for a while only.
+    # The wait is limited.
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
     thread.join(limit)

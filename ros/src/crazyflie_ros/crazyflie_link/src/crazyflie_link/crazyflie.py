@@ -38,7 +38,7 @@ CHECK_PERIOD = 0.05  #: Period at which the link is checked, s.
 #: link can take a second on a busy machine.
 SILENCE_LIMIT = 1.0
 
-_RETRY_PERIOD = 0.2  #: Between two attempts to connect for the first time, s.
+_RETRY_PERIOD = 0.2  #: Time between two attempts to connect for the first time (s).
 
 #: Pause after the first failed attempt to connect again, and the longest one, s; each is twice the
 #: one before.
@@ -159,8 +159,8 @@ class Crazyflie:
     def connect(self, limit: float = 0.0) -> None:
         """Connect for the first time; blocks. A `CrazyflieError` has the reason and what to do.
 
-        Where nothing answers, it is tried again until a limit (s) or `close`; what waiting does not
-        mend is raised at once.
+        Without an answer, it retries until a limit (s) or `close`; errors that waiting cannot
+        correct are raised at once.
         """
         uri = self.address.uri
         if self._watcher is not None or self._closed.is_set():
@@ -181,7 +181,7 @@ class Crazyflie:
         self._watcher.start()
 
     def link(self) -> Link:
-        """Return the link on which the vehicle is heard; `LinkLostError` if there is none."""
+        """Return the link on which the vehicle is heard; `LinkLostError` without a link."""
         link = self._link
         if link is None or self._silent_since is not None:
             raise LinkLostError(f"no link to the vehicle: {self._reason}")
@@ -243,7 +243,7 @@ class Crazyflie:
     # The life of the link: opened by `connect`, then followed in a thread of its own.
 
     def _any_link(self):
-        # Also one that is silent or still being opened.
+        # The link may be silent or still being opened.
         return self._link or self._opening
 
     def _set_state(self, state, text):
@@ -270,7 +270,7 @@ class Crazyflie:
     def _open(self):
         self._opening = link = self._make_link()
         try:
-            # `close` looks for it here; if it was called before, it has found nothing.
+            # `close` closes the link that it finds here; if it was called before, it found none.
             self._end_if_closed(link)
             link.open()
         finally:
@@ -298,7 +298,7 @@ class Crazyflie:
             self._link = None
             self._silent_since = None
             if self._closed.is_set():
-                # `close` may have looked for the link just now, and found nothing.
+                # `close` may just have been called, and found no link.
                 if link is not None:
                     link.close(_CLOSED)
                 return
@@ -310,7 +310,7 @@ class Crazyflie:
                 return
 
     def _is_usable(self, health, text):
-        # Whether the link may stay, at least for a while.
+        # Decides whether the link may stay, at least for a while.
         if health is LinkHealth.ALIVE:
             was_silent = self._silent_since is not None
             self._silent_since = None
@@ -351,8 +351,8 @@ class Crazyflie:
         return self._closed.is_set()
 
     def _start_blocks(self):
-        # Returns which blocks were refused: other firmware may have been installed, and the vehicle
-        # needs a link all the same.
+        # Returns the refused blocks: other firmware may have been installed, and the vehicle still
+        # needs a link.
         refused = ""
         with self._blocks_lock:
             for block in self._blocks:

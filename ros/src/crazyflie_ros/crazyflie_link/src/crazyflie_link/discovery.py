@@ -11,11 +11,11 @@ from crazyflie_link.address import Address
 from crazyflie_link.cflib_internals import init_drivers
 from crazyflie_link.errors import AddressError, CrazyflieError, RefusedError, explain
 
-DEFAULT_ADDRESS = f"{DEFAULT_ADDR:X}"  #: Radio address that vehicles have when they are new.
+DEFAULT_ADDRESS = f"{DEFAULT_ADDR:X}"  #: Radio address of new vehicles.
 
 
 def scan(address: str = DEFAULT_ADDRESS) -> tuple[list[str], list[CrazyflieError]]:
-    """Look for vehicles on all interfaces; takes some seconds with a radio.
+    """Search for vehicles on all interfaces; takes some seconds with a radio.
 
     On UDP the ports 19850 to 19859 of 127.0.0.1, or of the environment variable SCAN_ADDRESS, are
     tried; by radio an address of up to 10 hexadecimal digits, or else `AddressError` is raised.
@@ -45,8 +45,8 @@ def scan(address: str = DEFAULT_ADDRESS) -> tuple[list[str], list[CrazyflieError
     return found, problems
 
 
-#: What can be done -> cflib's name of it: restart into the firmware or the boot loader, switch the
-#: main processor and the decks off or on again, switch everything off.
+#: Mode -> cflib's name of it: restart into the firmware or the boot loader, switch the main
+#: processor and the decks off or on again, switch everything off.
 MODES = {
     "firmware": "reboot_to_fw",
     "bootloader": "reboot_to_bootloader",

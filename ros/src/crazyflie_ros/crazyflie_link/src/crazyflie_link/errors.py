@@ -12,7 +12,7 @@ class AddressError(CrazyflieError):
 
 
 class NoDongleError(CrazyflieError):
-    """There is no Crazyradio, or no permission to use it."""
+    """The Crazyradio is missing, or may not be used."""
 
 
 class NoAnswerError(CrazyflieError):
@@ -24,7 +24,7 @@ class SetupError(CrazyflieError):
 
 
 class LinkLostError(CrazyflieError):
-    """There is no connection, or it was lost."""
+    """The connection does not exist, or was lost."""
 
 
 class NoReplyError(CrazyflieError):
@@ -36,7 +36,7 @@ class RefusedError(CrazyflieError):
 
 
 class AlreadyLandingError(RefusedError):
-    """The vehicle has refused to land, since it lands."""
+    """The vehicle has refused to land, since it is landing already."""
 
 
 class UnknownNameError(CrazyflieError):
@@ -103,7 +103,7 @@ _CAUSES = (
 
 
 def explain(uri: str, text: str) -> CrazyflieError:
-    """Return the error that a text of a driver of cflib, maybe with a traceback, stands for."""
+    """Return the error for a text of one of cflib's drivers, which may contain a traceback."""
     lower = text.lower()
     for patterns, error_type, advice in _CAUSES:
         if any(pattern in lower for pattern in patterns):

@@ -19,9 +19,9 @@ from crazyflie_link.supervisor import read_state
 from crazyflie_link.transmission import REPLY_LIMIT, RESEND_PERIOD, Request, Send
 from crazyflie_model.supervisor import SupervisorState
 
-ALL_GROUPS = 0  #: Group mask that every vehicle obeys.
+ALL_GROUPS = 0  #: Group mask of commands to all vehicles.
 
-# The first protocol versions with the present forms of two commands.
+# First versions of the protocol with the present forms of two commands.
 _GO_TO_2_PROTOCOL = 8
 _START_2_PROTOCOL = 10
 
@@ -34,8 +34,8 @@ _BUSY = 1  #: Reply to a takeoff while the planner flies, and to a landing while
 class _Knowledge:
     """Trajectories and groups (bits, None if unknown), which cannot be read.
 
-    Those that were defined have bytes of the memory; those that were overwritten, the trajectory
-    whose upload has done it.
+    ``defined`` ones have bytes of the memory; ``overwritten`` ones have the trajectory whose upload
+    has overwritten them.
     """
 
     defined: dict[int, range] = field(default_factory=dict)
@@ -63,14 +63,14 @@ class HighLevel(Subsystem):
         self._knowledge.groups = 0
 
     def dry_run(self) -> Self:
-        """Return one that refuses what this one would refuse, and sends nothing."""
+        """Return an object that refuses the same commands, and sends nothing."""
         dry = copy.copy(self)
         dry._is_dry = True
         dry._knowledge = copy.deepcopy(self._knowledge)
         return dry
 
     def broadcast(self, shared: SharedCommand) -> Self:
-        """Return one whose next command is sent to several vehicles at once.
+        """Return an object whose next command is sent to several vehicles at once.
 
         A broadcast is not acknowledged, but every vehicle that has received it answers as it does
         to its own command. One that does not answer within 0.2 s is sent its own.
@@ -111,7 +111,7 @@ class HighLevel(Subsystem):
     def land(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
         """Sink to a height (m) in a duration (s), keeping position and heading.
 
-        The firmware obeys on the ground, too, and starts the motors there. A vehicle that lands
+        The firmware also obeys on the ground, and starts the motors there. A vehicle that lands
         refuses it: `AlreadyLandingError`.
         """
         _check("landing", duration, group_mask, height)

@@ -22,20 +22,20 @@ from crazyflie_link.parameters import FirmwareParameters
 from crazyflie_link.subsystem import Subsystem, find_memory, write_memory
 from crazyflie_link.transmission import Request
 
-STATIONS = 16  #: The most that the firmware can be built for.
+STATIONS = 16  #: Largest number of base stations of the firmware.
 
 _TYPE = "lighthouse.systemType"
 _STORE = bytes([Localization.LH_PERSIST_DATA])
 
 _READ_LIMIT = 10.0  #: Time limit of reading all base stations of one kind of memory, s.
 _ANGLE_LIMIT = 5.0  #: Time in which the vehicle must have measured angles often enough, s.
-_FEWEST_ANGLES = 10  #: A base station of which fewer sets of angles came is not one that is seen.
+_FEWEST_ANGLES = 10  #: Least number of sets of angles from a visible base station.
 
-_FLASH_LIMIT = 3.0  #: Time limit of storing, s: the vehicle may tidy its flash memory up.
+_FLASH_LIMIT = 3.0  #: Time limit of storing (s): the vehicle may reorganise its flash memory.
 
 
 class Lighthouse(Subsystem):
-    """The base stations that the vehicle remembers, and those that it sees."""
+    """The base stations that the vehicle stores, and those that it sees."""
 
     def read(self) -> tuple[dict[int, LighthouseBsGeometry], dict[int, LighthouseBsCalibration]]:
         """Return the valid geometries and calibrations in the vehicle, by number; blocks."""
@@ -87,7 +87,7 @@ class Lighthouse(Subsystem):
             numbers = {*geometries, *calibrations}
             unknown = [number for number in numbers if number not in range(STATIONS)]
         except Exception as error:
-            # cflib raises bare exceptions, and whatever a strange file leads to.
+            # cflib raises bare exceptions, and any error of an invalid file.
             reason = " ".join(str(error).split())
             raise ValueRangeError(
                 f"lighthouse file {path}: {reason}; expected a lighthouse_system_configuration, as "
@@ -102,7 +102,7 @@ class Lighthouse(Subsystem):
                 f"lighthouse file {path}: base station {unknown[0]!r}; expected 0 to {STATIONS - 1}"
             )
         if parameters.values().get(_TYPE) != system_type:
-            # It forgets all stations.
+            # cflib's reader forgets all stations.
             parameters.write(_TYPE, system_type)
         first, calibration_first = (
             LighthouseMemory.GEO_START_ADDR,

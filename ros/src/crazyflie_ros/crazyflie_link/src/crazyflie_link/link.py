@@ -38,7 +38,7 @@ _log = logging.getLogger(__name__)
 OnPacket = Callable[[int, int, bytes], None]  #: Is called with port, channel and data.
 
 
-OLDEST_PROTOCOL = 4  #: The first protocol version with tables of more than 255 items.
+OLDEST_PROTOCOL = 4  #: First version of the protocol with tables of more than 255 items.
 
 _TABLES = {CRTPPort.LOGGING: "log table", CRTPPort.PARAM: "parameter table"}
 
@@ -116,7 +116,7 @@ class LinkSetup:
             self._step = "list of memories"
             return True
         if (port, channel) == (CRTPPort.PARAM, READ_CHANNEL):
-            # A value that comes again is no progress.
+            # A repeated value is not progress.
             known = len(self._values)
             self._values.add(bytes(data[:2]))
             total = self._sizes.get(port, 0)
@@ -195,7 +195,7 @@ class Link:
     def _open(self):
         init_drivers()
         self._setup.begin()
-        # A dongle that hangs, or the search for a host's name, may block.
+        # A dongle that hangs, or the lookup of a host's name, may block.
         threading.Thread(target=self._open_cflib, name="crazyflie-open", daemon=True).start()
         asked = time.monotonic()
         with self._changed:
@@ -246,7 +246,7 @@ class Link:
         return self._error
 
     def health(self) -> tuple[LinkHealth, str]:
-        """Return what the vehicle's packets show, and the same in words."""
+        """Return the health of the link by the vehicle's packets, and the same in words."""
         if self._monitor is None:
             return LinkHealth.ALIVE, "not connected yet"
         state = self._monitor.state(time.monotonic())

@@ -1,9 +1,9 @@
-"""Whether the vehicle at the other end of a link is still there.
+"""Checks whether the vehicle at the other end of a link still answers.
 
 cflib never notices a vehicle that is frozen: a UDP socket stays open, and a radio's answers
 come from a second processor. So a link is lost when neither a log packet nor the answer to a ping
-has come for a while. Firmware that restarts within that time answers pings, but has forgotten its
-log blocks: so log data have to come as well.
+has come for a while. Firmware that restarts within that time answers pings, but has lost its log
+blocks: so log data must also come.
 """
 
 import enum
@@ -15,8 +15,8 @@ LOST_AFTER = 0.45
 
 _PERIODS_MISSED = 4  #: Number of consecutive log packets that may be missing.
 _HEARD_FOR = 0.25  #: After a silence log data may come a little later than answers to pings, s.
-_WINDOW = 20  #: Pings that the link quality is computed from; cflib sends 10 a second.
-_LATEST, _FEW = 5, 3  #: A link is poor when so few of the latest pings have been answered.
+_WINDOW = 20  #: Number of pings for the link quality; cflib sends 10 a second.
+_LATEST, _FEW = 5, 3  #: Fraction of answered pings below which a link is poor.
 
 
 class LinkHealth(enum.Enum):
@@ -82,7 +82,7 @@ class LinkMonitor:
     def quality(self) -> float:
         """Return the share of the latest pings that were answered, 0 to 1.
 
-        The very latest is left out: its answer may be under way.
+        The latest ping is not included: its answer may be under way.
         """
         with self._lock:
             pings = list(self._pings.values())[:-1]
@@ -95,7 +95,7 @@ class LinkMonitor:
         return len(pings) == _LATEST and sum(pings) <= _FEW
 
     def state(self, now: float) -> LinkHealth:
-        """Return what the packets show; to be called several times within the limit.
+        """Return the state of the link by its packets; to be called several times within the limit.
 
         When this call itself comes late, the machine was busy, and packets may not have been read
         yet: the vehicle gets a new period.
@@ -112,5 +112,5 @@ class LinkMonitor:
         # The answer to a ping may have come just after the last log packet; both are missing then.
         if self._received - self._logged < 0.5 * self._log_limit:
             return LinkHealth.ALIVE
-        # Until its log data come, too, that is not known.
+        # Until log data also come, the state is not known.
         return LinkHealth.RESTARTED if now - self._heard_since > _HEARD_FOR else LinkHealth.SILENT

@@ -18,7 +18,7 @@ from crazyflie_link.subsystem import Subsystem, check_finite
 #: Time for which the poses of one frame of the motion capture are collected, s.
 FRAME_WINDOW = 0.005
 MAX_POSITION = 32.767  #: Largest coordinate in a packed pose, m: 16 bits of mm.
-POSES_PER_PACKET, POSITIONS_PER_PACKET = 2, 4  #: The most that fit in 30 bytes.
+POSES_PER_PACKET, POSITIONS_PER_PACKET = 2, 4  #: Largest numbers that fit in 30 bytes.
 
 # Channel and type of packed poses and positions (crtp_localization_service.c).
 _POSITIONS_CHANNEL = 2
@@ -100,7 +100,7 @@ class Localization(Subsystem):
         self._packed: tuple[PackedPoses, int] | None = None
 
     def broadcast_by(self, packed: PackedPoses | None, vehicle_id: int = 0) -> None:
-        """Send poses together with those of other vehicles; None for by itself again."""
+        """Send poses together with those of other vehicles; None sends them alone again."""
         self._packed = None if packed is None else (packed, vehicle_id)
 
     def position(self, x: float, y: float, z: float) -> None:

@@ -18,13 +18,14 @@ from crazyflie_link.link import Link
 from crazyflie_link.subsystem import Subsystem, elements
 from crazyflie_link.transmission import REPLY_LIMIT
 
-#: The firmware counts periods in 10 ms, in one byte of which 255 is not allowed.
+#: Unit of periods in the firmware (ms): one byte, in which 255 is not allowed.
 SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS, PERIOD_STEP_MS = 10, 2540, 10
 
 _STAMP_END = 4  #: A log packet begins with the number of its block and three bytes of time.
-_TICKS = 1 << 24  #: The vehicle counts ms in 24 bits.
-_REORDERED_MS = 100  #: A packet that is older by at most this was overtaken by another, ms.
-#: The largest delay of the quickest packet, ms: this machine may have been busy.
+_TICKS = 1 << 24  #: The vehicle's time in ms has 24 bits.
+#: Largest age of a packet that was overtaken by another (ms). Largest delay of the fastest packet
+#: (ms): this machine may have been busy.
+_REORDERED_MS = 100
 _LATEST_FIRST_MS = 60_000.0
 
 
@@ -42,9 +43,8 @@ class LogBlock:
 
     The period is 10 to 2540 ms, in steps of 10. Variables, such as "stateEstimate.x", come in the
     vehicle's own types, together at most 26 bytes. ``callback(time_ms, values)`` is called in
-    cflib's thread with the vehicle's time (ms since it was switched on; it comes with 24 bits, and
-    what it had above these when it was connected is not known) and numbers in the order of the
-    variables.
+    cflib's thread with the vehicle's time (ms since it was switched on; it comes with 24 bits;
+    higher bits from before the connection are not known) and numbers in the order of the variables.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Uptime:
         step_ms = (time_ms - before_ms) % _TICKS
         # After hours without a packet.
         step_ms += _TICKS * max(0, round((elapsed_ms - step_ms) / _TICKS))
-        # How much later than the quickest packet this one came.
+        # Delay of this packet relative to the fastest one.
         late = self._late_ms + elapsed_ms - step_ms
         self._late_ms = max(0.0, late)
         has_restarted = late < -_LATEST_FIRST_MS

@@ -76,7 +76,7 @@ class FirmwareParameters(Subsystem):
         return self._keep(link, element, answer[2:])
 
     def store(self, name: str) -> None:
-        """Store the present value of a persistent parameter: it outlives a restart; blocks."""
+        """Store the present value of a persistent parameter, to survive a restart; blocks."""
         self._persist(name, MISC_PERSISTENT_STORE, "storing")
 
     def clear(self, name: str) -> None:
@@ -84,7 +84,7 @@ class FirmwareParameters(Subsystem):
         self._persist(name, MISC_PERSISTENT_CLEAR, "clearing")
 
     def stored(self, name: str) -> PersistentParamState:
-        """Return is_stored, default_value and stored_value (or None) of one; blocks."""
+        """Return is_stored, default_value and stored_value (or None) of a parameter; blocks."""
         element, answer = self._ask_persistent(
             name, MISC_PERSISTENT_GET_STATE, "reading the state of"
         )

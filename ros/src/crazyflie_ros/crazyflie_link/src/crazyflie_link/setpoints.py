@@ -1,4 +1,4 @@
-"""Setpoints that are streamed: the vehicle follows the latest for a short while."""
+"""Streamed setpoints: the vehicle follows the latest for a short while."""
 
 import math
 import struct
@@ -39,9 +39,8 @@ class Setpoints(Subsystem):
         """Roll, pitch (degrees), yaw rate (degrees/s) and thrust (PWM, 0 to 65535).
 
         Positive pitch accelerates forward; over the link it is negated (by cflib).
-        Positive yaw rate is clockwise seen from above, as the link has it: the
-        firmware negates it. The firmware ignores thrust until one setpoint
-        of zero thrust has come.
+        Positive yaw rate is clockwise seen from above, as on the link: the firmware negates it. The
+        firmware ignores thrust until one setpoint of zero thrust has come.
         """
         check_finite("attitude setpoint", roll, pitch, yaw_rate, thrust)
         if not 0 <= thrust <= FULL_PWM:
@@ -58,8 +57,8 @@ class Setpoints(Subsystem):
     ) -> None:
         """Position (m), velocity (m/s), acceleration (m/s^2), attitude and body rates (rad/s).
 
-        Positions, velocities and accelerations are of the world; the quaternion is
-        (x, y, z, w). Over the link all are in thousandths, in 16 bits: at most
+        Positions, velocities and accelerations are in the world frame; the quaternion is (x, y, z,
+        w). Over the link all are in thousandths, in 16 bits: at most
         +-32.767. Rates are in milliradians/s there.
         """
         thousandths = (*position, *velocity, *acceleration, *rates)
@@ -114,10 +113,10 @@ class Setpoints(Subsystem):
         sent.wait(_SENT_LIMIT)
 
     def notify_setpoints_stop(self, remain_valid_ms: int = 0, at_once: bool = False) -> None:
-        """Announce that no more setpoints follow; the last one still counts for some ms.
+        """Announce that no more setpoints follow; the last one remains valid for some ms.
 
-        Without it the firmware ignores high-level commands after a streamed setpoint. At once means
-        in the calling thread, which has to be the one that sends: see `Subsystem.guarded`.
+        Without it the firmware ignores high-level commands after a streamed setpoint. ``at_once``
+        sends in the calling thread, which must be the one that sends: see `Subsystem.guarded`.
         """
         if not 0 <= remain_valid_ms < 2**32:
             raise ValueRangeError(f"{remain_valid_ms} ms is not in 0 to 2^32 - 1")

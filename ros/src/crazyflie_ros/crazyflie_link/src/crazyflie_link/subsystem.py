@@ -60,7 +60,7 @@ MaySend = Callable[[], bool]
 class _GuardedLink:
     """A `Link` whose commands and requests are sent only if ``may_send()``.
 
-    A request that is held back ends as one that is not answered does.
+    A request that is held back ends like an unanswered one.
     """
 
     def __init__(self, link: Link, may_send: MaySend):
@@ -82,7 +82,7 @@ class _GuardedLink:
 
 
 class Subsystem:
-    """A part of the firmware, spoken to over the vehicle's present link."""
+    """A part of the firmware, reached over the vehicle's present link."""
 
     def __init__(self, current_link: Callable[[], Link]):
         self._current_link = current_link

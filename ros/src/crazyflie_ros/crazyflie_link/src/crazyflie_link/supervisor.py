@@ -23,10 +23,10 @@ from crazyflie_link.subsystem import Subsystem
 from crazyflie_link.transmission import Request
 from crazyflie_model.supervisor import SupervisorState
 
-#: The first protocol version in which the supervisor has a port of its own.
+#: First version of the protocol in which the supervisor has a port of its own.
 SUPERVISOR_PROTOCOL = 12
-ANSWER = 0x80  #: Is added to the number of a command in the supervisor's answer.
-PERIOD = 0.05  #: Between two repetitions, s.
+ANSWER = 0x80  #: Offset of the number of a command in the supervisor's answer.
+PERIOD = 0.05  #: Time between two repetitions (s).
 #: Number of repetitions to a vehicle that is heard, but does not report its state.
 BLIND_REPEATS = 5
 
@@ -38,7 +38,7 @@ _OLD_STOP = packet(
 )
 _ASK_STATE = packet(CRTPPort.SUPERVISOR, SUPERVISOR_CH_INFO, bytes([CMD_GET_STATE_BITFIELD]))
 
-#: Stops the motors of vehicles with any firmware.
+#: Packet that stops the motors of vehicles with any firmware.
 BROADCAST_STOP = (_STOP, _OLD_STOP, _STOP_SETPOINT)
 
 
@@ -46,8 +46,8 @@ BROADCAST_STOP = (_STOP, _OLD_STOP, _STOP_SETPOINT)
 class EmergencyStop:
     """Stop the motors, on the present link and on every later one.
 
-    It is sent until the supervisor says that it is locked; to firmware that cannot say so, a few
-    times while the vehicle is heard.
+    It is sent until the supervisor says that it is locked; with firmware that cannot report it, a
+    few times while the vehicle is heard.
     """
 
     # Returns the link on which something can be sent, also if it is silent or being opened.
@@ -78,7 +78,7 @@ class EmergencyStop:
                 self._thread.start()
 
     def receive(self, port: int, channel: int, data: bytes) -> None:
-        """Look for the vehicle's report that it is locked in a packet."""
+        """Check a packet for the vehicle's report that it is locked."""
         self._heard = True
         if (port, channel) != (CRTPPort.SUPERVISOR, SUPERVISOR_CH_INFO) or len(data) < 3:
             return
@@ -156,7 +156,7 @@ _WATCHDOG = "watchdog"
 class Supervisor(Subsystem):
     """The supervisor: the part of the firmware that arms and stops the motors.
 
-    All that blocks raises `CrazyflieError` without a link or a reply.
+    Blocking methods raise `CrazyflieError` without a link or a reply.
     """
 
     def __init__(self, current_link: Callable[[], Link], emergency: EmergencyStop):
@@ -191,8 +191,8 @@ class Supervisor(Subsystem):
     def emergency_stop(self) -> None:
         """Stop the motors at once, before anything that is queued; does not block.
 
-        Sent again and again until the vehicle is seen to be locked, also on a link that is silent
-        or being opened, and on every later one. The vehicle has to be restarted before it can fly
+        The stop is repeated until the vehicle is seen to be locked, also on a link that is silent
+        or being opened, and on every later one. The vehicle must be restarted before it can fly
         again.
         """
         self._emergency.begin()
@@ -216,7 +216,7 @@ class Supervisor(Subsystem):
 
     def _command(self, link: Link, data: bytes, what: str) -> None:
         def accepts(answer: bytes) -> bool:
-            # Success, and the state of what was commanded: armed is not the answer to disarming.
+            # Success requires the commanded state: "armed" is not the answer to disarming.
             return len(answer) < 3 or len(data) < 2 or not answer[1] or answer[2] == data[1]
 
         prefix = bytes([ANSWER | data[0]])

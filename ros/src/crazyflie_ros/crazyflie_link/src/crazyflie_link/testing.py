@@ -18,7 +18,7 @@ Place = tuple[int, int]  #: Channel, and last byte of the address, of a vehicle.
 NULL = 0xF3
 LINK_BITS = 3 << 2
 
-#: Of the vehicles of `crazyflie_link`'s own tests.
+#: Ports of the vehicles of `crazyflie_link`'s own tests.
 PLACES: tuple[Place, ...] = ((10, 0xE7), (20, 0xE7), (30, 0x01), (30, 0x02))
 
 
@@ -86,7 +86,7 @@ class Dongle:
             return
         link = self._link(place)
         if data[0] & NULL != NULL:
-            # What cflib's numbering of packets clears.
+            # Bits that cflib's numbering of packets clears.
             link.send(bytes([data[0] | LINK_BITS, *data[1:]]))
         try:
             self._answer = b"\1" + link.recv(64)

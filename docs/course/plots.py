@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 from crazyflie_mission_api import DryRun
 from crazyflie_mission_api.group_state import Rules
 from crazyflie_reports.node_graph import dot, example_graph
-from crazyflie_sweep.sweep_parameters import Plan
+from crazyflie_sweep.sweep_parameters import SweepPlan
 from crazyflie_sweep.sweeper import Sweeper
 from crazyflie_sweep.velocities import oscillator_velocity
 
@@ -167,7 +167,7 @@ def draw_lanes(path: Path, _log: Path) -> None:
 
 def draw_sweep(path: Path, _log: Path) -> None:
     """Draw a sweep that is half done: where it flew, and what that has covered."""
-    plan = Plan.from_mapping({})
+    plan = SweepPlan.from_mapping({})
     sweeper = Sweeper(plan, (0.0, 0.0, 1.0))
     flown = []
     while sweeper.coverage.share < 0.5:

@@ -9,7 +9,7 @@ from std_srvs.srv import EmptyRequest
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_dev.soak import Soak, soak
-from crazyflie_dev.soak_faults import FAULTS, LIVE_VALUES, NODES, Flight, live_parameters
+from crazyflie_dev.soak_faults import FAULTS, LIVE_VALUES, NODES, SoakFlight, live_parameters
 from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
@@ -69,7 +69,7 @@ def test_faults_of_poses_arrive():
         if fault.name in names:
             names.remove(fault.name)
             graph = FakeGraph({})
-            steps = fault.run(Flight(graph, Random(1), print))
+            steps = fault.run(SoakFlight(graph, Random(1), print))
             next(steps)
             (arrived,) = graph.faults["/tf"](message)
             assert str(arrived.transforms) != str(message.transforms), fault.name

@@ -9,7 +9,7 @@ from doctor_findings import found, the_only
 
 from crazyflie_doctor import graph, running_graph, timing
 from crazyflie_doctor.graph import Graph
-from crazyflie_doctor.timing import Recording, Transform
+from crazyflie_doctor.timing import TimingRecording, Transform
 from crazyflie_lqr.models import near_hover
 
 CONTROL = ("crazyflie_msgs/ControlStamped", "e85f24c467a6496a2e0c3b92ff0fe75d")
@@ -170,7 +170,7 @@ def stream(child="crazyflie", parent="world", node="/mocap", period=0.01, age=0.
 
 
 def test_motion_that_is_well(tmp_path):
-    recording = Recording(
+    recording = TimingRecording(
         transforms=stream() + stream("crazyflie/base_link", "crazyflie", "/static", 0.1)
     )
     for check in (
@@ -194,18 +194,18 @@ def test_motion_that_is_well(tmp_path):
 )
 def test_clocks(simulated, sources, clocks, part):
     given = but(parameters={"/use_sim_time": simulated}, publishers={"/clock": sources})
-    level, text = the_only(timing.check_clock(given, Recording(clocks=clocks)))
+    level, text = the_only(timing.check_clock(given, TimingRecording(clocks=clocks)))
     assert level == "error"
     assert part in text
 
 
 def test_simulated_time_that_goes():
     given = but(parameters={"/use_sim_time": True}, publishers={"/clock": {"/sim"}})
-    assert not found(timing.check_clock(given, Recording(clocks=[1.0, 2.0])))
+    assert not found(timing.check_clock(given, TimingRecording(clocks=[1.0, 2.0])))
 
 
 def test_a_node_that_lives_by_another_clock():
-    level, text = the_only(timing.check_clock(WELL, Recording(transforms=stream(age=1.7e9))))
+    level, text = the_only(timing.check_clock(WELL, TimingRecording(transforms=stream(age=1.7e9))))
     assert level == "error"
     assert "/mocap stamps transforms by another clock" in text
 
@@ -223,16 +223,18 @@ def test_a_node_that_lives_by_another_clock():
     ],
 )
 def test_no_tree(transforms, part):
-    level, text = the_only(timing.check_tf_tree(WELL, Recording(transforms=transforms)))
+    level, text = the_only(timing.check_tf_tree(WELL, TimingRecording(transforms=transforms)))
     assert level == "error"
     assert part in text
 
 
 def test_frames_that_silent_publishes():
-    level, text = the_only(timing.check_frames(WELL, Recording(transforms=stream("crazyfly"))))
+    level, text = the_only(
+        timing.check_frames(WELL, TimingRecording(transforms=stream("crazyfly")))
+    )
     assert level == "error"
     assert "the frame crazyflie that /state_estimator needs (did you mean crazyfly?)" in text
-    apart = Recording(transforms=stream("a") + stream("crazyflie", "map"))
+    apart = TimingRecording(transforms=stream("a") + stream("crazyflie", "map"))
     assert "does not connect world and crazyflie" in the_only(timing.check_frames(WELL, apart))[1]
 
 
@@ -248,14 +250,14 @@ def test_frames_that_silent_publishes():
     ],
 )
 def test_poor_poses(transforms, level, part):
-    found_level, text = the_only(timing.check_tf_rate(WELL, Recording(transforms=transforms)))
+    found_level, text = the_only(timing.check_tf_rate(WELL, TimingRecording(transforms=transforms)))
     assert found_level == level
     assert part in text
 
 
 def test_a_constant_link_between_vehicle_and_world_may_be_slow():
     slow = stream("crazyflie", "vicon/cf7", "/static", 0.1, age=-0.1)
-    recording = Recording(transforms=stream("vicon/cf7") + slow)
+    recording = TimingRecording(transforms=stream("vicon/cf7") + slow)
     assert not found(timing.check_tf_rate(WELL, recording))
 
 
@@ -271,7 +273,7 @@ def test_gains_and_delay(tmp_path, used, levels):
     period = 0.01
     late = used * margin - 0.5 * period
     stamps = [k * period for k in range(100)]
-    recording = Recording(
+    recording = TimingRecording(
         delays={"/control/lqr": [late] * 100}, control_stamps={"/control/lqr": stamps}
     )
     findings = found(timing.check_gains(but(parameters=parameters), recording))
@@ -280,7 +282,7 @@ def test_gains_and_delay(tmp_path, used, levels):
 
 def test_a_gain_file_that_is_gone():
     parameters = {**PARAMETERS, "/lqr_controller/K_file": "/nowhere/K.txt"}
-    recording = Recording(
+    recording = TimingRecording(
         delays={"/control/lqr": [0.0, 0.0]}, control_stamps={"/control/lqr": [1.0, 1.01]}
     )
     level, text = the_only(timing.check_gains(but(parameters=parameters), recording))

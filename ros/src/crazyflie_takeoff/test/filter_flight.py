@@ -5,7 +5,7 @@ from takeoff_helpers import PointMass
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, LossTimeouts
 from crazyflie_takeoff.limits import Box, Limits
 from crazyflie_takeoff.motion import Motion
-from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.safe_control import SafeSetpoint
 from crazyflie_takeoff.transition_table import FlightState
 
 G = 9.81
@@ -15,7 +15,7 @@ TIMEOUTS = LossTimeouts(0.1, 0.5, 5.0, 3.0)
 
 
 def level(thrust):
-    return Setpoint(0.0, 0.0, 0.0, thrust)
+    return SafeSetpoint(0.0, 0.0, 0.0, thrust)
 
 
 class Flight:
@@ -41,8 +41,8 @@ class Flight:
         return 50.0 + self.ticks / 100
 
     def fly(self, control):
-        if isinstance(control, (Setpoint, float)):
-            thrust = control.thrust if isinstance(control, Setpoint) else control
+        if isinstance(control, (SafeSetpoint, float)):
+            thrust = control.thrust if isinstance(control, SafeSetpoint) else control
             self.flown.append(thrust)
             # The point mass knows g only.
             self.vehicle.command(thrust - self.hover + G if thrust > 0.0 else 0.0)

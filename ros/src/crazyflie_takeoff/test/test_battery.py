@@ -8,7 +8,7 @@ from std_srvs.srv import EmptyRequest
 from takeoff_helpers import SERVER, filter_status, state
 
 from crazyflie_msgs.msg import FlightStatus
-from crazyflie_takeoff.takeoff_checks import Battery, Charge
+from crazyflie_takeoff.takeoff_checks import BatteryCheck, Charge
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.transport import ServiceError
@@ -108,7 +108,7 @@ def test_a_battery_that_is_silent_or_not_a_number_says_nothing():
 
 
 def test_with_duration_zero_one_low_voltage_is_enough_and_a_good_one_is_good():
-    battery = Battery(low=3.2, critical=3.0, duration=0.0)
+    battery = BatteryCheck(low=3.2, critical=3.0, duration=0.0)
     assert battery.charge(0.0) is Charge.UNKNOWN
     for time, (voltage, charge) in enumerate(
         [(4.0, Charge.GOOD), (3.1, Charge.LOW), (2.9, Charge.CRITICAL), (3.9, Charge.GOOD)]
@@ -118,7 +118,7 @@ def test_with_duration_zero_one_low_voltage_is_enough_and_a_good_one_is_good():
 
 
 def test_the_time_below_a_level_begins_with_the_first_voltage_that_is_below():
-    battery = Battery(low=3.2, critical=3.0, duration=1.0)
+    battery = BatteryCheck(low=3.2, critical=3.0, duration=1.0)
     # Sags between good voltages, and one to critical from low, do not last.
     for time, (voltage, charge) in enumerate(
         [

@@ -19,7 +19,7 @@ from crazyflie_takeoff.limits import (
 )
 from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.relay import Relay
-from crazyflie_takeoff.safe_control import MAX_BRAKING, MAX_SUBSTITUTE, Setpoint
+from crazyflie_takeoff.safe_control import MAX_BRAKING, MAX_SUBSTITUTE, SafeSetpoint
 
 G = 9.81
 ANY = st.floats(allow_nan=False, allow_infinity=False)
@@ -28,7 +28,7 @@ ANY = st.floats(allow_nan=False, allow_infinity=False)
 @given(ANY, ANY, ANY, ANY, st.sampled_from([0.0, MIN_THRUST]))
 def test_any_control_ends_in_range(roll, pitch, yaw_dot, thrust, lowest):
     limits = Limits(NO_BOX, 0.5, -0.5, 3.0, 10.0)
-    result = limits.in_range(Setpoint(roll, pitch, yaw_dot, thrust), lowest)
+    result = limits.in_range(SafeSetpoint(roll, pitch, yaw_dot, thrust), lowest)
     assert max(abs(result.roll), abs(result.pitch)) <= MAX_TILT
     assert abs(result.yaw_dot) <= MAX_YAW_RATE
     assert lowest <= result.thrust <= MAX_THRUST
@@ -39,10 +39,10 @@ def test_a_model_may_have_closer_limits():
     limits = Limits(NO_BOX, 0.5, -0.5, 3.0, 10.0, 0.1, 1.0, 12.0)
     relay = Relay(limits, 0.1)
     beyond = (
-        Setpoint(0.11, 0.0, 0.0, 10.0),
-        Setpoint(0.0, -0.11, 0.0, 10.0),
-        Setpoint(0.0, 0.0, 1.1, 10.0),
-        Setpoint(0.0, 0.0, 0.0, 12.1),
+        SafeSetpoint(0.11, 0.0, 0.0, 10.0),
+        SafeSetpoint(0.0, -0.11, 0.0, 10.0),
+        SafeSetpoint(0.0, 0.0, 1.1, 10.0),
+        SafeSetpoint(0.0, 0.0, 0.0, 12.1),
     )
     for control in beyond:
         assert not relay.pass_unchanged(0.0, control)
@@ -53,7 +53,7 @@ def test_a_model_may_have_closer_limits():
 
 def test_a_control_within_limits_is_passed_on_by_a_filter_that_runs():
     gaps = RunGaps()
-    control = Setpoint(MAX_TILT, -MAX_TILT, 3.0, MAX_THRUST)
+    control = SafeSetpoint(MAX_TILT, -MAX_TILT, 3.0, MAX_THRUST)
     for k in range(1000):
         # As often as a filter runs that has little to do.
         gaps.run(0.04 * k)
@@ -65,27 +65,27 @@ def test_what_is_kept_for_long_changes_the_speed_by_half_a_metre_per_second(gap)
     gaps = RunGaps()
     gaps.run(1.0)
     gaps.run(1.0 + gap)
-    high = gaps.apply(Setpoint(MAX_TILT, 0.0, 0.0, MAX_THRUST), G)
-    low = gaps.apply(Setpoint(-MAX_TILT, 0.0, 0.0, MIN_THRUST), G)
+    high = gaps.apply(SafeSetpoint(MAX_TILT, 0.0, 0.0, MAX_THRUST), G)
+    low = gaps.apply(SafeSetpoint(-MAX_TILT, 0.0, 0.0, MIN_THRUST), G)
     assert (high.thrust - G) * gap == pytest.approx(0.5)
     assert (low.thrust - G) * gap == pytest.approx(-0.5)
     assert G * math.tan(high.roll) * gap <= 0.5 + 1e-9
     # The ramp of a landing ends at zero thrust all the same.
-    assert gaps.apply(Setpoint(0.0, 0.0, 0.0, 0.0), G, is_ramp=True).thrust == 0.0
+    assert gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, 0.0), G, is_ramp=True).thrust == 0.0
     for k in range(400):
         gaps.run(1.0 + gap + 0.01 * (k + 1))
-    assert gaps.apply(Setpoint(0.0, 0.0, 0.0, 14.0), G).thrust == 14.0
+    assert gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, 14.0), G).thrust == 14.0
 
 
 def test_speeds_do_not_add_up_over_long_gaps():
     gaps = RunGaps()
     gaps.run(1.0)
     gaps.run(1.3)
-    assert gaps.apply(Setpoint(0.0, 0.0, 0.0, MAX_THRUST), G, climb=0.4).thrust == pytest.approx(
-        G + 0.1 / 0.3
-    )
-    assert gaps.apply(Setpoint(0.0, 0.0, 0.0, MAX_THRUST), G, climb=0.8).thrust < G
-    assert gaps.apply(Setpoint(0.0, 0.0, 0.0, MIN_THRUST), G, climb=-0.8).thrust > G
+    assert gaps.apply(
+        SafeSetpoint(0.0, 0.0, 0.0, MAX_THRUST), G, climb=0.4
+    ).thrust == pytest.approx(G + 0.1 / 0.3)
+    assert gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, MAX_THRUST), G, climb=0.8).thrust < G
+    assert gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, MIN_THRUST), G, climb=-0.8).thrust > G
 
 
 @given(
@@ -100,7 +100,7 @@ def test_no_speed_is_ended_with_a_thrust_that_the_filter_does_not_give(gap, clim
     gaps = RunGaps()
     gaps.run(1.0)
     gaps.run(1.0 + gap)
-    result = gaps.apply(Setpoint(0.0, 0.0, 0.0, thrust), hover, climb).thrust
+    result = gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, thrust), hover, climb).thrust
     assert MIN_THRUST <= result <= max(thrust, MAX_SUBSTITUTE)
     assert result >= min(thrust, hover - MAX_BRAKING)
 
@@ -147,13 +147,13 @@ def test_how_much_thrust_a_filter_passes_on_that_has_not_run(gap, climb, least, 
     gaps.run(1.0 + gap)
     assert gaps.longest == gap
     for asked, passed in ((-90.0, least), (0.5, 0.5), (90.0, most)):
-        control = gaps.apply(Setpoint(0.0, 0.0, 3.0, G + asked), G, climb)
+        control = gaps.apply(SafeSetpoint(0.0, 0.0, 3.0, G + asked), G, climb)
         assert control.thrust - G == pytest.approx(passed)
         assert control.yaw_dot == 3.0
-    tilted = gaps.apply(Setpoint(1.0, -1.0, 0.0, G), G)
+    tilted = gaps.apply(SafeSetpoint(1.0, -1.0, 0.0, G), G)
     assert math.tan(tilted.roll) == pytest.approx(0.5 / gap / G)
     assert tilted.pitch == -tilted.roll
-    ramp = gaps.apply(Setpoint(0.0, 0.0, 0.0, -90.0), G, climb, is_ramp=True)
+    ramp = gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, -90.0), G, climb, is_ramp=True)
     assert ramp.thrust == -90.0
 
 

@@ -16,12 +16,12 @@ from flight_clock import (
     in_state,
 )
 
-from crazyflie_takeoff.server_table import Event, FilterReport, FlightStateMachine
+from crazyflie_takeoff.server_table import FilterReport, FlightStateMachine, ServerEvent
 
 
 def test_landing_descends_first():
     flight = flying()
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.5, -0.5, 1.0))
     clock.run(1.0)
     assert clock.thrusts() == []
@@ -46,9 +46,9 @@ def test_landing_descends_first():
 def test_the_ground_is_where_the_vehicle_took_off():
     flight = grounded()
     Clock(flight, position=(0.0, 0.0, 0.7), start=0.0).run(0.1)
-    flight.request(Event.TAKEOFF)
+    flight.request(ServerEvent.TAKEOFF)
     Clock(flight, position=(0.0, 0.0, 1.5), start=1.0).run(6.01)
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 0.76)).run(0.1)
     assert flight.flight_state is DESCENDING
     clock.position = (0.0, 0.0, 0.74)
@@ -58,7 +58,7 @@ def test_the_ground_is_where_the_vehicle_took_off():
 
 def test_the_reference_presses_only_a_little_below_the_ground():
     flight = flying()
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 0.5)).run(4.5)
     heights = [reference[2] for _, reference in clock.references()]
     assert min(heights) == pytest.approx(-0.3)
@@ -67,7 +67,7 @@ def test_the_reference_presses_only_a_little_below_the_ground():
 
 def test_a_vehicle_that_does_not_descend_is_landed_all_the_same():
     flight = flying()
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 1.0))
     assert clock.run_until(LANDING) == pytest.approx(1.0 / 0.3 + 3.0, abs=0.011)
     # Zero thrust for at most two seconds until the vehicle is down.
@@ -77,7 +77,7 @@ def test_a_vehicle_that_does_not_descend_is_landed_all_the_same():
 
 def test_waits_for_the_touchdown_when_the_height_is_known():
     flight = flying(BARE)
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 0.2)).run(1.5)
     assert flight.flight_state is LANDING
     assert [thrust for _, thrust in clock.thrusts()[100:]] == [0.0] * 5
@@ -88,7 +88,7 @@ def test_waits_for_the_touchdown_when_the_height_is_known():
 
 def test_a_vehicle_that_sinks_in_the_ramp_was_not_on_the_ground():
     flight = flying()
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 0.04)).run(0.3)
     assert flight.flight_state is LANDING
     clock.position = (0.0, 0.0, -0.05)
@@ -118,7 +118,7 @@ def test_a_vehicle_that_sinks_in_the_ramp_was_not_on_the_ground():
 
 def test_a_vehicle_that_has_stopped_sinking_is_down():
     flight = flying()
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 0.04)).run(0.1)
     clock.position = (0.0, 0.0, -0.5)
     clock.run(0.1)
@@ -128,10 +128,10 @@ def test_a_vehicle_that_has_stopped_sinking_is_down():
     clock.run(3.0)
     assert flight.flight_state is ON_GROUND
     # The next landing is to where the vehicle took off, again.
-    flight.request(Event.TAKEOFF)
+    flight.request(ServerEvent.TAKEOFF)
     clock.position = (0.0, 0.0, 0.5)
     clock.run(6.1)
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock.position = (0.0, 0.0, -0.44)
     clock.run(0.5)
     assert flight.flight_state is DESCENDING
@@ -142,7 +142,7 @@ def test_a_vehicle_that_has_stopped_sinking_is_down():
 
 def test_the_bare_ramp_is_not_taken_back():
     flight = flying(BARE)
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(0.5)
     clock.position = (0.0, 0.0, 0.5)
     clock.run(0.4)
@@ -151,7 +151,7 @@ def test_the_bare_ramp_is_not_taken_back():
 
 def test_a_descent_without_a_state_goes_on_by_dead_reckoning():
     flight = flying()
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(1.0)
     clock.position = None
     clock.run(1.0)
@@ -168,7 +168,7 @@ def test_a_descent_without_a_state_goes_on_by_dead_reckoning():
 
 def test_a_descent_goes_on_from_where_the_vehicle_is_seen_again():
     flight = flying()
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 2.0)).run(1.0)
     clock.position = None
     clock.run(2.0)
@@ -185,7 +185,7 @@ def test_a_descent_that_begins_without_a_state_begins_where_the_vehicle_was_seen
     flight = flying()
     Clock(flight, position=(0.5, -0.5, 0.8), start=6.01).run(0.1)
     clock = Clock(flight, start=6.11).run(1.0)
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock.said.clear()
     clock.run(0.5)
     assert flight.flight_state is DESCENDING
@@ -196,11 +196,11 @@ def test_a_descent_that_begins_without_a_state_begins_where_the_vehicle_was_seen
 @pytest.mark.parametrize("seen", [0.7, None])
 def test_a_descent_waits_while_the_filter_holds_the_vehicle(seen):
     flight = flying()
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(1.0)
     clock.position = None if seen is None else (0.0, 0.0, seen)
     height = seen or 1.0
-    flight.set_filter(FilterReport(Event.FILTER_HOLDS))
+    flight.set_filter(FilterReport(ServerEvent.FILTER_HOLDS))
     clock.run(2.0)
     assert clock.references()[-1][1] == pytest.approx((0, 0, height, 0, 0, -0.3), abs=0.005)
     flight.set_filter(FilterReport())
@@ -211,27 +211,27 @@ def test_a_descent_waits_while_the_filter_holds_the_vehicle(seen):
 
 def test_the_descent_of_a_restarted_server_waits_while_the_filter_holds_the_vehicle():
     flight = FlightStateMachine(PLAN)
-    flight.set_filter(FilterReport(Event.FILTER_HOLDS, DESCENDING))
+    flight.set_filter(FilterReport(ServerEvent.FILTER_HOLDS, DESCENDING))
     flight.recover((0.0, 0.0, 1.0), ground=0.0)
     clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(2.0)
     assert flight.flight_state is DESCENDING
     assert {reference[2] for _, reference in clock.references()} == {1.0}
-    flight.set_filter(FilterReport(Event.FILTER_PASSES, DESCENDING))
+    flight.set_filter(FilterReport(ServerEvent.FILTER_PASSES, DESCENDING))
     clock.run(1.0)
     assert clock.references()[-1][1] == pytest.approx((0, 0, 0.7, 0, 0, -0.3), abs=0.01)
 
 
 def test_a_descent_that_is_held_for_ever_ends():
     flight = flying()
-    flight.request(Event.LAND)
-    flight.set_filter(FilterReport(Event.FILTER_HOLDS))
+    flight.request(ServerEvent.LAND)
+    flight.set_filter(FilterReport(ServerEvent.FILTER_HOLDS))
     clock = Clock(flight, position=(0.0, 0.0, 1.0))
     assert clock.run_until(LANDING, 100.0) == pytest.approx(60.0 + 1.0 / 0.3 + 3.0, abs=0.05)
 
 
 def test_a_descent_keeps_its_speed_when_the_plan_changes():
     flight = flying()
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     flight.plan = BARE
     clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(1.0)
     assert clock.references()[-1][1] == pytest.approx((0.0, 0.0, 0.703, 0.0, 0.0, -0.3))
@@ -240,7 +240,7 @@ def test_a_descent_keeps_its_speed_when_the_plan_changes():
 @pytest.mark.parametrize("sees", [True, False])
 def test_a_descent_under_way_is_made_faster(sees):
     flight = flying()
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 4.0)).run(1.0)
     clock.position = (0.0, 0.0, 3.7) if sees else None
     clock.run(0.01)
@@ -255,16 +255,16 @@ def test_a_descent_under_way_is_made_faster(sees):
 def test_a_descent_above_a_table_is_made_as_fast_as_it_has_to_be():
     flight = grounded()
     flight.tick(0.0, (0.0, 0.0, 0.75))
-    flight.request(Event.TAKEOFF)
+    flight.request(ServerEvent.TAKEOFF)
     Clock(flight, position=(0.0, 0.0, 2.75), start=1.0).run(6.01)
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     flight.limit_descent(2.5)
     assert flight.tick(8.0, (0.0, 0.0, 2.75)).reference[5] == pytest.approx(-2.0 / 2.5)
 
 
 def test_a_descent_that_is_fast_enough_is_not_made_slower():
     flight = flying()
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(1.0)
     flight.limit_descent(7.0)
     clock.run(0.01)

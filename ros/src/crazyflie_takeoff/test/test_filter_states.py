@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_msgs.msg import FilterStatus
-from crazyflie_takeoff.filter_machine import Event, FilterMachine, FilterState, LossTimeouts
+from crazyflie_takeoff.filter_machine import FilterEvent, FilterMachine, FilterState, LossTimeouts
 from crazyflie_takeoff.motion import Motion
-from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.safe_control import SafeSetpoint
 from crazyflie_takeoff.transition_table import FlightState
 
 TABLE = FilterMachine.TABLE
@@ -46,7 +46,7 @@ class World:
             self.machine.toggle()
         if random.random() < 0.1:
             thrust = self.machine.takeoff_thrust
-            self.machine.takeoff(0.0, "control", Setpoint(0.0, 0.0, 0.0, thrust))
+            self.machine.takeoff(0.0, "control", SafeSetpoint(0.0, 0.0, 0.0, thrust))
 
     def facts(self):
         """Return all that guards could change."""
@@ -71,7 +71,7 @@ def test_whatever_happens_the_table_decides(seed):
     machine = world.machine
     for _ in range(50):
         world.change(random)
-        event = random.choice(list(Event))
+        event = random.choice(list(FilterEvent))
         before = world.facts()
         rows = world.rows(event)
         # Guards change nothing, and all that hold lead to the same state.
@@ -83,7 +83,7 @@ def test_whatever_happens_the_table_decides(seed):
         if machine.state is not state:
             assert machine.elapsed == 0.0
             assert machine.state in LEGAL.get(state, FilterState)
-        if state is FilterState.EMERGENCY and event is not Event.RESET:
+        if state is FilterState.EMERGENCY and event is not FilterEvent.RESET:
             assert machine.state is FilterState.EMERGENCY
         if machine.state in (FilterState.DOWN, FilterState.EMERGENCY):
             assert machine.is_on_ground
@@ -94,14 +94,14 @@ def test_whatever_happens_the_table_decides(seed):
 @pytest.mark.parametrize(
     ("state", "event", "facts", "after"),
     [
-        (FilterState.PASSING, Event.TICK, {"silence": 0.125}, FilterState.PASSING),
-        (FilterState.PASSING, Event.TICK, {"silence": 0.14}, FilterState.HOLDING),
-        (FilterState.HOLDING, Event.TICK, {"elapsed": 3.0}, FilterState.HOLDING),
-        (FilterState.HOLDING, Event.TICK, {"elapsed": 3.1}, FilterState.SINKING),
-        (FilterState.HOLDING, Event.TICK, {"elapsed": 2.0, "age": 1.5}, FilterState.HOLDING),
-        (FilterState.HOLDING, Event.TICK, {"elapsed": 2.0, "age": 1.6}, FilterState.SINKING),
-        (FilterState.EMERGENCY, Event.RESET, {"elapsed": 1.9}, FilterState.EMERGENCY),
-        (FilterState.EMERGENCY, Event.RESET, {"elapsed": 2.0}, FilterState.DOWN),
+        (FilterState.PASSING, FilterEvent.TICK, {"silence": 0.125}, FilterState.PASSING),
+        (FilterState.PASSING, FilterEvent.TICK, {"silence": 0.14}, FilterState.HOLDING),
+        (FilterState.HOLDING, FilterEvent.TICK, {"elapsed": 3.0}, FilterState.HOLDING),
+        (FilterState.HOLDING, FilterEvent.TICK, {"elapsed": 3.1}, FilterState.SINKING),
+        (FilterState.HOLDING, FilterEvent.TICK, {"elapsed": 2.0, "age": 1.5}, FilterState.HOLDING),
+        (FilterState.HOLDING, FilterEvent.TICK, {"elapsed": 2.0, "age": 1.6}, FilterState.SINKING),
+        (FilterState.EMERGENCY, FilterEvent.RESET, {"elapsed": 1.9}, FilterState.EMERGENCY),
+        (FilterState.EMERGENCY, FilterEvent.RESET, {"elapsed": 2.0}, FilterState.DOWN),
     ],
 )
 def test_how_long_the_filter_waits(state, event, facts, after):
@@ -121,7 +121,7 @@ def test_a_controller_that_does_not_answer_is_missing(may_lack_reference):
     machine = World().machine
     machine.state, machine.is_needed = FilterState.HOLDING, True
     machine.elapsed, machine.may_lack_reference = 9.0, may_lack_reference
-    assert machine.handle(Event.TICK)
+    assert machine.handle(FilterEvent.TICK)
     assert machine.lacks_controller == (not may_lack_reference)
 
 
@@ -131,7 +131,7 @@ def test_each_row_can_be_taken():
         world = World()
         for _ in range(30):
             world.change(random)
-            event = random.choice(list(Event))
+            event = random.choice(list(FilterEvent))
             taken.update(TABLE.index(row) for row in world.rows(event)[:1])
             world.machine.handle(event)
     assert taken == set(range(len(TABLE)))
@@ -144,7 +144,7 @@ def test_each_state_has_an_exit_and_an_entry():
 
 
 def test_an_emergency_comes_from_every_state():
-    stopped = {row.state for row in TABLE if row.event is Event.STOP and row.guard is None}
+    stopped = {row.state for row in TABLE if row.event is FilterEvent.STOP and row.guard is None}
     assert stopped == set(FilterState) - {FilterState.EMERGENCY}
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState
 from crazyflie_takeoff.safe_control import (
     SINK_SPEED,
-    Setpoint,
+    SafeSetpoint,
 )
 
 
@@ -38,7 +38,7 @@ def test_holds_after_a_tenth_of_a_second_and_goes_on_without_a_step():
     for k in range(30):
         flight.ticks += 1
         out = flight.filter.commanded(flight.time, 16.0, level(16.0))
-        returned.append(out.thrust if isinstance(out, Setpoint) else out)
+        returned.append(out.thrust if isinstance(out, SafeSetpoint) else out)
         assert flight.filter.tick(flight.time) is None
         assert k == 0 or abs(returned[-1] - returned[-2]) < 0.4
     assert returned[0] == pytest.approx(flight.flown[before + 39], abs=0.1)

@@ -9,9 +9,9 @@ from crazyflie_takeoff.filter_machine import FilterMachine, LossTimeouts
 from crazyflie_takeoff.limits import Box, Callers, Debounce, DescentWatch, Limits, Walls
 from crazyflie_takeoff.motion import Delay, Ground, MeasuredPosition, Measurement, Motion
 from crazyflie_takeoff.relay import Relay
-from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.safe_control import SafeSetpoint
 from crazyflie_takeoff.server_table import DESCENT_MARGIN, Descent
-from crazyflie_takeoff.takeoff_checks import Battery, Charge, DriverConnection
+from crazyflie_takeoff.takeoff_checks import BatteryCheck, Charge, DriverConnection
 from crazyflie_takeoff.transition_table import FlightState
 
 
@@ -229,7 +229,7 @@ def test_a_complaint_has_to_last():
 
 
 def level(thrust):
-    return Setpoint(0.0, 0.0, 0.0, thrust)
+    return SafeSetpoint(0.0, 0.0, 0.0, thrust)
 
 
 def measure(relay, motion):
@@ -263,7 +263,7 @@ def test_each_fault_alone_ends_a_flight(fault):
     for k in range(30):
         measure(relay, at(1.0, 2.9 if fault == "climb" else 0.0))
         if fault == "climb":
-            relay.takeoff("control", Setpoint(0.0, 0.0, 0.0, 99.0), False)
+            relay.takeoff("control", SafeSetpoint(0.0, 0.0, 0.0, 99.0), False)
         step = 0.3 if fault == "busy" else 0.1
         crash, objection = complaints(relay, step * k, step, fault == "stays")
     assert not crash
@@ -294,7 +294,7 @@ def test_two_takeoff_servers_in_flight_are_noticed_at_once_and_two_controllers_s
     [(3.2, Charge.GOOD), (3.1, Charge.LOW), (3.0, Charge.LOW), (2.9, Charge.CRITICAL)],
 )
 def test_a_voltage_counts_when_it_has_lasted(voltage, charge):
-    battery = Battery(3.2, 3.0, 2.0)
+    battery = BatteryCheck(3.2, 3.0, 2.0)
     assert math.isnan(battery.voltage)
     battery.measure(10.0, voltage)
     battery.measure(11.75, voltage)

@@ -6,22 +6,22 @@ from hypothesis import strategies as st
 from crazyflie_takeoff.server_table import (
     TABLE,
     TAKEOVERS,
-    Event,
     FilterReport,
     FlightStateMachine,
-    Plan,
+    ServerEvent,
     ServerState,
+    TakeoffPlan,
 )
 from crazyflie_takeoff.transition_table import FlightState
 
 G = 9.81
-PLAN = Plan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.3)
-BARE = Plan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.0)
+PLAN = TakeoffPlan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.3)
+BARE = TakeoffPlan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.0)
 
 POSITIONS = st.none() | st.tuples(st.just(0.0), st.just(0.0), st.floats(-0.1, 2.0))
-CALLS = st.sampled_from([Event.TAKEOFF, Event.LAND])
+CALLS = st.sampled_from([ServerEvent.TAKEOFF, ServerEvent.LAND])
 TICKS = st.tuples(st.floats(0.0, 2.5), POSITIONS)
-FILTER = st.sampled_from([Event.FILTER_PASSES, Event.FILTER_HOLDS, *TAKEOVERS])
+FILTER = st.sampled_from([ServerEvent.FILTER_PASSES, ServerEvent.FILTER_HOLDS, *TAKEOVERS])
 
 
 @given(st.lists(CALLS | TICKS, max_size=40), st.sampled_from([PLAN, BARE]))
@@ -30,10 +30,10 @@ def test_flights_that_the_filter_does_not_end(steps, plan):
     flight = FlightStateMachine(plan, ServerState.ON_GROUND)
     time, in_flight, ramp, last = 0.0, False, None, FlightState.ON_GROUND
     for step in steps:
-        if isinstance(step, Event):
+        if isinstance(step, ServerEvent):
             accepted = flight.accepts(step)
             starts = (ServerState.ON_GROUND,)
-            if step is Event.LAND:
+            if step is ServerEvent.LAND:
                 starts = (ServerState.LIFTING_OFF, ServerState.CLIMBING, ServerState.FLYING)
             assert accepted == (flight.state in starts)
             flight.handle(step)
@@ -82,13 +82,13 @@ def test_walks_through_the_table(remembered, position, steps, plan):
             if flight.state is ServerState.YIELDED:
                 assert output.thrust is output.reference is None
             continue
-        if step in (Event.TAKEOFF, Event.LAND):
+        if step in (ServerEvent.TAKEOFF, ServerEvent.LAND):
             flight.handle(step)
         else:
             flight.set_filter(FilterReport(step))
         assert before is flight.state or (before, flight.state) in rows
         takes_off = before in (ServerState.LIFTING_OFF, ServerState.CLIMBING)
-        if step in TAKEOVERS and not (takes_off and step is Event.FILTER_DOWN):
+        if step in TAKEOVERS and not (takes_off and step is ServerEvent.FILTER_DOWN):
             assert flight.state in (ServerState.ON_GROUND, ServerState.YIELDED)
     for _ in range(80):
         time += 1.0

@@ -4,11 +4,11 @@ import pytest
 
 from crazyflie_takeoff.server_table import (
     TAKEOVERS,
-    Event,
     FilterReport,
     FlightStateMachine,
-    Plan,
+    ServerEvent,
     ServerState,
+    TakeoffPlan,
 )
 from crazyflie_takeoff.transition_table import FlightState
 
@@ -16,7 +16,7 @@ ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState
 
 
 def recovered(remembered, height, descent_speed=0.3, ground=0.0, **report):
-    flight = FlightStateMachine(Plan((0.0, 0.0, 1.0), 1.0, 5.0, descent_speed))
+    flight = FlightStateMachine(TakeoffPlan((0.0, 0.0, 1.0), 1.0, 5.0, descent_speed))
     flight.set_filter(FilterReport(remembered=remembered, **report))
     assert flight.state is ServerState.RECOVERING
     flight.recover(None if height is None else (0.0, 0.0, height), ground)
@@ -65,7 +65,7 @@ def test_toggles_only_what_the_former_server_has_not(remembered, height):
 @pytest.mark.parametrize("remembered", [None, FLYING, LANDING])
 def test_a_filter_that_has_the_vehicle_keeps_it(event, remembered):
     flight = recovered(remembered, 1.0, event=event)
-    sinks = event is Event.FILTER_SINKS
+    sinks = event is ServerEvent.FILTER_SINKS
     assert flight.state is (ServerState.YIELDED if sinks else ServerState.ON_GROUND)
     assert flight.tick(0.0).toggle == (remembered is FLYING)
 
@@ -87,7 +87,7 @@ def test_is_on_a_table_when_no_controller_sends_commands():
 
 
 def test_a_recovered_descent_waits_while_the_filter_holds_the_vehicle():
-    flight = recovered(DESCENDING, 1.0, event=Event.FILTER_HOLDS)
+    flight = recovered(DESCENDING, 1.0, event=ServerEvent.FILTER_HOLDS)
     for k in range(100):
         output = flight.tick(k / 100, (0.0, 0.0, 1.0))
     assert output.reference[2] == 1.0

@@ -21,10 +21,10 @@ from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUS
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.relay import Relay
-from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.safe_control import SafeSetpoint
 from crazyflie_takeoff.transition_table import FlightState
 
-TILTED = Setpoint(0.2, -0.1, 1.0, G + 0.5)
+TILTED = SafeSetpoint(0.2, -0.1, 1.0, G + 0.5)
 HALF = pytest.approx((0.1, -0.05, 0.5, G + 0.25))
 
 
@@ -177,7 +177,9 @@ def flying(z=1.0, state=FLYING):
 def test_a_nominal_control_passes_unchanged(state):
     machine = flying(state=state)
     assert machine.pass_unchanged(1.01, level(G), 0.0)
-    assert machine.pass_unchanged(1.02, Setpoint(MAX_TILT, -MAX_TILT, MAX_YAW_RATE, MAX_THRUST), 0)
+    assert machine.pass_unchanged(
+        1.02, SafeSetpoint(MAX_TILT, -MAX_TILT, MAX_YAW_RATE, MAX_THRUST), 0
+    )
     assert machine.pass_unchanged(1.03, level(MIN_THRUST), 0.04)
     assert not machine.pass_unchanged(1.04, level(MIN_THRUST), 0.05)
     # Until the filter has to run again.
@@ -189,9 +191,9 @@ def test_a_nominal_control_passes_unchanged(state):
 @pytest.mark.parametrize(
     "control",
     [
-        Setpoint(0.27, 0.0, 0.0, G),
-        Setpoint(0.0, -0.27, 0.0, G),
-        Setpoint(0.0, 0.0, -3.5, G),
+        SafeSetpoint(0.27, 0.0, 0.0, G),
+        SafeSetpoint(0.0, -0.27, 0.0, G),
+        SafeSetpoint(0.0, 0.0, -3.5, G),
         level(16.1),
         level(3.9),
     ],
@@ -242,7 +244,7 @@ def test_the_short_way_leads_where_the_long_one_does(seed, state):
     for k in range(400):
         time += random.choice([0.01, 0.01, 0.01, 0.002, 0.03])
         thrust = random.gauss(G + 0.5, 1.0 if random.random() < 0.9 else 5.0)
-        control = Setpoint(random.gauss(0.0, 0.05), random.gauss(0.0, 0.1), 0.1, thrust)
+        control = SafeSetpoint(random.gauss(0.0, 0.05), random.gauss(0.0, 0.1), 0.1, thrust)
         age = random.choice([0.0, 0.0, 0.0, 0.01, 0.06])
         if random.random() < 0.95:
             if short.pass_unchanged(time, control, age):
@@ -282,7 +284,7 @@ def test_a_nominal_tick_leaves_what_a_whole_one_does(seed, state):
     for _ in range(300):
         time += random.choice([0.01, 0.01, 0.01, 0.04, 0.002, 0.0, -0.01, 0.3, 2.0][: 5 + seed % 5])
         thrust = random.gauss(G + 0.5, 1.0 if random.random() < 0.95 else 5.0)
-        control = Setpoint(random.gauss(0.0, 0.05), random.gauss(0.0, 0.1), 0.1, thrust)
+        control = SafeSetpoint(random.gauss(0.0, 0.05), random.gauss(0.0, 0.1), 0.1, thrust)
         caller = "a" if random.random() < 0.98 else "b"
         if random.random() < 0.1:
             height, speed = random.uniform(0.2, 2.2), random.uniform(-1.0, 2.5)

@@ -10,7 +10,7 @@ from crazyflie_takeoff.safe_control import (
     MAX_BRAKING,
     HoverThrust,
     SafeControl,
-    Setpoint,
+    SafeSetpoint,
     braking_time,
     descent_time,
 )
@@ -33,14 +33,14 @@ def test_learns_the_thrust_of_hover_also_from_a_climb():
 def test_learns_the_vertical_part_of_a_tilted_thrust(roll, pitch, vertical):
     tilted = HoverThrust()
     for _ in range(2000):
-        tilted.update(0.01, Setpoint(roll, pitch, 0.0, G / vertical).lift, 0.0)
+        tilted.update(0.01, SafeSetpoint(roll, pitch, 0.0, G / vertical).lift, 0.0)
     assert tilted.value == pytest.approx(G, rel=1e-6)
 
 
 def test_a_state_that_is_the_last_one_is_not_taken_again():
     # 0.2 s at full thrust after it, the vehicle rises by 1.2 m/s more: that is braked at once.
     motion = Motion((0.0, 0.0, 0.5), (0.0, 0.0, 0.4))
-    safe = SafeControl(G, motion, 0.2, Setpoint(0.0, 0.0, 0.0, 16.0))
+    safe = SafeControl(G, motion, 0.2, SafeSetpoint(0.0, 0.0, 0.0, 16.0))
     thrusts = [safe.advance(0.01, motion, False).thrust for _ in range(3)]
     assert max(thrusts) == pytest.approx(G - MAX_BRAKING)
     # A new one is used.
@@ -147,14 +147,14 @@ def test_the_thrust_of_a_vehicle_that_does_not_sink_goes_down_further():
 
 def test_without_a_state_the_velocity_is_reckoned_from_the_control():
     motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-    safe = SafeControl(G, motion, 0.1, Setpoint(0.1, 0.2, 0.0, G + 1.0))
+    safe = SafeControl(G, motion, 0.1, SafeSetpoint(0.1, 0.2, 0.0, G + 1.0))
     assert safe.climb == pytest.approx(0.1)
     control = safe.advance(0.0, None, False)
     # g tan(0.2) for 0.1 s forward, g tan(0.1) to the right; 0.3 g per m/s against it.
     assert math.tan(control.pitch) == pytest.approx(-0.03 * G * math.tan(0.2))
     assert math.tan(control.roll) == pytest.approx(-0.03 * G * math.tan(0.1))
     assert control.thrust - G == pytest.approx(-0.1 / 0.3)
-    turned = SafeControl(G, motion._replace(yaw=math.pi), 0.1, Setpoint(0.1, 0.2, 0.0, G))
+    turned = SafeControl(G, motion._replace(yaw=math.pi), 0.1, SafeSetpoint(0.1, 0.2, 0.0, G))
     assert turned.advance(0.0, None, False)[:2] == pytest.approx(control[:2])
 
 
@@ -189,7 +189,7 @@ def test_the_mean_of_hover_by_its_time_constant():
 
 
 def test_a_mixture_of_controls():
-    mixed = Setpoint(0.0, 1.0, 2.0, 3.0).mixed(Setpoint(4.0, 3.0, 2.0, -1.0), 0.25)
+    mixed = SafeSetpoint(0.0, 1.0, 2.0, 3.0).mixed(SafeSetpoint(4.0, 3.0, 2.0, -1.0), 0.25)
     assert mixed == (1.0, 1.5, 2.0, 2.0)
 
 
@@ -202,4 +202,4 @@ def test_without_any_state_it_is_level_and_sinks_slowly():
 
 def test_a_state_from_the_future_is_not_reckoned_back():
     motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.25))
-    assert SafeControl(G, motion, -0.1, Setpoint(0.0, 0.0, 0.0, 16.0)).climb == 0.25
+    assert SafeControl(G, motion, -0.1, SafeSetpoint(0.0, 0.0, 0.0, 16.0)).climb == 0.25

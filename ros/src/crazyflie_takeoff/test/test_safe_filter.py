@@ -12,7 +12,7 @@ from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import (
     MAX_SAFE_TILT,
     MOTORS_OFF,
-    Setpoint,
+    SafeSetpoint,
 )
 from crazyflie_takeoff.transition_table import FlightState
 from crazyflie_utils.refusal import RefusalError
@@ -284,7 +284,7 @@ def test_whatever_happens_when(events):
 
 
 def check(control_filter, out):
-    if isinstance(out, Setpoint):
+    if isinstance(out, SafeSetpoint):
         roll, pitch, yaw_dot, thrust = out
         # Controls that it passes on are limited to the range of controls.
         least = MIN_THRUST if control_filter.state is FilterState.PASSING else 0.5 * G
@@ -294,4 +294,4 @@ def check(control_filter, out):
     if control_filter.state in (FilterState.EMERGENCY, FilterState.DOWN):
         assert out is None or out == MOTORS_OFF
     if control_filter.state is FilterState.SINKING:
-        assert out is None or isinstance(out, Setpoint)
+        assert out is None or isinstance(out, SafeSetpoint)

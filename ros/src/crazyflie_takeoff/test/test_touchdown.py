@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from takeoff_helpers import PointMass, feedback
 
-from crazyflie_takeoff.server_table import Event, FlightStateMachine, Plan, ServerState
+from crazyflie_takeoff.server_table import FlightStateMachine, ServerEvent, ServerState, TakeoffPlan
 
 STIFF, SOFT = (20.0, 20.98), (1.5, 1.0)
 """Height gains of the simulation's and of the hardware's controller."""
@@ -17,10 +17,12 @@ def land(height, gains, speed=0.3, miscalibration=0.0):
     ``miscalibration`` is how much more thrust the vehicle gives than it is
     told, m/s^2; the hover begins in its equilibrium.
     """
-    flight = FlightStateMachine(Plan((0.0, 0.0, height), 1.0, 5.0, speed), ServerState.FLYING)
+    flight = FlightStateMachine(
+        TakeoffPlan((0.0, 0.0, height), 1.0, 5.0, speed), ServerState.FLYING
+    )
     vehicle = PointMass(height)
     reference = (height - miscalibration / gains[0], 0.0)
-    flight.request(Event.LAND)
+    flight.request(ServerEvent.LAND)
     for tick in range(6000):
         output = flight.tick(tick / 100, (0.0, 0.0, vehicle.z))
         if output.reference is not None:

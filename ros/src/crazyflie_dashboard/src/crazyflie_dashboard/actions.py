@@ -13,7 +13,7 @@ from geometry_msgs.msg import Point
 from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest
 
 from crazyflie_dashboard.answers import any_of, failed, gathered, settle
-from crazyflie_dashboard.discovery import Graph, Request, Service, Vehicle
+from crazyflie_dashboard.discovery import FoundVehicle, Graph, Request, Service
 from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.moves import Move, expect_apart, formation, in_frame
@@ -63,7 +63,7 @@ _TYPES = {
 class Target:
     """A vehicle that is commanded, and its latest snapshot."""
 
-    vehicle: Vehicle
+    vehicle: FoundVehicle
     now: VehicleSnapshot
     fence: Box | None = None  #: Its geofence, in the frame of its states.
 

@@ -58,7 +58,7 @@ class Graph:
 
 
 @dataclass(frozen=True)
-class Vehicle:
+class FoundVehicle:
     """A vehicle on the graph."""
 
     namespace: str  #: Absolute, without a slash at its end: "" or /cf1.
@@ -79,7 +79,7 @@ class Vehicle:
         return f"{self.namespace}/high_level"
 
 
-def vehicles(graph: Graph) -> list[Vehicle]:
+def vehicles(graph: Graph) -> list[FoundVehicle]:
     """Return the vehicles of a graph, cf10 after cf9.
 
     A vehicle is a namespace with states, controls, or the status of a driver; without any, one with
@@ -134,7 +134,7 @@ def _vehicle(top, driver, topics, services, has_driver):
     if Action.GO_TO not in found and {f"{top}/takeoff", f"{top}/land"} <= services.keys():
         go_to = Service(f"{top}/high_level/go_to", Request.GO_TO, needs_commander=True)
         found[Action.GO_TO] = (go_to,)
-    return Vehicle(top, driver, merged, found, has_driver)
+    return FoundVehicle(top, driver, merged, found, has_driver)
 
 
 def _candidates(

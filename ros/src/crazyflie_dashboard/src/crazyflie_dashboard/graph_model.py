@@ -15,7 +15,7 @@ from rosgraph_msgs.msg import Log
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_dashboard.answers import listed
-from crazyflie_dashboard.discovery import Graph, Vehicle, vehicles
+from crazyflie_dashboard.discovery import FoundVehicle, Graph, vehicles
 from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.messages import Diagnostics, log_line
 from crazyflie_dashboard.page_state import IMAGES
@@ -133,7 +133,7 @@ class GraphModel:
             self.plots[name] = VehiclePlots(self._clock)
         self._receive()
 
-    def fence(self, vehicle: Vehicle) -> Box | None:
+    def fence(self, vehicle: FoundVehicle) -> Box | None:
         """Return the geofence of a vehicle, in the frame of its states; None if it has none."""
         return self._surroundings.box(vehicle.namespace)
 
@@ -176,7 +176,7 @@ class GraphModel:
         self._update_vehicles(vehicles(self.graph), now)
         self._surroundings.follow(self.graph)
 
-    def _update_vehicles(self, found: list[Vehicle], now: float) -> None:
+    def _update_vehicles(self, found: list[FoundVehicle], now: float) -> None:
         for vehicle in found:
             name = vehicle.name
             self._seen[name] = now

@@ -8,7 +8,7 @@ import roslib.packages
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rosgraph_msgs.msg import Log
 
-from crazyflie_dashboard.discovery import Vehicle
+from crazyflie_dashboard.discovery import FoundVehicle
 from crazyflie_dashboard.snapshot import Kind, LogLine, Sentence
 
 _MAX_AGE = 10.0  #: Age after which a diagnostic is dropped (s).
@@ -64,7 +64,7 @@ class Diagnostics:
             for each in wrong
         )
 
-    def kind(self, vehicle: Vehicle) -> Kind:
+    def kind(self, vehicle: FoundVehicle) -> Kind:
         """Return the kind of a vehicle, by the address that its driver has for it."""
         if not vehicle.has_driver:
             return Kind.SIMULATED

@@ -52,7 +52,7 @@ def listed(folders: Iterable[str | Path]) -> tuple[MissionFile, ...]:
     return tuple(found)
 
 
-class Flight:
+class MissionFlight:
     """A mission in a process of its own, which goes on without this one.
 
     Its output is a file. The file ``record`` identifies the process: its number alone may belong to
@@ -80,7 +80,7 @@ class Flight:
     @staticmethod
     def begin(
         folder: Path, title: str, command: list[str], environment: Mapping[str, str]
-    ) -> "tuple[Flight, subprocess.Popen[Any]]":
+    ) -> "tuple[MissionFlight, subprocess.Popen[Any]]":
         """Start a mission, with its files in a folder."""
         folder.mkdir(parents=True, exist_ok=True)
         for old in folder.glob("*.out"):
@@ -93,7 +93,7 @@ class Flight:
         started.rename(record.with_suffix(".out"))
         known = {"title": title, "pid": process.pid, "began": _began(process.pid)}
         record.write_text(json.dumps({**known, "master": _master(), "is_stopped": False}))
-        return Flight(record), process
+        return MissionFlight(record), process
 
     def wait(self, process: "subprocess.Popen[Any] | None" = None) -> int:
         """Wait for its end; return its exit status, or 0 if another process started it."""
@@ -160,11 +160,11 @@ class Missions:
         self._python = python
         self._folder = folder or Path(rospkg.get_ros_home()) / "crazyflie_missions"
         self._lock = threading.Lock()
-        self._flights: list[Flight] = []
+        self._flights: list[MissionFlight] = []
         self._passed: dict[tuple[Any, ...], Mapping[str, Triple]] = {}
         for record in self._folder.glob("*.json"):
             try:
-                flight = Flight(record)
+                flight = MissionFlight(record)
             except (OSError, ValueError, KeyError):
                 continue
             self._follow(flight, None, lambda status: None)
@@ -226,7 +226,9 @@ class Missions:
                         f"{mission.title}: {name} is not where it was at the dry run; expected "
                         "another one"
                     )
-        flight, process = Flight.begin(self._folder, mission.title, command, _environment(vehicles))
+        flight, process = MissionFlight.begin(
+            self._folder, mission.title, command, _environment(vehicles)
+        )
 
         def finish(status):
             # Stopped while Python itself was starting: nothing has flown.
@@ -256,7 +258,7 @@ class Missions:
 
     def _follow(
         self,
-        flight: Flight,
+        flight: MissionFlight,
         process: "subprocess.Popen[Any] | None",
         finish: Callable[[int], None],
     ) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import roslib.message
 from std_msgs.msg import Float32
 
-from crazyflie_dashboard.discovery import Vehicle
+from crazyflie_dashboard.discovery import FoundVehicle
 from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.snapshot import STALE_AGE, Kind, Reference, VehicleSnapshot
 from crazyflie_driver.msg import GenericLogData
@@ -55,7 +55,7 @@ class VehicleModel:
     ----------
     handle : NodeHandle
         Closed when the vehicle goes.
-    vehicle : Vehicle
+    vehicle : FoundVehicle
     time : callable
         The machine's time, s.
     on_row : callable
@@ -65,7 +65,7 @@ class VehicleModel:
     def __init__(
         self,
         handle: NodeHandle,
-        vehicle: Vehicle,
+        vehicle: FoundVehicle,
         time: Callable[[], float],
         on_row: Callable[[str, Any], None],
     ):
@@ -261,7 +261,7 @@ def _known(number: float) -> float | None:
     return None if math.isnan(number) else number
 
 
-def frame_of(vehicle: Vehicle, frames: Frames, is_alone: bool) -> str | None:
+def frame_of(vehicle: FoundVehicle, frames: Frames, is_alone: bool) -> str | None:
     """Return the frame of a vehicle: the one that has its name.
 
     The frame of a single vehicle may have any name: one that is away from its origin is preferred.

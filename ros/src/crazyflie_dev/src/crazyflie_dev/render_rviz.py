@@ -72,7 +72,7 @@ def material_of(model: Path, name: str) -> list[float]:
     return [float(part) for part in colour.attrib["rgba"].split()[:3]]
 
 
-class Scene:
+class RvizScene:
     """RViz's picture of the flight on a display, and its expected content.
 
     ``description`` is the folder of crazyflie_description, which has the colours.
@@ -120,7 +120,7 @@ def render(output: Path, log: Path, launch_arguments: list[str]) -> None:
     description = Path(rospkg.RosPack().get_path("crazyflie_description"))
     with virtual_display(*SCREEN) as display:
         os.environ.update(DISPLAY=display, LIBGL_ALWAYS_SOFTWARE="1")
-        scene = Scene(display, description)
+        scene = RvizScene(display, description)
         arguments = ["crazyflie_examples", "sw_hover.launch", "rviz:=true", *launch_arguments]
         show_progress(f"launching {' '.join(arguments)} on display {display}")
         with roslaunch(arguments, log):

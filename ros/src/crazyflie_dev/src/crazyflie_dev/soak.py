@@ -29,7 +29,7 @@ from crazyflie_dev.soak_faults import (
     MISSION_PARAMETERS,
     MISSIONS,
     Fault,
-    Flight,
+    SoakFlight,
 )
 from crazyflie_dev.soak_page import NAME, PageNode
 from crazyflie_dev.soak_watch import Watch
@@ -77,7 +77,7 @@ class Soak:
         self.refused = self.answered = 0
         self.page = PageNode(self.graph)
         self.clicked = 0  #: Flights that were commanded by the page.
-        self._flight = Flight(self.graph, self.random, self.start)
+        self._flight = SoakFlight(self.graph, self.random, self.start)
         self._fault_steps: Iterator[None] = iter(())
         self._is_over = True
         self.watch.begin()

@@ -65,7 +65,7 @@ Steps = Generator[None, None, None]
 
 
 @dataclass
-class Flight:
+class SoakFlight:
     """The flight on which faults act."""
 
     graph: FakeGraph
@@ -73,7 +73,7 @@ class Flight:
     respawn: Callable[[str], None]  #: ``respawn(name)`` starts a node's process again.
 
 
-Act = Callable[[Flight], object]
+Act = Callable[[SoakFlight], object]
 
 
 @dataclass
@@ -81,7 +81,7 @@ class Fault:
     """A fault: what it does, and how long it lasts."""
 
     name: str
-    run: Callable[[Flight], Steps]
+    run: Callable[[SoakFlight], Steps]
     #: shortest, longest: s.
     shortest: float
     longest: float
@@ -94,7 +94,7 @@ class Fault:
     is_emergency: bool = False  #: Whether motors have to stand still.
 
 
-def lasting(begin: Act, end: Act = lambda _: None) -> Callable[[Flight], Steps]:
+def lasting(begin: Act, end: Act = lambda _: None) -> Callable[[SoakFlight], Steps]:
     """Return a fault that acts at its beginning and at its end."""
 
     def run(flight):
@@ -108,7 +108,7 @@ def lasting(begin: Act, end: Act = lambda _: None) -> Callable[[Flight], Steps]:
     return run
 
 
-def repeated(act: Act) -> Callable[[Flight], Steps]:
+def repeated(act: Act) -> Callable[[SoakFlight], Steps]:
     """Return a fault that acts at each step."""
 
     def run(flight):
@@ -119,7 +119,7 @@ def repeated(act: Act) -> Callable[[Flight], Steps]:
     return run
 
 
-def together(*faults: Callable[[Flight], Steps]) -> Callable[[Flight], Steps]:
+def together(*faults: Callable[[SoakFlight], Steps]) -> Callable[[SoakFlight], Steps]:
     """Return faults as one; they end in this order."""
 
     def run(flight):
@@ -136,7 +136,7 @@ def together(*faults: Callable[[Flight], Steps]) -> Callable[[Flight], Steps]:
 # Poses.
 
 
-def on_tf(change: Callable[[Any, Flight], list[Any]]) -> Callable[[Flight], Steps]:
+def on_tf(change: Callable[[Any, SoakFlight], list[Any]]) -> Callable[[SoakFlight], Steps]:
     """Return a fault: ``change(message, flight)`` returns what arrives on /tf."""
 
     def begin(flight):
@@ -145,7 +145,7 @@ def on_tf(change: Callable[[Any, Flight], list[Any]]) -> Callable[[Flight], Step
     return lasting(begin, lambda flight: flight.graph.faults.pop("/tf"))
 
 
-def with_each(edit: Callable[[Any, Flight], None]) -> Callable[[Flight], Steps]:
+def with_each(edit: Callable[[Any, SoakFlight], None]) -> Callable[[SoakFlight], Steps]:
     """Return a fault: ``edit(transform, flight)`` changes each transform on /tf."""
 
     def change(message, flight):
@@ -174,7 +174,7 @@ def _jump(transform, flight):
     translation.z += flight.random.uniform(-1.0, 3.0)
 
 
-def _shift(offset: float) -> Callable[[Flight], Steps]:
+def _shift(offset: float) -> Callable[[SoakFlight], Steps]:
     def edit(transform, _):
         stamp = max(0.0, transform.header.stamp.to_sec() + offset)
         transform.header.stamp = genpy.Time.from_sec(stamp)
@@ -201,11 +201,11 @@ def _freeze_camera(flight):
 # Nodes and the clock.
 
 
-def _kill(name: str) -> Callable[[Flight], Steps]:
+def _kill(name: str) -> Callable[[SoakFlight], Steps]:
     return lasting(lambda flight: flight.graph.kill(name), lambda flight: flight.respawn(name))
 
 
-def _freeze(name: str) -> Callable[[Flight], Steps]:
+def _freeze(name: str) -> Callable[[SoakFlight], Steps]:
     return lasting(lambda flight: flight.graph.freeze(name), lambda flight: flight.graph.thaw(name))
 
 
@@ -229,7 +229,7 @@ def _starve(flight):
             flight.graph.thaw(name)
 
 
-def _second_launch(name: str) -> Callable[[Flight], Steps]:
+def _second_launch(name: str) -> Callable[[SoakFlight], Steps]:
     """Return a fault: a node waits for the end of the flight, then its namesake takes its place."""
 
     def replace(flight):
@@ -249,7 +249,7 @@ def _set_clock(flight):
 # Other programs.
 
 
-def _refer_to(*state: float, age: float = 0.0) -> Callable[[Flight], None]:
+def _refer_to(*state: float, age: float = 0.0) -> Callable[[SoakFlight], None]:
     """Return what publishes a reference: x, y, z, x_dot, y_dot, z_dot."""
 
     def publish(flight):
@@ -262,7 +262,7 @@ def _refer_to(*state: float, age: float = 0.0) -> Callable[[Flight], None]:
     return publish
 
 
-def _command(topic: str, **control: float) -> Callable[[Flight], Steps]:
+def _command(topic: str, **control: float) -> Callable[[SoakFlight], Steps]:
     def publish(flight):
         message = ControlStamped(control=Control(**control))
         message.header.stamp = flight.graph.stamp()
@@ -364,7 +364,7 @@ def _set(graph, full_name, value):
             graph.call(service, ReconfigureRequest(config))
 
 
-def _changing(act: Callable[[Flight], None]) -> Callable[[Flight], Steps]:
+def _changing(act: Callable[[SoakFlight], None]) -> Callable[[SoakFlight], Steps]:
     """Return a fault that calls ``act(flight)`` at each fifth step, and restores parameters."""
 
     def run(flight):

@@ -19,7 +19,7 @@ from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_doctor.graph import Graph, Type
-from crazyflie_doctor.timing import Recording, Transform
+from crazyflie_doctor.timing import TimingRecording, Transform
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils.main import begin
 
@@ -155,14 +155,14 @@ def _handshake(connection: socket.socket, fields: dict[str, str]) -> Type | None
     return answer["type"], answer["md5sum"]
 
 
-def record(graph: Graph, duration: float) -> Recording:
+def record(graph: Graph, duration: float) -> TimingRecording:
     """Return what is published within ``duration`` seconds of the machine's clock.
 
     The node publishes nothing, and subscribes to topics of the graph that have a publisher.
     """
     process = begin(f"doctor_{os.getpid()}")
     handle = process.handle(f"/doctor_{os.getpid()}")
-    recording = Recording()
+    recording = TimingRecording()
 
     def now():
         return handle.stamp().to_sec()

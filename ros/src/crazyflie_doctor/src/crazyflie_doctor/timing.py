@@ -45,7 +45,7 @@ class Transform:
 
 
 @dataclass
-class Recording:
+class TimingRecording:
     """Messages of some seconds."""
 
     transforms: list[Transform] = field(default_factory=list)  #: In the order in which they came.
@@ -58,7 +58,7 @@ class Recording:
     reported: dict[str, set[str]] = field(default_factory=dict)
 
 
-def check_clock(graph: Graph, recording: Recording) -> Iterator[Finding]:
+def check_clock(graph: Graph, recording: TimingRecording) -> Iterator[Finding]:
     """Check that all nodes use one clock, and that it advances."""
     sources = graph.publishers.get("/clock", set())
     if graph.parameters.get("/use_sim_time", False):
@@ -89,7 +89,7 @@ def check_clock(graph: Graph, recording: Recording) -> Iterator[Finding]:
         )
 
 
-def check_tf_tree(_: Graph, recording: Recording) -> Iterator[Finding]:
+def check_tf_tree(_: Graph, recording: TimingRecording) -> Iterator[Finding]:
     """Find frames with two parents or two publishers, and loops."""
     parents, sources = defaultdict(set), defaultdict(set)
     for t in recording.transforms:
@@ -125,7 +125,7 @@ def _loops(parents):
             path.append(parent)
 
 
-def check_frames(graph: Graph, recording: Recording) -> Iterator[Finding]:
+def check_frames(graph: Graph, recording: TimingRecording) -> Iterator[Finding]:
     """Find frames, and pairs of frames, that nodes need and no node publishes."""
     known = {frame for t in recording.transforms for frame in (t.parent, t.child)}
     for node, (fixed, robot) in sorted(frames_of(graph).items()):
@@ -170,7 +170,7 @@ def _chain(recording, fixed, robot):
     return path
 
 
-def check_tf_rate(graph: Graph, recording: Recording) -> Iterator[Finding]:
+def check_tf_rate(graph: Graph, recording: TimingRecording) -> Iterator[Finding]:
     """Check rate, pauses and age of the poses of every vehicle."""
     streams = defaultdict(list)
     for t in recording.transforms:
@@ -215,7 +215,7 @@ def _check_stream(child, transforms):
         yield error(f"{what} is {-age:.2f} s ahead of the clock", "synchronise the clocks (chrony)")
 
 
-def check_gains(graph: Graph, recording: Recording) -> Iterator[Finding]:
+def check_gains(graph: Graph, recording: TimingRecording) -> Iterator[Finding]:
     """Compare the delay from pose to control with what the gains in use tolerate.
 
     The loop's delay is the measured time from the pose's stamp, plus half of the period for which

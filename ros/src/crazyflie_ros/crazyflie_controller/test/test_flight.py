@@ -6,10 +6,10 @@ from closed_loop import PERIOD, Loop, control_from_cmd_vel
 
 from crazyflie_control_merger.cmd_vel_converter_node import cmd_vel_from_control
 from crazyflie_controller.flight import HOLD_LIMIT, OFF_AGE, State
-from crazyflie_controller.go_to import HeadingPose, Setpoint
+from crazyflie_controller.go_to import GoToSetpoint, HeadingPose
 from crazyflie_utils.refusal import RefusalError
 
-OFF = Setpoint()
+OFF = GoToSetpoint()
 VEHICLES = [
     {},
     {"mass_error": 0.05, "thrust_error": -0.05},

@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from crazyflie_driver.monitors import Battery, Charge
+from crazyflie_driver.monitors import BatteryMonitor, Charge
 
 
 @pytest.fixture
 def battery():
-    return Battery(low=3.2, critical=3.0, critical_time=5.0)
+    return BatteryMonitor(low=3.2, critical=3.0, critical_time=5.0)
 
 
 def test_low_is_said_at_once(battery):

@@ -15,7 +15,7 @@ from crazyflie_takeoff.safe_control import (
     MOTORS_OFF,
     RETURN_TIME,
     SafeControl,
-    Setpoint,
+    SafeSetpoint,
     descent_time,
 )
 from crazyflie_takeoff.transition_table import FlightState, Table, Transition, step
@@ -45,7 +45,7 @@ class FilterState(enum.IntEnum):
         return self >= FilterState.SINKING
 
 
-class Event(enum.Enum):
+class FilterEvent(enum.Enum):
     """Event that can change the state of the filter."""
 
     TAKEOFF_CONTROL = enum.auto()  # A control of the takeoff server.
@@ -95,7 +95,7 @@ class FilterMachine(Generic[Control]):
     started listens until a takeoff control comes or `stop_listening` is called; before that, only a
     flight state can select the controller.
 
-    Methods that return a control to publish return it unchanged, or a `Setpoint` of the
+    Methods that return a control to publish return it unchanged, or a `SafeSetpoint` of the
     filter's own, or None. Call `tick` every 10 ms, or 40 ms while `is_nominal`.
     ``sees`` states whether the vehicle's state is received.
     """
@@ -268,8 +268,8 @@ class FilterMachine(Generic[Control]):
     # Controls.
 
     def takeoff(
-        self, time: float, control: Control, setpoint: Setpoint, caller: str = ""
-    ) -> Control | Setpoint | None:
+        self, time: float, control: Control, setpoint: SafeSetpoint, caller: str = ""
+    ) -> Control | SafeSetpoint | None:
         """Return the control to publish after a takeoff control of a node at ``time`` (s).
 
         ``setpoint`` has the numbers of ``control``.
@@ -282,7 +282,7 @@ class FilterMachine(Generic[Control]):
             return MOTORS_OFF
         self.may_lack_reference = False
         self.takeoff_thrust = setpoint.thrust
-        self.handle(Event.TAKEOFF_CONTROL)
+        self.handle(FilterEvent.TAKEOFF_CONTROL)
         if self.state is not FilterState.PASSING:
             return None
         self._ground_check_pending = False
@@ -296,8 +296,8 @@ class FilterMachine(Generic[Control]):
         """Accept a commanded control if it passes unchanged; return whether it does.
 
         In a nominal flight nearly all controls do; for the others, call `commanded`. The control
-        comes from the node that sent the last one, and has the fields of a `Setpoint`; for ``age``
-        see `commanded`.
+        comes from the node that sent the last one, and has the fields of a `SafeSetpoint`; for
+        ``age`` see `commanded`.
         """
         elapsed = time - self._ticked
         is_nominal = self.passes_unchanged and age < 0.5 * self._timeouts.hold
@@ -309,8 +309,13 @@ class FilterMachine(Generic[Control]):
         return True
 
     def commanded(
-        self, time: float, control: Control, setpoint: Setpoint, caller: str = "", age: float = 0.0
-    ) -> Control | Setpoint | None:
+        self,
+        time: float,
+        control: Control,
+        setpoint: SafeSetpoint,
+        caller: str = "",
+        age: float = 0.0,
+    ) -> Control | SafeSetpoint | None:
         """Return the control to publish after a commanded control; see `takeoff`.
 
         A control whose data were measured ``age`` s earlier than usual is treated as if it had come
@@ -326,7 +331,7 @@ class FilterMachine(Generic[Control]):
         is_unchecked = self._ground_check_pending and self.in_flight
         if is_unchecked and self._measured.fresh is not None:
             self._ground_check_pending = is_unchecked = False
-            self.handle(Event.FIRST_STATE)
+            self.handle(FilterEvent.FIRST_STATE)
         if self.state.passes_nothing or is_unchecked or chosen is None:
             return None
         if chosen is not control:
@@ -351,7 +356,7 @@ class FilterMachine(Generic[Control]):
         return control
 
     def _pass_on(self, time, control, age=0.0):
-        if self.handle(Event.COMMANDED_CONTROL):
+        if self.handle(FilterEvent.COMMANDED_CONTROL):
             self._return_age = 0.0
         learns = not self.is_on_ground
         passed = self.relay.commanded(time, control, age, self.in_flight, self._lands, learns)
@@ -359,7 +364,7 @@ class FilterMachine(Generic[Control]):
             return passed
         return self.relay.mixed(self._own, self._return_age / RETURN_TIME)
 
-    def stop_listening(self, time: float) -> Control | Setpoint | None:
+    def stop_listening(self, time: float) -> Control | SafeSetpoint | None:
         """Return the commanded control that has waited until ``time`` (s), or None."""
         self._ground_check_pending = self._is_listening = False
         if self._waiting is None:
@@ -367,7 +372,7 @@ class FilterMachine(Generic[Control]):
         chosen = self._choose(time, self._waiting)
         return None if chosen is None or self.state.passes_nothing else self._pass_on(time, chosen)
 
-    def tick(self, time: float) -> Setpoint | None:
+    def tick(self, time: float) -> SafeSetpoint | None:
         """Advance to ``time`` (s); return a control to publish, or None."""
         relay = self.relay
         relay.flush()
@@ -386,13 +391,13 @@ class FilterMachine(Generic[Control]):
         lands = self._lands and self.state is FilterState.PASSING
         crash, objection = relay.complaints(step, lands)
         if crash:
-            self.handle(Event.CRASH, crash)
+            self.handle(FilterEvent.CRASH, crash)
         if objection:
-            self.handle(Event.OBJECTION, objection)
+            self.handle(FilterEvent.OBJECTION, objection)
         self._land_if_contended()
         self._takeoff_time = min(self._takeoff_time, time)
         self.is_needed = self.selects_controller(time)
-        self.handle(Event.TICK)
+        self.handle(FilterEvent.TICK)
         is_missed = self.lacks_controller or self.may_lack_reference or not self.is_commanded
         # In the climb of a takeoff, the controller is selected when the server has become silent.
         climbs = self._flight_state is FlightState.TAKING_OFF and self.is_needed
@@ -426,7 +431,7 @@ class FilterMachine(Generic[Control]):
 
     def _land_if_contended(self):
         if contention := self.relay.contention:
-            self.handle(Event.OBJECTION, contention)
+            self.handle(FilterEvent.OBJECTION, contention)
 
     def _fly(self, elapsed):
         # `SafeControl` has integrated the step before the takeover.
@@ -446,7 +451,7 @@ class FilterMachine(Generic[Control]):
 
     def stop(self, reason: str) -> None:
         """Stop the motors until `reset`, whatever controls come."""
-        self.handle(Event.STOP, reason)
+        self.handle(FilterEvent.STOP, reason)
 
     def reset(self) -> None:
         """Allow the next takeoff after an emergency.
@@ -455,7 +460,7 @@ class FilterMachine(Generic[Control]):
         """
         if self.state is not FilterState.EMERGENCY:
             raise RefusalError("there is no emergency")
-        if not self.handle(Event.RESET):
+        if not self.handle(FilterEvent.RESET):
             raise RefusalError(
                 f"the motors were stopped less than {RESET_DELAY:g} s ago; see that the vehicle "
                 "is at rest on the ground"
@@ -463,7 +468,7 @@ class FilterMachine(Generic[Control]):
 
     # The table.
 
-    def handle(self, event: Event, reason: str = "") -> bool:
+    def handle(self, event: FilterEvent, reason: str = "") -> bool:
         """Step the table; return whether the state has changed.
 
         ``reason`` is that of an objection, a crash or a stop.
@@ -568,24 +573,24 @@ class FilterMachine(Generic[Control]):
 
     #: The transitions; in any other case the state stays.
     TABLE: ClassVar[Table[FilterState, "FilterMachine[Any]"]] = (
-        Transition(_PASSING, Event.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
-        Transition(_PASSING, Event.TICK, _control_is_lost, _HOLDING, _hold_place),
-        Transition(_PASSING, Event.OBJECTION, _is_airborne, _SINKING, _take_over_and_land),
-        Transition(_PASSING, Event.CRASH, _is_airborne, _EMERGENCY, _stop_at_once),
-        Transition(_PASSING, Event.STOP, None, _EMERGENCY, _stop_at_once),
-        Transition(_HOLDING, Event.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
-        Transition(_HOLDING, Event.COMMANDED_CONTROL, None, _PASSING),
-        Transition(_HOLDING, Event.TAKEOFF_CONTROL, None, _PASSING),
-        Transition(_HOLDING, Event.TICK, _control_is_not_needed, _PASSING),
-        Transition(_HOLDING, Event.TICK, _control_stays_away, _SINKING, _give_up_waiting),
-        Transition(_HOLDING, Event.OBJECTION, None, _SINKING, _land),
-        Transition(_HOLDING, Event.CRASH, None, _EMERGENCY, _stop_at_once),
-        Transition(_HOLDING, Event.STOP, None, _EMERGENCY, _stop_at_once),
-        Transition(_SINKING, Event.TICK, _has_touched_down, _DOWN, _end_descent),
-        Transition(_SINKING, Event.TICK, _descent_is_over, _DOWN, _end_long_descent),
-        Transition(_SINKING, Event.CRASH, None, _EMERGENCY, _stop_at_once),
-        Transition(_SINKING, Event.STOP, None, _EMERGENCY, _stop_at_once),
-        Transition(_DOWN, Event.TAKEOFF_CONTROL, _lifts_off, _PASSING, _end_flight),
-        Transition(_DOWN, Event.STOP, None, _EMERGENCY, _stop_at_once),
-        Transition(_EMERGENCY, Event.RESET, _may_be_reset, _DOWN, _release),
+        Transition(_PASSING, FilterEvent.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
+        Transition(_PASSING, FilterEvent.TICK, _control_is_lost, _HOLDING, _hold_place),
+        Transition(_PASSING, FilterEvent.OBJECTION, _is_airborne, _SINKING, _take_over_and_land),
+        Transition(_PASSING, FilterEvent.CRASH, _is_airborne, _EMERGENCY, _stop_at_once),
+        Transition(_PASSING, FilterEvent.STOP, None, _EMERGENCY, _stop_at_once),
+        Transition(_HOLDING, FilterEvent.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
+        Transition(_HOLDING, FilterEvent.COMMANDED_CONTROL, None, _PASSING),
+        Transition(_HOLDING, FilterEvent.TAKEOFF_CONTROL, None, _PASSING),
+        Transition(_HOLDING, FilterEvent.TICK, _control_is_not_needed, _PASSING),
+        Transition(_HOLDING, FilterEvent.TICK, _control_stays_away, _SINKING, _give_up_waiting),
+        Transition(_HOLDING, FilterEvent.OBJECTION, None, _SINKING, _land),
+        Transition(_HOLDING, FilterEvent.CRASH, None, _EMERGENCY, _stop_at_once),
+        Transition(_HOLDING, FilterEvent.STOP, None, _EMERGENCY, _stop_at_once),
+        Transition(_SINKING, FilterEvent.TICK, _has_touched_down, _DOWN, _end_descent),
+        Transition(_SINKING, FilterEvent.TICK, _descent_is_over, _DOWN, _end_long_descent),
+        Transition(_SINKING, FilterEvent.CRASH, None, _EMERGENCY, _stop_at_once),
+        Transition(_SINKING, FilterEvent.STOP, None, _EMERGENCY, _stop_at_once),
+        Transition(_DOWN, FilterEvent.TAKEOFF_CONTROL, _lifts_off, _PASSING, _end_flight),
+        Transition(_DOWN, FilterEvent.STOP, None, _EMERGENCY, _stop_at_once),
+        Transition(_EMERGENCY, FilterEvent.RESET, _may_be_reset, _DOWN, _release),
     )

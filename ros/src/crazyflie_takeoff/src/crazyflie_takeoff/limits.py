@@ -11,7 +11,7 @@ from crazyflie_takeoff.safe_control import (
     HOVER_RANGE,
     MAX_BRAKING,
     MAX_SUBSTITUTE,
-    Setpoint,
+    SafeSetpoint,
     limited,
 )
 
@@ -75,12 +75,12 @@ class Limits:
     yaw_rate: float = MAX_YAW_RATE  # Largest yaw rate of controls (rad/s).
     thrust: float = MAX_THRUST  # Largest thrust of controls (m/s^2).
 
-    def in_range(self, control: Setpoint, lowest: float) -> Setpoint:
+    def in_range(self, control: SafeSetpoint, lowest: float) -> SafeSetpoint:
         """Return a finite control with roll, pitch, yaw rate and thrust limited to their ranges.
 
         ``lowest`` is the least thrust, m/s^2: `MIN_THRUST` in flight.
         """
-        return Setpoint(
+        return SafeSetpoint(
             limited(control.roll, self.tilt),
             limited(control.pitch, self.tilt),
             limited(control.yaw_dot, self.yaw_rate),
@@ -223,8 +223,8 @@ class RunGaps:
             self._lost += share * (float(gap > BUSY_GAP) - self._lost)
 
     def apply(
-        self, control: Setpoint, hover: float, climb: float = 0.0, is_ramp: bool = False
-    ) -> Setpoint:
+        self, control: SafeSetpoint, hover: float, climb: float = 0.0, is_ramp: bool = False
+    ) -> SafeSetpoint:
         """Return the limited control.
 
         ``hover`` is the thrust of hover, m/s^2. ``climb`` is z_dot, m/s, or 0 if it is not known: a
@@ -240,7 +240,7 @@ class RunGaps:
         most = hover + max((MAX_SPEED_CHANGE - rising) / self.longest, -MAX_BRAKING)
         most = max(most, MIN_THRUST)
         least = min(hover - (MAX_SPEED_CHANGE - sinking) / self.longest, MAX_SUBSTITUTE)
-        return Setpoint(
+        return SafeSetpoint(
             limited(control.roll, tilt),
             limited(control.pitch, tilt),
             control.yaw_dot,

@@ -14,7 +14,7 @@ from crazyflie_takeoff.limits import (
     Walls,
 )
 from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Ground, Measurement, Motion
-from crazyflie_takeoff.safe_control import MOTORS_OFF, HoverThrust, Setpoint
+from crazyflie_takeoff.safe_control import MOTORS_OFF, HoverThrust, SafeSetpoint
 
 LEARNING_STEP = 0.2  #: Longest time between controls from which hover is learned (s).
 HANDOVER = 3  #: Most changes between publishers in a handover from one controller to another.
@@ -60,13 +60,13 @@ class Relay:
         return self._hover.value
 
     @property
-    def passed(self) -> Setpoint:
+    def passed(self) -> SafeSetpoint:
         """The last control that was passed on; level hover before the first commanded one."""
         return self._passed if math.isfinite(self._time) else self._level
 
     @property
     def _level(self):
-        return Setpoint(0.0, 0.0, 0.0, self.hover)
+        return SafeSetpoint(0.0, 0.0, 0.0, self.hover)
 
     @property
     def is_nominal(self) -> bool:
@@ -121,7 +121,7 @@ class Relay:
     def pass_unchanged(self, time: float, control: Any) -> bool:
         """Accept a commanded control while `is_free` holds; return False if it is out of range.
 
-        ``control`` has the fields of a `Setpoint`.
+        ``control`` has the fields of a `SafeSetpoint`.
         """
         roll, pitch, thrust = control.roll, control.pitch, control.thrust
         limits = self._limits
@@ -142,7 +142,7 @@ class Relay:
         """Learn from the controls that have passed unchanged since the last call."""
         if (control := self._unchanged) is None:
             return
-        setpoint = Setpoint(control.roll, control.pitch, control.yaw_dot, control.thrust)
+        setpoint = SafeSetpoint(control.roll, control.pitch, control.yaw_dot, control.thrust)
         self._command = self._allowed_command = self._passed = setpoint
         if self._duration > 0.0:
             self._learn(self._duration, self._impulse / self._duration)
@@ -150,12 +150,14 @@ class Relay:
         self.commanded_callers.renew(self._time)
         self._unchanged, self._duration, self._impulse = None, 0.0, 0.0
 
-    def takeoff(self, control: Control, setpoint: Setpoint, lands: bool) -> Control | Setpoint:
+    def takeoff(
+        self, control: Control, setpoint: SafeSetpoint, lands: bool
+    ) -> Control | SafeSetpoint:
         """Return a takeoff control as it is passed on."""
         self._takeoff = self._allowed(setpoint, 0.0, lands, is_ramp=True)
         return control if self._takeoff == setpoint else self._takeoff
 
-    def command(self, setpoint: Setpoint) -> None:
+    def command(self, setpoint: SafeSetpoint) -> None:
         """Set the last commanded control."""
         self._command = setpoint
 
@@ -167,7 +169,7 @@ class Relay:
         in_flight: bool,
         lands: bool = False,
         learns: bool = True,
-    ) -> Control | Setpoint:
+    ) -> Control | SafeSetpoint:
         """Return the last commanded control, whose data are ``age`` s late, as it is passed on.
 
         ``learns`` is whether the thrust of hover is learned from it.
@@ -181,17 +183,17 @@ class Relay:
             return self._faded(allowed, age)
         return control if allowed == self._command else allowed
 
-    def mixed(self, own: Setpoint, weight: float) -> Setpoint:
+    def mixed(self, own: SafeSetpoint, weight: float) -> SafeSetpoint:
         """Return the mean of ``own`` and the last commanded control, which has a weight (0-1)."""
         self._passed = own.mixed(self._allowed_command, weight)
         return self._passed
 
-    def late(self, silence: float) -> Setpoint | None:
+    def late(self, silence: float) -> SafeSetpoint | None:
         """Return the control that replaces one ``silence`` s ago; None if it is not late."""
         is_late = silence > 0.5 * self._hold and math.isfinite(self._time)
         return self._faded(self._passed, silence) if is_late else None
 
-    def late_takeoff(self, age: float) -> Setpoint | None:
+    def late_takeoff(self, age: float) -> SafeSetpoint | None:
         """Return the control that replaces the last takeoff control; None if it is not late.
 
         ``age`` is that of the takeoff control, s. Less thrust than that of hover belongs to a ramp,

@@ -45,7 +45,7 @@ MAX_SUBSTITUTE = (1.0 + HOVER_RANGE) * GRAVITY  #: Largest thrust of the filter'
 RETURN_TIME = 0.2  #: Time in which the control changes over from the filter's own (s).
 
 
-class Setpoint(NamedTuple):
+class SafeSetpoint(NamedTuple):
     """A control: roll and pitch in rad, yaw rate in rad/s, thrust in m/s^2."""
 
     roll: float
@@ -58,12 +58,12 @@ class Setpoint(NamedTuple):
         """Vertical part of the thrust, m/s^2."""
         return self.thrust * math.cos(self.roll) * math.cos(self.pitch)
 
-    def mixed(self, other: "Setpoint", weight: float) -> "Setpoint":
+    def mixed(self, other: "SafeSetpoint", weight: float) -> "SafeSetpoint":
         """Return the mean with another setpoint, which has a weight (0 ... 1)."""
-        return Setpoint(*(a + weight * (b - a) for a, b in zip(self, other, strict=True)))
+        return SafeSetpoint(*(a + weight * (b - a) for a, b in zip(self, other, strict=True)))
 
 
-MOTORS_OFF = Setpoint(0.0, 0.0, 0.0, 0.0)
+MOTORS_OFF = SafeSetpoint(0.0, 0.0, 0.0, 0.0)
 
 
 class HoverThrust:
@@ -106,7 +106,11 @@ class SafeControl:
     """
 
     def __init__(
-        self, hover: float, motion: Motion | None, age: float = 0.0, control: Setpoint = MOTORS_OFF
+        self,
+        hover: float,
+        motion: Motion | None,
+        age: float = 0.0,
+        control: SafeSetpoint = MOTORS_OFF,
     ):
         self._hover = hover
         self._control = control
@@ -124,7 +128,7 @@ class SafeControl:
         """z_dot, measured or integrated, m/s."""
         return self._velocity[2]
 
-    def advance(self, step: float, measured: Motion | None, sinks: bool) -> Setpoint:
+    def advance(self, step: float, measured: Motion | None, sinks: bool) -> SafeSetpoint:
         """Return the next control, ``step`` s after the last one.
 
         ``measured`` is the latest motion; the same object again is no new measurement. ``sinks`` is
@@ -148,7 +152,7 @@ class SafeControl:
         correction = (self._target - self._velocity[2]) / SETTLING - self._pressure
         correction = min(max(correction, -MAX_BRAKING), MAX_CORRECTION)
         thrust = min(self._hover + correction, MAX_SUBSTITUTE)
-        self._control = Setpoint(roll, pitch, 0.0, thrust)
+        self._control = SafeSetpoint(roll, pitch, 0.0, thrust)
         return self._control
 
     def _press(self, step, sinks):

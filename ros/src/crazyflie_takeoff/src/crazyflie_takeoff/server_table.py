@@ -81,7 +81,7 @@ _FLIGHT_STATES = {
 }
 
 
-class Event(enum.Enum):
+class ServerEvent(enum.Enum):
     """Event that can change the state of the server."""
 
     RECOVER = enum.auto()  # The evidence is complete, or the time for it is over.
@@ -97,14 +97,14 @@ class Event(enum.Enum):
 
 
 #: Events after which the motors are off, and those after which the filter has the vehicle.
-STOPS = (Event.FILTER_EMERGENCY, Event.FILTER_REFUSES)
-TAKEOVERS = (Event.FILTER_SINKS, Event.FILTER_DOWN, *STOPS)
+STOPS = (ServerEvent.FILTER_EMERGENCY, ServerEvent.FILTER_REFUSES)
+TAKEOVERS = (ServerEvent.FILTER_SINKS, ServerEvent.FILTER_DOWN, *STOPS)
 
 
 class FilterReport(NamedTuple):
     """The last status of the filter."""
 
-    event: Event = Event.FILTER_PASSES
+    event: ServerEvent = ServerEvent.FILTER_PASSES
     remembered: FlightState | None = None  # Flight state that the filter received last.
     is_commanded: bool = True  # Whether a controller sends commands, or may do so.
     reason: str = ""  # Why the filter does not pass controls on, or refuses takeoffs.
@@ -152,7 +152,7 @@ class Descent:
 
 
 @dataclass(frozen=True)
-class Plan:
+class TakeoffPlan:
     """Durations and speed of takeoffs and landings."""
 
     hover: Position
@@ -190,11 +190,11 @@ def _send_hover_point(flight):
 
 
 def _filter_sinks(flight):
-    return flight.filter.event is Event.FILTER_SINKS
+    return flight.filter.event is ServerEvent.FILTER_SINKS
 
 
 def _filter_has_stopped_motors(flight):
-    return flight.filter.event in (Event.FILTER_DOWN, *STOPS)
+    return flight.filter.event in (ServerEvent.FILTER_DOWN, *STOPS)
 
 
 def _high_and_commanded_but_not_remembered(flight):
@@ -260,7 +260,7 @@ def _filter_too_late(flight):
     return flight.elapsed + ROUNDING >= FILTER_LIMIT
 
 
-_S, _E = ServerState, Event
+_S, _E = ServerState, ServerEvent
 _TAKEOFF = (_S.LIFTING_OFF, _S.CLIMBING)
 _AIRBORNE_OR_LANDING = (_S.FLYING, _S.DESCENDING, _S.RAMPING_DOWN, _S.TOUCHING_DOWN)
 
@@ -325,7 +325,7 @@ class Output:
 class FlightStateMachine:
     """The vehicle's flight, from the ground to the ground; `TABLE` has its transitions."""
 
-    def __init__(self, plan: Plan, state: ServerState = ServerState.RECOVERING):
+    def __init__(self, plan: TakeoffPlan, state: ServerState = ServerState.RECOVERING):
         self.state = state
         self.plan = plan  #: May be replaced; a takeoff or landing that has begun keeps its plan.
         self.filter = NO_FILTER  #: The last status of the filter.
@@ -364,15 +364,15 @@ class FlightStateMachine:
         self.filter = report
         self.handle(report.event)
 
-    def accepts(self, event: Event) -> bool:
+    def accepts(self, event: ServerEvent) -> bool:
         """Return whether the present state has a transition for an event."""
         return find(TABLE, self.state, event, self) is not None
 
-    def handle(self, event: Event) -> None:
+    def handle(self, event: ServerEvent) -> None:
         """Make the transition of an event, if the present state has one."""
         self.state = step(TABLE, self.state, event, self)
 
-    def request(self, event: Event) -> None:
+    def request(self, event: ServerEvent) -> None:
         """Make the transition of an event; `RefusalError` if the present state has none."""
         if not self.accepts(event):
             raise RefusalError(REFUSALS[self.flight_state])
@@ -387,7 +387,7 @@ class FlightStateMachine:
         remembered = self.filter.remembered
         self.measured = position
         self.ground = 0.0 if remembered is None else ground
-        self.handle(Event.RECOVER)
+        self.handle(ServerEvent.RECOVER)
         self._in_flight = self._is_in_flight() if remembered is None else remembered.in_flight
 
     def limit_descent(self, duration: float) -> None:
@@ -405,8 +405,8 @@ class FlightStateMachine:
             self._measure(position)
         if self.state is ServerState.DESCENDING:
             self._plan_descent(is_seen_again)
-        while self.accepts(Event.TICK):
-            self.handle(Event.TICK)
+        while self.accepts(ServerEvent.TICK):
+            self.handle(ServerEvent.TICK)
         if self.descent is not None:
             self.reference = self.descent.reference(self.elapsed)
             if position is None:
@@ -428,7 +428,7 @@ class FlightStateMachine:
 
     def _plan_descent(self, is_seen_again):
         position, elapsed = self._position, self.elapsed
-        waits = self.filter.event is Event.FILTER_HOLDS and elapsed < FILTER_LIMIT
+        waits = self.filter.event is ServerEvent.FILTER_HOLDS and elapsed < FILTER_LIMIT
         if position is None or not (self.descent is None or is_seen_again or waits):
             return
         if not self.ground_is_known:

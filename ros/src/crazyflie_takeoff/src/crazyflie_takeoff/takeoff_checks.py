@@ -11,7 +11,7 @@ from crazyflie_model.supervisor import SupervisorState
 from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic
 from crazyflie_takeoff.limits import Box
 from crazyflie_takeoff.motion import MeasuredPosition
-from crazyflie_takeoff.server_table import Event, FilterReport, Plan
+from crazyflie_takeoff.server_table import FilterReport, ServerEvent, TakeoffPlan
 from crazyflie_utils import parameter
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
 
@@ -168,9 +168,9 @@ class TakeoffServerParameters(FlightTopicParameters):
         """The hover point, m."""
         return self.hover_x, self.hover_y, self.hover_z
 
-    def plan(self) -> Plan:
+    def plan(self) -> TakeoffPlan:
         """Return the durations and the speed of takeoffs and landings."""
-        return Plan(self.hover, self.open_loop, self.settle, self.descent_speed)
+        return TakeoffPlan(self.hover, self.open_loop, self.settle, self.descent_speed)
 
 
 def hover_complaint(hover: tuple[float, float, float], box: Box) -> str:
@@ -199,7 +199,7 @@ class Charge(enum.Enum):
     CRITICAL = enum.auto()
 
 
-class Battery:
+class BatteryCheck:
     """The charge of a battery, from the time for which its voltage has been below two levels (V).
 
     In flight the voltage sags with every burst of thrust. So it must stay low for ``duration``
@@ -288,7 +288,7 @@ class TakeoffChecks:
         self.box = parameters.box
         self.position = MeasuredPosition()
         self.driver = DriverConnection()
-        self.battery = Battery(
+        self.battery = BatteryCheck(
             parameters.battery_low, parameters.battery_critical, parameters.battery_duration
         )
         # The filter publishes it, and there may be no filter.
@@ -318,9 +318,9 @@ class TakeoffChecks:
 
     def refusal(self, now: float, report: FilterReport) -> str:
         """Return why the vehicle must not take off at ``now`` (s); empty if it may."""
-        if report.event is Event.FILTER_REFUSES:
+        if report.event is ServerEvent.FILTER_REFUSES:
             return report.reason
-        if report.event is Event.FILTER_EMERGENCY:
+        if report.event is ServerEvent.FILTER_EMERGENCY:
             return f"emergency, {report.reason}; reset it first"
         return (
             hover_complaint(self.parameters.hover, self.box)

@@ -20,7 +20,7 @@ from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, LossTim
 from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic
 from crazyflie_takeoff.limits import Limits
 from crazyflie_takeoff.motion import Delay, Motion
-from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.safe_control import SafeSetpoint
 from crazyflie_takeoff.transition_table import FlightState, flight_state
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
 from crazyflie_utils.parameters import vehicle_model
@@ -389,7 +389,7 @@ class TakeoffControlFilterNode(Node):
     # Outputs.
 
     def _publish(self, control, stamp):
-        if isinstance(control, Setpoint):
+        if isinstance(control, SafeSetpoint):
             control = stamped(ControlStamped, stamp, control=Control(*control))
         if control is not None:
             self._final.publish(control)
@@ -418,7 +418,7 @@ class TakeoffControlFilterNode(Node):
 
 def _setpoint(message):
     c = message.control
-    return Setpoint(c.roll, c.pitch, c.yaw_dot, c.thrust)
+    return SafeSetpoint(c.roll, c.pitch, c.yaw_dot, c.thrust)
 
 
 def _words(status):

@@ -25,9 +25,9 @@ from crazyflie_takeoff.server_table import (
     REFUSALS,
     STOPS,
     TAKEOVERS,
-    Event,
     FilterReport,
     FlightStateMachine,
+    ServerEvent,
     ServerState,
 )
 from crazyflie_takeoff.takeoff_checks import (
@@ -60,11 +60,11 @@ LEAVE_LIMIT = 7.0
 START_LIMIT = 5.0
 
 _EVENTS = {
-    FilterStatus.PASSING: Event.FILTER_PASSES,
-    FilterStatus.HOLDING: Event.FILTER_HOLDS,
-    FilterStatus.SINKING: Event.FILTER_SINKS,
-    FilterStatus.DOWN: Event.FILTER_DOWN,
-    FilterStatus.EMERGENCY: Event.FILTER_EMERGENCY,
+    FilterStatus.PASSING: ServerEvent.FILTER_PASSES,
+    FilterStatus.HOLDING: ServerEvent.FILTER_HOLDS,
+    FilterStatus.SINKING: ServerEvent.FILTER_SINKS,
+    FilterStatus.DOWN: ServerEvent.FILTER_DOWN,
+    FilterStatus.EMERGENCY: ServerEvent.FILTER_EMERGENCY,
 }
 
 # For an operator, both parts of a landing are one.
@@ -85,7 +85,7 @@ class Calls:
     """
 
     def __init__(self) -> None:
-        self.waiting: list[tuple[Event, Future[EmptyResponse]]] = []
+        self.waiting: list[tuple[ServerEvent, Future[EmptyResponse]]] = []
         self._under_way: Future[EmptyResponse] | None = None
 
     def begin(self, future: "Future[EmptyResponse]", reason: Exception) -> None:
@@ -144,7 +144,7 @@ class StatusPublisher:
         report, state = self._flight.filter, self._flight.flight_state
         if state is None:
             return
-        if report.event is Event.FILTER_SINKS:
+        if report.event is ServerEvent.FILTER_SINKS:
             evidence = "the filter brings the vehicle down"
         elif report.event in TAKEOVERS:
             evidence = "the filter has stopped the motors"
@@ -191,7 +191,7 @@ class StatusPublisher:
         checks, event = self._checks, self._flight.filter.event
         text = _text(*self._content())
         level = flight_topics.WARN if ": " in text else flight_topics.OK
-        if event in (Event.FILTER_SINKS, Event.FILTER_EMERGENCY):
+        if event in (ServerEvent.FILTER_SINKS, ServerEvent.FILTER_EMERGENCY):
             level = flight_topics.ERROR
         figures = {
             "state is fresh": str(checks.position.value(self._handle.time()) is not None),
@@ -204,7 +204,7 @@ class StatusPublisher:
         """Return flight state, reason, and why a takeoff is refused."""
         state, report = self._flight.flight_state, self._flight.filter
         if state is not FlightState.ON_GROUND:
-            is_held = report.event is Event.FILTER_HOLDS and state is not None
+            is_held = report.event is ServerEvent.FILTER_HOLDS and state is not None
             reasons = (self.reason, report.reason if is_held else "")
             return state, "; ".join(filter(None, reasons)), REFUSALS[state]
         return state, self.reason, self.takeoff_refusal()
@@ -294,17 +294,17 @@ class TakeoffServerNode(Node):
     def enter_safe_state(self) -> None:
         """Abort a takeoff with a landing, continue a landing, and fail the calls."""
         if self._flight.flight_state is FlightState.TAKING_OFF:
-            self._flight.handle(Event.LAND)
+            self._flight.handle(ServerEvent.LAND)
         name = self._handle.name
         self._calls.fail_all(ServiceError(f"{name} has failed or is shutting down; see its log"))
 
     # Services.
 
     def _on_takeoff(self, _):
-        return self._serve(Event.TAKEOFF)
+        return self._serve(ServerEvent.TAKEOFF)
 
     def _on_land(self, _):
-        return self._serve(Event.LAND)
+        return self._serve(ServerEvent.LAND)
 
     def _serve(self, event):
         future: Future[EmptyResponse] = Future()
@@ -318,14 +318,14 @@ class TakeoffServerNode(Node):
         may_wait = self._is_starting and self._checks.may_become_complete(self._handle.time())
         waiting, self._calls.waiting = self._calls.waiting, []
         for event, future in waiting:
-            if event is Event.TAKEOFF and may_wait:
+            if event is ServerEvent.TAKEOFF and may_wait:
                 self._calls.waiting.append((event, future))
             else:
                 self._begin(event, future)
         self._set_pace()
 
     def _begin(self, event, future):
-        takes_off = event is Event.TAKEOFF
+        takes_off = event is ServerEvent.TAKEOFF
         parameters = self._parameters
         name = self._handle.resolve(
             parameters.takeoff_service if takes_off else parameters.land_service
@@ -443,9 +443,9 @@ class TakeoffServerNode(Node):
                 self._land(complaint, f"takeoff aborted: {complaint}")
 
     def _land(self, reason, failure):
-        if self._flight.accepts(Event.LAND):
+        if self._flight.accepts(ServerEvent.LAND):
             self._calls.fail(ServiceError(failure))
-            self._flight.handle(Event.LAND)
+            self._flight.handle(ServerEvent.LAND)
             self._status.reason = reason
 
     def _tick(self, before):
@@ -488,8 +488,8 @@ def report_of(message: FilterStatus) -> FilterReport:
     KeyError or ValueError: the message has a state that does not exist.
     """
     event, reason = _EVENTS[message.state], message.reason
-    if message.takeoff_refusal and event in (Event.FILTER_PASSES, Event.FILTER_DOWN):
-        event, reason = Event.FILTER_REFUSES, message.takeoff_refusal
+    if message.takeoff_refusal and event in (ServerEvent.FILTER_PASSES, ServerEvent.FILTER_DOWN):
+        event, reason = ServerEvent.FILTER_REFUSES, message.takeoff_refusal
     return FilterReport(event, flight_state(message.flight_state), message.is_commanded, reason)
 
 

@@ -15,7 +15,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_sweep.sweep_node import SweepNode, VelocityServerNode
-from crazyflie_sweep.sweep_parameters import Plan
+from crazyflie_sweep.sweep_parameters import SweepPlan
 from crazyflie_tutorial_msgs.msg import SweepReport
 from crazyflie_tutorial_msgs.srv import VelocityAtResponse
 from crazyflie_utils import ServiceError
@@ -303,4 +303,4 @@ def test_the_configuration_is_the_default():
     node = SweepNode()
     assert FakeProcess(parameters).launch(node, "/sweep")
     for name in ("area", "lane_width", "height", "speed", "coverage"):
-        assert getattr(node._parameters, name) == getattr(Plan.from_mapping({}), name)
+        assert getattr(node._parameters, name) == getattr(SweepPlan.from_mapping({}), name)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from crazyflie_sweep.sweep_parameters import Area, Plan
+from crazyflie_sweep.sweep_parameters import Area, SweepPlan
 from crazyflie_sweep.sweeper import Coverage, Sweeper
 from crazyflie_sweep.velocities import oscillator_velocity
 
@@ -52,7 +52,7 @@ LIMIT = 300.0
 def make(start=START, **parameters):
     """Return a sweeper; a parameter's name has __ in place of /."""
     given = {name.replace("__", "/"): value for name, value in parameters.items()}
-    return Sweeper(Plan.from_mapping({**PLAN, **given}), start)
+    return Sweeper(SweepPlan.from_mapping({**PLAN, **given}), start)
 
 
 def fly(sweeper, off=(0.0, 0.0, 0.0), velocity=None):

@@ -56,7 +56,7 @@ def is_listed(body_id: int, text: str) -> bool:
     return "all" in names or str(body_id) in names
 
 
-class Scene:
+class MocapScene:
     """Rigid bodies at their last observation.
 
     The noise is in standard deviations along and about each axis, m and rad. ``single_markers`` are
@@ -247,7 +247,7 @@ _LONGEST_WAIT = 0.1  #: s.
 
 
 class MocapServer(Server):
-    """Streams the frames of a `Scene`; OSError if a port is taken or an address is invalid.
+    """Streams the frames of a `MocapScene`; OSError if a port is taken or an address is invalid.
 
     ``warn`` is not used: the server does not fall behind.
     """
@@ -257,7 +257,7 @@ class MocapServer(Server):
         _check_address("multicast_address", settings.multicast_address)
         self.switches = settings.switches()
         noise = (settings.position_noise, settings.attitude_noise)
-        self._scene = Scene(
+        self._scene = MocapScene(
             self.switches, *noise, settings.seed, settings.single_markers, settings.rate
         )
         self._encoder = Encoder(settings.version)

@@ -6,7 +6,7 @@ Times are s of any monotonic clock; after a reset of the clock, a manoeuvre cont
 import math
 from enum import Enum
 
-from crazyflie_controller.go_to import GoToController, HeadingPose, Setpoint
+from crazyflie_controller.go_to import GoToController, GoToSetpoint, HeadingPose
 from crazyflie_model.limits import OFF_AGE
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 from crazyflie_utils.last_valid import HOLD_LIMIT
@@ -66,7 +66,7 @@ class GoToFlight:
         self._time = -math.inf
         self._entered = -math.inf
         self._interval: float | None = None
-        self._setpoint: Setpoint | None = Setpoint()
+        self._setpoint: GoToSetpoint | None = GoToSetpoint()
         self._ground = 0.0
         self._descent_speed = DESCENT_SPEED
         self._touchdown_thrust = 0.0
@@ -111,7 +111,9 @@ class GoToFlight:
             self._descent_speed = max(DESCENT_SPEED, (self._pose.z - self._ground) / limit)
             self._enter(State.LANDING)
 
-    def tick(self, time: float, stamp: float | None, pose: HeadingPose | None) -> Setpoint | None:
+    def tick(
+        self, time: float, stamp: float | None, pose: HeadingPose | None
+    ) -> GoToSetpoint | None:
         """Return the setpoint for a time (s); None leaves the vehicle to its own watchdog.
 
         The pose is the latest one, or None. Its stamp is in s of any clock; the same
@@ -125,7 +127,7 @@ class GoToFlight:
     # One action for each state.
 
     def _idle(self):
-        return Setpoint()
+        return GoToSetpoint()
 
     def _take_off(self):
         thrust = TAKEOFF_RATE * (self._time - self._entered)
@@ -138,7 +140,7 @@ class GoToFlight:
             return self._go()
         if thrust >= self._controller.max_thrust:
             return self._abort(f"takeoff ended: not lifted off with a thrust of {thrust:.0f} PWM")
-        return Setpoint(thrust=thrust)
+        return GoToSetpoint(thrust=thrust)
 
     def _go(self):
         return self._fly_to(self._hover if self._goal is None else self._goal)
@@ -158,8 +160,8 @@ class GoToFlight:
         elapsed = self._time - self._entered
         if elapsed >= TOUCHDOWN_DURATION:
             self._enter(State.IDLE)
-            return Setpoint()
-        return Setpoint(thrust=max(self._touchdown_thrust - TOUCHDOWN_RATE * elapsed, 0.0))
+            return GoToSetpoint()
+        return GoToSetpoint(thrust=max(self._touchdown_thrust - TOUCHDOWN_RATE * elapsed, 0.0))
 
     _ACTIONS = {
         State.IDLE: _idle,
@@ -185,7 +187,7 @@ class GoToFlight:
     def _abort(self, warning):
         self._warning = warning
         self._enter(State.IDLE)
-        return Setpoint()
+        return GoToSetpoint()
 
     def _touch_down(self):
         self._touchdown_thrust = 0.0 if self._setpoint is None else self._setpoint.thrust

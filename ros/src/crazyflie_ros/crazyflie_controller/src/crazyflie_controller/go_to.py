@@ -101,7 +101,7 @@ class HeadingPose(NamedTuple):
     yaw: float
 
 
-class Setpoint(NamedTuple):
+class GoToSetpoint(NamedTuple):
     """A setpoint on cmd_vel.
 
     Pitch (deg, positive accelerates ahead) is ``linear.x``, roll (deg, positive accelerates to the
@@ -119,7 +119,7 @@ class GoToController:
 
     The tilt is ignored on purpose: for a vehicle that is tilted forward, a goal far below would
     seem to be ahead, and tilt it even more. Parameters are by `AXES`; outputs are pitch, roll,
-    thrust and yaw rate of `Setpoint`, from errors in m and rad.
+    thrust and yaw rate of `GoToSetpoint`, from errors in m and rad.
     """
 
     def __init__(self, parameters: dict[str, PidParameters]):
@@ -149,7 +149,7 @@ class GoToController:
         """Skip the rate of change at the next error, which does not continue the last one."""
         self._error = None
 
-    def update(self, pose: HeadingPose, goal: HeadingPose, interval: float) -> Setpoint:
+    def update(self, pose: HeadingPose, goal: HeadingPose, interval: float) -> GoToSetpoint:
         """Return the setpoint.
 
         The interval is the time between the last pose and this one, s; > 0 except after
@@ -167,7 +167,7 @@ class GoToController:
         self._error = error
         errors, slopes = _in_heading_frame(error, pose.yaw), _in_heading_frame(slope, pose.yaw)
         columns = zip(self._pids, errors, slopes, strict=True)
-        return Setpoint(*(pid.update(e, rate, interval) for pid, e, rate in columns))
+        return GoToSetpoint(*(pid.update(e, rate, interval) for pid, e, rate in columns))
 
 
 def _in_heading_frame(error, yaw):

@@ -11,7 +11,7 @@ from geometry_msgs.msg import Point, PoseStamped, Quaternion, Transform, Transfo
 from sensor_msgs.msg import Imu, MagneticField, Temperature
 from std_msgs.msg import Float32, Header, String
 
-from crazyflie_driver.monitors import VARIANCES, VARIANCES_PERIOD_MS, Battery, Variances
+from crazyflie_driver.monitors import VARIANCES, VARIANCES_PERIOD_MS, BatteryMonitor, Variances
 from crazyflie_driver.msg import GenericLogData, crtpPacket
 from crazyflie_driver.parameters import POSITIONING_TOPIC
 from crazyflie_driver.positioning import PERIOD_MS, SYSTEMS, Positioning, check_deck
@@ -149,7 +149,7 @@ class LogTopics:
 
     _vehicle: BaseVehicle
     _on_status: Callable[[], None]
-    battery: Battery = field(init=False)
+    battery: BatteryMonitor = field(init=False)
     rssi: float | None = None  #: Latest strength of the vehicle's reception (-dBm).
     power_state: int | None = None  #: The firmware's pm.state.
     #: received_broadcasts, received_unicasts: Packets that the vehicle has counted, modulo 2^16.
@@ -177,7 +177,7 @@ class LogTopics:
 
     def __post_init__(self) -> None:
         server = self._vehicle.server
-        self.battery = Battery(
+        self.battery = BatteryMonitor(
             server.battery_low, server.battery_critical, server.battery_critical_time
         )
 

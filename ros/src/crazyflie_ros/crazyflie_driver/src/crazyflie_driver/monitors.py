@@ -17,7 +17,7 @@ class Charge(enum.IntEnum):
     CRITICAL = 3
 
 
-class Battery:
+class BatteryMonitor:
     """The charge of a battery by its voltage and two limits (V).
 
     The charge is critical once the voltage has been below its limit for a time (s), since it sinks

@@ -100,7 +100,7 @@ class SpawnerParameters(Parameters):
 
 
 @dataclass
-class Vehicle:
+class SpawnedVehicle:
     """A vehicle that was spawned."""
 
     process: VehicleProcess
@@ -118,7 +118,7 @@ class SpawnerNode(Node):
     start_process: Callable[[list[str]], VehicleProcess] = VehicleProcess
 
     def __init__(self) -> None:
-        self._vehicles: dict[str, Vehicle] = {}
+        self._vehicles: dict[str, SpawnedVehicle] = {}
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -162,7 +162,9 @@ class SpawnerNode(Node):
             [parameters.package, parameters.file, *(f"{k}:={v}" for k, v in arguments.items())]
         )
         future: Future[SpawnVehicleResponse] = Future()
-        self._vehicles[name] = Vehicle(process, math.ceil(parameters.start_limit / PERIOD), future)
+        self._vehicles[name] = SpawnedVehicle(
+            process, math.ceil(parameters.start_limit / PERIOD), future
+        )
         return future
 
     def _on_remove(self, request):

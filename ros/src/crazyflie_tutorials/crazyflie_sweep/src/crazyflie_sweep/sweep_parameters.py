@@ -54,7 +54,7 @@ class CoverageGoal(Parameters):
     )
 
 
-class Plan(Parameters):
+class SweepPlan(Parameters):
     """Area, lanes, speeds and coverage of a sweep."""
 
     area: Area = group(Area, "area")
@@ -75,7 +75,7 @@ class Plan(Parameters):
             yield f"speed/min is {speed.min:g}; expected <= speed/max, {speed.max:g} (m/s)"
 
 
-class SweepParameters(Plan):
+class SweepParameters(SweepPlan):
     """Parameters of `SweepNode`."""
 
     velocity_limit: float = parameter(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_sweep.lanes import LanePath, Line, Point, reversed_path, sweep
-from crazyflie_sweep.sweep_parameters import Area, Plan
+from crazyflie_sweep.sweep_parameters import Area, SweepPlan
 from crazyflie_sweep.velocities import OSCILLATOR_BEGIN, OSCILLATOR_END, OSCILLATOR_LENGTH
 
 
@@ -62,7 +62,7 @@ class Sweeper:
     positions and velocities by the same factor. ``start`` is the position of the vehicle.
     """
 
-    def __init__(self, plan: Plan, start: Point):
+    def __init__(self, plan: SweepPlan, start: Point):
         self._plan = plan
         #: Path through the area, without the path to its begin.
         self.lanes = sweep(plan.area, plan.lane_width, plan.height)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
@@ -140,7 +140,6 @@ def sampled(pieces):
     return (times, *map(np.array, parts))
 
 
-@settings(deadline=None)
 @given(VECTOR, VECTOR, st.tuples(SPEED, SPEED, SPEED), NUMBER, NUMBER)
 def test_a_move_in_flight_is_smooth_and_keeps_the_limits(start, end, velocity, yaw, end_yaw):
     seconds = shortest_duration(math.dist(start, end), math.hypot(*velocity)) + 1e-9

@@ -96,7 +96,7 @@ swarm.timeHelper.sleep(3.0)
 print("turned to", abs(round(cf1.yaw(), 1)))
 cf1.goTo([0.4, side * 0.8, 1.0], math.pi / 2.0, 2.0)
 swarm.timeHelper.sleep(3.0)
-print("moved to", abs(round(cf1.yaw(), 1)), [abs(round(each, 1)) for each in cf1.position()])
+print("moved to", abs(round(cf1.yaw(), 1)), [abs(round(float(each), 1)) for each in cf1.position()])
 """
 
 

@@ -1,0 +1,6 @@
+"""Settings of the property tests: a busy computer is no failure."""
+
+from hypothesis import settings
+
+settings.register_profile("model", parent=settings.default, deadline=None)
+settings.load_profile("model")

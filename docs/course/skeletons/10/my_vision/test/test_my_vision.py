@@ -37,6 +37,13 @@ def test_step_1_blur_keeps_the_mean_and_takes_away_noise():
     assert blurred.std() < 0.3 * noise.std()
 
 
+def test_step_1_blur_counts_near_neighbours_more():
+    image = np.zeros((9, 9), dtype=np.uint8)
+    image[4, 4] = 255
+    middle, near, far = filters.blur(image, 5)[4, 4:7].astype(int)
+    assert middle > near > far > 0
+
+
 def test_step_1_edges_are_where_brightness_changes(picture):
     found = filters.edges(picture, low=40.0, high=120.0, size=3)
     assert set(np.unique(found)) == {0, 255}

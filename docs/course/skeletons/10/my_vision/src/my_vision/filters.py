@@ -28,7 +28,7 @@ def blur(image: Image, size: int) -> Image:
     image : ndarray of uint8
         Coloured or grey.
     size : int
-        Of the square of neighbours; odd, pixels.
+        Size of the square of neighbours (odd, pixels).
     """
     raise NotImplementedError("step 1")
 

@@ -14,6 +14,6 @@ def hide(image: Image, face: Target, size: int) -> Image:
     face : Target
         Its centre and half its width, pixels.
     size : int
-        Of the blur, odd, pixels; see `crazyflie_vision.filters.blur`.
+        Size of the blur (odd, pixels); see `crazyflie_vision.filters.blur`.
     """
     raise NotImplementedError("blur the square, and nothing else")

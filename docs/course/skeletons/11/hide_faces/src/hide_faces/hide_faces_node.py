@@ -12,7 +12,7 @@ from hide_faces.hide import hide
 class HideFacesParameters(FilterParameters):
     """Parameters of `HideFacesNode`."""
 
-    size: int = parameter(KERNEL, "of the square that is blurred", 75, live=True)
+    size: int = parameter(KERNEL, "size of the square that is averaged for a pixel", 75, live=True)
 
 
 class HideFacesNode(FilterNode):

@@ -8,7 +8,7 @@ LIMITS = Limits(speed=0.8, acceleration=1.5)
 
 HEIGHT = 1.0
 SIDE = 1.2
-"""Of the square, m."""
+"""Side of the square (m)."""
 
 
 def square() -> list[tuple[float, float, float]]:

@@ -14,7 +14,7 @@ def hide(image: Image, face: Target, size: int) -> Image:
     face : Target
         Its centre and half its width, pixels.
     size : int
-        Of the blur, odd, pixels; see `crazyflie_vision.filters.blur`.
+        Size of the blur (odd, pixels); see `crazyflie_vision.filters.blur`.
     """
     height, width = image.shape[:2]
     left, right = (round(min(max(face.x + s * face.radius, 0), width)) for s in (-1, 1))

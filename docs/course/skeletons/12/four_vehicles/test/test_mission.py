@@ -41,11 +41,12 @@ def test_every_vehicle_visits_every_corner_and_lands():
         assert {tuple(goals[name]) for goals in fleet.visited} == {tuple(p) for p in square()}
 
 
-def test_another_order_would_be_refused():
+def test_straight_through_the_middle_is_refused():
     with DryRun(STARTS, Rules(bounds=ROOM, limits=LIMITS)) as fleet:
         fleet.takeoff(1.0)
         corners = square()
-        fleet.formation(corners)
+        places = fleet.formation(corners)
+        opposite = {name: (-x, -y, z) for name, (x, y, z) in places.items()}
         with pytest.raises(MissionError, match="apart"):
-            fleet.go_to(dict(zip(fleet.names, corners[::-1], strict=True)))
+            fleet.go_to(opposite)
         fleet.land()

@@ -14,8 +14,8 @@ from crazyflie_msgs.msg import (
     PrioritizedControl,
     PrioritizedControlStamped,
 )
+from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_utils.transport import ServiceError
 from crazyflie_utils.vectors import to_vector
 
 NODES = [RegularControlMergerNode, NoYawMergerNode]

@@ -15,7 +15,7 @@ from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action, Kind
 from crazyflie_utils.main import ros_process
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 NAMES = ("cf1", "cf2", "cf3")
 LIMIT = 30.0

@@ -10,7 +10,7 @@ from rosgraph.network import read_ros_handshake_header, write_ros_handshake_head
 from std_srvs.srv import Empty
 
 from crazyflie_dashboard.emergency import ALL, EmergencyLane
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 LIMIT = 30.0
 

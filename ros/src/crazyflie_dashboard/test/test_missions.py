@@ -11,7 +11,7 @@ import pytest
 from crazyflie_dashboard.missions import Missions, listed
 from crazyflie_dashboard.page_data import MissionFile
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 LIMIT = 30.0
 

@@ -7,8 +7,7 @@ import sys
 
 import pytest
 
-from crazyflie_utils.testing.programs import running
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import running, wait_until
 
 HERE, THERE = "10.213.7.1", "10.213.7.2"
 LIMIT = 120.0

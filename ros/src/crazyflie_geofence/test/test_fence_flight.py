@@ -10,9 +10,9 @@ from std_srvs.srv import EmptyRequest
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
-from crazyflie_utils.transport import ServiceError
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch/sw_geofence.launch"
 FILTER, FENCE = "/takeoff_control_filter", "/geofence"

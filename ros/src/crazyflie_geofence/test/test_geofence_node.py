@@ -17,8 +17,8 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing import FakeProcess, launch_files
-from crazyflie_utils.transport import ServiceError
 from crazyflie_utils.vectors import to_vector
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch"

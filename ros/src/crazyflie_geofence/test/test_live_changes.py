@@ -12,7 +12,7 @@ from crazyflie_geofence.geofence_node import GeofenceNode, GeofenceParameters
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_utils.testing.live_changes import live_changes
+from crazyflie_utils.testing.random_input import live_changes
 
 STATE = st.tuples(*[st.floats(-5.0, 5.0)] * 6, st.floats(-3.0, 3.0))
 

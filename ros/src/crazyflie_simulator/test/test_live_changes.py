@@ -11,7 +11,7 @@ from crazyflie_simulator.quadrotor_simulator_node import (
     QuadrotorSimulatorNode,
     QuadrotorSimulatorParameters,
 )
-from crazyflie_utils.testing.live_changes import live_changes
+from crazyflie_utils.testing.random_input import live_changes
 
 
 def numbers(transform):

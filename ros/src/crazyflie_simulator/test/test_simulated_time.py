@@ -8,8 +8,7 @@ from simulators import NODES, PARAMETERS, refusal, transforms
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_simulator.simulator_node import NearHoverSimulatorNode
-from crazyflie_utils.node import Node
-from crazyflie_utils.process import Process
+from crazyflie_utils.node import Node, Process
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.testing.fake_transport import FakeTransport
 

@@ -15,8 +15,8 @@ from crazyflie_simulator.simulator_node import (
     NearHoverSimulatorNode,
 )
 from crazyflie_utils import NodeHandle, ServiceError
-from crazyflie_utils.clock import SimulatedClock
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.timers import SimulatedClock
 
 
 def fly(process, count, thrust, period=0.1, **control):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_state_estimator.estimator_node import KalmanParameters
-from crazyflie_utils.testing.live_changes import live_changes
+from crazyflie_utils.testing.random_input import live_changes
 from crazyflie_utils.vectors import to_tuple
 
 

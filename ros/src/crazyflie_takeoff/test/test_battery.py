@@ -10,8 +10,8 @@ from takeoff_helpers import SERVER, filter_status, state
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_takeoff.takeoff_checks import BatteryCheck, Charge
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
+from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_utils.transport import ServiceError
 
 # The battery.
 

@@ -10,8 +10,8 @@ from takeoff_helpers import FILTER, SERVER, HoverNetwork
 
 from crazyflie_takeoff.all_emergency_node import AllEmergencyNode
 from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
+from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_utils.transport import ServiceError
 
 G = 9.81
 

@@ -15,8 +15,8 @@ from takeoff_helpers import (
 
 from crazyflie_msgs.msg import FilterStatus
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
+from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_utils.transport import ServiceError
 
 G = 9.81
 

@@ -7,7 +7,7 @@ from takeoff_helpers import GRAVITY, ControllerNode, HoverNetwork, control, feed
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils.node import Node
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.refusal import ServiceError
 
 COMMANDED, TAKEOFF = "/control/lqr", "/control/takeoff"
 

@@ -5,7 +5,7 @@ from flight_words import states, thrusts, until_on_ground
 from takeoff_helpers import SERVER, HoverNetwork, state
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.refusal import ServiceError
 
 # Landing.
 

@@ -10,7 +10,7 @@ from flight_words import thrusts
 from takeoff_helpers import BARE, SERVER, HoverNetwork
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.refusal import ServiceError
 
 GAP = 1.0
 """How long there is no server or filter, s."""

@@ -7,7 +7,7 @@ from lone_server import call, flying, launch, on_ground, states, thrusts, toggle
 from std_srvs.srv import EmptyResponse
 from takeoff_helpers import GRAVITY, SERVER, state
 
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.refusal import ServiceError
 
 
 def test_takes_off_and_lands():

@@ -11,7 +11,7 @@ from takeoff_helpers import SERVER, filter_status, state
 from crazyflie_msgs.msg import FilterStatus, VehicleStatus
 from crazyflie_takeoff.takeoff_checks import MAX_CONNECTION_AGE
 from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.refusal import ServiceError
 
 
 def test_says_nothing_until_it_knows_where_the_flight_stands():

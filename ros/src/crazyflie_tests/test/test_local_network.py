@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 from workspaces import FAST, TOP, clean_environment
 
-from crazyflie_utils.testing.programs import free_port, running
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import free_port, running, wait_until
 
 LISTEN = "0A"
 """State of a TCP socket in /proc/net/tcp."""

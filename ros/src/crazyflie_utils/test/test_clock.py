@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_utils import clock
-from crazyflie_utils.clock import SimulatedClock, SteadyClock
+from crazyflie_utils import timers
+from crazyflie_utils.timers import SimulatedClock, SteadyClock
 
 SECOND = 1_000_000_000
 
@@ -33,7 +33,7 @@ class FakeMachine:
 def machine(monkeypatch):
     """Return the clocks of a machine that has been up for 50 s."""
     machine = FakeMachine(wall=1000 * SECOND, monotonic=50 * SECOND)
-    monkeypatch.setattr(clock, "time", machine)
+    monkeypatch.setattr(timers, "time", machine)
     return machine
 
 

@@ -6,8 +6,7 @@ import pytest
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerResponse
 
-from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.refusal import RefusalError, ServiceError
 
 LIMIT = 60.0
 

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from crazyflie_utils.parameters.server import ParameterWriter
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 
 class Master:

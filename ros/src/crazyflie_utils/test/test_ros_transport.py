@@ -22,7 +22,7 @@ from crazyflie_utils.ros1 import calls, patches
 from crazyflie_utils.ros1.calls import wait_for_answer
 from crazyflie_utils.ros1.own_topics import OwnPublication, OwnSubscription
 from crazyflie_utils.ros1.transport import RosTransport
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 
 def ignore(text, key):

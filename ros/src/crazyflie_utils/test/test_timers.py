@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_utils.clock import SteadyClock
-from crazyflie_utils.timers import Executor, SteadyTimers, TimerQueue
+from crazyflie_utils.timers import Executor, SteadyClock, SteadyTimers, TimerQueue
 
 LIMIT = 60.0
 

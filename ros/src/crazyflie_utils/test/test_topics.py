@@ -3,8 +3,7 @@
 import pytest
 from std_msgs.msg import Empty, String
 
-from crazyflie_utils.topics import Topics
-from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber
+from crazyflie_utils.topics import ExternalPublisher, ExternalSubscriber, Topics
 
 
 class Wire(ExternalPublisher):

@@ -8,7 +8,7 @@ from cflib.crtp.udpdriver import UdpDriver
 from cflib.utils.power_switch import PowerSwitch
 from virtual_client import LIMIT, Client
 
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.firmware.supervisor import State
 from crazyflie_virtual.log import log_variables
 from crazyflie_virtual.parameters import parameter_specs

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
 LIMIT = 300.0

@@ -10,7 +10,7 @@ from cflib.localization import LighthouseConfigWriter
 from cflib.utils.multiranger import Multiranger
 from virtual_client import LIMIT, Client
 
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.memory import LighthouseMemory
 from crazyflie_virtual.server import VehicleServer
 from crazyflie_virtual.settings import VehicleSettings

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 TOP = Path(__file__).resolve().parents[4]
 PROGRAM = TOP / "docs" / "examples" / "cflib_hover" / "hover.py"

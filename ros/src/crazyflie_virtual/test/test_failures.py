@@ -10,8 +10,7 @@ import time
 import pytest
 from virtual_client import LIMIT, Client
 
-from crazyflie_utils.testing.programs import free_port
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import free_port, wait_until
 from crazyflie_virtual.firmware.supervisor import State
 
 

@@ -15,8 +15,7 @@ from flight_recorder import HEIGHT, MOMENT, NEAR
 from recording import recorded
 from virtual_client import Client
 
-from crazyflie_utils.testing.programs import free_port, running
-from crazyflie_utils.testing.waiting import LIMIT, wait_until
+from crazyflie_utils.testing.programs import LIMIT, free_port, running, wait_until
 
 PAUSE = 0.1
 """s. It was 0.03 on a machine with three times the load that it has processors for; and 0.13 to

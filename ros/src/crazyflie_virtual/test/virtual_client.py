@@ -7,7 +7,7 @@ from cflib.crazyflie import Crazyflie
 from cflib.crazyflie.log import LogConfig
 from cflib.crtp.crtpstack import CRTPPacket
 
-from crazyflie_utils.testing.waiting import LIMIT
+from crazyflie_utils.testing.programs import LIMIT
 
 
 class Client:

@@ -7,7 +7,7 @@ import rospkg
 from hypothesis import HealthCheck, given, settings
 
 from crazyflie_utils import ParameterError
-from crazyflie_utils.testing.wrong_files import (
+from crazyflie_utils.testing.random_input import (
     assert_refused,
     assert_taken_or_refused,
     with_an_odd_word,

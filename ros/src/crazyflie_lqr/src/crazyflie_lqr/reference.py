@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable, Sequence
 
 from crazyflie_lqr.linear_feedback import Components, at_rest
-from crazyflie_utils.clock import CLOCK_STEP
 from crazyflie_utils.last_valid import LastValid
+from crazyflie_utils.timers import CLOCK_STEP
 
 #: Age of the last reference up to which its velocity is used (s).
 VELOCITY_LIMIT = 0.5

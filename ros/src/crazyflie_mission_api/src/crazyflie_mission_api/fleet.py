@@ -37,8 +37,8 @@ from crazyflie_mission_api.trajectories import TimedTrajectory
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_utils import NodeHandle, ParameterError
 from crazyflie_utils.main import begin_script
+from crazyflie_utils.node import Process
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, Number
-from crazyflie_utils.process import Process
 from crazyflie_utils.timers import Timer
 
 _FROZEN = 10.0  #: Longest time that /clock may stand still (s of the machine's clock).

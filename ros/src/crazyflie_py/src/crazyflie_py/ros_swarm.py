@@ -27,7 +27,7 @@ from crazyflie_py.script_vehicle import ScriptVehicle
 from crazyflie_py.separation_watch import SeparationWatch
 from crazyflie_py.swarm import NullVisualizer, Order, ParameterStore, ScriptState, Swarm
 from crazyflie_utils.main import begin_script
-from crazyflie_utils.process import Process
+from crazyflie_utils.node import Process
 
 _FIND_LIMIT = 10.0  #: Timeout of the search for the vehicles of a file (s, machine's clock).
 _WATCH_PERIOD = 0.05  #: Period of the checks of distances, as in a fleet (s).

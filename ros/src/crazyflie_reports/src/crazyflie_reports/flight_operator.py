@@ -19,8 +19,8 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_reports.flight_record import FlightRecord
 from crazyflie_utils.main import ros_process
-from crazyflie_utils.process import Process
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.node import Process
+from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.vectors import to_vector
 
 

@@ -9,7 +9,7 @@ from fake_driver import FakeDriver
 
 from crazyflie_demo.flight_plan_nodes import HighLevelFlightNode, TrajectoryFlightNode
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 FIGURE8 = Path(__file__).parents[1] / "data" / "figure8.csv"
 PREPARATION = ["update_params", "update_params"]

@@ -8,7 +8,7 @@ from sensor_msgs.msg import Joy
 
 from crazyflie_demo.teleop_nodes import JoystickControllerNode
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 
 def launch(has_controller=True, parameters=None):

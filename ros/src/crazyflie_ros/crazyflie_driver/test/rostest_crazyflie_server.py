@@ -24,7 +24,7 @@ from crazyflie_driver.srv import (
     UpdateParams,
 )
 from crazyflie_utils.testing.peer import LIMIT, listening
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
 

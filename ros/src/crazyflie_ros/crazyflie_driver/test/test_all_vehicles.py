@@ -27,7 +27,7 @@ from crazyflie_link.address import Address
 from crazyflie_link.broadcast import REPEATS
 from crazyflie_link.testing import Dongle
 from crazyflie_utils import ServiceError
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 ALL = "/crazyflie_server/all/"
 GO_TO = GoToRequest(0, True, Point(0.5, 0.0, 0.0), 0.0, Duration(2))

@@ -32,7 +32,7 @@ from crazyflie_driver.srv import (
     UploadTrajectoryRequest,
 )
 from crazyflie_utils import ServiceError
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 GROUPS, KNOWN_TRAJECTORY = 0b0101, 7
 

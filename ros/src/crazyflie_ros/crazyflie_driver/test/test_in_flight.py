@@ -20,7 +20,7 @@ from crazyflie_driver.srv import GoToRequest, NotifySetpointsStopRequest, StopRe
 from crazyflie_link.address import Address
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_utils import ServiceError
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 
 @pytest.fixture

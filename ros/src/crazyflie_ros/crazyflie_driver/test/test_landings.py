@@ -19,7 +19,7 @@ from crazyflie_driver.srv import (
     UploadTrajectoryRequest,
 )
 from crazyflie_utils import ServiceError
-from crazyflie_utils.testing.waiting import LIMIT
+from crazyflie_utils.testing.programs import LIMIT
 from crazyflie_virtual.testing import virtual_vehicle
 
 HEIGHT = 1.0

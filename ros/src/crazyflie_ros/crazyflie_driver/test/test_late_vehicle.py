@@ -6,8 +6,7 @@ from safety_helpers import wait_for_words
 from std_msgs.msg import Bool
 
 from crazyflie_utils import ServiceError
-from crazyflie_utils.testing.programs import free_port
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import free_port, wait_until
 
 
 def connected(server):

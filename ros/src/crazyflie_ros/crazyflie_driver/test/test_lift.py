@@ -7,7 +7,7 @@ from safety_helpers import FLYING, LOCKED, READY, SETPOINTS_STOP, is_, wait_for_
 
 from crazyflie_driver.msg import FullState, Hover, Position
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
 PERIOD = 0.02

@@ -19,7 +19,7 @@ from safety_helpers import (
 from crazyflie_driver.srv import UpdateParamsRequest
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import READ_ONLY, virtual_vehicle
 
 LIMIT = 60.0

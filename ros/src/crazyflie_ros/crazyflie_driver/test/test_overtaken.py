@@ -9,7 +9,7 @@ from std_srvs.srv import EmptyRequest
 
 from crazyflie_driver.srv import GoToRequest, StopRequest
 from crazyflie_utils import ServiceError
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 LIMIT = 60.0
 

@@ -9,8 +9,8 @@ from geometry_msgs.msg import PoseStamped
 
 from crazyflie_driver.positioning import OUT_OF_REACH, SYSTEMS, Positioning
 from crazyflie_driver.srv import TakeoffRequest
-from crazyflie_utils.testing.waiting import wait_until
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.refusal import ServiceError
+from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
 TAKEOFF = TakeoffRequest(height=0.5, duration=rospy.Duration(2))

@@ -11,7 +11,7 @@ from crazyflie_driver.srv import LandRequest, NotifySetpointsStopRequest, Takeof
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.log import LogBlock
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils.testing.waiting import LIMIT, wait_until
+from crazyflie_utils.testing.programs import LIMIT, wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
 PERIOD = 0.02

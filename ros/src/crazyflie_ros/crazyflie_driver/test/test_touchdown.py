@@ -4,7 +4,7 @@ import pytest
 from safety_helpers import HIGH_LEVEL, LAND, TAKEOFF, is_, wait_for_words
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 pytestmark = pytest.mark.filterwarnings("ignore:The supervisor subsystem:UserWarning")
 

@@ -9,7 +9,7 @@ from safety_helpers import TAKEOFF
 
 from crazyflie_driver.monitors import FEWEST, WINDOW, Variances
 from crazyflie_utils import ServiceError
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
 NAMES = ("kalman.varPX", "kalman.varPY", "kalman.varPZ")

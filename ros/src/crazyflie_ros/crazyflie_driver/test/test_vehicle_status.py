@@ -8,7 +8,7 @@ from std_msgs.msg import Empty
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_msgs.msg import VehicleStatus
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 
 def published(server):

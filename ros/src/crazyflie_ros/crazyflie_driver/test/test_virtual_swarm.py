@@ -8,7 +8,7 @@ from geometry_msgs.msg import Point
 
 from crazyflie_driver.srv import GoToRequest, LandRequest, TakeoffRequest
 from crazyflie_link.broadcast import REPEATS
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
 ALL = "/crazyflie_server/all/"

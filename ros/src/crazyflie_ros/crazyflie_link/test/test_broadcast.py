@@ -15,7 +15,7 @@ from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.localization import PackedPoses, pack
 from crazyflie_link.supervisor import BROADCAST_STOP
 from crazyflie_link.testing import PLACES
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import FakeVehicle
 
 # The thread of cflib that ends with the dongle.

@@ -11,7 +11,7 @@ from crazyflie_link.cflib_internals import SafeCrazyflie
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import LinkLostError
 from crazyflie_link.link import Link
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 URI = "udp://127.0.0.1:1"
 LIMIT = 60.0

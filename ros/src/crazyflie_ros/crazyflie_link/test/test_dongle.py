@@ -9,7 +9,7 @@ import pytest
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import NoDongleError
 from crazyflie_link.testing import PLACES
-from crazyflie_utils.testing.waiting import LIMIT, wait_until
+from crazyflie_utils.testing.programs import LIMIT, wait_until
 
 # The thread of cflib that ends is what these tests are about.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")

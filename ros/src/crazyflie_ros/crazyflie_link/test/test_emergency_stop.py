@@ -9,7 +9,7 @@ from crazyflie_link.crazyflie import LinkState
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.link import LinkTimeouts
 from crazyflie_link.supervisor import EmergencyStop
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 LIMIT = 60.0
 STOP, OLD_STOP = b"\x03", b"\x03"

@@ -11,7 +11,7 @@ from cflib.crtp.udpdriver import UdpDriver
 
 from crazyflie_link import cflib_internals
 from crazyflie_link.cflib_internals import SafeCrazyflie, init_drivers, table_cache
-from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_utils.testing.programs import wait_until
 
 LIMIT = 10.0
 

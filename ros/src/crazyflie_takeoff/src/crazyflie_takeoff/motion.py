@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from crazyflie_utils.clock import CLOCK_STEP
+from crazyflie_utils.timers import CLOCK_STEP
 
 MAX_FEEDBACK_AGE = 0.2  #: Oldest state that controls the vehicle and its limits (s).
 MAX_POSITION_AGE = 0.5  #: Age up to which a position is that of the vehicle (s).

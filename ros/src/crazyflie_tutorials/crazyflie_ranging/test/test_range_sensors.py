@@ -14,7 +14,7 @@ from crazyflie_model.angles import quaternion_from_rpy, rotate
 from crazyflie_ranging import range_sensors
 from crazyflie_ranging.range_sensors import DIRECTIONS, Ranger, cone
 from crazyflie_utils import ParameterError
-from crazyflie_utils.testing.wrong_files import (
+from crazyflie_utils.testing.random_input import (
     assert_refused,
     assert_taken_or_refused,
     with_an_odd_word,

@@ -6,13 +6,18 @@ from functools import partial
 
 from rosgraph_msgs.msg import Clock
 
-from crazyflie_utils.clock import SimulatedClock, SteadyClock
 from crazyflie_utils.flights import ShutdownInhibitor
 from crazyflie_utils.log import NodeLog
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED, Transforms
-from crazyflie_utils.timers import Executor, SteadyTimers, Timer, TimerQueue
-from crazyflie_utils.topics import Publisher, Topics
-from crazyflie_utils.transport import Transport
+from crazyflie_utils.timers import (
+    Executor,
+    SimulatedClock,
+    SteadyClock,
+    SteadyTimers,
+    Timer,
+    TimerQueue,
+)
+from crazyflie_utils.topics import Publisher, Topics, Transport
 
 
 class ClockSource:

@@ -25,11 +25,10 @@ from crazyflie_utils.parameters.declaration import (
 from crazyflie_utils.parameters.reconfigure import Reconfiguration
 from crazyflie_utils.parameters.server import PrivateParameters
 from crazyflie_utils.parameters.types import ParameterType
-from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.refusal import RefusalError, ServiceError
 from crazyflie_utils.tf.poses import StampedPose
 from crazyflie_utils.timers import Timer, VaryingTimer
 from crazyflie_utils.topics import LatestMessage, Publisher, Subscriber
-from crazyflie_utils.transport import ServiceError
 from crazyflie_utils.vectors import is_finite, number_getter
 
 P = TypeVar("P", bound=Parameters)

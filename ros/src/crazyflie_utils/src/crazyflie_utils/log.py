@@ -5,7 +5,7 @@ import traceback
 from collections.abc import Callable, Hashable
 from typing import Any
 
-from crazyflie_utils.transport import Transport
+from crazyflie_utils.topics import Transport
 
 _MAX_KEYS = 64
 

@@ -13,10 +13,9 @@ import rospy
 from typing_extensions import override
 
 from crazyflie_utils.handle import NodeHandle
-from crazyflie_utils.node import Node, initialization_failure
+from crazyflie_utils.node import Node, Process, initialization_failure
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, GraphName, ParameterType
-from crazyflie_utils.process import Process
 from crazyflie_utils.program import load, missing_module
 from crazyflie_utils.ros1.master_watch import MasterWatch, namesake
 from crazyflie_utils.ros1.transport import RosTransport

@@ -1,4 +1,4 @@
-"""The exception by which an algorithm refuses a command, with the reason."""
+"""The exceptions by which a command is refused, with the reason."""
 
 
 class RefusalError(Exception):
@@ -6,3 +6,7 @@ class RefusalError(Exception):
 
     If the callback of a service raises it, the text is the service's error.
     """
+
+
+class ServiceError(Exception):
+    """A service refused or failed; the text is the reason, for the caller."""

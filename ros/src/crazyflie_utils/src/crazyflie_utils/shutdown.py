@@ -11,8 +11,7 @@ from typing import NoReturn
 import rospy
 
 from crazyflie_utils.flights import Flights
-from crazyflie_utils.node import Node
-from crazyflie_utils.process import Process
+from crazyflie_utils.node import Node, Process
 
 _SHUTDOWN_LIMIT = 2.0  #: Longest time that shutdown waits for a callback (s).
 

@@ -23,7 +23,7 @@ from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, ParameterError, Parameters
 from crazyflie_utils.parameters.types import Boolean, Integer, Number, Text
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.refusal import ServiceError
 
 
 class Reconfiguration:

@@ -14,7 +14,7 @@ import rosgraph
 import rospy
 from rospy.impl.tcpros_base import TCPROSTransport
 
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.refusal import ServiceError
 
 #: Longest time that the caller of a service waits while simulated time stands still (s of the
 #: machine's clock).

@@ -18,6 +18,7 @@ from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.log import Throttle
 from crazyflie_utils.parameters.server import ParameterWriter
+from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.ros1 import patches
 from crazyflie_utils.ros1.calls import (
     ServiceCaller,
@@ -28,7 +29,7 @@ from crazyflie_utils.ros1.calls import (
 from crazyflie_utils.ros1.master_watch import living_node
 from crazyflie_utils.ros1.own_topics import OwnCallback, publish
 from crazyflie_utils.ros1.patches import log_without_master, shield_screen_log
-from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
+from crazyflie_utils.topics import ExternalPublisher, ExternalSubscriber, Transport
 
 #: Number of messages kept for a subscriber that does not keep up: a simulation that runs as fast as
 #: possible fills a short queue before the subscriber runs.

@@ -18,7 +18,7 @@ from crazyflie_utils.testing.fake_transport import (
     copy_outcome,
     refuse,
 )
-from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber
+from crazyflie_utils.topics import ExternalPublisher, ExternalSubscriber
 
 Deliver = Callable[[Any], None]
 

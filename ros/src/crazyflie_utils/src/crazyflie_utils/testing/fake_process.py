@@ -8,11 +8,9 @@ from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
 from typing_extensions import override
 
-from crazyflie_utils.clock import SimulatedClock
-from crazyflie_utils.node import Node
-from crazyflie_utils.process import Process
+from crazyflie_utils.node import Node, Process
 from crazyflie_utils.testing.fake_transport import FakeTransport
-from crazyflie_utils.timers import SteadyTimers, TimerQueue
+from crazyflie_utils.timers import SimulatedClock, SteadyTimers, TimerQueue
 
 #: Period at which a timer of period 0 fires here (s); on a real machine it fires as often as
 #: possible.

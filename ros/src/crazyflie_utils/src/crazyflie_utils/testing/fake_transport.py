@@ -9,8 +9,9 @@ from typing import Any
 import genpy
 from typing_extensions import override
 
+from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.timers import SteadyTimers
-from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
+from crazyflie_utils.topics import ExternalPublisher, ExternalSubscriber, Transport
 
 
 class _Record(ExternalPublisher):

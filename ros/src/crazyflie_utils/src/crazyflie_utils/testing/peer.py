@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import genpy
 import rospy
 
-from crazyflie_utils.testing.waiting import LIMIT, wait_until
+from crazyflie_utils.testing.programs import LIMIT, wait_until
 
 __all__ = ["LIMIT", "Received", "exchange", "listening", "wait_until"]
 

@@ -1,4 +1,4 @@
-"""Programs for the time of a with block, and ports for them."""
+"""Programs for the time of a with block, ports for them, and waiting with a limit; without ROS."""
 
 import contextlib
 import os
@@ -6,8 +6,11 @@ import random
 import signal
 import socket
 import subprocess
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from typing import Any
+
+LIMIT = 60.0  #: Timeout of a wait (s).
 
 #: Longest time until a program ends after each signal (s); roslaunch gives its nodes 15 s.
 _END_LIMIT = 60.0
@@ -52,3 +55,16 @@ def _interrupt(process):
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         raise
+
+
+def wait_until(
+    condition: Callable[[], object],
+    what: str = "a condition",
+    limit: float = LIMIT,
+    period: float = 0.01,
+) -> None:
+    """Wait until ``condition()``, checked every ``period`` (s); fail after ``limit`` (s)."""
+    end = time.monotonic() + limit
+    while not condition():
+        assert time.monotonic() < end, f"waited {limit:g} s for {what}"
+        time.sleep(period)

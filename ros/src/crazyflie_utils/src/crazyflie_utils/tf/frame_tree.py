@@ -15,8 +15,8 @@ from collections.abc import Callable, Hashable, Iterator
 import genpy
 import tf2_py
 
-from crazyflie_utils.clock import ros_time
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose, entries
+from crazyflie_utils.timers import ros_time
 
 TransformError = tf2_py.TransformException
 """tf does not know a transform; the text says why.

@@ -13,7 +13,7 @@ from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_utils.clock import ros_time
+from crazyflie_utils.timers import ros_time
 
 _LENGTH = struct.Struct("<I")
 _HEADER = struct.Struct("<4I")  # Sequence number, s, ns, length of the parent's name.

@@ -94,7 +94,7 @@ class Report:
             folder / FIGURES,
             [*keys, "figure", "value", "unit", "normal", "is normal"],
             [
-                [*key, f.name, _number(f.value), f.unit, f.normal, f.is_normal]
+                [*key, f.name, _number(f.value), f.unit, f.normal, _is_normal(f)]
                 for key, _, found in rows
                 for f in found
             ],
@@ -235,6 +235,10 @@ def _why_there_is_no_flight(log):
     yield "It has no flight."
     for event in log.events.events[: report_page.MAX_EVENTS]:
         yield f"{event.time - log.start:.1f} s: {event.kind.value}: {event.text}"
+
+
+def _is_normal(figure):
+    return None if math.isnan(figure.value) else figure.is_normal
 
 
 def _number(value):

@@ -9,7 +9,7 @@ from crazyflie_driver.srv import GoTo
 
 
 def service(name, service_type):
-    """Return a service as a function; ROSException if there is none within 10 s."""
+    """Return a service as a function; ROSException if it is not offered within 10 s."""
     rospy.wait_for_service(name, 10.0)
     return rospy.ServiceProxy(name, service_type)
 

@@ -164,7 +164,7 @@ def test_a_worker_with_another_version_of_the_code_does_not_fly(command, monkeyp
     assert "a worker has another version of the code" in errors
 
 
-def test_a_damaged_chunk_is_flown_anew(command, tmp_path):
+def test_a_damaged_chunk_is_flown_again(command, tmp_path):
     _, whole, _ = command()
     chunk = next((tmp_path / "settings" / "chunks").glob("0*.npy"))
     chunk.write_bytes(chunk.read_bytes()[:20])

@@ -115,7 +115,7 @@ def test_short_tokens_are_refused():
         Access("0.0.0.0", 8642, "short")
 
 
-def test_who_uses_a_port_is_said():
+def test_who_uses_a_port_is_reported():
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
         with pytest.raises(AccessError) as error:

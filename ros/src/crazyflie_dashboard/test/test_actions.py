@@ -200,7 +200,7 @@ def test_a_vehicle_that_is_stale_goes_nowhere_and_still_lands(fleet):
     assert called(fleet) == ["/cf1/high_level/land"]
 
 
-def test_what_a_vehicle_does_not_have_is_said(fleet):
+def test_what_a_vehicle_does_not_have_is_reported(fleet):
     assert fleet.command(Action.REBOOT, ["cf1"]) == {"cf1": "reboot: it has no service for it"}
     assert fleet.command(Action.LAND, ["cf9"]) == {"cf9": "land: there is no such vehicle"}
     with pytest.raises(RefusalError, match="no vehicle is chosen"):

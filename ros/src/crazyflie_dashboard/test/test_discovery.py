@@ -85,5 +85,5 @@ def test_objects_of_the_world_are_vehicles_only_where_nothing_else_is():
     assert names(Graph(topics=ball)) == ["world/ball"]
 
 
-def test_topics_of_other_types_are_none_of_a_vehicle():
+def test_topics_of_other_types_are_not_those_of_a_vehicle():
     assert names(Graph(topics={"/robot/state": "std_msgs/String"})) == []

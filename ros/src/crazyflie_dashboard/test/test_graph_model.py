@@ -42,7 +42,7 @@ def test_states_are_words_with_their_reason(fleet):
     assert not fleet.vehicles["cf2"].is_in_flight
 
 
-def test_why_a_takeoff_is_refused_is_said_on_the_ground(fleet):
+def test_why_a_takeoff_is_refused_is_reported_on_the_ground(fleet):
     fleet.report("cf1", FlightStatus.ON_GROUND, takeoff_refusal="the battery is low")
     assert fleet.vehicles["cf1"].reason == "the battery is low"
     fleet.report("cf1", FlightStatus.FLYING, takeoff_refusal="the vehicle is in flight")
@@ -241,7 +241,7 @@ def test_the_frame_of_a_vehicle_without_a_name_is_its_own_on_the_ground_too():
 
 
 @pytest.mark.parametrize("rotation", [(0.0,) * 4, (math.nan, 0.0, 0.0, 1.0)])
-def test_a_pose_that_is_none_makes_its_own_vehicle_old_and_no_other(rotation):
+def test_an_invalid_pose_makes_only_its_own_vehicle_old(rotation):
     fleet = FakeFleet()
     fleet.find()
     for _ in range(12):
@@ -258,7 +258,7 @@ def test_a_pose_that_is_none_makes_its_own_vehicle_old_and_no_other(rotation):
 @pytest.mark.parametrize(
     ("offset", "text"), [(3.0, "is stamped in the future"), (-3.0, "s after their stamps")]
 )
-def test_clocks_that_are_not_set_alike_are_said(fleet, offset, text):
+def test_clocks_that_are_not_set_alike_are_reported(fleet, offset, text):
     for _ in range(5):
         stamp = fleet.process.clock.nanoseconds() + round(offset * 1e9)
         pose = StampedPose("world", "cf2", stamp, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))
@@ -292,7 +292,7 @@ def test_a_heading_that_is_infinite_marks_its_own_vehicle_and_no_other(fleet):
     assert not fleet.vehicles["cf3"].is_stale
 
 
-def test_a_master_that_does_not_answer_is_said_until_it_does():
+def test_a_master_that_does_not_answer_is_reported_until_it_does():
     fleet = FakeFleet()
     fleet.find()
     known = fleet.graph

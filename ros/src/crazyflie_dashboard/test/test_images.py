@@ -59,7 +59,7 @@ def test_colors_are_in_their_order(encoding, order):
     assert decoded(message(pixels, encoding))[5, 5] == pytest.approx((blue, green, red), abs=4)
 
 
-def test_what_cannot_be_shown_is_said():
+def test_what_cannot_be_shown_is_reported():
     with pytest.raises(ValueError, match="encoding is yuv422; expected one of bgr8, "):
         encoded(message(np.zeros((4, 4), np.uint8), "yuv422"))
     short = message(np.zeros((4, 4), np.uint8), "mono8")

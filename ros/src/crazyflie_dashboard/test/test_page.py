@@ -107,7 +107,7 @@ def test_a_scene_that_is_not_renewed_is_shown_as_old(browser, server):
     wait_for(lambda: browser.in_scene(stale), "a vehicle that is drawn as stale")
 
 
-def test_a_server_that_sends_nothing_is_said_by_the_page_itself(browser, driver):
+def test_a_server_that_sends_nothing_is_reported_by_the_page_itself(browser, driver):
     driver.execute_script("window.setBeat = () => {}")
     wait_for(lambda: browser.find("body.old"), "a page that says that it is old")
     assert "nothing comes from the dashboard" in browser.find("body").get_attribute("data-age")
@@ -145,7 +145,7 @@ def test_the_goal_goes_when_it_is_reached(browser, server):
     wait_for(lambda: not browser.in_scene("goal.visible"), "no goal")
 
 
-def test_what_is_said_again_and_again_is_one_line(browser, server):
+def test_what_is_reported_again_and_again_is_one_line(browser, server):
     log = tuple(
         LogLine(k, 12.0 + k, "warn", "/fleet", f"cf1 and cf2 are 0.{30 + k} m apart")
         for k in range(1, 41)

@@ -155,7 +155,7 @@ def test_a_hostile_page_in_the_same_browser_opens_no_websocket(browser, server, 
     driver.get_log("browser")
 
 
-def test_an_old_browser_is_told_so(browser, driver, server):
+def test_an_old_browser_gets_a_message(browser, driver, server):
     script = {"source": "delete HTMLScriptElement.supports"}
     added = driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
     try:

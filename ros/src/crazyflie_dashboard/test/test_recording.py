@@ -53,7 +53,7 @@ def test_a_recording_becomes_a_report(recording, tmp_path):
         recording.stop()
 
 
-def test_what_fails_is_said(recording, tmp_path):
+def test_what_fails_is_reported(recording, tmp_path):
     recording.start()
     recording._recorder.kill()
     with pytest.raises(RefusalError, match="nothing was recorded below"):

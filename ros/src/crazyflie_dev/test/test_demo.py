@@ -34,7 +34,7 @@ def position(moment):
 
 
 @pytest.mark.parametrize(("load", "is_busy"), [(1.9, False), (2.1, True)])
-def test_a_busy_computer_is_said(load, is_busy, capsys):
+def test_a_busy_computer_is_reported(load, is_busy, capsys):
     say_if_busy(load, processors=2)
     assert ("too busy: 2.1 programs" in capsys.readouterr().err) == is_busy
 

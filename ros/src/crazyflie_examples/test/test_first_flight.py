@@ -62,7 +62,7 @@ def test_a_fault_stops_it_at_its_step(faults, step, words):
     assert len(before) == NAMES.index(step)
 
 
-def test_an_address_that_is_none_is_named(capsys):
+def test_an_invalid_address_is_named(capsys):
     assert main(["radio:80"]) == 1
     assert "radio:80" in capsys.readouterr().err
     with pytest.raises(SystemExit):

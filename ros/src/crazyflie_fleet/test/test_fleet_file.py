@@ -358,7 +358,7 @@ def test_a_model_file_is_relative_to_the_fleet_file(tmp_path):
         ("bolt", r"robots/a/model .*is 'bolt'; expected one of near_hover.*a Bolt has"),
     ],
 )
-def test_a_model_that_is_none_is_named_with_its_line(tmp_path, model, expected):
+def test_an_invalid_model_is_named_with_its_line(tmp_path, model, expected):
     (tmp_path / "grams.yaml").write_text("mass: 33\n")
     file = tmp_path / "fleet.yaml"
     file.write_text(f"robots: {{a: {{initial_position: [0, 0, 0], model: {model}}}}}\n")

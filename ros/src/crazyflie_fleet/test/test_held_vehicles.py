@@ -55,7 +55,7 @@ def test_only_a_vehicle_that_was_held_needs_more_distance():
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_position_of_which_one_coordinate_is_unknown_is_none(axis):
+def test_a_position_with_an_unknown_coordinate_is_unknown(axis):
     unknown = SECOND.copy()
     unknown[axis] = np.nan
     separation = Separation([0.15, 0.15])

@@ -63,7 +63,7 @@ def test_a_velocity_moves_the_goal_on(bench):
     assert bench.fly(1.2)[-1] == pytest.approx([0.55, 0.0, 0.7, 0.0, 0.0, 0.0])
 
 
-def test_what_the_controller_cannot_do_is_said(bench):
+def test_what_the_controller_cannot_do_is_reported(bench):
     bench.process.publish(f"{TOP}/cmd_hover", Hover(vx=0.1, yawrate=20.0, zDistance=1.0))
     bench.process.publish(f"{TOP}/cmd_stop", Empty())
     assert bench.process.logged("warn") == [

@@ -135,7 +135,7 @@ def test_a_frame_of_motion_capture_is_not_the_fixed_one(tmp_path, frame):
         ([("a", "b"), ("b", "a")], "frames are in a loop, each the parent of the one before: a, b"),
     ],
 )
-def test_why_there_is_no_pose_is_said_by_takeoff(tmp_path, poses, reason):
+def test_why_there_is_no_pose_is_reported_by_takeoff(tmp_path, poses, reason):
     path = write(tmp_path / "fleet.yaml", ["frame: a", "frame: b"])
     process = FakeProcess()
     process.transport.set_param("/fleet", {"simulated": False, "nodes": NODES})

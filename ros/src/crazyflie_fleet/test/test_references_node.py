@@ -119,7 +119,7 @@ def test_who_is_flown_elsewhere_is_kept_apart_from():
     assert "/cf2/go_to" not in flight.process.transport.services
 
 
-def test_a_vehicle_in_flight_that_is_not_seen_any_more_is_said(flight):
+def test_a_vehicle_in_flight_that_is_not_seen_any_more_is_reported(flight):
     flight.see("cf2", 1.0, y_dot=-1.0)
     flight.want("cf1", 0.3)
     flight.silence("cf2")
@@ -155,7 +155,7 @@ def test_a_way_begins_where_the_vehicle_was(flight):
     assert flight.followed("cf1")[-1].state.y == pytest.approx(0.25, abs=0.02)
 
 
-def test_a_vehicle_that_was_never_seen_is_said():
+def test_a_vehicle_that_was_never_seen_is_reported():
     process = FakeProcess()
     assert process.launch(ReferencesNode(fleet_file.grid(1).vehicles, (), "world"), "/references")
     process.publish("/cf1/in_flight_flight_status", flight_status("TAKING_OFF"))

@@ -94,7 +94,7 @@ def test_a_box_that_is_enlarged_in_flight_is_enlarged_for_all(flight):
     assert flight.texts["/in_flight_state"] == "on_ground"
 
 
-def test_a_fence_that_is_started_anew_has_the_box_that_it_had(flight):
+def test_a_fence_that_is_restarted_has_the_box_that_it_had(flight):
     flight.change(box_max_x=8.0)
     flight.refer(5.0, 0.0, 1.0)
     flight.graph.advance(15.0)
@@ -141,7 +141,7 @@ def test_far_outside_the_present_box_the_motors_are_stopped(flight):
     assert "m outside the geofence" in flight.texts["/in_flight_filter"]
 
 
-def test_the_hover_point_has_to_be_in_the_present_box():
+def test_the_hover_point_must_be_in_the_present_box():
     flight = FencedFlight()
     with pytest.raises(ServiceError, match="outside the geofence"):
         flight.change("/takeoff_server", hover_x=3.0)

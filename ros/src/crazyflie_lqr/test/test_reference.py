@@ -75,7 +75,7 @@ def test_a_stamp_from_the_future_does_not_shut_the_others_out():
     assert reference.update(2.0 * GOAL, stamp=60.1, now=60.1)
 
 
-def test_after_a_reset_of_the_clock_the_order_begins_anew():
+def test_a_reset_of_the_clock_restarts_the_order():
     reference = GuardedReference(6)
     reference.update(GOAL, stamp=60.0, now=60.0)
     assert reference.update(2.0 * GOAL, stamp=1.0, now=1.0)

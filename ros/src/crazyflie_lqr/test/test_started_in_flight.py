@@ -42,7 +42,7 @@ def test_it_is_silent_without_a_reference_otherwise(process, state):
         (False, "do the machines' clocks agree"),
     ],
 )
-def test_why_states_are_late_is_said_once(process, had_fresh_ones, words):
+def test_why_states_are_late_is_reported_once(process, had_fresh_ones, words):
     refer(process)
     if had_fresh_ones:
         answer(process)

@@ -56,7 +56,7 @@ def test_one_without_a_stamp_is_taken_as_new_in_simulated_time_too():
     assert ages((0.0, 5.0), (0.0, 30.0)) == [0.0, 0.0]
 
 
-def test_another_clock_that_begins_anew_does_so():
+def test_another_clock_that_restarts_does_so():
     assert ages((50.0, NOW), (51.0, NOW + 1.0), (1.0, NOW + 2.0), (2.0, NOW + 3.0)) == (
         pytest.approx([0.0] * 4, abs=0.01)
     )
@@ -68,7 +68,7 @@ def test_the_same_clock_is_recognised_after_something_of_another():
     assert age.update(NOW - 400.0, NOW, NOW) == 400.0
 
 
-def test_after_a_reset_of_simulated_time_all_begins_anew():
+def test_a_reset_of_simulated_time_restarts_everything():
     age = StateAge()
     ages((500.0, 500.0), age=age)
     assert age.update(0.1, 0.1, 0.1) == 0.0

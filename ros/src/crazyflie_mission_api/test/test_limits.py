@@ -49,7 +49,7 @@ def test_limits_of_thrust_leave_room_to_hover():
     Limits(min_thrust=0.99 * GRAVITY, max_thrust=1.01 * GRAVITY)
 
 
-def test_a_number_may_be_its_minimum_but_not_what_it_has_to_exceed():
+def test_a_number_may_be_its_minimum_but_not_what_it_must_exceed():
     assert number(2, "it", minimum=2.0) == number(np.float32(2.0), "it", above=1.99) == 2.0
     for value, bounds in (
         (1.99, {"minimum": 2.0}),

@@ -59,7 +59,7 @@ def test_integrals_are_limited():
     np.testing.assert_allclose(memory[:2], limits[:2])
 
 
-def test_without_thrust_the_motors_are_off_and_the_loops_begin_anew():
+def test_without_thrust_the_motors_are_off_and_the_loops_restart():
     memory, _ = inner_loops.update(
         inner_loops.initial_memory(0.0), [0.2, 0.1, 1.0, GRAVITY], LEVEL, LEVEL
     )

@@ -45,7 +45,7 @@ def test_a_block_lasts_at_least_50_ms():
 
 
 @pytest.mark.parametrize(("gap", "kept"), [(0.0, 1), (-1.0, 1), (0.2, 2), (0.25, 1)])
-def test_after_a_gap_all_begins_anew(gap, kept):
+def test_everything_restarts_after_a_gap(gap, kept):
     monitor = ResponseMonitor()
     monitor.update(1.0, ZERO, ZERO)
     monitor.update(1.0 + gap, ZERO, ZERO)

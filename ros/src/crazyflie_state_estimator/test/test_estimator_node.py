@@ -155,7 +155,7 @@ def test_bad_transforms_are_passed_over():
 
 
 @pytest.mark.parametrize("flown", [0.01, 0.1])
-def test_begins_anew_when_time_is_reset(flown):
+def test_restarts_when_time_is_reset(flown):
     process = launch()
     fly(process, lambda elapsed: ((50.0, 0.0, 0.0), (0.0, 0.0, 0.0)), flown)
     process.clock.set(1.0)

@@ -70,7 +70,7 @@ def test_controls_that_are_not_finite_are_ignored():
     assert "/control" in warning
 
 
-def test_the_kalman_filter_begins_anew_when_time_is_reset():
+def test_the_kalman_filter_restarts_when_time_is_reset():
     process = launch(**{"filter/type": "kalman", "topics/control": "/control"})
     thrown(process, 9.81)
     process.clock.set(1.0)

@@ -54,13 +54,13 @@ class Camera:
         return self
 
 
-def test_a_pose_that_repeats_in_flight_is_none():
+def test_a_pose_that_repeats_in_flight_is_rejected():
     camera = Camera().lift()
     assert camera.show((0.0, 0.0, 1.001), STILL, 3.0) == [True] * 300
     assert camera.show((0.0, 0.0, 1.002), STILL) == [False]
 
 
-def test_it_is_none_either_when_the_motors_have_stopped_meanwhile():
+def test_it_is_rejected_also_when_the_motors_have_stopped_meanwhile():
     camera = Camera().lift()
     camera.show((0.0, 0.0, 1.001), STILL, 1.0)
     assert all(camera.show((0.0, 0.0, 1.001), None, 9.0))
@@ -118,7 +118,7 @@ def test_what_lifts_any_vehicle_does_not_leave_it_on_the_ground(thrust, is_froze
 @pytest.mark.parametrize(
     "acceleration", [(2.0, 0.0, 0.0), (0.0, -2.0, 0.0), (0.0, 0.0, 2.0), (1.2, 1.2, -0.3)]
 )
-def test_a_place_that_does_not_answer_to_the_control_is_none(noise, acceleration):
+def test_poses_that_do_not_respond_to_the_control_are_rejected(noise, acceleration):
     camera = Camera(noise).lift()
     hover = (0.0, 0.0, 1.0)
     assert not any(camera.show(hover, STILL, 5.0))
@@ -155,7 +155,7 @@ def test_a_vehicle_that_stands_on_a_table_with_less_thrust_is_believed():
     assert not any(camera.show((0.0, 0.0, 0.51), (1.0, 1.0, -2.0), 3.0))
 
 
-def test_motion_that_ends_without_a_control_is_none():
+def test_motion_that_ends_without_a_control_is_rejected():
     camera = Camera(0.001)
     camera.show((0.0, 0.0, 0.0), None, 1.0)
     camera.move(1.0, duration=2.0)

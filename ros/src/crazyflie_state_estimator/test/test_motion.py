@@ -111,7 +111,7 @@ def test_a_repeated_stamp_gives_nothing_and_changes_nothing():
     np.testing.assert_allclose(motion.velocity, [1.0, 0.0, 0.0])
 
 
-def test_time_that_goes_back_begins_anew():
+def test_time_that_goes_back_restarts():
     subject = estimator()
     subject.update(DAY, (5.0, 0.0, 0.0), LEVEL)
     subject.update(DAY + 10 * MS, (5.0, 0.0, 0.0), LEVEL)

@@ -252,7 +252,7 @@ def test_a_descent_under_way_is_made_faster(sees):
     assert last[2] == pytest.approx(3.7 - 0.99 * 3.7 / 7.0, abs=0.01)
 
 
-def test_a_descent_above_a_table_is_made_as_fast_as_it_has_to_be():
+def test_a_descent_above_a_table_is_made_as_fast_as_it_must_be():
     flight = grounded()
     flight.tick(0.0, (0.0, 0.0, 0.75))
     flight.request(ServerEvent.TAKEOFF)

@@ -218,7 +218,7 @@ def test_a_vehicle_that_a_new_box_leaves_outside_may_come_back_and_not_go_away()
     assert inside.complaint((1.25, 0.0, 1.0)) == "0.75 m outside the geofence"
 
 
-def test_a_complaint_has_to_last():
+def test_a_complaint_must_last():
     debounce = Debounce(0.5)
     assert [debounce.advance(0.25, "high") for _ in range(3)] == ["", "", "high"]
     assert debounce.advance(0.25, "") == ""
@@ -236,7 +236,7 @@ def measure(relay, motion):
     relay.measure(motion, 0.0, is_on_ground=False, in_flight=True)
 
 
-def test_a_vehicle_that_is_to_land_has_to_come_down():
+def test_a_vehicle_that_is_to_land_must_come_down():
     watch = DescentWatch()
     said = [bool(watch.advance(0.25, 1.0)) for _ in range(8)]
     assert said == [False] * 7 + [True]

@@ -140,7 +140,7 @@ def test_the_least_thrust_of_a_control(relay, in_flight, least):
         (LANDING, 1.0, 0.0, False),
     ],
 )
-def test_only_a_landing_that_is_seen_above_the_ground_has_to_come_down(state, z, age, objects):
+def test_only_a_landing_that_is_seen_above_the_ground_must_come_down(state, z, age, objects):
     machine = FilterMachine(TIMEOUTS, LIMITS)
     machine.takeoff(0.0, "zero", level(0.0))
     machine.measure(at(0.25))

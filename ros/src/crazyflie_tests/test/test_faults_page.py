@@ -58,7 +58,7 @@ def test_every_row_names_test_functions(row):
         assert checks(functions(path)[name]), name
 
 
-def test_an_empty_test_is_none():
+def test_an_empty_test_checks_nothing():
     empty = ast.parse("def test_nothing():\n    'Fly.'\n    pass\n").body[0]
     assert not checks(empty)
 

@@ -68,7 +68,7 @@ def test_failures_make_the_status(run_test, folder):
         ("ros/src/crazyflie_tests/test/rostest_flight.py", "name the .test file that starts it"),
     ],
 )
-def test_what_cannot_be_tested_is_said(run_test, argument, complaint):
+def test_what_cannot_be_tested_is_reported(run_test, argument, complaint):
     status, printed = run_test(argument)
     assert status == 1
     assert complaint in printed

@@ -72,7 +72,7 @@ def test_parameters_cannot_be_changed_by_accident():
         read().height = 2.0
 
 
-def test_all_that_is_wrong_is_said_at_once():
+def test_all_that_is_wrong_is_reported_at_once():
     with pytest.raises(ParameterError) as error:
         read(**{"hover/z": "high", "motors": 5, "noisy": 1, "PIDs/X/kp": math.nan})
     assert str(error.value).splitlines() == [
@@ -126,7 +126,7 @@ def test_from_a_mapping():
     assert FlightParameters.from_mapping(GOOD) == read()
 
 
-def test_unknown_names_in_a_mapping_are_said_with_the_rest():
+def test_unknown_names_in_a_mapping_are_reported_with_the_rest():
     with pytest.raises(ParameterError) as error:
         FlightParameters.from_mapping({"hight": 1.0, "PIDs/X/kp": 2.0}, "bodies/7/")
     first, second = str(error.value).splitlines()
@@ -147,7 +147,7 @@ def test_from_a_command_line():
     assert parse(*given) == read(noisy=True, motors=2)
 
 
-def test_all_that_is_wrong_with_a_command_line_is_said(capsys):
+def test_all_that_is_wrong_with_a_command_line_is_reported(capsys):
     with pytest.raises(SystemExit) as end:
         parse("--hover-z", "high", "--noisy", "perhaps", "--motors", "9")
     assert end.value.code == 2
@@ -162,7 +162,7 @@ def test_all_that_is_wrong_with_a_command_line_is_said(capsys):
 
 
 @pytest.mark.parametrize("text", ["1_000", "1e", "-", "1,5", "0x1p3", "1__0", "١"])
-def test_a_word_that_only_python_takes_for_a_number_is_none(capsys, text):
+def test_a_word_that_only_python_takes_for_a_number_is_refused(capsys, text):
     with pytest.raises(SystemExit):
         parse(f"--hover-z={text}", "--PIDs-X-kp=2", f"--motors={text}")
     said = capsys.readouterr().err

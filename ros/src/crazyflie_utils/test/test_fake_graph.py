@@ -78,7 +78,7 @@ def test_who_is_killed_says_nothing_more(graph, listener):
         graph.call("/count", TriggerRequest()).result()
 
 
-def test_who_is_started_anew_begins_at_the_beginning(graph, listener):
+def test_a_restarted_process_begins_at_the_beginning(graph, listener):
     graph.advance(0.35)
     graph.kill("/talker")
     graph.start("/talker", Talker())

@@ -65,7 +65,7 @@ def world(monkeypatch):
     return world
 
 
-def test_a_master_that_is_started_anew_is_told_of_this_process(world):
+def test_a_master_that_is_restarted_is_told_of_this_process(world):
     world.master.is_there = False
     for _ in range(3):
         world.watch.look()

@@ -38,7 +38,7 @@ def test_table():
     assert table(SomeParameters) == TABLE
 
 
-def test_tables_of_a_page_are_made_anew():
+def test_tables_of_a_page_are_made_again():
     comment = f"<!-- parameters: {__name__}:SomeParameters -->\n"
     page = f"# A node\n\n{comment}\n| old | table |\n|---|---|\n\nText.\n"
     made = with_tables(page)

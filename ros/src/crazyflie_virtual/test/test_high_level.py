@@ -83,7 +83,7 @@ def test_flight_by_mellingers_controller(bench):
     assert not bench.motors_run
 
 
-def test_a_spiral_ends_where_it_has_to(bench):
+def test_a_spiral_ends_where_it_must(bench):
     bench.take_off()
     begin = bench.firmware.setpoint
     assert command(bench, "spiral", -math.pi / 2, 0.4, 0.6, -0.3, 3.0, clockwise=True) == 0

@@ -157,7 +157,7 @@ def test_a_port_that_is_taken(watch):
         MocapServer(MocapSettings(command_port=server.address[1], observer_port=0))
 
 
-def test_an_address_that_is_none():
+def test_an_invalid_address():
     with pytest.raises(OSError, match="multicast_address is 'somewhere'; expected an IPv4 address"):
         MocapServer(MocapSettings(command_port=0, observer_port=0, multicast_address="somewhere"))
 

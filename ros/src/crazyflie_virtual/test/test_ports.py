@@ -264,7 +264,7 @@ def test_packed_positions_and_poses_are_for_those_with_the_address(bench):
         (1, b""),
     ],
 )
-def test_measurements_that_are_none_are_ignored(bench, channel, data):
+def test_invalid_measurements_are_ignored(bench, channel, data):
     assert bench.ask(Port.LOCALIZATION, channel, data) == []
     assert bench.firmware.localization.time is None
 

@@ -32,7 +32,7 @@ def test_packets_come_back(port, channel, data):
     assert decode(Packet(port, channel, data).encode()) == (port, channel, data)
 
 
-def test_packets_of_a_wrong_size_are_none():
+def test_packets_of_a_wrong_size_are_refused():
     assert decode(b"") is None
     assert decode(bytes(32)) is None
     with pytest.raises(ValueError, match="30 bytes, got 31"):

@@ -114,7 +114,7 @@ def test_a_picture_lies_beside_the_file(write, tmp_path):
     assert world["crate"].picture == str(tmp_path / "face.png")
 
 
-def test_everything_wrong_is_said_at_once(write):
+def test_everything_wrong_is_reported_at_once(write):
     bad = GOOD.replace("type: box", "type: cone").replace("radius: 0.2", "radius: -1")
     with pytest.raises(ParameterError) as error:
         world_file.load(write(bad))

@@ -101,7 +101,7 @@ def test_stamps_keep_their_order_and_distance(seed, drift):
 
 
 @pytest.mark.parametrize("step", [-300.0, -0.2, 0.2, 300.0])
-def test_begins_anew_when_the_servers_clock_is_set(step):
+def test_restarts_when_the_servers_clock_is_set(step):
     clock = ClockOffset()
     network = Network(50.0)
     network.run(clock, 3.0)
@@ -166,7 +166,7 @@ def test_two_servers_are_told_apart():
         assert clock.update(other.message()[0], arrival) is FrameOrder.FOREIGN
 
 
-def test_begins_anew_when_the_servers_clock_has_stood_still():
+def test_restarts_when_the_servers_clock_has_stood_still():
     clock = ClockOffset()
     network = Network(50.0)
     network.run(clock, 3.0)

@@ -69,7 +69,7 @@ def test_bodies_that_move_are_tracked():
 
 
 @pytest.mark.usefixtures("_fake_package")
-def test_frames_that_repeat_are_none():
+def test_frames_that_repeat_show_no_moving_body():
     with connection("127.0.0.2") as source:
         assert frames(source)[0] == []
         assert "no body that moves" in source.silence_hint

@@ -158,7 +158,7 @@ def test_a_flash_is_no_vehicle(scene):
     assert "left" not in scene.show(0.02, (0.0, 0.6, 1.1), RIGHT)
 
 
-def test_two_markers_at_one_start_point_are_none():
+def test_two_markers_at_one_start_point_are_not_tracked():
     scene = Scene()
     assert scene.show(1.0, LEFT, (0.1, 0.5, 0.04), RIGHT) == {"right": RIGHT}
     assert "expected one marker that rests at its start point" in scene.tracker.explain("left")

@@ -101,7 +101,7 @@ def test_the_first_frame_of_a_group_decides_about_its_server(monkeypatch):
     assert seen == {(1, None, (1.0, 2.0, 3.0)), (7, None, (7.0, 2.0, 3.0))}
 
 
-def test_the_answer_of_another_sender_is_none():
+def test_the_answer_of_another_sender_is_ignored():
     warnings = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as commands:
         commands.bind(("127.0.0.1", 0))

@@ -114,7 +114,7 @@ def test_a_unicast_server_is_sent_keep_alives(monkeypatch):
         source.close()
 
 
-def test_a_server_that_was_started_anew_is_found_over_the_same_sockets():
+def test_a_server_that_was_restarted_is_found_over_the_same_sockets():
     port = free_port()
     with contextlib.ExitStack() as stack:
         with server(port):
@@ -129,7 +129,7 @@ def test_a_server_that_was_started_anew_is_found_over_the_same_sockets():
         assert source._sockets == sockets
 
 
-def test_a_server_that_became_another_is_connected_to_anew(monkeypatch):
+def test_a_server_that_became_another_is_connected_to_again(monkeypatch):
     monkeypatch.setattr(module, "_SILENCE", 0.05)
     port = free_port()
     with contextlib.ExitStack() as stack:

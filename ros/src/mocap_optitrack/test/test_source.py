@@ -101,7 +101,7 @@ def test_a_connection_that_cannot_be_opened_is_tried_again():
     assert all(source.is_closed for source in run.sources)
 
 
-def test_a_connection_that_ends_is_made_anew():
+def test_a_connection_that_ends_is_made_again():
     with Run(["a server", frame(1), SourceError("gone")], ["a server", frame(2)]) as run:
         said = [run.next() for _ in range(5)]
     assert said[2:] == [("failure", "gone"), ("connected", "a server"), ("frame", frame(2))]

@@ -212,7 +212,7 @@ def test_a_server_whose_clock_is_set_back_is_followed():
     assert published == pytest.approx(40, abs=3)
 
 
-def test_another_server_is_learned_anew():
+def test_another_server_is_learned_again():
     one = tracker()
     time = settled(one)
     one.restart()

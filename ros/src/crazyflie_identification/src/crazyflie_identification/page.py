@@ -52,7 +52,7 @@ def page(fit: Fit, kind: QuadrotorParameters, title: str) -> str:
         "<tr><th></th><th>used</th><th>not used</th><th></th></tr>"
         f"{rows}</table>"
         "<h2>The part that was not used</h2><p>Measured blue, predicted red; position, velocity "
-        f"and heading begin anew every 3 s.</p>{plots}</html>"
+        f"and heading start again every 3 s.</p>{plots}</html>"
     )
 
 

@@ -277,7 +277,7 @@ def test_a_goal_during_a_landing_waits_for_the_next_takeoff():
     assert loop.run(12.0)[:, 0].max() > 1.9
 
 
-def test_the_integrals_begin_anew_with_every_flight():
+def test_the_integrals_restart_with_every_flight():
     # Two flights in a row are the same.
     loop = flying()
     first = loop.run(3.0)

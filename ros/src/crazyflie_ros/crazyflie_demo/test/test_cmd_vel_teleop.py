@@ -84,7 +84,7 @@ def test_axes_and_ranges_can_be_chosen():
     assert last(process) == (0.0, 0.0, 50000.0, 90.0)
 
 
-def test_a_negative_axis_is_inverted_and_axis_0_is_none():
+def test_a_negative_axis_is_inverted_and_axis_0_is_no_axis():
     process = launch(QuadrotorTeleopNode, **{**SDK, "x_axis": -5, "yaw_axis": 0, "z_axis": -2})
     tilt(process)
     tilt(process, pitch=1.0, roll=0.5, yaw=1.0, thrust=-0.5)

@@ -112,7 +112,7 @@ def test_the_position_is_that_of_the_frame_that_is_named():
 
 
 @pytest.mark.parametrize("tf", [Listener, lambda stamp: buffer_with("cf", stamp)])
-def test_a_position_of_long_ago_is_none(tf):
+def test_an_old_position_is_refused(tf):
     assert vehicle(tf(99.9)).position().tolist() == [1.0, 2.0, 3.0]
     text = "/cf in world: the last position is 1.5 s old; expected at most 0.5 s"
     with pytest.raises(tf2_ros.TransformException, match=text):

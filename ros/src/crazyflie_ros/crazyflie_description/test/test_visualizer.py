@@ -49,7 +49,7 @@ def test_path_drops_the_oldest_points():
     assert list(path.positions) == [(2.0, 0.0, 0.0), (3.0, 0.0, 0.0), (4.0, 0.0, 0.0)]
 
 
-def test_path_begins_anew_when_time_is_reset():
+def test_path_restarts_when_time_is_reset():
     path = FlownPath(0.5, 10)
     path.add(5.0, (0.0, 0.0, 0.0))
     path.add(6.0, (0.0, 0.0, 1.0))
@@ -206,7 +206,7 @@ def test_a_frame_that_never_appears_is_named(process):
     assert process.published("/visualizer/markers") == []
 
 
-def test_path_begins_anew_when_simulated_time_is_reset(process):
+def test_path_restarts_when_simulated_time_is_reset(process):
     for z in (0.0, 0.5, 1.0):
         fly_to(process, z)
     process.clock.set(1.0)

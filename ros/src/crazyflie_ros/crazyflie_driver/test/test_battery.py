@@ -12,7 +12,7 @@ def battery():
     return BatteryMonitor(low=3.2, critical=3.0, critical_time=5.0)
 
 
-def test_low_is_said_at_once(battery):
+def test_low_is_reported_at_once(battery):
     assert battery.charge is Charge.UNKNOWN
     assert battery.update(3.7, 0.0) is Charge.GOOD
     assert battery.words() == ""

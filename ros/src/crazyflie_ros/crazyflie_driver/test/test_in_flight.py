@@ -128,7 +128,7 @@ def loses_replies(vehicle, count):
     vehicle.lose = lose
 
 
-def test_a_takeoff_whose_reply_is_lost_is_none_that_failed(server, vehicle):
+def test_a_takeoff_whose_reply_is_lost_has_not_failed(server, vehicle):
     loses_replies(vehicle, 1)
     server.call("/cf1/takeoff", TAKEOFF)
     assert [data[0] for data in vehicle.packets(8, 0)] == [7, 7]

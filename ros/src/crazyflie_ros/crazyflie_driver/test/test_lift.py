@@ -88,7 +88,7 @@ def stream_until_warned(server, topic, message):
         ("cmd_full_state", NORTH, "cmd_full_state, 1.00 m, yaw 90 degrees"),
     ],
 )
-def test_what_was_told_and_what_is_measured_is_said(server, topic, message, told):
+def test_what_was_told_and_what_is_measured_is_reported(server, topic, message, told):
     vehicle = stand(server, STANDING, FLYING)
     warning = stream_until_warned(server, topic, message)
     assert f"cf1: was commanded to fly ({told}), and has not lifted off" in warning

@@ -80,7 +80,7 @@ def test_an_old_vehicle_that_flies_lands_before_its_motors_are_stopped(server):
     assert commands(vehicle) == [(7, 1), (8, 0), *UNLOCKED]
 
 
-def test_a_link_that_is_set_up_anew_sends_an_old_vehicle_in_the_air_nothing(server):
+def test_a_link_that_is_set_up_again_sends_an_old_vehicle_in_the_air_nothing(server):
     vehicle = make_old_vehicle(server, READY)
     server.add(vehicle.uri)
     vehicle.wait_for_packets(7, 1)

@@ -92,7 +92,7 @@ def test_a_restart_within_the_time_of_a_ping(server, vehicle):
     wait_for_words(server, "ready")
 
 
-def test_half_of_the_packets_lost_is_said(server, vehicle):
+def test_half_of_the_packets_lost_is_reported(server, vehicle):
     vehicle.lose = lambda count: count % 2 == 0
     wait_for_words(server, "poor link")
 

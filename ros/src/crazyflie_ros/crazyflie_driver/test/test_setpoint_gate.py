@@ -199,7 +199,7 @@ def test_after_an_emergency_or_a_removal_nothing_passes(events):
         assert bool(gate.refusal(time, is_zero)) is bool(latched or is_down or is_empty)
 
 
-def test_a_stream_that_was_landed_for_its_battery_has_to_pause():
+def test_a_stream_that_was_landed_for_its_battery_must_pause():
     """The voltage comes back by itself as soon as the motors rest."""
     gate = SetpointGate()
     assert stream(gate, 0.0, 1.0) == (0, "")

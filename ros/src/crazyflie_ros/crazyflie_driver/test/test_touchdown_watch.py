@@ -74,7 +74,7 @@ def test_a_vehicle_that_sinks_behind_its_target_does_not_stand():
     assert step is Next.NOTHING
 
 
-def test_an_estimate_that_stands_still_with_a_speed_is_none_on_the_ground():
+def test_an_estimate_that_stands_still_with_a_speed_is_not_on_the_ground():
     """Motion capture is frozen; the accelerometer goes on."""
     touchdown = Touchdown(0.0, 0.0, 60.0)
     steps = {touchdown.sample(k * PERIOD, 1.0, -0.5, 0.0) for k in range(50)}

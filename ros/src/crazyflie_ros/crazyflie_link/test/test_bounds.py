@@ -88,7 +88,7 @@ def test_durations_and_time_scales_are_at_least_0_01(target, flying, command):
 
 
 @pytest.mark.parametrize(("time_ms", "has_restarted"), [(61_000, False), (61_001, True)])
-def test_a_clock_that_is_ahead_has_begun_anew(time_ms, has_restarted):
+def test_a_clock_that_is_ahead_has_restarted(time_ms, has_restarted):
     uptime = Uptime()
     assert not uptime.has_restarted(0, 10.0)
     assert uptime.has_restarted(time_ms, 11.0) == has_restarted

@@ -111,7 +111,7 @@ def test_it_was_pressed_while_the_link_is_silent(vehicle, make_link, states):
     assert link.supervisor.wait_for_emergency_stop(LIMIT)
 
 
-def test_a_link_that_is_set_up_anew_begins_with_it(vehicle, make_link, states):
+def test_a_link_that_is_set_up_again_begins_with_it(vehicle, make_link, states):
     """The vehicle may have been restarted meanwhile, and must not fly before it is added again."""
     link = make_link(vehicle.uri, reconnect=True, on_state=states)
     link.connect()

@@ -165,7 +165,7 @@ def restarts(*packets):
         ([(1000, 0.0), (1100, 10.0), (11_100, 10.1), (1000, 12.0)], True),
     ],
 )
-def test_a_clock_that_begins_anew_is_a_restart(packets, restarted):
+def test_a_clock_that_was_reset_is_a_restart(packets, restarted):
     assert restarts(*packets) is restarted
 
 
@@ -208,7 +208,7 @@ def test_times_are_unwrapped_however_long_no_packet_came(first, steps):
         assert uptime.unwrapped(sent % WRAP_MS) == sent
 
 
-def test_times_after_a_restart_begin_anew():
+def test_times_start_from_zero_after_a_restart():
     uptime = Uptime()
     uptime.has_restarted(WRAP_MS - 16, 0.0)
     uptime.has_restarted(5, 0.1)

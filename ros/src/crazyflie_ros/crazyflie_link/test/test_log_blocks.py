@@ -15,7 +15,7 @@ def log_block(name, receive=lambda *_: None, variables=("pm.vbat",), period_ms=2
     return LogBlock(name, period_ms, variables, receive)
 
 
-def test_a_start_that_the_vehicle_refuses_is_none(vehicle, make_link, states):
+def test_a_start_that_the_vehicle_refuses_is_an_error(vehicle, make_link, states):
     link = make_link(vehicle.uri, reconnect=True, on_state=states)
     link.connect()
     vehicle.answers[5, 1, 3] = b"\3\1\2"

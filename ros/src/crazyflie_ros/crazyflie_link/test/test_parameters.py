@@ -102,7 +102,7 @@ def test_an_answer_without_a_value_is_a_refusal_to_read(vehicle, link):
         link.parameters.read("sound.freq")
 
 
-def test_an_old_confirmation_of_disarming_is_none_of_arming(vehicle, link):
+def test_an_old_confirmation_of_disarming_does_not_confirm_arming(vehicle, link):
     vehicle.deaf.add((9, 1, b""))
     with ThreadPoolExecutor() as pool:
         arming = pool.submit(link.supervisor.arm)

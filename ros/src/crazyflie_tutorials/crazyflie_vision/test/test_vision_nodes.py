@@ -172,7 +172,7 @@ def test_stops_within_0_15_s_of_silence(follow):
         ({"x": math.nan}, "its point is not finite"),
     ],
 )
-def test_bad_targets_are_none(follow, target, expected):
+def test_bad_targets_are_ignored(follow, target, expected):
     follow.publish("/camera/camera_info", INFO)
     see(follow, **target)
     follow.advance(0.05)
@@ -252,7 +252,7 @@ def test_bad_parameters_are_named(files, node, parameters, expected):
     assert expected in fake.logged("error")[0]
 
 
-def test_a_picture_that_is_none_is_named(files, tmp_path):
+def test_an_invalid_picture_is_named(files, tmp_path):
     (tmp_path / "face.jpg").write_text("no picture")
     (tmp_path / "world.yaml").write_text((CONFIG / "face.yaml").read_text())
     fake = FakeProcess()

@@ -1,4 +1,4 @@
-"""What a median makes of spikes, and its parameter: the exercise of lesson 2."""
+"""A median filter removes spikes, and has a parameter: the exercise of lesson 2."""
 
 from std_msgs.msg import Float64
 

@@ -28,7 +28,7 @@ def process():
 
 
 def see_at(process, x):
-    """Let the vehicle be at x (m); return marker and distance."""
+    """Place the vehicle at x (m); return marker and distance."""
     transform = TransformStamped(child_frame_id="crazyflie")
     transform.header.frame_id = "world"
     transform.header.stamp.secs = int(process.clock.time())

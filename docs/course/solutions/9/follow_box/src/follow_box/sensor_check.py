@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Reading:
-    """What a sensor said.
+    """Measurements of a sensor.
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ LOG_PARAMETER = f"genericLogTopic_truth_Variables: [{', '.join(_VARIABLES)}]"
 """The driver's parameter of the log block, as YAML."""
 
 _RESTART = bytes((0xFF, 0xFE, 0xF0, 0x01))
-"""What the radio chip takes for the command to restart the firmware."""
+"""The radio chip's command to restart the firmware."""
 
 
 class Vehicle:

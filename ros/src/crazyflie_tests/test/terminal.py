@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 _PROMPT = re.compile(r"\[status (\d+)\]\r?\n")
-"""What the shell prints when it wants the next command: the status of the last one."""
+"""The shell's prompt, with the status of the last command."""
 
 _PROMPT_SETTINGS = {"PROMPT_COMMAND": 'echo "[status $?]"', "PS1": "", "PS2": "", "TERM": "dumb"}
 """They are inherited by a shell that is started in the shell."""

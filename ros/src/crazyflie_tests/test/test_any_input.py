@@ -28,7 +28,7 @@ VALUES = st.recursive(
     ),
     max_leaves=12,
 )
-"""What YAML, or another node, may put on the parameter server."""
+"""Values that YAML, or another node, may put on the parameter server."""
 
 LINES = st.lists(st.text(alphabet="0123456789.-+eE#,; \t\0naif\u0664", max_size=40), max_size=6)
 CONTENTS = st.binary(max_size=200) | LINES.map(lambda lines: "\n".join(lines).encode())

@@ -58,7 +58,7 @@ nothing of the workspace, so they are followed in a view of it, and nothing is b
 the others name is tested where it is made, and that they name it rightly, in test_pages.py."""
 
 VIRTUAL_VEHICLE = "virtual_"
-"""What pages type that launch it. Its ports can be used by one of them at a time."""
+"""In the commands of pages that launch it. One of them at a time can use its ports."""
 
 
 def cases():

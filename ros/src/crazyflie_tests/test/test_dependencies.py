@@ -94,7 +94,7 @@ def named_in_manifests():
 
 
 OF_DEBIAN = {"eigen": "libeigen3-dev"}
-"""What rosdep calls a package -> what Debian calls it, where they differ."""
+"""rosdep's name of a package -> Debian's, where they differ."""
 
 SYSTEM_PACKAGES = sorted((named_in_launch_files() | named_in_manifests()) - own_packages())
 
@@ -233,7 +233,7 @@ def normalized(name):
 
 
 TOOLS = {"pip", "setuptools"}
-"""What Python itself puts into a virtual environment."""
+"""Packages that Python itself puts into a virtual environment."""
 
 
 def test_the_virtual_environment_is_the_list():

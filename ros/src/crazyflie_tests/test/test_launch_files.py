@@ -39,7 +39,7 @@ FILES = {
     "crazyflie_simulator": ["rviz/crazyflie_simulator.rviz"],
     "xacro": ["xacro", "xacro.py"],
 }
-"""What users' launch files find with ``$(find PACKAGE)/...``."""
+"""Files that users' launch files find with ``$(find PACKAGE)/...``."""
 
 RECORDABLE = [
     path

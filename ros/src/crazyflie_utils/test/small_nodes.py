@@ -11,7 +11,7 @@ from crazyflie_utils import Node, Parameters, ServiceError, parameter, run
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Integer
 
 SAFE = -1.0
-"""What a `Ticker` says at last."""
+"""The last message of a `Ticker`."""
 
 
 class RelayParameters(Parameters):

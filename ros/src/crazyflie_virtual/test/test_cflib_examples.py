@@ -20,7 +20,7 @@ from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
 LIMIT = 300.0
-"""What an example may take, s; the longest takes 52 on a machine that has nothing else to do."""
+"""Time limit of an example (s); the longest takes 52 on a machine that does nothing else."""
 
 
 class Expected(NamedTuple):

@@ -15,7 +15,7 @@ LIMIT = 60.0
 """How long anything may take to come about, s."""
 
 _SCAN = b"\xff"
-"""What cflib asks a port, to see whether there is a vehicle."""
+"""cflib's request to a port, which a vehicle answers."""
 
 
 class Observer:

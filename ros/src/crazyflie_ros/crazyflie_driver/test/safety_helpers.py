@@ -13,7 +13,7 @@ from crazyflie_utils.testing.peer import wait_until
 ZERO = struct.pack("<fffH", 0, 0, 0, 0)
 SETPOINTS_STOP = struct.pack("<BI", 0, 0)
 UNLOCKED = [(3, 0)] * 100 + [(7, 1)]
-"""What `commands` are when the thrust lock is opened, or a vehicle on the ground is left."""
+"""The `commands` that open the thrust lock, and that leave a vehicle on the ground."""
 READY, FLYING, HIGH_LEVEL, LOCKED = 0x20E, 0x21E, 0x31E, 0x244
 """Recorded of the firmware: on the ground, in a flight on setpoints, which is also what it reports
 for 2 s after a touchdown, in one by its high-level commander, and after an emergency stop."""

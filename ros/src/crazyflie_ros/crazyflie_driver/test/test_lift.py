@@ -50,7 +50,7 @@ class Stream:
 
 
 STANDING = {"stateEstimate.vz": ("f", 0.02), "stateEstimate.yaw": ("f", -10.0)}
-"""What the vehicle estimates, beside its height of 0.75 m; m/s, degrees."""
+"""The vehicle's estimate in addition to its height of 0.75 m; m/s, degrees."""
 
 # (0, 0, z, w) with tan(yaw / 2) = z / w; its norm does not matter.
 NORTH = FullState(pose=Pose(Point(0, 0, 1.0), Quaternion(0, 0, 0.5**0.5, 0.5**0.5)))

@@ -270,6 +270,21 @@ def test_a_way_after_a_hold_begins_at_rest(flight):
     assert abs(flight.followed("cf1")[-1].state.y_dot) < 0.05
 
 
+def test_a_way_back_is_open_also_for_a_vehicle_that_has_not_come_to_rest(flight):
+    flight.go_to(goal=(0.0, 0.9, 1.0), seconds=4.0)
+    flight.process.advance(2.6)
+    flight.see("cf1", 0.8)
+    flight.process.advance(0.06)
+    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    # It overshoots the place where it is held: there the way back begins.
+    flight.see("cf1", 0.82)
+    flight.go_to(goal=(0.0, 0.0, 1.0), seconds=4.0)
+    flight.see("cf1", 0.8)
+    flight.process.advance(5.0)
+    assert flight.process.published("/fleet/waiting")[-1].data == ""
+    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.0)
+
+
 def test_a_way_of_a_vehicle_that_is_elsewhere_begins_with_its_velocity(flight):
     flight.want("cf1", 0.0)
     flight.see("cf1", -0.5, y_dot=0.4)

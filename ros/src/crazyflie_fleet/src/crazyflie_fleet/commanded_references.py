@@ -1,6 +1,7 @@
 """References of a vehicle that flies by high-level commands, and the marker of its path."""
 
 import copy
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -109,7 +110,13 @@ class CommandedReferences:
             self.follower.take_setpoint(now, goal)
 
     def ahead(self, time: float) -> Triple | None:
-        """Return the position of the references after a time (s), m; None if they do not move."""
+        """Return the position of the references after a time (s), m; None if they do not move.
+
+        A move that is held stands still, and may begin nearer to the other vehicle than this one
+        has come to rest: whether it may go on depends on where it ends.
+        """
+        if self._is_move and self._is_held():
+            time = math.inf
         goal = self.follower.goal(self._handle.time() + time)
         return goal.position if goal is not None and self._is_moving else None
 

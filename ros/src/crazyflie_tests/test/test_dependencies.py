@@ -254,7 +254,8 @@ def test_the_virtual_environment_is_the_list():
 
 def is_installed(name, version):
     try:
-        return importlib.metadata.version(name) == version
+        # As for pip, 4.4.5+dfsg of Debian is 4.4.5.
+        return importlib.metadata.version(name).partition("+")[0] == version
     except importlib.metadata.PackageNotFoundError:
         return False
 

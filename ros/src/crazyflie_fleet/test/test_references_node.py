@@ -276,13 +276,17 @@ def test_a_way_back_is_open_also_for_a_vehicle_that_has_not_come_to_rest(flight)
     flight.see("cf1", 0.8)
     flight.process.advance(0.06)
     assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
-    # It overshoots the place where it is held: there the way back begins.
+    # It overshoots the place where it is held, and then rests a little behind it.
     flight.see("cf1", 0.82)
+    before = len(flight.followed("cf1"))
     flight.go_to(goal=(0.0, 0.0, 1.0), seconds=4.0)
-    flight.see("cf1", 0.8)
+    flight.see("cf1", 0.79)
     flight.process.advance(5.0)
     assert flight.process.published("/fleet/waiting")[-1].data == ""
-    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.0)
+    references = [each.state.y for each in flight.followed("cf1")[before:]]
+    # The way back begins at the place where it is held, not nearer to the other vehicle.
+    assert max(references) <= 0.8
+    assert references[-1] == pytest.approx(0.0)
 
 
 def test_a_way_of_a_vehicle_that_is_elsewhere_begins_with_its_velocity(flight):

@@ -112,8 +112,8 @@ class CommandedReferences:
     def ahead(self, time: float) -> Triple | None:
         """Return the position of the references after a time (s), m; None if they do not move.
 
-        A move that is held stands still, and may begin nearer to the other vehicle than this one
-        has come to rest: whether it may go on depends on where it ends.
+        A move that is held stands still at its beginning, which may be nearer to the other vehicle
+        than this one is: whether it may go on depends on where it ends.
         """
         if self._is_move and self._is_held():
             time = math.inf
@@ -137,10 +137,10 @@ class CommandedReferences:
 
     def _command(self, follower, command, arguments):
         present = self.present()
-        if self._is_held():
-            # It is at rest, away from its goal.
+        if self._vehicle is not None and self._vehicle.held_at is not None:
+            # Its present reference is there, at rest, and not at its goal.
             follower.forget()
-            present = at_rest(present.position, present.yaw)
+            present = at_rest(self._vehicle.held_at, present.yaw)
         try:
             command(follower, self._handle.time(), present, *arguments)
         except RefusalError as reason:

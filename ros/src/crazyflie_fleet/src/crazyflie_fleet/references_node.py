@@ -195,7 +195,8 @@ class TrackedVehicle:
         self._timers = timers  # Timers, by their periods (s).
         self.name = config.name
         self.buffer = config.buffer
-        self.is_held = False  #: Whether it is kept at its place, as another one is too near.
+        #: Place where it is kept, m, as another one is too near; None while it follows references.
+        self.held_at: Triple | None = None
         self.is_to_land = False  #: Whether only the fleet moves it, until it lands.
         #: Called when the fleet, or another node, commands it.
         self.on_interruption: Callable[[], None] = lambda: None
@@ -210,6 +211,11 @@ class TrackedVehicle:
         self._heading: float | None = None  # Heading commanded in this flight (rad).
         # Own references that this node has not received yet, by their identity.
         self._own: dict[int, PositionVelocityStateStamped] = {}
+
+    @property
+    def is_held(self) -> bool:
+        """Whether it is kept at its place, as another one is too near."""
+        return self.held_at is not None
 
     def register(self, handle: NodeHandle, frame: str) -> None:
         """Create the publishers and the subscriber; ``frame`` is the fixed frame."""
@@ -270,13 +276,13 @@ class TrackedVehicle:
 
     def hold(self) -> None:
         """Keep the vehicle at its position and ignore commands."""
-        self.is_held = True
         x, y, z = self._states.positions[self.number].tolist()
-        self._publish(at_rest((x, y, z), self._present_heading()))
+        self.held_at = (x, y, z)
+        self._publish(at_rest(self.held_at, self._present_heading()))
 
     def release(self) -> None:
         """Follow the last reference again."""
-        self.is_held = False
+        self.held_at = None
         if self._commanded is not None:
             # With a new stamp: a controller ignores what is older than the hold.
             self._publish(self._commanded)

@@ -51,7 +51,7 @@ class World:
         self.wires.append(Wire(latch))
         return self.wires[-1]
 
-    def subscribe(self, topic, message_type, deliver):
+    def subscribe(self, topic, message_type, deliver, may_wait):
         self.subscribed.append((topic, message_type, deliver))
         return Inlet(self, (topic, message_type, deliver))
 

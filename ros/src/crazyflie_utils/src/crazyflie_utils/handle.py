@@ -161,13 +161,13 @@ class NodeHandle:
             except Exception as error:
                 self.report_fault(callback, error)
 
-        receive: Callable[[Any], None]
+        topics = self._process.topics
         if latest_only:
-            self._latest.append(LatestMessage(work))
-            receive = self._latest[-1].take
+            latest = LatestMessage(work)
+            subscriber = latest.subscribe(topics, name, message_type)
+            self._latest.append(latest)
         else:
-            receive = partial(self._submit, work)
-        subscriber = self._process.topics.subscribe(name, message_type, receive)
+            subscriber = topics.subscribe(name, message_type, partial(self._submit, work))
         self._undo.append(subscriber.close)
         return subscriber
 
@@ -282,8 +282,7 @@ class NodeHandle:
     def _tick(self, callback):
         def tick():
             for latest in self._latest:
-                if latest.waiting:
-                    latest.deliver()
+                latest.deliver()
             if self.is_closed:
                 return
             try:

@@ -41,6 +41,9 @@ class ExternalSubscriber(ABC):
     def has_publishers(self) -> bool:
         """Return whether another process publishes."""
 
+    def collect(self) -> None:  # noqa: B027 - Nothing waits in most transports.
+        """Deliver the messages that wait; see `Transport.subscribe`."""
+
     @abstractmethod
     def close(self) -> None:
         """End the subscription."""
@@ -84,11 +87,16 @@ class Transport(ABC):
 
     @abstractmethod
     def subscribe(
-        self, topic: str, message_type: type, deliver: Callable[[Any], None]
+        self,
+        topic: str,
+        message_type: type,
+        deliver: Callable[[Any], None],
+        may_wait: Callable[[], bool] = lambda: False,
     ) -> ExternalSubscriber:
         """Call ``deliver(message)`` with the messages of other processes.
 
-        That includes latched ones; a topic may be subscribed more than once.
+        That includes latched ones; a topic may be subscribed more than once. While ``may_wait()``,
+        messages may be held back until the subscriber's `collect` is called.
         """
 
     @abstractmethod
@@ -201,6 +209,7 @@ class Subscriber:
         self._topic = topic
         self._receiver = receiver
         self._external = external
+        self.collect = external.collect  #: Delivers the messages that wait.
 
     def has_publishers(self) -> bool:
         """Return whether there are publishers, in this process or in others."""
@@ -226,13 +235,23 @@ class LatestMessage:
 
     def __init__(self, callback: Callable[[Any], None]):
         self._callback = callback
-        self.waiting: deque[Any] = deque(maxlen=1)  #: The message, if it is new.
-        self.take = self.waiting.append  #: Stores a message; it replaces the previous one.
+        self._waiting: deque[Any] = deque(maxlen=1)
+        self._collect: Callable[[], None] | None = None
+
+    def subscribe(self, topics: "Topics", name: str, message_type: type) -> Subscriber:
+        """Subscribe to a topic, whose messages may wait until the next `deliver`."""
+        subscriber = topics.subscribe(
+            name, message_type, self._waiting.append, may_wait=lambda: True
+        )
+        self._collect = subscriber.collect
+        return subscriber
 
     def deliver(self) -> None:
         """Call the callback with the latest message, if it is new."""
-        if self.waiting:
-            self._callback(self.waiting.pop())
+        if self._collect is not None:
+            self._collect()
+        if self._waiting:
+            self._callback(self._waiting.pop())
 
 
 class Topics:
@@ -253,10 +272,12 @@ class Topics:
         message_type: type[genpy.Message],
         receiver: Receiver,
         outside_type: type[genpy.Message] | None = None,
+        may_wait: Callable[[], bool] = lambda: False,
     ) -> Subscriber:
         """Call ``receiver(message)`` for every message on a topic.
 
-        Messages from outside come as ``outside_type``, a subclass of ``message_type``, if given.
+        Messages from outside come as ``outside_type``, a subclass of ``message_type``, if given;
+        ``may_wait`` is that of `Transport.subscribe`.
         """
         topic = self._topic(name, message_type)
         topic.receivers.append(receiver)
@@ -265,7 +286,7 @@ class Topics:
                 receiver(publisher.latched)
         # One subscription for each receiver, so that a late one gets the latched message of another
         # process; the connection is shared.
-        external = self._transport.subscribe(name, outside_type or message_type, receiver)
+        external = self._transport.subscribe(name, outside_type or message_type, receiver, may_wait)
         return Subscriber(topic, receiver, external)
 
     def _topic(self, name, message_type):

@@ -118,10 +118,17 @@ class OwnCallback:
     """A callback of a handle, which ignores messages that handles of this process publish.
 
     Those are passed by a call, if ``is_handed_over()``. They also come by a socket without
-    `skip_self_connections`, or if rospy also subscribes to the topic in this process.
+    `skip_self_connections`, or if rospy also subscribes to the topic in this process. ``may_wait``
+    is that of `Transport.subscribe`.
     """
 
-    def __init__(self, deliver: Callable[[Any], None], is_handed_over: Callable[[], bool]):
+    def __init__(
+        self,
+        deliver: Callable[[Any], None],
+        is_handed_over: Callable[[], bool],
+        may_wait: Callable[[], bool],
+    ):
+        self.may_wait = may_wait
         self._deliver = deliver
         self._is_handed_over = is_handed_over
 
@@ -166,6 +173,16 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
         """Return whether only handles have subscribed."""
         return all(isinstance(callback, OwnCallback) for callback, _ in self.callbacks or ())
 
+    def _may_wait(self):
+        return self._is_own() and all(callback.may_wait() for callback, _ in self.callbacks or ())
+
+    def collect(self) -> None:
+        """Deliver the messages that wait, in this thread; see `receiving.Reception`."""
+        # None after the last subscription has ended.
+        for connection in self.connections or ():
+            if (reception := getattr(connection, "reception", None)) is not None:
+                reception.collect()
+
     @override
     def has_connection(self, endpoint_id: str) -> bool:
         if "skip_self_connections" in self._patches and endpoint_id == rospy.get_node_uri():
@@ -187,7 +204,9 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
             ):
                 return False
             if "harden_subscribers" in self._patches and self._is_own():
-                harden(c, self._report, self._limits_rate)
+                c.reception = harden(
+                    c, self._report, self._limits_rate, self._may_wait, self.receive_callback
+                )
             return super().add_connection(c)
 
 

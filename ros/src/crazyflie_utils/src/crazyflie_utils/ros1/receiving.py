@@ -2,10 +2,12 @@
 
 Messages that cannot be decoded are dropped and the connection goes on, where rospy would connect
 again and again. Publishers of another type and messages without end are disconnected, and a flood
-is decoded in part.
+is decoded in part. Messages that are needed only when they are looked up wait in the socket.
 """
 
 import io
+import math
+import select
 import socket
 import struct
 import threading
@@ -34,6 +36,7 @@ MAX_RATE = 2000.0  #: Rate of messages on one connection above which they are a 
 _BURST = 200.0  #: Number of messages beyond `MAX_RATE` from which they are a flood.
 _FLOOD_PERIOD = 0.005  #: Period in which one message of a flood is accepted (s).
 _MAX_READS = 16  #: Largest number of reads of a socket in one period: a flood never ends.
+PATIENCE = 0.15  #: Longest time for which messages wait to be collected (s).
 
 
 class RateLimiter:
@@ -64,6 +67,8 @@ class Inbox:
         self._report = report
         self._limiter = RateLimiter()
         self._part = bytearray()
+        #: Error that ended the connection while messages were collected.
+        self.end: TransportTerminated | None = None
         # Data that have come after the header of the connection.
         self._read = connection.read_buff.getvalue()[: connection.read_buff.tell()]
         self.sock.setblocking(True)
@@ -77,6 +82,23 @@ class Inbox:
         if limits_rate and frames and self._limiter.is_flooded(len(frames)):
             frames = self._drop_flood(frames)
         return self._decode(frames)
+
+    def collect(self) -> tuple[list[genpy.Message], bool]:
+        """Return the messages that are complete, without waiting, and whether more have come."""
+        frames: list[bytes] = []
+        has_more = True
+        try:
+            for _ in range(_MAX_READS):
+                read_before = self._connection.stat_bytes
+                frames += self._take(socket.MSG_DONTWAIT)
+                has_more = self._connection.stat_bytes - read_before == self._protocol.buff_size
+                if not has_more:
+                    break
+        except BlockingIOError:
+            has_more = False
+        except TransportTerminated as end:
+            self.end = end
+        return self._decode(frames), has_more
 
     def _drop_flood(self, frames):
         """Return the messages of one period to decode: the last one, or all of a lossless type."""
@@ -150,32 +172,109 @@ class Inbox:
         return _LENGTH.size + size
 
 
-def harden(connection: Any, report: Report, limits_rate: bool) -> None:
-    """Make a connection to a publisher, which is not connected yet, receive by an `Inbox`.
+class Reception:
+    """Receives from a connection, a TCPROSTransport of rospy, in the place of its own method.
+
+    While ``may_wait()``, messages wait until `collect` is called or `PATIENCE` is over, unless they
+    come as a flood: a thread that wakes up for each of them takes as long as what it does.
+    """
+
+    def __init__(
+        self,
+        connection: Any,
+        report: Report,
+        limits_rate: bool,
+        may_wait: Callable[[], bool],
+        deliver: Callable[[list[genpy.Message], Any], None],
+    ):
+        self._connection = connection
+        self._report = report
+        self._limits_rate = limits_rate
+        self._may_wait = may_wait
+        self._deliver = deliver
+        self._inbox: Inbox | None = None
+        self._collected = -math.inf
+        # Cleared for good: only the connection's own thread reads the socket from then on.
+        self._waits = True
+        # Held during delivery, which keeps the messages in order.
+        self._lock = threading.RLock()
+
+    def receive_once(self) -> list[genpy.Message]:
+        """Wait for messages and return them; TransportTerminated if there will be none."""
+        connection = self._connection
+        if connection.socket is None:
+            raise TransportException("connection not initialized")
+        with self._lock:
+            # After a reconnection there is another socket.
+            if self._inbox is None or self._inbox.sock is not connection.socket:
+                self._inbox = Inbox(connection, self._report)
+        messages: list[genpy.Message] = []
+        while not (messages or connection.done or rospy.core.is_shutdown()):
+            if self._inbox.end is not None:
+                raise self._inbox.end
+            if self._is_waiting():
+                self._collect_later(self._inbox.sock)
+            else:
+                messages = self._inbox.receive(self._limits_rate)
+        return self._count(messages)
+
+    def collect(self) -> None:
+        """Deliver the messages that wait, in this thread."""
+        with self._lock:
+            inbox = self._inbox
+            if inbox is None or inbox.end is not None or not self._is_waiting():
+                return
+            messages, has_more = inbox.collect()
+            self._collected = time.monotonic()
+            self._waits = not has_more
+            if messages:
+                self._deliver(self._count(messages), self._connection)
+
+    def _is_waiting(self):
+        with self._lock:
+            self._waits = self._waits and self._may_wait()
+            return self._waits
+
+    def _collect_later(self, sock):
+        """Collect what has come, unless somebody else has done so recently."""
+        rest = self._collected + PATIENCE - time.monotonic()
+        if rest > 0.0:
+            time.sleep(rest)
+            return
+        poll = select.poll()
+        try:
+            poll.register(sock, select.POLLIN)
+        # Another thread may close the connection at any moment.
+        except (OSError, ValueError) as error:
+            raise TransportTerminated(str(error)) from None
+        if poll.poll(1000):
+            self.collect()
+
+    def _count(self, messages):
+        self._connection.stat_num_msg += len(messages)
+        if self._connection.is_latched and messages:
+            self._connection.latch = messages[-1]
+        return messages
+
+
+def harden(
+    connection: Any,
+    report: Report,
+    limits_rate: bool,
+    may_wait: Callable[[], bool],
+    deliver: Callable[[list[genpy.Message], Any], None],
+) -> Reception:
+    """Make a connection to a publisher, which is not connected yet, receive by a `Reception`.
 
     With ``limits_rate`` only the last message of every 5 ms is decoded in a flood of more than
     `MAX_RATE`; all of them, every 5 ms, of a message type with the attribute ``lossless``.
     """
-    inbox: list[Inbox] = []
-
-    def receive_once():
-        if connection.socket is None:
-            raise TransportException("connection not initialized")
-        # After a reconnection there is another socket.
-        if not inbox or inbox[0].sock is not connection.socket:
-            inbox[:] = [Inbox(connection, report)]
-        messages: list[genpy.Message] = []
-        while not (messages or connection.done or rospy.core.is_shutdown()):
-            messages = inbox[0].receive(limits_rate)
-        connection.stat_num_msg += len(messages)
-        if connection.is_latched and messages:
-            connection.latch = messages[-1]
-        return messages
-
-    connection.receive_once = receive_once
+    reception = Reception(connection, report, limits_rate, may_wait, deliver)
+    connection.receive_once = reception.receive_once
     connection._validate_header = partial(
         _validate_header, connection, connection._validate_header, report
     )
+    return reception
 
 
 def _validate_header(connection, validate, report, header):

@@ -27,7 +27,7 @@ from crazyflie_utils.ros1.calls import (
     withdrawn,
 )
 from crazyflie_utils.ros1.master_watch import living_node
-from crazyflie_utils.ros1.own_topics import OwnCallback, publish
+from crazyflie_utils.ros1.own_topics import OwnCallback, OwnSubscription, publish
 from crazyflie_utils.ros1.patches import log_without_master, shield_screen_log
 from crazyflie_utils.topics import ExternalPublisher, ExternalSubscriber, Transport
 
@@ -68,6 +68,11 @@ class _RosSubscriber(ExternalSubscriber):
 
     def has_publishers(self) -> bool:
         return self._subscriber is not None and self._subscriber.get_num_connections() > 0
+
+    def collect(self) -> None:
+        own = self._subscriber and self._subscriber.impl
+        if isinstance(own, OwnSubscription):
+            own.collect()
 
     def close(self) -> None:
         self._run(self._end)
@@ -156,7 +161,11 @@ class RosTransport(Transport):
         return _RosPublisher(publisher, lambda: self._published.subtract([topic]))
 
     def subscribe(
-        self, topic: str, message_type: type, deliver: Callable[[Any], None]
+        self,
+        topic: str,
+        message_type: type,
+        deliver: Callable[[Any], None],
+        may_wait: Callable[[], bool] = lambda: False,
     ) -> ExternalSubscriber:
         """Register a subscriber with the master, from a callback without waiting for it."""
 
@@ -167,7 +176,7 @@ class RosTransport(Transport):
             patches.own_subscription(
                 topic, message_type, is_handed_over, self._refuse, self._limits_rate
             )
-            callback = OwnCallback(deliver, is_handed_over)
+            callback = OwnCallback(deliver, is_handed_over, may_wait)
             name = self._rospy_name(topic)
             return rospy.Subscriber(name, message_type, callback, tcp_nodelay=True)
 

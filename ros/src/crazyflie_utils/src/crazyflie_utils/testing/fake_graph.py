@@ -261,7 +261,13 @@ class _GraphTransport(FakeTransport):
         self.advertised.append(topic)
         return _Publication(self, topic, latch)
 
-    def subscribe(self, topic: str, message_type: type, deliver: Deliver) -> ExternalSubscriber:
+    def subscribe(
+        self,
+        topic: str,
+        message_type: type,
+        deliver: Deliver,
+        may_wait: Callable[[], bool] = lambda: False,
+    ) -> ExternalSubscriber:
         subscribers = self.subscribers.setdefault(topic, [])
         subscribers.append(deliver)
         for message in self.graph.latched(topic, self.name):

@@ -98,7 +98,11 @@ class FakeTransport(Transport):
         return self.publishers.setdefault(topic, _Record())
 
     def subscribe(
-        self, topic: str, message_type: type, deliver: Callable[[Any], None]
+        self,
+        topic: str,
+        message_type: type,
+        deliver: Callable[[Any], None],
+        may_wait: Callable[[], bool] = lambda: False,
     ) -> ExternalSubscriber:
         """Keep ``deliver`` for `FakeProcess.publish`."""
         subscribers = self.subscribers.setdefault(topic, [])

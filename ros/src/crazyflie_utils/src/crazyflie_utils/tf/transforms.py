@@ -149,8 +149,9 @@ class Transforms:
     def _listen(self):
         if self._subscriber is None:
             self._subscriber = self._topics.subscribe(
-                "/tf", TFMessage, self._on_transforms, RawTransforms
+                "/tf", TFMessage, self._on_transforms, RawTransforms, lambda: not self._listeners
             )
+            self.on_lookup(self._subscriber.collect)
             self._topics.subscribe("/tf_static", TFMessage, self._on_static)
 
     def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:

@@ -1,5 +1,6 @@
 """The button for which scripts wait: that of a joystick, or any key."""
 
+import functools
 import glob
 import logging
 import os
@@ -7,8 +8,7 @@ import select
 import sys
 import termios
 import tty
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Callable, Iterator, Sequence
 
 from crazyflie_demo.joystick import EVENT, Joystick
 from crazyflie_py.crazyflie import TimeHelper
@@ -23,11 +23,8 @@ _POLL_PERIOD = 0.01  #: s.
 _KEY = [0] * BUTTON + [1]  #: Buttons that are reported for a key.
 
 
-class Device(Protocol):
-    """A source of button events."""
-
-    def poll(self) -> Sequence[int]:
-        """Return 1 for each button that is pressed, else 0; waits 0.01 s at most."""
+#: A source of button events: 1 for each button that is pressed, else 0; waits 0.01 s at most.
+Poll = Callable[[], Sequence[int]]
 
 
 class JoystickDevice:
@@ -54,36 +51,25 @@ class JoystickDevice:
         return RuntimeError(f"swarm.input: the joystick {self._path} was disconnected ({reason})")
 
 
-class KeyboardDevice:
-    """The terminal."""
-
-    def poll(self) -> Sequence[int]:
-        """Return the button as pressed if a key was typed."""
-        file = sys.stdin.fileno()
-        settings = termios.tcgetattr(file)
-        tty.setcbreak(file, termios.TCSANOW)
-        try:
-            is_typed = bool(select.select([file], [], [], _POLL_PERIOD)[0])
-            return _KEY if is_typed and os.read(file, 1024) else []
-        finally:
-            termios.tcsetattr(file, termios.TCSANOW, settings)
+def _poll_keyboard():
+    """Return the button as pressed if a key was typed into the terminal."""
+    file = sys.stdin.fileno()
+    settings = termios.tcgetattr(file)
+    tty.setcbreak(file, termios.TCSANOW)
+    try:
+        is_typed = bool(select.select([file], [], [], _POLL_PERIOD)[0])
+        return _KEY if is_typed and os.read(file, 1024) else []
+    finally:
+        termios.tcsetattr(file, termios.TCSANOW, settings)
 
 
-class UnattendedDevice:
-    """No operator: the button is pressed for one poll, `UNATTENDED_DELAY` after the first poll."""
-
-    def __init__(self, time: Callable[[], float]):
-        self._time = time
-        self._begin: float | None = None
-
-    def poll(self) -> Sequence[int]:
-        """Return the button as pressed when the time has come."""
-        if self._begin is None:
-            self._begin = self._time()
-        if self._time() < self._begin + UNATTENDED_DELAY:
-            return []
-        self._begin = None
-        return _KEY
+def _unattended(time: Callable[[], float]) -> Iterator[Sequence[int]]:
+    """Yield the button as pressed once, `UNATTENDED_DELAY` after the first request; repeat."""
+    while True:
+        begin = time()
+        while time() < begin + UNATTENDED_DELAY:
+            yield []
+        yield _KEY
 
 
 class Input:
@@ -105,29 +91,24 @@ class Input:
         self._time_helper = time_helper
         self._is_simulated = is_simulated
         self._pattern = devices
-        self._device: Device | None = None
 
-    def _poll(self) -> Sequence[int]:
-        # The device is opened late: most scripts need none.
-        if self._device is None:
-            self._device = self._find()
-        return self._device.poll()
-
-    def _find(self) -> Device:
+    @functools.cached_property
+    def _poll(self) -> Poll:
+        # Not before it is needed: most scripts need none.
         for path in sorted(glob.glob(self._pattern)):
             try:
-                return JoystickDevice(path)
+                return JoystickDevice(path).poll
             except OSError as error:
                 _log.warning("swarm.input: cannot open %s: %s", path, error.strerror)
         if _has_terminal():
-            return KeyboardDevice()
+            return _poll_keyboard
         if self._is_simulated:
             _log.warning(
                 "swarm.input: neither a joystick nor a terminal is connected; the button is "
                 "pressed %g s after the wait begins",
                 UNATTENDED_DELAY,
             )
-            return UnattendedDevice(self._time_helper.time)
+            return _unattended(self._time_helper.time).__next__
         raise RuntimeError(
             f"swarm.input: neither a joystick ({self._pattern}) nor a terminal is connected; "
             "expected one of them"

@@ -15,18 +15,19 @@ LIMIT = 90.0
 
 TRACE = """
 import json, runpy, sys
-from crazyflie_py.ros_connection import ScriptConnection
+from crazyflie_py.ros_swarm import RosSwarm
 
 track = []
-sleep = ScriptConnection.sleep
+sleep = RosSwarm.sleep
 
 
 def traced(self, duration):
     sleep(self, duration)
-    track.append([self.fleet.position(name) for name in self.fleet.names])
+    fleet = self._connection.fleet
+    track.append([fleet.position(name) for name in fleet.names])
 
 
-ScriptConnection.sleep = traced
+RosSwarm.sleep = traced
 sys.argv = sys.argv[1:]
 try:
     runpy.run_path(sys.argv[0], run_name="__main__")

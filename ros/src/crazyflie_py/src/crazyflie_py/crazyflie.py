@@ -4,8 +4,11 @@ Names, arguments and defaults are Crazyswarm's. Angles are in rad unless a metho
 lengths in m, times in s.
 """
 
+import functools
 import logging
+import operator
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -28,8 +31,7 @@ from crazyflie_mission_api.mission_vehicle import (
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_py import arguments as check
-from crazyflie_py.fleet import FleetVehicle
-from crazyflie_py.swarm import DEFAULT_COLOR, NullVisualizer, Order, Swarm
+from crazyflie_py.swarm import DEFAULT_COLOR, NullVisualizer, Order, Swarm, SwarmVehicle
 
 _log = logging.getLogger(__name__)
 
@@ -83,22 +85,20 @@ class TimeHelper:
 
 
 class ScriptCommands:
-    """Checks arguments and sends commands to the vehicle ``name``, by default to all."""
+    """Checks arguments and sends commands to a vehicle, by default to all."""
 
-    def __init__(self, swarm: Swarm, name: str | None = None):
+    def __init__(self, swarm: Swarm, vehicle: SwarmVehicle | None = None):
         self._swarm = swarm
-        self._vehicle = name
-        self._name = name or "allcfs"  # In messages.
+        self._vehicle = vehicle
+        self._vehicles = swarm.vehicles if vehicle is None else [vehicle]
+        self._name = "allcfs" if vehicle is None else vehicle.name  # In messages.
 
     def _command(self, name: str, send: Callable[[Any], Any], *facts: Any, **options: Any) -> None:
         self._swarm.command(Order(name, send, *facts, **options), self._vehicle)
 
     def _send(self, setpoint: Setpoint) -> None:
-        self._swarm.send(setpoint, self._vehicle)
-
-    def _names(self) -> list[str]:
-        every = [vehicle.name for vehicle in self._swarm.fleet]
-        return every if self._vehicle is None else [self._vehicle]
+        for vehicle in self._vehicles:
+            vehicle.send(setpoint)
 
     def _where(self, method: str) -> str:
         return f"{self._name}.{method}"
@@ -165,7 +165,7 @@ class ScriptCommands:
         place, turn = check.triple(where, "goal", goal), check.number(where, "yaw", yaw)
         seconds = check.number(where, "duration", duration, 0.0)
         mask = self._mask(where, mask)
-        turn = self._swarm.checked_yaw(turn, self._vehicle)
+        turn = self._vehicles[0].checked_yaw(turn)
         move = Move(place, turn, seconds, bool(relative))
         self._command(
             "go_to",
@@ -245,8 +245,8 @@ class ScriptCommands:
         self._set_parameters(check.parameters(self._where("setParam"), {name: value}))
 
     def _set_parameters(self, values: Mapping[str, float]) -> None:
-        for vehicle in self._names():
-            self._swarm.parameters[vehicle].update(values)
+        for vehicle in self._vehicles:
+            vehicle.parameters.update(values)
 
     def cmdFullState(
         self, pos: ArrayLike, vel: ArrayLike, acc: ArrayLike, yaw: float, omega: ArrayLike
@@ -262,17 +262,18 @@ class ScriptCommands:
 class Crazyflie(ScriptCommands):
     """One vehicle."""
 
-    def __init__(self, swarm: Swarm, vehicle: FleetVehicle):
-        super().__init__(swarm, vehicle.name)
-        self.id = vehicle.id  #: Last byte of its radio address.
+    _vehicle: SwarmVehicle
+
+    def __init__(self, swarm: Swarm, vehicle: SwarmVehicle):
+        super().__init__(swarm, vehicle)
+        self.id = vehicle.config.id  #: Last byte of its radio address.
         #: name, prefix: "cf1", "/cf1".
         self.name = vehicle.name
         self.prefix = f"/{vehicle.name}"
         #: Start point in the fleet file (m).
-        self.initialPosition: Array = np.array(vehicle.position)
+        self.initialPosition: Array = np.array(vehicle.config.position)
         #: Colour that `setLEDColor` has set; initially, Crazyswarm's colour in pictures.
         self.ledRGB = DEFAULT_COLOR
-        self._group_mask = 0
 
     def setGroupMask(self, groupMask: int) -> None:
         """Make the vehicle a member of up to 8 groups, a bit each.
@@ -280,8 +281,7 @@ class Crazyflie(ScriptCommands):
         A command with a mask other than 0 concerns vehicles that have a bit in common with it.
         """
         mask = check.byte(self._where("setGroupMask"), "groupMask", groupMask)
-        self._swarm.set_group_mask(mask, self.name)
-        self._group_mask = mask
+        self._vehicle.set_group_mask(mask)
 
     def goTo(
         self,
@@ -311,7 +311,10 @@ class Crazyflie(ScriptCommands):
         where = self._where("uploadTrajectory")
         number = check.byte(where, "trajectoryId", trajectoryId)
         offset = check.byte(where, "pieceOffset", pieceOffset)
-        pieces = self._swarm.checked_pieces(check.pieces(where, trajectory), self.name)
+        pieces = [
+            replace(piece, yaw=[*map(self._vehicle.checked_yaw, piece.yaw)])
+            for piece in check.pieces(where, trajectory)
+        ]
         self._command(
             "upload_trajectory", lambda vehicle: vehicle.upload_trajectory(number, offset, pieces)
         )
@@ -320,31 +323,31 @@ class Crazyflie(ScriptCommands):
 
     def position(self) -> Array:
         """Return the position, m, shape (3,)."""
-        return np.array(self._swarm.state(self.name).position)
+        return np.array(self._vehicle.state().position)
 
     def velocity(self) -> Array:
         """Return the velocity, m/s, shape (3,)."""
-        return np.array(self._swarm.state(self.name).velocity)
+        return np.array(self._vehicle.state().velocity)
 
     def acceleration(self) -> Array:
         """Return the acceleration, m/s^2, shape (3,)."""
-        return np.array(self._swarm.state(self.name).acceleration)
+        return np.array(self._vehicle.state().acceleration)
 
     def rpy(self) -> tuple[float, float, float]:
         """Return roll, pitch and yaw, rad; a positive pitch accelerates forward."""
-        return self._swarm.state(self.name).rpy
+        return self._vehicle.state().rpy
 
     def yaw(self) -> float:
         """Return the yaw, rad."""
-        return self._swarm.state(self.name).rpy[2]
+        return self._vehicle.state().rpy[2]
 
     def get_position(self) -> list[float]:
         """Return the position, m."""
-        return list(self._swarm.state(self.name).position)
+        return list(self._vehicle.state().position)
 
     def get_pose(self) -> dict[str, Any]:
         """Return "position" (x, y, z) and "orientation" (x, y, z, w), with these attributes."""
-        state = self._swarm.state(self.name)
+        state = self._vehicle.state()
         point = SimpleNamespace(**dict(zip("xyz", state.position, strict=True)))
         quaternion = quaternion_from_rpy(*state.rpy)
         orientation = SimpleNamespace(**dict(zip("xyzw", quaternion, strict=True)))
@@ -352,14 +355,14 @@ class Crazyflie(ScriptCommands):
 
     def get_status(self) -> dict[str, Any]:
         """Return battery voltage, supervisor bits and others, with crazyswarm2's keys."""
-        return self._swarm.status(self.name)
+        return self._vehicle.status()
 
     # Parameters.
 
     def getParam(self, name: str) -> float:
         """Return a firmware parameter, GROUP/NAME or GROUP.NAME."""
         key = check.parameter_name(self._where("getParam"), name)
-        return self._swarm.parameters[self.name][key]
+        return self._vehicle.parameters[key]
 
     def setParams(self, params: Mapping[str, float]) -> None:
         """Set firmware parameters, name -> value."""
@@ -453,12 +456,12 @@ class Crazyflie(ScriptCommands):
             check.integer(where, "voronoiProjectionMaxIters", iterations, 1, 10**6),
         )
         found = check.instances(where, "others", others, Crazyflie)
-        names = [other.name for other in found if other is not self]
-        self._swarm.avoid(self.name, names, settings)
+        vehicles = [other._vehicle for other in found if other is not self]
+        self._vehicle.avoid(vehicles, settings)
 
     def disableCollisionAvoidance(self) -> None:
         """End collision avoidance."""
-        self._swarm.avoid(self.name, (), None)
+        self._vehicle.avoid((), None)
 
 
 class _Found(dict[Any, Crazyflie]):
@@ -476,16 +479,13 @@ class CrazyflieServer(ScriptCommands):
     def __init__(self, swarm: Swarm):
         super().__init__(swarm)
         #: In the order of the fleet file.
-        self.crazyflies = [Crazyflie(swarm, vehicle) for vehicle in swarm.fleet]
+        self.crazyflies = [Crazyflie(swarm, vehicle) for vehicle in swarm.vehicles]
         self.crazyfliesById = _Found({cf.id: cf for cf in self.crazyflies})
         self.crazyfliesByName = _Found({cf.name: cf for cf in self.crazyflies})
 
     @override
     def _groups(self) -> int:
-        groups = 0
-        for crazyflie in self.crazyflies:
-            groups |= crazyflie._group_mask
-        return groups
+        return functools.reduce(operator.or_, (vehicle.groups for vehicle in self._vehicles))
 
     def goTo(self, goal: ArrayLike, yaw: float, duration: float, groupMask: int = 0) -> None:
         """Fly by an offset (m) and an angle (rad); see `Crazyflie.goTo`."""

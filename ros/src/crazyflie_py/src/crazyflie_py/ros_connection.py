@@ -10,8 +10,6 @@ from typing import Any
 from crazyflie_fleet.high_level_services import HIGH_LEVEL
 from crazyflie_fleet.vehicle_nodes import PLACE
 from crazyflie_mission_api import Fleet, MissionError
-from crazyflie_mission_api.mission_vehicle import never
-from crazyflie_mission_api.ros_vehicle import CALL_TIMEOUT
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.parameters.types import Integer
 
@@ -24,18 +22,13 @@ class CommandRefusedError(RuntimeError):
 
 
 class ScriptConnection:
-    """Handle, fleet and calls that all vehicles of a script share."""
+    """Handle and fleet that all vehicles of a script share."""
 
     def __init__(self, handle: NodeHandle, fleet: Fleet, is_unchecked: bool):
         self.handle = handle
         self.fleet = fleet
         self.is_unchecked = is_unchecked  #: Whether refusals are only warnings.
         self.said: set[str] = set()  #: See `SimulatedParameters`.
-
-    def call(self, service: str, service_type: Any, *arguments: Any) -> "Future[Any]":
-        """Call a service by its absolute name; return the future of the answer."""
-        request = service_type._request_class(*arguments)
-        return self.handle.call_service(service, service_type, request, CALL_TIMEOUT)
 
     def refuse(self, text: str) -> None:
         """Raise `CommandRefusedError`; with --unchecked warn."""
@@ -62,11 +55,6 @@ class ScriptConnection:
                 failures[name] = str(call.exception())
         if failures:
             self.refuse("; ".join(f"{name}: {what}: {text}" for name, text in failures.items()))
-
-    def sleep(self, duration: float) -> None:
-        """Return after a duration of the vehicles' time (s)."""
-        clock = self.fleet.clock
-        clock.wait_until(never, clock.time() + duration)
 
 
 def running_vehicles(handle: NodeHandle) -> list[str]:

@@ -1,24 +1,33 @@
 """A running vehicle of a script: checks of its commands, its parameters and its state."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import FirmwareNumber
-from crazyflie_mission_api.mission_vehicle import Clock, Setpoint
+from crazyflie_fleet.separation import LOOK_AHEAD
+from crazyflie_mission_api.mission_vehicle import (
+    SETPOINT_TIMEOUT,
+    AttitudeSetpoint,
+    MotorsOffSetpoint,
+    Move,
+    PositionSetpoint,
+    Setpoint,
+    led_to,
+)
 from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, velocity_between
 from crazyflie_model.angles import Triple, rpy_from_quaternion
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_msgs.msg import FlightStatus, VehicleStatus
 from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.ros_connection import ScriptConnection
-from crazyflie_py.separation_watch import HeldVehicle
 from crazyflie_py.simulated_parameters import SimulatedParameters
 from crazyflie_py.swarm import Order, ParameterStore, ScriptState
 from crazyflie_utils import ParameterError
 
 _STATE_TIMEOUT = 10.0  #: Timeout of a pose (s of the vehicles' time).
+_HOLD_DURATION = 0.8  #: Time in which a held vehicle stops (s).
 _VELOCITY_SPAN = 0.2  #: Longest time between the two poses of a velocity (s).
 
 _UNKNOWN: Triple = (math.nan, math.nan, math.nan)
@@ -27,47 +36,6 @@ _UNKNOWN: Triple = (math.nan, math.nan, math.nan)
 _FIRMWARE_INFINITY = 1e9
 
 _NOT_FLYING = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
-
-
-class MeasuredStates:
-    """States of one vehicle; accelerations are not known, NaN."""
-
-    def __init__(self, vehicle: RosVehicle, clock: Clock):
-        self._vehicle = vehicle
-        self._clock = clock
-        self._last: TimedPose | None = None
-        self._velocity = _UNKNOWN
-
-    def state(self) -> ScriptState:
-        """Return the state; its velocity is that between two poses.
-
-        Raises
-        ------
-        TimeoutError
-            No pose has come for 10 s.
-        """
-        pose, last = self._wait(lambda pose: True), self._last
-        if last is None or pose.time - last.time > _VELOCITY_SPAN:
-            last, pose = pose, self._wait(lambda new: new.time > pose.time)
-        if pose.time > last.time:
-            self._velocity = velocity_between(last, pose)
-        self._last = pose
-        rpy = rpy_from_quaternion(*pose.rotation)
-        return ScriptState(pose.position, self._velocity, _UNKNOWN, rpy)
-
-    def _wait(self, condition: Callable[[TimedPose], bool]) -> TimedPose:
-        def is_there():
-            pose = self._vehicle.pose()
-            return pose is not None and condition(pose)
-
-        self._clock.wait_until(is_there, self._clock.time() + _STATE_TIMEOUT)
-        pose = self._vehicle.pose()
-        if pose is None:
-            raise TimeoutError(
-                f"{self._vehicle.name}: no position for {_STATE_TIMEOUT:g} s; does motion "
-                "capture track the vehicle?"
-            )
-        return pose
 
 
 def avoidance_parameters(settings: AvoidanceSettings) -> dict[str, float]:
@@ -134,34 +102,36 @@ class ScriptVehicle:
     ):
         self.name = vehicle.name
         self.vehicle = vehicle
-        self.held = HeldVehicle(vehicle, connection)
-        self.states = MeasuredStates(vehicle, connection.fleet.clock)
+        self.config = config
+        self.pose = vehicle.pose
         self.parameters: ParameterStore = (
             FirmwareParameters(vehicle, connection)
             if has_firmware
-            else SimulatedParameters(self.name, self, connection.said)
+            else SimulatedParameters(self, connection.said)
         )
-        self._start = config.position
+        self.groups = 0  #: Mask of the groups that the script has made it a member of.
+        self.is_landing = False  #: Whether the script has landed it; it is not held then.
         self._connection = connection
-        self._groups = 0
+        self._avoids = False  # Its firmware avoids collisions.
+        self._free_until = -math.inf
+        # The last setpoint, and its time (s); the position at which the vehicle is held (m).
+        self._streamed: tuple[Setpoint, float] | None = None
+        self._held_at: Triple | None = None
+        self._last_pose: TimedPose | None = None
+        self._velocity = _UNKNOWN
 
     # Commands.
 
-    @property
-    def groups(self) -> int:
-        """Mask of the groups that the script has made it a member of."""
-        return self._groups
-
-    @groups.setter
-    def groups(self, mask: int) -> None:
-        self.held.end_setpoints()
-        call = self.vehicle.set_group_mask(mask)
+    def set_group_mask(self, group_mask: int) -> None:
+        """Make the vehicle a member of groups, a bit each."""
+        self.end_setpoints()
+        call = self.vehicle.set_group_mask(group_mask)
         self._connection.finish("set_group_mask", {self.name: call})
-        self._groups = mask
+        self.groups = group_mask
 
     def is_member(self, group_mask: int) -> bool:
         """Return whether a command to groups concerns the vehicle."""
-        return group_mask == 0 or bool(group_mask & self._groups)
+        return group_mask == 0 or bool(group_mask & self.groups)
 
     def prepare(self, order: Order) -> None:
         """Refuse a command to a goal outside the fence; otherwise record its consequences."""
@@ -169,12 +139,13 @@ class ScriptVehicle:
             self._check("goTo" if order.name == "go_to" else order.name, order.goal)
         if order.flies:
             self.note_flight()
-        self.held.free(order.duration)
+        # It is not held while it takes off or lands.
+        self._free_until = self._connection.fleet.time() + order.duration
 
     def send(self, setpoint: Setpoint) -> None:
         """Send a setpoint; while the vehicle is too near to another, send one that holds it."""
         self.note_flight()
-        self.vehicle.send(self.held.passed(setpoint))
+        self.vehicle.send(self._passed(setpoint))
 
     def checked_yaw(self, yaw: float) -> float:
         """Return a yaw that the vehicle can have, rad; another is refused."""
@@ -187,7 +158,7 @@ class ScriptVehicle:
 
     def _check(self, what, goal):
         """Refuse a goal (m) outside the vehicle's fence, or below the ground."""
-        bounds, place = self.vehicle.bounds, self.vehicle.position() or self._start
+        bounds, place = self.vehicle.bounds, self.vehicle.position() or self.config.position
         goal = [old if math.isnan(new) else new for new, old in zip(goal, place, strict=True)]
         for value, low, high, axis in zip(goal, bounds.lower, bounds.upper, "xyz", strict=True):
             if not low <= value <= high:
@@ -196,8 +167,8 @@ class ScriptVehicle:
                     f"{low:g} to {high:g} m"
                 )
 
-    def avoid(self, settings: AvoidanceSettings | None) -> None:
-        """Set collision avoidance of the firmware; None ends it."""
+    def avoid(self, others: Sequence[object], settings: AvoidanceSettings | None) -> None:
+        """Set collision avoidance of the firmware, which determines the others; None ends it."""
         if not self.vehicle.uses_driver:
             if settings is not None:
                 self._connection.handle.warn(
@@ -207,11 +178,11 @@ class ScriptVehicle:
             return
         if settings is None:
             self.parameters.update({"colAv.enable": 0})
-            self.held.avoids = False
+            self._avoids = False
             return
         try:
             self.parameters.update({**avoidance_parameters(settings), "colAv.enable": 1})
-            self.held.avoids = True
+            self._avoids = True
         except ValueError as error:
             self._connection.refuse(f"{self.name}: enableCollisionAvoidance: {error}")
 
@@ -219,19 +190,98 @@ class ScriptVehicle:
 
     def note_flight(self) -> None:
         """Record that the vehicle must be landed at the end of the script."""
-        self.held.is_landing = False
+        self.is_landing = False
         self._connection.fleet.adopt(self.name)
 
     def note_landing(self, group_mask: int) -> None:
         """Record that the script lands the vehicles of groups."""
-        self.held.is_landing = self.held.is_landing or self.is_member(group_mask)
+        self.is_landing = self.is_landing or self.is_member(group_mask)
 
     def has_begun(self) -> bool:
         """Return whether a takeoff under the workspace's controller is under way."""
         status = self.vehicle.flight_status.state
         return status in (FlightStatus.TAKING_OFF, FlightStatus.FLYING)
 
+    # Distances from other vehicles.
+
+    def _passed(self, setpoint: Setpoint) -> Setpoint:
+        """Return the setpoint to send in place of one that a script sends."""
+        self._streamed = setpoint, self._connection.fleet.time()
+        if self._held_at is None or isinstance(setpoint, AttitudeSetpoint | MotorsOffSetpoint):
+            return setpoint
+        return PositionSetpoint(self._held_at, self.vehicle.heading())
+
+    def end_setpoints(self) -> None:
+        """Record that a command follows setpoints."""
+        self._streamed = self._held_at = None
+
+    @property
+    def may_be_held(self) -> bool:
+        """Whether it flies, and neither takes off, nor lands, nor avoids others by itself."""
+        is_flying = bool(self.vehicle.driver_status.supervisor & VehicleStatus.FLYING)
+        is_free = self._connection.fleet.time() < self._free_until
+        return is_flying and not is_free and not self.is_landing and not self._avoids
+
+    def streamed_goal(self, place: Triple) -> Triple | None:
+        """Return the place to which setpoints move it from a place (m); None without setpoints."""
+        if self._streamed is None:
+            return None
+        setpoint, time = self._streamed
+        if self._connection.fleet.time() - time > SETPOINT_TIMEOUT:
+            return None
+        return led_to(setpoint, place, self.vehicle.heading(), LOOK_AHEAD)
+
+    def hold(self, place: Triple) -> None:
+        """Hold it at a position (m)."""
+        if self.streamed_goal(place) is not None:
+            self._held_at = place
+            return
+        move = Move(place, self.vehicle.heading(), _HOLD_DURATION)
+        self.vehicle.go_to(move).add_done_callback(self._note_hold)
+
+    def release(self) -> None:
+        """Release it: it follows its setpoints again."""
+        self._held_at = None
+
+    def _note_hold(self, answer):
+        if answer.exception() is not None:
+            self._connection.handle.warn(
+                f"{self.name}: the vehicle cannot be held: {answer.exception()}"
+            )
+
     # State.
+
+    def state(self) -> ScriptState:
+        """Return the state; its velocity is that between two poses.
+
+        Raises
+        ------
+        TimeoutError
+            No pose has come for 10 s.
+        """
+        pose, last = self._wait(lambda pose: True), self._last_pose
+        if last is None or pose.time - last.time > _VELOCITY_SPAN:
+            last, pose = pose, self._wait(lambda new: new.time > pose.time)
+        if pose.time > last.time:
+            self._velocity = velocity_between(last, pose)
+        self._last_pose = pose
+        rpy = rpy_from_quaternion(*pose.rotation)
+        return ScriptState(pose.position, self._velocity, _UNKNOWN, rpy)
+
+    def _wait(self, condition: Callable[[TimedPose], bool]) -> TimedPose:
+        def is_there():
+            pose = self.pose()
+            return pose is not None and condition(pose)
+
+        clock = self._connection.fleet.clock
+        clock.wait_until(is_there, clock.time() + _STATE_TIMEOUT)
+        pose = self.pose()
+        if pose is None:
+            raise TimeoutError(
+                f"{self.name}: no position for {_STATE_TIMEOUT:g} s; does motion "
+                "capture track the vehicle?"
+            )
+        return pose
 
     def status(self) -> dict[str, Any]:
         """Return the status with the keys of crazyswarm2's Crazyflie.get_status."""

@@ -6,96 +6,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_mission_api.mission_vehicle import (
-    SETPOINT_TIMEOUT,
-    AttitudeSetpoint,
-    MotorsOffSetpoint,
-    Move,
-    PositionSetpoint,
-    Setpoint,
-    led_to,
-)
-from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, velocity_between
-from crazyflie_model.angles import Triple
-from crazyflie_msgs.msg import VehicleStatus
+from crazyflie_mission_api.ros_vehicle import TimedPose, velocity_between
 from crazyflie_py.ros_connection import ScriptConnection
-
-_HOLD_DURATION = 0.8  #: Time in which a held vehicle stops (s).
+from crazyflie_py.script_vehicle import ScriptVehicle
 
 _SHORTEST_SPAN = 0.02  #: Least time between two poses for a velocity (s).
 _LONGEST_SPAN = 0.3  #: Age of the first pose above which it is not used for a velocity (s).
 _LOWEST_SPEED = 0.05  #: Speed below which a vehicle hovers (m/s).
 _REPEAT = 2.0  #: Shortest time between two warnings of a vehicle (s).
-
-
-class HeldVehicle:
-    """One vehicle."""
-
-    def __init__(self, vehicle: RosVehicle, connection: ScriptConnection):
-        self.name = vehicle.name
-        #: is_landing, avoids: Whether it lands, and whether its firmware avoids collisions; it is
-        #: not held then.
-        self.is_landing = False
-        self.avoids = False
-        self._free_until = -math.inf
-        self._vehicle = vehicle
-        self._connection = connection
-        # The last setpoint, and its time (s); the position at which the vehicle is held (m).
-        self._streamed: tuple[Setpoint, float] | None = None
-        self._held_at: Triple | None = None
-
-    def passed(self, setpoint: Setpoint) -> Setpoint:
-        """Return the setpoint to send in place of one that a script sends."""
-        self._streamed = setpoint, self._connection.fleet.time()
-        if self._held_at is None or isinstance(setpoint, AttitudeSetpoint | MotorsOffSetpoint):
-            return setpoint
-        return PositionSetpoint(self._held_at, self._vehicle.heading())
-
-    def free(self, duration: float) -> None:
-        """Record that it takes off or lands, for a duration (s)."""
-        self._free_until = self._connection.fleet.time() + duration
-
-    def end_setpoints(self) -> None:
-        """Record that a command follows setpoints."""
-        self._streamed = self._held_at = None
-
-    @property
-    def may_be_held(self) -> bool:
-        """Whether it flies, and neither takes off, nor lands, nor avoids others by itself."""
-        is_flying = bool(self._vehicle.driver_status.supervisor & VehicleStatus.FLYING)
-        is_free = self._connection.fleet.time() < self._free_until
-        return is_flying and not is_free and not self.is_landing and not self.avoids
-
-    def pose(self) -> TimedPose | None:
-        """Return its position, m; None if that is not known."""
-        return self._vehicle.pose()
-
-    def streamed_goal(self, place: Triple) -> Triple | None:
-        """Return the place to which setpoints move it from a place (m); None without setpoints."""
-        if self._streamed is None:
-            return None
-        setpoint, time = self._streamed
-        if self._connection.fleet.time() - time > SETPOINT_TIMEOUT:
-            return None
-        return led_to(setpoint, place, self._vehicle.heading(), LOOK_AHEAD)
-
-    def hold(self, place: Triple) -> None:
-        """Hold it at a position (m)."""
-        if self.streamed_goal(place) is not None:
-            self._held_at = place
-            return
-        move = Move(place, self._vehicle.heading(), _HOLD_DURATION)
-        self._vehicle.go_to(move).add_done_callback(self._note_hold)
-
-    def release(self) -> None:
-        """Release it: it follows its setpoints again."""
-        self._held_at = None
-
-    def _note_hold(self, answer):
-        if answer.exception() is not None:
-            self._connection.handle.warn(
-                f"{self.name}: the vehicle cannot be held: {answer.exception()}"
-            )
 
 
 class SeparationWatch:
@@ -105,7 +23,7 @@ class SeparationWatch:
 
     Parameters
     ----------
-    vehicles : sequence of HeldVehicle
+    vehicles : sequence of ScriptVehicle
     buffers : sequence of float
         Radii of the space that is reserved for each vehicle, m.
     connection : Connection
@@ -114,7 +32,7 @@ class SeparationWatch:
 
     def __init__(
         self,
-        vehicles: Sequence[HeldVehicle],
+        vehicles: Sequence[ScriptVehicle],
         buffers: Sequence[float],
         connection: ScriptConnection,
     ):

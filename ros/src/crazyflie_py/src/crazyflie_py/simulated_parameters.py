@@ -4,10 +4,9 @@ import functools
 import logging
 import math
 from collections.abc import Mapping
-from typing import Protocol
 
 from crazyflie_model.angles import Triple
-from crazyflie_py.swarm import DEFAULT_COLOR
+from crazyflie_py.swarm import DEFAULT_COLOR, SwarmVehicle
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.parameters import Parameter, parameter_specs
@@ -18,12 +17,6 @@ _log = logging.getLogger(__name__)
 _COLOR = ("ring.solidRed", "ring.solidGreen", "ring.solidBlue")
 
 
-class HasGroups(Protocol):
-    """A vehicle that is a member of groups."""
-
-    groups: int
-
-
 class SimulatedParameters:
     """Firmware parameters, "group.name" -> value.
 
@@ -31,17 +24,13 @@ class SimulatedParameters:
 
     Parameters
     ----------
-    name : str
-        Of the vehicle.
-    planner : Planner or other object
-        Has the ``groups``.
+    vehicle : SwarmVehicle
     said : set of str
         Names that have caused a warning, shared by all vehicles.
     """
 
-    def __init__(self, name: str, planner: HasGroups, said: set[str]):
-        self._name = name
-        self._planner = planner
+    def __init__(self, vehicle: SwarmVehicle, said: set[str]):
+        self._vehicle = vehicle
         self._said = said
         self._values: dict[str, float] = {}
 
@@ -49,12 +38,12 @@ class SimulatedParameters:
         """Set parameters; those that the virtual vehicle lacks are stored, with a warning."""
         for key, value in values.items():
             if key == "hlCommander.groupmask":
-                self._planner.groups = int(value)
+                self._vehicle.set_group_mask(int(value))
             elif key not in self._said and key not in _defaults():
                 self._said.add(key)
                 _log.warning(
                     "%s.setParam: the simulation has no parameter %s; it is stored without effect",
-                    self._name,
+                    self._vehicle.name,
                     key,
                 )
             self._check(key, value)
@@ -74,7 +63,7 @@ class SimulatedParameters:
             return
         _log.warning(
             "%s.setParam: %s is %g; expected %s: a real vehicle refuses it",
-            self._name,
+            self._vehicle.name,
             key,
             value,
             expected,
@@ -83,7 +72,7 @@ class SimulatedParameters:
     def __getitem__(self, key: str) -> float:
         """Return a value; ValueError for a name that is not known and was not set."""
         if key == "hlCommander.groupmask":
-            return self._planner.groups
+            return self._vehicle.groups
         if key in self._values:
             return self._values[key]
         if key in _defaults():
@@ -91,7 +80,7 @@ class SimulatedParameters:
         group = key.partition(".")[0]
         known = [name for name in _defaults() if name.startswith(f"{group}.")]
         expected = ", ".join(known) if known else f"no group {group}; there are {_groups()}"
-        raise ValueError(f"{self._name}.getParam: name is {key}; expected {expected}")
+        raise ValueError(f"{self._vehicle.name}.getParam: name is {key}; expected {expected}")
 
     @property
     def led_color(self) -> Triple:

@@ -47,94 +47,6 @@ class SimulatedMotion(NamedTuple):
     yaw: float
 
 
-class IdealMotion:
-    """Motion of one vehicle, in steps.
-
-    Parameters
-    ----------
-    position : tuple, 3 components
-        At the beginning, m; the yaw is 0.
-    max_speed : float
-        m/s.
-    disturbance : float
-        Standard deviation of the noise of velocity setpoints, m/s.
-    """
-
-    def __init__(self, position: Triple, max_speed: float, disturbance: float):
-        self._max_speed = max_speed
-        self._disturbance = disturbance
-        self._avoidance: CollisionAvoidance | None = None
-        self._others: Sequence[IdealMotion] = ()
-        self.now = SimulatedMotion(np.array(position), np.zeros(3), np.zeros(3), 0.0)
-
-    def avoid(self, others: Sequence[Self], settings: AvoidanceSettings | None) -> None:
-        """Avoid other vehicles; None for settings ends collision avoidance."""
-        self._others = others
-        self._avoidance = None if settings is None else CollisionAvoidance(settings)
-
-    def held(self) -> SimulatedMotion:
-        """Return the motion of a vehicle that stays at its place."""
-        return SimulatedMotion(self.now.position, np.zeros(3), np.zeros(3), self.now.yaw)
-
-    def tracked(self, goal: Goal[float] | FullStateSetpoint, dt: float) -> SimulatedMotion:
-        """Return the motion ``dt`` (s) from now, towards the goal, as far as limits permit."""
-        vectors = (goal.position, goal.velocity, goal.acceleration)
-        position, velocity, acceleration = map(np.array, vectors)
-        return self._limited(SimulatedMotion(position, velocity, acceleration, goal.yaw), dt)
-
-    def at_setpoint(self, setpoint: Setpoint, dt: float) -> SimulatedMotion:
-        """Return the motion ``dt`` (s) from now; an attitude keeps the vehicle in place."""
-        if isinstance(setpoint, FullStateSetpoint):
-            return self.tracked(setpoint, dt)
-        if isinstance(setpoint, PositionSetpoint):
-            zero = np.zeros(3)
-            goal = SimulatedMotion(np.array(setpoint.position), zero, zero, setpoint.yaw)
-            return self._approached(self._limited(goal, dt), dt)
-        if isinstance(setpoint, VelocityWorldSetpoint):
-            return self._at_velocity(np.array(setpoint.velocity), setpoint.yaw_rate, dt)
-        if isinstance(setpoint, HoverSetpoint):
-            climb = (setpoint.height - self.now.position[2]) / dt
-            velocity = np.array([*setpoint.velocity(self.now.yaw), climb])
-            return self._at_velocity(velocity, setpoint.yaw_rate, dt)
-        return self.held()
-
-    def _limited(self, goal, dt):
-        if self._avoidance is not None:
-            position, velocity = self._avoidance.position_setpoint(
-                self.now.position, self._other_positions(), goal.position, goal.velocity
-            )
-            if np.array_equal(position, goal.position):
-                goal = goal._replace(velocity=velocity)
-            else:
-                goal = self._approached(goal._replace(position=position), dt)
-        way = goal.position - self.now.position
-        reach = self._max_speed * dt
-        if np.linalg.norm(way) <= reach:
-            return goal
-        return self._approached(
-            goal._replace(position=self.now.position + _clamped(way, reach)), dt
-        )
-
-    def _approached(self, goal, dt):
-        """Return a goal with the velocity at which it is reached."""
-        velocity = (goal.position - self.now.position) / dt
-        return goal._replace(velocity=velocity, acceleration=np.zeros(3))
-
-    def _at_velocity(self, velocity, yaw_rate, dt):
-        position = self.now.position
-        if self._avoidance is not None:
-            others = self._other_positions()
-            velocity = self._avoidance.velocity_setpoint(position, others, velocity)
-        velocity = _clamped(velocity, self._max_speed)
-        if self._disturbance:
-            velocity = velocity + self._disturbance * np.random.normal(size=3)
-        yaw = self.now.yaw + math.radians(yaw_rate) * dt
-        return SimulatedMotion(position + dt * velocity, velocity, np.zeros(3), yaw)
-
-    def _other_positions(self):
-        return np.array([other.now.position for other in self._others]).reshape(-1, 3)
-
-
 def attitude(acceleration: Array, yaw: float) -> Triple:
     """Return roll, pitch and yaw (rad) of a multirotor that accelerates, by differential flatness.
 
@@ -179,9 +91,14 @@ class SimulatedVehicle(IdealVehicle):
     ):
         self._warned: set[str] = set()
         super().__init__(vehicle.name, time, vehicle.position)
-        self.id, self.initial_position = vehicle.id, vehicle.position
-        self._motion = IdealMotion(self.initial_position, max_speed, disturbance)
-        self.parameters = SimulatedParameters(self.name, self, said)
+        self.config = vehicle
+        self.parameters = SimulatedParameters(self, said)
+        #: Position and motion, which the swarm sets in steps.
+        self.motion = SimulatedMotion(np.array(vehicle.position), np.zeros(3), np.zeros(3), 0.0)
+        self._max_speed = max_speed
+        self._disturbance = disturbance
+        self._avoidance: CollisionAvoidance | None = None
+        self._others: Sequence[Self] = ()
         self._setpoint: Setpoint | None = None
         self._sent = 0.0
         self._expiry = math.inf
@@ -240,7 +157,7 @@ class SimulatedVehicle(IdealVehicle):
 
     @override
     def _stop_motors(self, method: str) -> None:
-        height = self.motion.position[2] - self.initial_position[2]
+        height = self.motion.position[2] - self.config.position[2]
         if height > _FALL_HEIGHT:
             self._warn(
                 f"{self.name}.{method}: the motors stop {height:.2f} m above the start; a real "
@@ -251,28 +168,19 @@ class SimulatedVehicle(IdealVehicle):
 
     def avoid(self, others: Sequence[Self], settings: AvoidanceSettings | None) -> None:
         """Avoid other vehicles; None for settings ends collision avoidance."""
-        self._motion.avoid([other._motion for other in others], settings)
+        self._others = others
+        self._avoidance = None if settings is None else CollisionAvoidance(settings)
+
+    def checked_yaw(self, yaw: float) -> float:
+        """Return the yaw, rad: the vehicle can have any."""
+        return yaw
 
     # State.
-
-    @property
-    def motion(self) -> SimulatedMotion:
-        """Position and motion of the vehicle."""
-        return self._motion.now
-
-    @motion.setter
-    def motion(self, motion: SimulatedMotion) -> None:
-        self._motion.now = motion
 
     @property
     def is_flying(self) -> bool:
         """Whether motors would run."""
         return self._setpoint is not None or self.is_active
-
-    @property
-    def led_color(self) -> Triple:
-        """Red, green and blue, 0 to 1."""
-        return self.parameters.led_color
 
     def state(self) -> ScriptState:
         """Return position, velocity, acceleration and attitude."""
@@ -310,11 +218,73 @@ class SimulatedVehicle(IdealVehicle):
                     f"{self.name}: no setpoint for {SETPOINT_TIMEOUT:g} s; a real vehicle levels "
                     "out and stops its motors 2 s after the last one"
                 )
-            return self._motion.at_setpoint(self._setpoint, dt)
+            return self._at_setpoint(self._setpoint, dt)
         # Also at the end of a landing.
         if self._flies or now - dt < self.trajectory.end:
-            return self._motion.tracked(self.trajectory.goal(now), dt)
-        return self._motion.held()
+            return self._tracked(self.trajectory.goal(now), dt)
+        return self._stopped()
+
+    def _stopped(self) -> SimulatedMotion:
+        """Return the motion of a vehicle that stays at its place."""
+        return SimulatedMotion(self.motion.position, np.zeros(3), np.zeros(3), self.motion.yaw)
+
+    def _tracked(self, goal: Goal[float] | FullStateSetpoint, dt: float) -> SimulatedMotion:
+        """Return the motion ``dt`` (s) from now, towards the goal, as far as limits permit."""
+        vectors = (goal.position, goal.velocity, goal.acceleration)
+        position, velocity, acceleration = map(np.array, vectors)
+        return self._limited(SimulatedMotion(position, velocity, acceleration, goal.yaw), dt)
+
+    def _at_setpoint(self, setpoint: Setpoint, dt: float) -> SimulatedMotion:
+        """Return the motion ``dt`` (s) from now; an attitude keeps the vehicle in place."""
+        if isinstance(setpoint, FullStateSetpoint):
+            return self._tracked(setpoint, dt)
+        if isinstance(setpoint, PositionSetpoint):
+            zero = np.zeros(3)
+            goal = SimulatedMotion(np.array(setpoint.position), zero, zero, setpoint.yaw)
+            return self._approached(self._limited(goal, dt), dt)
+        if isinstance(setpoint, VelocityWorldSetpoint):
+            return self._at_velocity(np.array(setpoint.velocity), setpoint.yaw_rate, dt)
+        if isinstance(setpoint, HoverSetpoint):
+            climb = (setpoint.height - self.motion.position[2]) / dt
+            velocity = np.array([*setpoint.velocity(self.motion.yaw), climb])
+            return self._at_velocity(velocity, setpoint.yaw_rate, dt)
+        return self._stopped()
+
+    def _limited(self, goal, dt):
+        if self._avoidance is not None:
+            position, velocity = self._avoidance.position_setpoint(
+                self.motion.position, self._other_positions(), goal.position, goal.velocity
+            )
+            if np.array_equal(position, goal.position):
+                goal = goal._replace(velocity=velocity)
+            else:
+                goal = self._approached(goal._replace(position=position), dt)
+        way = goal.position - self.motion.position
+        reach = self._max_speed * dt
+        if np.linalg.norm(way) <= reach:
+            return goal
+        return self._approached(
+            goal._replace(position=self.motion.position + _clamped(way, reach)), dt
+        )
+
+    def _approached(self, goal, dt):
+        """Return a goal with the velocity at which it is reached."""
+        velocity = (goal.position - self.motion.position) / dt
+        return goal._replace(velocity=velocity, acceleration=np.zeros(3))
+
+    def _at_velocity(self, velocity, yaw_rate, dt):
+        position = self.motion.position
+        if self._avoidance is not None:
+            others = self._other_positions()
+            velocity = self._avoidance.velocity_setpoint(position, others, velocity)
+        velocity = _clamped(velocity, self._max_speed)
+        if self._disturbance:
+            velocity = velocity + self._disturbance * np.random.normal(size=3)
+        yaw = self.motion.yaw + math.radians(yaw_rate) * dt
+        return SimulatedMotion(position + dt * velocity, velocity, np.zeros(3), yaw)
+
+    def _other_positions(self):
+        return np.array([other.motion.position for other in self._others]).reshape(-1, 3)
 
     @override
     def _warn(self, text: str) -> None:

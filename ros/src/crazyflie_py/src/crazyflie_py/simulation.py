@@ -4,18 +4,13 @@ import argparse
 import logging
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
 from crazyflie_fleet.fleet_config import close_pairs
-from crazyflie_mission_api.mission_vehicle import Setpoint
-from crazyflie_model.collision_avoidance import AvoidanceSettings
-from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.fleet import FleetVehicle
-from crazyflie_py.simulated_parameters import SimulatedParameters
 from crazyflie_py.simulated_vehicle import SimulatedVehicle
-from crazyflie_py.swarm import Order, ScriptState
+from crazyflie_py.swarm import Order, Swarm
 from crazyflie_py.visualizer import visualizer_for
 
 _log = logging.getLogger(__name__)
@@ -39,7 +34,7 @@ class CsvOutput:
         for vehicle in vehicles:
             state = vehicle.state()
             row = [time, *state.position, *state.rpy]
-            self._rows.setdefault(vehicle.id, []).append(row)
+            self._rows.setdefault(vehicle.config.id, []).append(row)
 
     def next_phase(self) -> None:
         """Write the present phase, and begin the next one."""
@@ -56,8 +51,8 @@ class CsvOutput:
         self._rows.clear()
 
 
-class Simulation:
-    """A `crazyflie_py.swarm.Swarm` without ROS.
+class Simulation(Swarm):
+    """A swarm without ROS.
 
     Parameters
     ----------
@@ -66,14 +61,14 @@ class Simulation:
         Of `crazyflie_py.crazyswarm_py.build_argparser`.
     """
 
+    vehicles: Sequence[SimulatedVehicle]
+
     def __init__(self, fleet: Sequence[FleetVehicle], options: argparse.Namespace):
         self.dt: float = options.dt
-        self.fleet = fleet
         self._steps = 0
         self._residual = 0.0
         limits = (options.maxvel, options.disturbance, set[str]())
         self.vehicles = [SimulatedVehicle(vehicle, self.time, *limits) for vehicle in fleet]
-        self._by_name = {vehicle.name: vehicle for vehicle in self.vehicles}
         self._buffers = [vehicle.buffer for vehicle in fleet]
         self._close: set[tuple[int, int]] = set()
         self.visualizer = visualizer_for(options.vis, has_video=options.video is not None)
@@ -81,40 +76,9 @@ class Simulation:
             self.visualizer.startVideoOutput(options.video, self.dt)
         self._output = CsvOutput() if options.writecsv else None
 
-    # Commands, without restrictions.
-
-    def _chosen(self, name: str | None) -> list[SimulatedVehicle]:
-        return self.vehicles if name is None else [self._by_name[name]]
-
-    def command(self, order: Order, name: str | None) -> None:
-        for vehicle in self._chosen(name):
-            order.send(vehicle)
-
-    def send(self, setpoint: Setpoint, name: str | None) -> None:
-        for vehicle in self._chosen(name):
-            vehicle.send(setpoint)
-
-    def set_group_mask(self, group_mask: int, name: str) -> None:
-        self._by_name[name].set_group_mask(group_mask)
-
-    def checked_yaw(self, yaw: float, name: str | None) -> float:
-        return yaw
-
-    def checked_pieces(self, pieces: list[PolynomialPiece], name: str) -> list[PolynomialPiece]:
-        return pieces
-
-    def avoid(self, name: str, others: Sequence[str], settings: AvoidanceSettings | None) -> None:
-        self._by_name[name].avoid([self._by_name[other] for other in others], settings)
-
-    @property
-    def parameters(self) -> dict[str, SimulatedParameters]:
-        return {vehicle.name: vehicle.parameters for vehicle in self.vehicles}
-
-    def state(self, name: str) -> ScriptState:
-        return self._by_name[name].state()
-
-    def status(self, name: str) -> dict[str, Any]:
-        return self._by_name[name].status()
+    def command(self, order: Order, vehicle: SimulatedVehicle | None) -> None:
+        for each in self.vehicles if vehicle is None else [vehicle]:
+            order.send(each)
 
     # The clock.
 

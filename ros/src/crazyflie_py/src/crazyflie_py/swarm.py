@@ -12,7 +12,6 @@ from typing import Any, NamedTuple, Protocol
 from crazyflie_mission_api.mission_vehicle import Setpoint
 from crazyflie_model.angles import Triple
 from crazyflie_model.collision_avoidance import AvoidanceSettings
-from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.fleet import FleetVehicle
 
 #: Colour in which Crazyswarm draws vehicles: red, green and blue, 0 to 1.
@@ -72,49 +71,48 @@ class NullVisualizer:
         """Draw vehicles at a time, s."""
 
 
-class Swarm(Protocol):
-    """All vehicles and the clock; where a name is expected, None is all vehicles."""
+class SwarmVehicle(Protocol):
+    """A vehicle of a swarm."""
 
-    dt: float  #: Period of the clock's steps, s; of the real clock 0.
-
-    @property
-    def fleet(self) -> Sequence[FleetVehicle]:
-        """At least one vehicle; ids and names are different."""
+    name: str
+    config: FleetVehicle
+    groups: int  #: Mask of the groups that it belongs to.
 
     @property
-    def visualizer(self) -> NullVisualizer:
-        """The visualizer of --sim; otherwise one that draws nothing."""
+    def parameters(self) -> ParameterStore:
+        """Firmware parameters."""
 
-    @property
-    def parameters(self) -> Mapping[str, ParameterStore]:
-        """Firmware parameters by the names of the vehicles."""
-
-    def command(self, order: Order, name: str | None) -> None:
-        """Send a command; returns when it is accepted, not when it is carried out."""
-
-    def send(self, setpoint: Setpoint, name: str | None) -> None:
+    def send(self, setpoint: Setpoint) -> None:
         """Send a low-level setpoint once."""
 
-    def set_group_mask(self, group_mask: int, name: str) -> None:
-        """Make a vehicle a member of groups, a bit each."""
+    def set_group_mask(self, group_mask: int) -> Any:
+        """Make the vehicle a member of groups, a bit each."""
 
-    def checked_yaw(self, yaw: float, name: str | None) -> float:
-        """Return a yaw that the vehicles can have, rad."""
+    def checked_yaw(self, yaw: float) -> float:
+        """Return a yaw that the vehicle can have, rad; another is refused."""
 
-    def checked_pieces(self, pieces: list[PolynomialPiece], name: str) -> list[PolynomialPiece]:
-        """Return pieces with yaws that the vehicle can have."""
-
-    def avoid(self, name: str, others: Sequence[str], settings: AvoidanceSettings | None) -> None:
-        """Avoid collisions with others; None for settings ends that.
+    def avoid(self, others: Sequence[Any], settings: AvoidanceSettings | None) -> None:
+        """Avoid collisions with others of the swarm; None for settings ends that.
 
         With hardware the firmware determines the others.
         """
 
-    def state(self, name: str) -> ScriptState:
+    def state(self) -> ScriptState:
         """Return the state; TimeoutError if none is received for 10 s."""
 
-    def status(self, name: str) -> dict[str, Any]:
+    def status(self) -> dict[str, Any]:
         """Return the status with the keys of crazyswarm2's Crazyflie.get_status."""
+
+
+class Swarm(Protocol):
+    """All vehicles and the clock."""
+
+    dt: float  #: Period of the clock's steps, s; of the real clock 0.
+    vehicles: Sequence[SwarmVehicle]  #: At least one vehicle; ids and names are different.
+    visualizer: NullVisualizer  #: That of --sim; otherwise one that draws nothing.
+
+    def command(self, order: Order, vehicle: Any) -> None:
+        """Send a command to a vehicle, or to all (None); returns when it is accepted."""
 
     def time(self) -> float:
         """Return the time, s."""

@@ -115,7 +115,7 @@ class MatplotlibVisualizer(NullVisualizer):
         for artist in self._artists:
             artist.remove()
         positions = np.array([vehicle.motion.position for vehicle in crazyflies])
-        colors = [vehicle.led_color for vehicle in crazyflies]
+        colors = [vehicle.parameters.led_color for vehicle in crazyflies]
         lines = [positions[list(edge)] for edge in self._edges]
         if self._radii is not None:
             lines += [position + circle for position in positions for circle in self._radii]

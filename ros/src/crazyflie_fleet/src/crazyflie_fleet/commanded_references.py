@@ -11,7 +11,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_fleet.follower import CommandFollower, Velocity
 from crazyflie_fleet.high_level_services import HighLevelParameters, reference_message
-from crazyflie_fleet.references_node import TimerShare, TrackedVehicle
+from crazyflie_fleet.references_node import TrackedVehicle
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_model.trajectory import Trajectory
@@ -19,7 +19,6 @@ from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.timers import Timer
 
 _COLOUR = ColorRGBA(0.95, 0.55, 0.05, 0.8)
 _WIDTH = 0.01  #: Width of the line (m).
@@ -84,7 +83,7 @@ class CommandedReferences:
         self._is_move = False
         # When the last setpoint came; None without a stream.
         self._setpoint_time: float | None = None
-        self._timer: Timer | TimerShare | None = None
+        self._stop_timer: Callable[[], None] | None = None
         self._state: Goal[float] | None = None
         self._state_time = 0.0
         self._vehicle = vehicle
@@ -203,13 +202,16 @@ class CommandedReferences:
         if not self._is_moving:
             self._plan.clear()
         is_needed = self._is_moving or self._setpoint_time is not None
-        if is_needed and self._timer is None:
-            timers = self._handle if self._vehicle is None else self._vehicle
-            on_timer = self._handle.guard(self._on_timer)
-            self._timer = timers.timer(self._parameters.time_step, on_timer)
-        elif not is_needed and self._timer is not None:
-            self._timer.stop()
-            self._timer = None
+        if is_needed and self._stop_timer is None:
+            period = self._parameters.time_step
+            if self._vehicle is None:
+                self._stop_timer = self._handle.timer(period, self._on_timer).stop
+            else:
+                on_timer = self._handle.guard(self._on_timer)
+                self._stop_timer = self._vehicle.timer(period, on_timer)
+        elif not is_needed and self._stop_timer is not None:
+            self._stop_timer()
+            self._stop_timer = None
 
     def _on_timer(self):
         now = self._handle.time()

@@ -1,8 +1,9 @@
 """Vehicles that fly together, their settings, and the types of these settings' values."""
 
 import dataclasses
+import itertools
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,31 +55,20 @@ DEFAULT_TOPICS = {
 }
 
 
-class _Pattern(ParameterType):
-    """A text that a regular expression matches."""
+class VehicleName(ParameterType):
+    """Name of a vehicle's namespace and frame; /all/takeoff is a service for all vehicles."""
 
     label = "string"
 
-    def __init__(self, pattern: "re.Pattern[str]", expected: str):
-        self._pattern = pattern
-        self._expected = expected
-
     @override
     def __call__(self, value: Any) -> str:
-        if not isinstance(value, str) or not self._pattern.fullmatch(value):
+        if not isinstance(value, str) or not re.fullmatch("(?!all$)[A-Za-z][A-Za-z0-9_]*", value):
             raise ValueError
         return value
 
     @override
     def __str__(self) -> str:
-        return self._expected
-
-
-#: Name of a vehicle's namespace and frame; /all/takeoff is a service for all vehicles.
-VEHICLE_NAME = _Pattern(
-    re.compile(r"(?!all$)[A-Za-z][A-Za-z0-9_]*"),
-    "letters, digits and underscores, the first a letter, and not 'all'",
-)
+        return "letters, digits and underscores, the first a letter, and not 'all'"
 
 
 class VehicleUri(ParameterType):
@@ -400,24 +390,17 @@ class FleetConfig:
 
     def at_ports(self, first_port: int) -> "FleetConfig":
         """Return the same vehicles at UDP ports of this computer, one after the other."""
-        vehicles = tuple(
-            dataclasses.replace(
-                vehicle,
-                settings=dataclasses.replace(
-                    vehicle.settings, uri=f"udp://127.0.0.1:{first_port + number}"
-                ),
-            )
-            for number, vehicle in enumerate(self.vehicles)
-        )
-        return dataclasses.replace(self, vehicles=vehicles)
+        uris = (f"udp://127.0.0.1:{port}" for port in itertools.count(first_port))
+        return self._with_settings({"uri": uri} for uri in uris)
 
     def positioned_by(self, source: str) -> "FleetConfig":
         """Return the same vehicles with another source of their poses, of `SOURCES`."""
+        return self._with_settings(itertools.repeat({"positioning": source}))
+
+    def _with_settings(self, changes: Iterable[Mapping[str, Any]]) -> "FleetConfig":
         vehicles = tuple(
-            dataclasses.replace(
-                vehicle, settings=dataclasses.replace(vehicle.settings, positioning=source)
-            )
-            for vehicle in self.vehicles
+            dataclasses.replace(v, settings=dataclasses.replace(v.settings, **change))
+            for v, change in zip(self.vehicles, changes, strict=False)
         )
         return dataclasses.replace(self, vehicles=vehicles)
 

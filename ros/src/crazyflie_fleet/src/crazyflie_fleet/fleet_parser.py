@@ -13,7 +13,6 @@ from crazyflie_fleet.fleet_config import (
     DEFAULT_TOPICS,
     DYNAMICS,
     LOCAL,
-    VEHICLE_NAME,
     WITHOUT_EFFECT,
     BroadcastSettings,
     DefaultTopicSettings,
@@ -25,6 +24,7 @@ from crazyflie_fleet.fleet_config import (
     PartialSettings,
     RobotSettings,
     VehicleConfig,
+    VehicleName,
     close_pairs,
     vehicle_key,
 )
@@ -41,7 +41,7 @@ _SIMILAR = 0.8
 _TOP = ("robots", "robot_types", "all", "machines", "fileversion")
 _FIRMWARE = ("firmware_params", "firmware_logging")
 _LOGGING = ("enabled", "default_topics", "custom_topics")
-_FIRMWARE_NUMBER = FirmwareNumber()
+_FIRMWARE_NUMBER, _VEHICLE_NAME = FirmwareNumber(), VehicleName()
 _WITHOUT_EFFECT = [
     declaration.name
     for declaration in RobotSettings.declarations()
@@ -135,7 +135,7 @@ class FleetParser:
             self._check(common, "broadcasts")
         broadcasts = self._broadcasts(common)
         for name, entry in robots.items():
-            self._check_type(VEHICLE_NAME, name, entry)
+            self._check_type(_VEHICLE_NAME, name, entry)
             self._check(entry)
             self._check_choice(entry, "type", types)
         for entry in (*robots.values(), *types.values(), *([common] if common else [])):
@@ -145,8 +145,7 @@ class FleetParser:
         vehicles = [self._vehicle(name, entry, types, common) for name, entry in robots.items()]
         self._raise_errors()
         enabled = [vehicle for vehicle in vehicles if vehicle.settings.enabled]
-        self._check_addresses(enabled, robots)
-        self._check_frames(enabled, robots)
+        self._check_apart(enabled, robots)
         self._raise_errors()
         disabled = [vehicle.name for vehicle in vehicles if not vehicle.settings.enabled]
         if not enabled:
@@ -224,28 +223,21 @@ class FleetParser:
                 )
                 self._error(chosen, f"is {shown(chosen.value)}; expected {expected}")
 
-    def _check_addresses(self, vehicles, robots):
-        seen: dict[str, str] = {}
+    def _check_apart(self, vehicles, robots):
+        """Check that no two vehicles have one address, or one frame of motion capture."""
+        uris: dict[str, str] = {}
+        # Two with one frame would both fly by the pose of one body.
+        frames = {vehicle.name: vehicle.name for vehicle in vehicles}
         for vehicle in vehicles:
-            if vehicle.uri is None:
-                continue
-            other = seen.setdefault(vehicle_key(vehicle.uri), vehicle.name)
-            if other != vehicle.name:
+            name, robot, frame = vehicle.name, robots[vehicle.name], vehicle.mocap_frame
+            if vehicle.uri and (other := uris.setdefault(vehicle_key(vehicle.uri), name)) != name:
                 line = (_inner(robots[other], "uri") or robots[other]).line
                 self._error(
-                    _inner(robots[vehicle.name], "uri") or robots[vehicle.name],
+                    _inner(robot, "uri") or robot,
                     f"is {vehicle.uri}, which is also that of {other} in line {line}; expected "
                     "an address of its own",
                 )
-
-    def _check_frames(self, vehicles, robots):
-        # Two with one frame would both fly by the pose of one body.
-        seen = {vehicle.name: vehicle.name for vehicle in vehicles}
-        for vehicle in vehicles:
-            frame = vehicle.mocap_frame
-            other = seen.setdefault(frame, vehicle.name)
-            if other != vehicle.name:
-                robot = robots[vehicle.name]
+            if (other := frames.setdefault(frame, name)) != name:
                 self._error(
                     _inner(robot, "motion_capture/frame") or robot,
                     f"has the frame {frame} of motion capture, which is that of {other}; expected "
@@ -334,7 +326,7 @@ class FleetParser:
         custom = []
         for key, inner in _entries(parts, "custom_topics").items():
             topic = self._read(inner, LogTopicSettings)
-            self._check_type(VEHICLE_NAME, key, inner)
+            self._check_type(_VEHICLE_NAME, key, inner)
             if topic is not None:
                 custom.append(LogTopic(key, topic.frequency, topic.variables))
         enabled = "enabled" not in parts or self._check_type(

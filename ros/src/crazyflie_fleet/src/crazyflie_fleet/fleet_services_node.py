@@ -11,7 +11,7 @@ from typing_extensions import override
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_fleet.high_level_services import HIGH_LEVEL, START_TOPIC
-from crazyflie_fleet.lander import SERVICE_TIMEOUT, Lander, Refusals
+from crazyflie_fleet.lander import Lander, Refusals
 from crazyflie_fleet.mission_watch import MISSION_TIMEOUT, MissionWatch
 from crazyflie_fleet.references_node import VehicleStates
 from crazyflie_msgs.msg import FlightStatus
@@ -35,8 +35,8 @@ _NOT_BEGUN = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
 
 
 @dataclass
-class _Takeoff:
-    """A call that waits until no vehicle refuses a takeoff."""
+class _Call:
+    """A call of a service for all; a takeoff waits until no vehicle refuses it."""
 
     service: str
     service_type: Any
@@ -60,7 +60,7 @@ class FleetServicesNode(Node):
         self._fleet = fleet
         self._states = states
         self._numbers = {name: number for number, name in enumerate(states.names)}
-        self._takeoffs: list[_Takeoff] = []
+        self._takeoffs: list[_Call] = []
         self._age = 0.0
 
     @override
@@ -108,7 +108,7 @@ class FleetServicesNode(Node):
         if getattr(request, "group_mask", 0):
             # Only the nodes of the vehicles know their groups.
             return self._call_all(service, service_type, request)
-        takeoff = _Takeoff(service, service_type, request)
+        takeoff = _Call(service, service_type, request)
         if not self._begin(takeoff):
             waiting = self._takeoff_refusals()
             self._handle.info(
@@ -154,11 +154,11 @@ class FleetServicesNode(Node):
                 return True
             rest = ", ".join(names)
             self._handle.info(f"flying already: {', '.join(flying)}; taking off: {rest}")
-        self._take_off(takeoff, names)
+        self._call_each(takeoff, names, is_takeoff=True)
         return True
 
-    def _take_off(self, takeoff, names):
-        """Call the takeoffs of vehicles; if one refuses, those that have begun land."""
+    def _call_each(self, call, names, is_takeoff=False):
+        """Call the services of vehicles; if one refuses a takeoff, those that have begun land."""
         open_calls = {*names}
         begun: list[str] = []
         refusals: dict[str, str] = {}
@@ -170,19 +170,19 @@ class FleetServicesNode(Node):
                 return
             if done.exception() is not None:
                 refusals[name] = str(done.exception())
-                if self._state(name) in _NOT_BEGUN:
+                if is_takeoff and self._state(name) in _NOT_BEGUN:
                     is_aborted = True
-                    self._abort(takeoff, [each for each in begun if each != name], refusals)
+                    self._abort(call, [each for each in begun if each != name], refusals)
                     return
             open_calls.discard(name)
             if not open_calls:
-                self._reply(takeoff.answer, refusals, takeoff.service_type._response_class())
+                self._reply(call.answer, refusals, call.service_type._response_class())
 
         for name in names:
             if is_aborted:
                 break
             begun.append(name)
-            self._call(name, takeoff.service, takeoff.service_type, takeoff.request, on_answer)
+            self._lander.call(name, call.service, call.service_type, call.request, on_answer)
 
     def _abort(self, takeoff, begun, refusals):
         text = f"no vehicle takes off: {self._text(refusals)}"
@@ -250,24 +250,6 @@ class FleetServicesNode(Node):
         return self._call_all(service, srv.GoTo, request)
 
     def _call_all(self, service, service_type, request):
-        response = service_type._response_class()
-        answer: Future[Any] = Future()
-        open_calls = set(self._fleet.names)
-        refusals: dict[str, str] = {}
-
-        def on_answer(name: str, done: Future[Any]) -> None:
-            if done.exception() is not None:
-                refusals[name] = str(done.exception())
-            open_calls.discard(name)
-            if not open_calls:
-                self._reply(answer, refusals, response)
-
-        for name in self._fleet.names:
-            self._call(name, service, service_type, request, on_answer)
-        return answer
-
-    def _call(self, name, service, service_type, request, on_answer):
-        call = self._handle.call_service(
-            f"/{name}/{service}", service_type, request, SERVICE_TIMEOUT
-        )
-        call.add_done_callback(partial(on_answer, name))
+        call = _Call(service, service_type, request)
+        self._call_each(call, self._fleet.names)
+        return call.answer

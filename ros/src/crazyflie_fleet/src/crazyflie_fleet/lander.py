@@ -1,8 +1,9 @@
 """Landings of a fleet by ROS: in rounds, and next to vehicles beneath."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
+from typing import Any
 
 import genpy
 import numpy as np
@@ -206,7 +207,7 @@ class Lander(LandingSide):
             request = GoToRequest(
                 0, False, Point(*goal), KEEP_HEADING, genpy.Duration.from_sec(duration)
             )
-            self._call(name, "go_to", GoTo, request, self._note_refusal)
+            self.call(name, "go_to", GoTo, request, self._note_refusal)
         return self.time() + duration
 
     @override
@@ -222,9 +223,17 @@ class Lander(LandingSide):
 
     def _call_land(self, name):
         self._calls.add(name)
-        self._call(name, "land", Empty, EmptyRequest(), self._on_landed)
+        self.call(name, "land", Empty, EmptyRequest(), self._on_landed)
 
-    def _call(self, name, service, service_type, request, on_answer):
+    def call(
+        self,
+        name: str,
+        service: str,
+        service_type: Any,
+        request: Any,
+        on_answer: Callable[[str, "Future[Any]"], None],
+    ) -> None:
+        """Call a service of a vehicle, and then ``on_answer(name, answer)``."""
         service = f"/{name}/{service}"
         call = self._handle.call_service(service, service_type, request, SERVICE_TIMEOUT)
         call.add_done_callback(partial(on_answer, name))

@@ -146,39 +146,26 @@ class SharedTimer:
     def __init__(self, handle: NodeHandle, period: float):
         self._handle = handle
         self._period = period
-        self._shares: dict[TimerShare, None] = {}
+        self._callbacks: dict[object, Callable[[], None]] = {}
         self._timer: Timer | None = None
 
-    def add(self, callback: Callable[[], None]) -> "TimerShare":
-        """Call ``callback()`` at each tick from now on."""
-        share = TimerShare(self, callback)
-        self._shares[share] = None
+    def add(self, callback: Callable[[], None]) -> Callable[[], None]:
+        """Call ``callback()`` at each tick from now on; return a function that ends this."""
+        key = object()
+        self._callbacks[key] = callback
         if self._timer is None:
             self._timer = self._handle.timer(self._period, self._on_timer)
-        return share
+        return partial(self._remove, key)
 
-    def remove(self, share: "TimerShare") -> None:
-        """End the calls of a callback."""
-        self._shares.pop(share, None)
-        if not self._shares and self._timer is not None:
+    def _remove(self, key):
+        self._callbacks.pop(key, None)
+        if not self._callbacks and self._timer is not None:
             self._timer.stop()
             self._timer = None
 
     def _on_timer(self):
-        for share in [*self._shares]:
-            share.callback()
-
-
-class TimerShare:
-    """A callback of a `SharedTimer`."""
-
-    def __init__(self, timer: SharedTimer, callback: Callable[[], None]):
-        self.callback = callback
-        self._timer = timer
-
-    def stop(self) -> None:
-        """End the calls."""
-        self._timer.remove(self)
+        for callback in [*self._callbacks.values()]:
+            callback()
 
 
 class TrackedVehicle:
@@ -246,8 +233,11 @@ class TrackedVehicle:
             self._own[id(message)] = message
             self._public.publish(message)
 
-    def timer(self, period: float, callback: Callable[[], None]) -> "TimerShare":
-        """Call ``callback()`` every ``period`` seconds, by one timer of all vehicles."""
+    def timer(self, period: float, callback: Callable[[], None]) -> Callable[[], None]:
+        """Call ``callback()`` every ``period`` seconds, by one timer of all vehicles.
+
+        Return a function that ends this.
+        """
         if period not in self._timers:
             self._timers[period] = SharedTimer(self._handle, period)
         return self._timers[period].add(callback)

@@ -39,7 +39,7 @@ def places(group):
 
 def watch(group):
     """Return a list of the least distances of vehicles, m, from now on."""
-    found, clock = [], group._clock
+    found, clock = [], group.clock
     wait_until = clock.wait_until
 
     def look(condition, deadline):

@@ -28,63 +28,6 @@ _DEFINITIONS = 31  #: Number of trajectories that can be defined at one time.
 _MIN_DURATION = 0.01  #: Shortest duration of a plan, as in the firmware (s).
 
 
-class TrajectoryMemory:
-    """The trajectory memory of an ideal vehicle: that of the firmware, with messages.
-
-    Trajectories have the ids of scripts, which go to 255; those of the firmware go to 30.
-
-    Parameters
-    ----------
-    name : str
-        Of the vehicle.
-    warn : callable
-        Gets a text.
-    """
-
-    def __init__(self, name: str, warn: Callable[[str], None]):
-        self._name = name
-        self._warn = warn
-        self._pieces: dict[int, PolynomialPiece] = {}
-        self._rooms: dict[int, range] = {}
-
-    def upload(self, trajectory_id: int, piece_offset: int, pieces: Pieces) -> None:
-        """Write pieces; ValueError if the memory is full."""
-        where = f"{self._name}.uploadTrajectory"
-        room = range(piece_offset, piece_offset + len(pieces))
-        if room.stop > MEMORY:
-            raise ValueError(
-                f"{where}: {len(pieces)} pieces from pieceOffset {piece_offset} on; expected no "
-                f"more than {MEMORY} in all, the room in the memory"
-            )
-        if trajectory_id not in self._rooms and len(self._rooms) >= _DEFINITIONS:
-            raise ValueError(
-                f"{where}: trajectoryId is {trajectory_id}; expected one of the {_DEFINITIONS} "
-                f"that are in use: {sorted(self._rooms)}"
-            )
-        if trajectory_id >= _DEFINITIONS:
-            self._warn(
-                f"{where}: trajectoryId is {trajectory_id}; a real vehicle refuses it, the "
-                f"firmware expects 0 to {_DEFINITIONS - 1}"
-            )
-        for other, taken in self._rooms.items():
-            if other != trajectory_id and set(taken) & set(room):
-                self._warn(
-                    f"{where}: pieces {room.start} to {room.stop - 1} overwrite trajectory "
-                    f"{other}; another pieceOffset keeps both"
-                )
-        self._rooms[trajectory_id] = room
-        self._pieces |= dict(zip(room, pieces, strict=True))
-
-    def __getitem__(self, trajectory_id: int) -> list[PolynomialPiece]:
-        """Return the pieces of a trajectory; ValueError for one that does not exist."""
-        if trajectory_id not in self._rooms:
-            raise ValueError(
-                f"{self._name}.startTrajectory: trajectoryId is {trajectory_id}; expected one that "
-                f"uploadTrajectory has written: {sorted(self._rooms) or 'there is none'}"
-            )
-        return [self._pieces[number] for number in self._rooms[trajectory_id]]
-
-
 class IdealVehicle(MissionVehicle):
     """A vehicle that follows the plans of the firmware's high-level commander without an error.
 
@@ -117,7 +60,9 @@ class IdealVehicle(MissionVehicle):
         self._time = time
         self._flies = False
         self.groups = 0  #: Mask of the groups that it belongs to.
-        self._memory = TrajectoryMemory(name, self._warn)
+        # The trajectory memory, and the place in it of each trajectory.
+        self._memory: dict[int, PolynomialPiece] = {}
+        self._rooms: dict[int, range] = {}
         self._prepared: Pieces = ()
 
     @property
@@ -192,14 +137,44 @@ class IdealVehicle(MissionVehicle):
     def upload_trajectory(
         self, trajectory_id: int, piece_offset: int, pieces: Pieces
     ) -> "Future[Any]":
-        self._memory.upload(trajectory_id, piece_offset, pieces)
+        # Trajectories have the ids of scripts, which go to 255; those of the firmware go to 30.
+        where = f"{self.name}.uploadTrajectory"
+        room = range(piece_offset, piece_offset + len(pieces))
+        if room.stop > MEMORY:
+            raise ValueError(
+                f"{where}: {len(pieces)} pieces from pieceOffset {piece_offset} on; expected no "
+                f"more than {MEMORY} in all, the room in the memory"
+            )
+        if trajectory_id not in self._rooms and len(self._rooms) >= _DEFINITIONS:
+            raise ValueError(
+                f"{where}: trajectoryId is {trajectory_id}; expected one of the {_DEFINITIONS} "
+                f"that are in use: {sorted(self._rooms)}"
+            )
+        if trajectory_id >= _DEFINITIONS:
+            self._warn(
+                f"{where}: trajectoryId is {trajectory_id}; a real vehicle refuses it, the "
+                f"firmware expects 0 to {_DEFINITIONS - 1}"
+            )
+        for other, taken in self._rooms.items():
+            if other != trajectory_id and set(taken) & set(room):
+                self._warn(
+                    f"{where}: pieces {room.start} to {room.stop - 1} overwrite trajectory "
+                    f"{other}; another pieceOffset keeps both"
+                )
+        self._rooms[trajectory_id] = room
+        self._memory |= dict(zip(room, pieces, strict=True))
         return done(None)
 
     @override
     def start_trajectory(self, flight: Playback, group_mask: int = 0) -> "Future[Any]":
         if not self._may_plan("startTrajectory", group_mask):
             return done(None)
-        pieces = self._memory[flight.number]
+        if flight.number not in self._rooms:
+            raise ValueError(
+                f"{self.name}.startTrajectory: trajectoryId is {flight.number}; expected one that "
+                f"uploadTrajectory has written: {sorted(self._rooms) or 'there is none'}"
+            )
+        pieces = [self._memory[place] for place in self._rooms[flight.number]]
         trajectory = Trajectory(pieces, flight.time_scale, flight.reverse)
         start = self.planned().position
         return self._fly(trajectory.moved_to(start, None) if flight.relative else trajectory)

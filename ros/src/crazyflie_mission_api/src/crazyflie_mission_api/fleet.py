@@ -279,7 +279,7 @@ class Fleet(VehicleGroup):
                 self._buffers[name] = buffer
         vehicle = self._others[name]
         end = time.monotonic() + _OBSTACLE_LIMIT
-        self._clock.wait_until(
+        self.clock.wait_until(
             lambda: vehicle.position() is not None or time.monotonic() > end, math.inf
         )
         return vehicle.position()

@@ -55,7 +55,7 @@ class GroupState:
         self._vehicles = {vehicle.name: vehicle for vehicle in vehicles}
         # Subgroups also keep apart from all vehicles.
         self._all_vehicles = self._vehicles
-        self._clock = clock
+        self.clock = clock
         self.rules = rules or Rules()
         # Trajectories of all vehicles in flight; shared with subgroups.
         self._commanded: dict[str, TimedTrajectory] = {}
@@ -84,11 +84,6 @@ class GroupState:
         """Names of the vehicles in flight."""
         return [name for name in self._vehicles if name in self._commanded]
 
-    @property
-    def clock(self) -> Clock:
-        """The time of the vehicles."""
-        return self._clock
-
     def adopt(self, name: str) -> None:
         """Register a vehicle that flies by other commands: it is landed at the end."""
         place = self._vehicles[name].position() or (0.0, 0.0, 0.0)
@@ -100,7 +95,7 @@ class GroupState:
 
     def time(self) -> float:
         """Return the time of the vehicles, s."""
-        return self._clock.time()
+        return self.clock.time()
 
     def position(self, name: str) -> tuple[float, float, float]:
         """Return the position of a vehicle, m."""
@@ -183,12 +178,12 @@ class GroupState:
         """Return why ``command(name)`` was refused: name to reason; by default of all vehicles."""
         futures = {name: command(name) for name in (self._vehicles if names is None else names)}
         # Their timeout is by the machine's clock: simulated time may run faster than a slow answer.
-        self._clock.wait_until(lambda: all(f.done() for f in futures.values()), math.inf)
+        self.clock.wait_until(lambda: all(f.done() for f in futures.values()), math.inf)
         errors = {name: future.exception() for name, future in futures.items()}
         return {name: str(error) for name, error in errors.items() if error is not None}
 
     def _wait(self, condition, deadline):
-        self._clock.wait_until(lambda: condition() or bool(self._faults()), deadline)
+        self.clock.wait_until(lambda: condition() or bool(self._faults()), deadline)
         if faults := self._faults():
             raise MissionError("; ".join(faults))
         return condition()

@@ -59,7 +59,7 @@ class LandingGroup(GroupState):
         self._stop_moving(is_checked)
         side = _Landing(self, is_checked)
         for _ in land_in_rounds(side):
-            self._clock.wait_until(never, self.time() + _PERIOD)
+            self.clock.wait_until(never, self.time() + _PERIOD)
         return side.failures
 
     def _stop_moving(self, is_checked):
@@ -72,7 +72,7 @@ class LandingGroup(GroupState):
                 stops[name] = (goal.position, goal.yaw)
         if stops:
             self._move(stops, _STOP_DURATION, is_checked)
-            self._clock.wait_until(never, now + _STOP_DURATION)
+            self.clock.wait_until(never, now + _STOP_DURATION)
 
     def _places(self) -> dict[str, Place]:
         """Return the positions of all vehicles: name to m."""

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from crazyflie_mission_api.limits import Bounds
@@ -14,8 +13,7 @@ from crazyflie_model.trajectory import Pieces
 SETPOINT_TIMEOUT = 0.5
 
 
-@dataclass(frozen=True)
-class FullStateSetpoint:
+class FullStateSetpoint(NamedTuple):
     """Position (m), velocity (m/s), acceleration (m/s^2), yaw (rad), body rates (rad/s)."""
 
     position: Triple
@@ -25,24 +23,21 @@ class FullStateSetpoint:
     omega: Triple
 
 
-@dataclass(frozen=True)
-class PositionSetpoint:
+class PositionSetpoint(NamedTuple):
     """Position (m) and yaw (rad)."""
 
     position: Triple
     yaw: float
 
 
-@dataclass(frozen=True)
-class VelocityWorldSetpoint:
+class VelocityWorldSetpoint(NamedTuple):
     """Velocity in the world frame (m/s) and yaw rate (deg/s, counter-clockwise)."""
 
     velocity: Triple
     yaw_rate: float
 
 
-@dataclass(frozen=True)
-class HoverSetpoint:
+class HoverSetpoint(NamedTuple):
     """Velocity forward and to the left (m/s), yaw rate (deg/s, counter-clockwise), height (m)."""
 
     vx: float
@@ -56,8 +51,7 @@ class HoverSetpoint:
         return c * self.vx - s * self.vy, s * self.vx + c * self.vy
 
 
-@dataclass(frozen=True)
-class AttitudeSetpoint:
+class AttitudeSetpoint(NamedTuple):
     """Roll right, pitch forward (deg), yaw rate (deg/s, counter-clockwise), thrust (PWM)."""
 
     roll: float
@@ -66,8 +60,7 @@ class AttitudeSetpoint:
     thrust: float
 
 
-@dataclass(frozen=True)
-class MotorsOffSetpoint:
+class MotorsOffSetpoint(NamedTuple):
     """Stops the motors; a later setpoint or command starts them again."""
 
 

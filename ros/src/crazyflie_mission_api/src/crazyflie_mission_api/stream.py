@@ -19,7 +19,6 @@ from crazyflie_mission_api.mission_vehicle import (
     AttitudeSetpoint,
     FullStateSetpoint,
     HoverSetpoint,
-    MotorsOffSetpoint,
     PositionSetpoint,
     Setpoint,
     VelocityWorldSetpoint,
@@ -41,15 +40,6 @@ RETRY_PERIOD = 1.0  #: Time from a failed command to the next try (s).
 
 #: Timeout of the connection before the first setpoint (s of the machine's clock).
 _CONNECTION_LIMIT = 2.0
-
-_TOPICS: dict[type, tuple[str, Any]] = {
-    FullStateSetpoint: ("cmd_full_state", FullState),
-    PositionSetpoint: ("cmd_position", Position),
-    VelocityWorldSetpoint: ("cmd_velocity_world", VelocityWorld),
-    HoverSetpoint: ("cmd_hover", Hover),
-    AttitudeSetpoint: ("cmd_vel", Twist),
-    MotorsOffSetpoint: ("cmd_stop", Empty),
-}
 
 Send = Callable[[], "Future[Any]"]
 
@@ -192,49 +182,45 @@ class SetpointPublishers:
     def __init__(self, handle: NodeHandle, top: str):
         self._handle = handle
         self._top = top
-        self._publishers: dict[type, Publisher] = {}
+        self._publishers: dict[str, Publisher] = {}
 
     def publish(self, setpoint: Setpoint) -> None:
         """Publish a setpoint; the first of each type waits until a node subscribes."""
-        publisher = self._publishers.get(type(setpoint)) or self._connect(type(setpoint))
-        message = message_of(setpoint)
+        topic, message = message_of(setpoint)
+        publisher = self._publishers.get(topic) or self._connect(topic, type(message))
         if hasattr(message, "header"):
             message.header.stamp = self._handle.stamp()
         publisher.publish(message)
 
-    def _connect(self, kind):
-        name, message_type = _TOPICS[kind]
-        publisher = self._handle.publisher(f"{self._top}/{name}", message_type)
-        self._publishers[kind] = publisher
+    def _connect(self, topic, message_type):
+        publisher = self._handle.publisher(f"{self._top}/{topic}", message_type)
+        self._publishers[topic] = publisher
         end = time.monotonic() + _CONNECTION_LIMIT
         while not publisher.has_subscribers() and time.monotonic() < end:
             time.sleep(0.01)
         return publisher
 
 
-def message_of(setpoint: Setpoint) -> Any:
-    """Return the driver's message, without a stamp; its yaw rates are clockwise, in deg/s."""
+def message_of(setpoint: Setpoint) -> tuple[str, Any]:
+    """Return the driver's topic and message, without a stamp.
+
+    Yaw rates of messages are clockwise, in deg/s.
+    """
     if isinstance(setpoint, FullStateSetpoint):
-        goal = Goal(
-            setpoint.position,
-            setpoint.velocity,
-            setpoint.acceleration,
-            setpoint.yaw,
-            setpoint.omega[2],
-        )
-        message = full_state_message(goal)
-        message.twist.angular = Vector3(*setpoint.omega)
-        return message
+        position, velocity, acceleration, yaw, omega = setpoint
+        message = full_state_message(Goal(position, velocity, acceleration, yaw, omega[2]))
+        message.twist.angular = Vector3(*omega)
+        return "cmd_full_state", message
     if isinstance(setpoint, PositionSetpoint):
         x, y, z = setpoint.position
-        return Position(x=x, y=y, z=z, yaw=math.degrees(setpoint.yaw))
+        return "cmd_position", Position(x=x, y=y, z=z, yaw=math.degrees(setpoint.yaw))
     if isinstance(setpoint, VelocityWorldSetpoint):
-        return VelocityWorld(vel=Vector3(*setpoint.velocity), yawRate=-setpoint.yaw_rate)
+        velocity = Vector3(*setpoint.velocity)
+        return "cmd_velocity_world", VelocityWorld(vel=velocity, yawRate=-setpoint.yaw_rate)
     if isinstance(setpoint, HoverSetpoint):
-        return Hover(
-            vx=setpoint.vx, vy=setpoint.vy, yawrate=-setpoint.yaw_rate, zDistance=setpoint.height
-        )
+        vx, vy, yaw_rate, height = setpoint
+        return "cmd_hover", Hover(vx=vx, vy=vy, yawrate=-yaw_rate, zDistance=height)
     if isinstance(setpoint, AttitudeSetpoint):
         linear = Vector3(setpoint.pitch, setpoint.roll, setpoint.thrust)
-        return Twist(linear, Vector3(0.0, 0.0, -setpoint.yaw_rate))
-    return Empty()
+        return "cmd_vel", Twist(linear, Vector3(0.0, 0.0, -setpoint.yaw_rate))
+    return "cmd_stop", Empty()

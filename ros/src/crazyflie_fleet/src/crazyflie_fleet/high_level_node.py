@@ -3,21 +3,23 @@
 import math
 from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
+from std_msgs.msg import Empty as EmptyMessage
 from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
 from crazyflie_driver import srv
+from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
 from crazyflie_fleet.commanded_references import CommandedReferences
-from crazyflie_fleet.follower import CommandFollower
+from crazyflie_fleet.follower import CommandFollower, Velocity
 from crazyflie_fleet.high_level_services import (
-    Groups,
     HighLevelParameters,
-    SetpointSubscribers,
     from_message,
     relay,
+    setpoint_goal,
 )
 from crazyflie_fleet.references_node import TrackedVehicle
 from crazyflie_model.polynomials import Goal, at_rest
@@ -59,7 +61,7 @@ class HighLevelNode(Node):
     def __init__(self, vehicle: TrackedVehicle | None = None) -> None:
         self._vehicle = vehicle
         self._status = FlightStatus()
-        self._groups = Groups()
+        self._groups = 0  # Mask of the groups of the vehicle; at first it has no group.
         self._takeoff: _Takeoff | None = None
         self._next: tuple[Any, ...] | None = None  # A command received in a takeoff, for its end.
         self._landings: list[Future[Any]] = []
@@ -79,14 +81,13 @@ class HighLevelNode(Node):
             ("go_to", srv.GoTo, self._on_go_to),
             ("start_trajectory", srv.StartTrajectory, self._on_start),
         ):
-            handle.advertise_service(
-                f"~{name}", service_type, self._groups.for_members(service_type, callback)
-            )
+            call = partial(self._for_members, service_type, callback)
+            handle.advertise_service(f"~{name}", service_type, call)
         for name, service_type, callback in (
             ("emergency", Empty, self._on_emergency),
             ("upload_trajectory", srv.UploadTrajectory, self._on_upload),
             ("notify_setpoints_stop", srv.NotifySetpointsStop, self._on_setpoints_stop),
-            ("set_group_mask", srv.SetGroupMask, self._groups.on_set_group_mask),
+            ("set_group_mask", srv.SetGroupMask, self._on_set_group_mask),
             # Services that only the firmware could carry out.
             ("update_params", srv.UpdateParams, lambda _: srv.UpdateParamsResponse()),
         ):
@@ -106,7 +107,14 @@ class HighLevelNode(Node):
             self._vehicle.ahead = self._references.ahead
             handle.advertise_service("go_to", srv.GoTo, self._on_limited_go_to)
         handle.subscribe(parameters.start_topic, String, self._on_start_all)
-        SetpointSubscribers(handle, self._on_setpoint, parameters.has_yaw)
+        for name, message_type, callback in (
+            ("full_state", FullState, self._on_position_setpoint),
+            ("position", Position, self._on_position_setpoint),
+            ("velocity_world", VelocityWorld, self._on_velocity_setpoint),
+            ("hover", Hover, self._on_hover_setpoint),
+            ("stop", EmptyMessage, self._on_stop_setpoint),
+        ):
+            handle.subscribe(f"~cmd_{name}", message_type, callback)
 
     @override
     def enter_safe_state(self) -> None:
@@ -193,6 +201,17 @@ class HighLevelNode(Node):
         return self._status.state == FlightStatus.FLYING
 
     # Commands.
+
+    def _on_set_group_mask(self, request):
+        self._groups = request.groupMask
+        return srv.SetGroupMaskResponse()
+
+    def _for_members(self, service_type, callback, request):
+        """Call ``callback(request)``; ignore requests to other groups, as the firmware does."""
+        # The mask of a command to all vehicles is 0.
+        if request.groupMask == 0 or request.groupMask & self._groups:
+            return callback(request)
+        return service_type._response_class()
 
     def _on_takeoff(self, request):
         duration = request.duration.to_sec()
@@ -319,7 +338,35 @@ class HighLevelNode(Node):
         except ServiceError as reason:
             self._handle.error(f"not done: {reason}")
 
-    def _on_setpoint(self, setpoint):
+    # Setpoints of the driver; in its messages the yaw rate is clockwise, in deg/s.
+
+    def _on_position_setpoint(self, message):
+        goal = setpoint_goal(message)
+        self._take(goal, (*goal.position, *goal.velocity), goal.yaw)
+
+    def _on_velocity_setpoint(self, message):
+        velocity = (message.vel.x, message.vel.y, message.vel.z)
+        self._take(Velocity(velocity, self._yaw_rate(message.yawRate)), velocity, message.yawRate)
+
+    def _on_hover_setpoint(self, message):
+        numbers = (message.vx, message.vy, message.zDistance)
+        rate = self._yaw_rate(message.yawrate)
+        setpoint = Velocity((message.vx, message.vy, 0.0), rate, message.zDistance)
+        self._take(setpoint, numbers, message.yawrate)
+
+    def _on_stop_setpoint(self, _):
+        self._handle.warn("ignoring cmd_stop: a vehicle in flight would fall", throttle=1.0)
+
+    def _yaw_rate(self, clockwise):
+        return -math.radians(clockwise) if self._parameters.has_yaw else 0.0
+
+    def _take(self, setpoint, numbers, turn):
+        if not all(map(math.isfinite, (*numbers, turn))):
+            self._handle.warn("ignoring a setpoint that is not finite", throttle=1.0)
+            return
+        if turn and not self._parameters.has_yaw:
+            text = "the controller keeps the heading 0: yaw and yaw rate of setpoints are ignored"
+            self._handle.warn(text, throttle=10.0)
         is_to_land = self._vehicle is not None and self._vehicle.is_to_land
         if self._is_followed() and not is_to_land:
             try:

@@ -1,24 +1,14 @@
-"""The driver's interface for a vehicle that a controller flies: messages, groups, setpoints."""
+"""The driver's interface for a vehicle that a controller flies: messages, parameters, calls."""
 
 import math
-from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
 import genpy
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
-from std_msgs.msg import Empty as EmptyMessage
 from std_srvs.srv import Empty, EmptyRequest
 
-from crazyflie_driver import srv
-from crazyflie_driver.msg import (
-    FullState,
-    Hover,
-    Position,
-    TrajectoryPolynomialPiece,
-    VelocityWorld,
-)
-from crazyflie_fleet.follower import Velocity
+from crazyflie_driver.msg import FullState, Position, TrajectoryPolynomialPiece
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_model.polynomials import Goal, PolynomialPiece, at_rest
 from crazyflie_msgs.msg import (
@@ -135,33 +125,7 @@ class HighLevelParameters(Parameters):
         return PositionVelocityYawStateStamped if self.has_yaw else PositionVelocityStateStamped
 
 
-_ALL = 0  #: Mask of a command to all vehicles.
-
 _CALL_TIMEOUT = 58.0  #: Timeout of the server's takeoffs and landings (s of the machine's clock).
-
-
-class Groups:
-    """The groups of a vehicle; at first it has no group."""
-
-    def __init__(self) -> None:
-        self._mask = 0
-
-    def on_set_group_mask(self, request: srv.SetGroupMaskRequest) -> srv.SetGroupMaskResponse:
-        """Answer a service call."""
-        self._mask = request.groupMask
-        return srv.SetGroupMaskResponse()
-
-    def for_members(
-        self, service_type: Any, callback: Callable[[Any], Any]
-    ) -> Callable[[Any], Any]:
-        """Return a callback that ignores requests to other groups, as the firmware does."""
-
-        def on_request(request):
-            if request.groupMask == _ALL or request.groupMask & self._mask:
-                return callback(request)
-            return service_type._response_class()
-
-        return on_request
 
 
 def relay(handle: NodeHandle, service: str, response_type: type) -> "Future[Any]":
@@ -184,55 +148,3 @@ def relay(handle: NodeHandle, service: str, response_type: type) -> "Future[Any]
     call = handle.call_service(service, Empty, EmptyRequest(), _CALL_TIMEOUT)
     call.add_done_callback(on_done)
     return answer
-
-
-class SetpointSubscribers:
-    """Subscribes to the driver's setpoints below a node; calls ``on_setpoint`` with finite ones.
-
-    Without ``has_yaw`` yaw and yaw rate are ignored with a warning; cmd_stop is in any case.
-    """
-
-    def __init__(
-        self,
-        handle: NodeHandle,
-        on_setpoint: Callable[[Goal[float] | Velocity], None],
-        has_yaw: bool,
-    ):
-        self._handle = handle
-        self._on_setpoint = on_setpoint
-        self._has_yaw = has_yaw
-        handle.subscribe("~cmd_full_state", FullState, self._on_position)
-        handle.subscribe("~cmd_position", Position, self._on_position)
-        handle.subscribe("~cmd_velocity_world", VelocityWorld, self._on_velocity)
-        handle.subscribe("~cmd_hover", Hover, self._on_hover)
-        handle.subscribe("~cmd_stop", EmptyMessage, self._on_stop)
-
-    def _on_position(self, message):
-        goal = setpoint_goal(message)
-        self._pass(goal, (*goal.position, *goal.velocity), goal.yaw)
-
-    def _on_velocity(self, message):
-        velocity = (message.vel.x, message.vel.y, message.vel.z)
-        setpoint = Velocity(velocity, self._yaw_rate(message.yawRate))
-        self._pass(setpoint, velocity, message.yawRate)
-
-    def _on_hover(self, message):
-        velocity = (message.vx, message.vy, 0.0)
-        setpoint = Velocity(velocity, self._yaw_rate(message.yawrate), message.zDistance)
-        self._pass(setpoint, (*velocity, message.zDistance), message.yawrate)
-
-    def _yaw_rate(self, clockwise):
-        # In the driver's messages the yaw rate is clockwise, in deg/s.
-        return -math.radians(clockwise) if self._has_yaw else 0.0
-
-    def _on_stop(self, _):
-        self._handle.warn("ignoring cmd_stop: a vehicle in flight would fall", throttle=1.0)
-
-    def _pass(self, setpoint, numbers, turn):
-        if not all(map(math.isfinite, (*numbers, turn))):
-            self._handle.warn("ignoring a setpoint that is not finite", throttle=1.0)
-            return
-        if turn and not self._has_yaw:
-            text = "the controller keeps the heading 0: yaw and yaw rate of setpoints are ignored"
-            self._handle.warn(text, throttle=10.0)
-        self._on_setpoint(setpoint)

@@ -234,7 +234,7 @@ class CommandedReferences:
         self._state_time = self._handle.time()
 
     def _is_held(self):
-        return self._vehicle is not None and self._vehicle.is_held
+        return self._vehicle is not None and self._vehicle.held_at is not None
 
     def _measured(self):
         """Return the present state of the vehicle; None if it is not known."""

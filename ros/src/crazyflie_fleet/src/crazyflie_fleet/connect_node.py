@@ -135,21 +135,16 @@ class FleetConnectNode(Node):
         for vehicle in self._vehicles:
             connection = self._connections[vehicle.name]
             handle.set_param(f"{connection.prefix}/{POSITIONING_PARAMETER}", connection.positioning)
-            request = connection.request()
-            answer = handle.call_service(ADD, AddCrazyflie, request, TIMEOUT)
-            answer.add_done_callback(partial(self._on_added, vehicle))
+            self._go_on(vehicle, self._connect(vehicle))
 
-    def _on_added(self, vehicle, done):
-        file = self._lighthouse_files.get(vehicle.name)
-        if done.exception() is not None or file is None:
-            self._write_parameters(vehicle, done)
-            return
-        service, request = f"/{vehicle.name}/write_lighthouse", WriteLighthouseRequest(file)
-        answer = self._handle.call_service(service, WriteLighthouse, request, TIMEOUT)
-        answer.add_done_callback(partial(self._write_parameters, vehicle))
-
-    def _write_parameters(self, vehicle, done):
-        error = done.exception()
+    def _connect(self, vehicle):
+        """Yield the calls that connect a vehicle, each after the answer of the one before."""
+        handle, name = self._handle, vehicle.name
+        yield handle.call_service(ADD, AddCrazyflie, self._connections[name].request(), TIMEOUT)
+        if file := self._lighthouse_files.get(name):
+            request = WriteLighthouseRequest(file)
+            service = f"/{name}/write_lighthouse"
+            yield handle.call_service(service, WriteLighthouse, request, TIMEOUT)
         params = dict(vehicle.firmware_params)
         if vehicle.settings.has_single_marker:
             # Only the Kalman filter uses external positions, and estimates the yaw from them.
@@ -159,27 +154,19 @@ class FleetConnectNode(Node):
             x, y, z = vehicle.position
             start = {"kalman.initialX": x, "kalman.initialY": y, "kalman.initialZ": z}
             params = {**start, **params, "kalman.resetEstimation": 1}
-        if error is not None or not params:
-            self._finish(vehicle, error)
-            return
-        values = {name.replace(".", "/"): x for name, x in params.items()}
-        writes = [
-            self._handle.set_param_later(f"/{vehicle.name}/{name}", value)
-            for name, value in values.items()
-        ]
-        # Parameters are set in this order: when the last one is set, all are.
-        write_parameters = partial(self._handle.submit, self._on_set, vehicle, [*values], writes)
-        writes[-1].add_done_callback(lambda _: write_parameters())
+        if params:
+            values = {key.replace(".", "/"): value for key, value in params.items()}
+            yield from [handle.set_param_later(f"/{name}/{key}", x) for key, x in values.items()]
+            request = UpdateParamsRequest([*values])
+            yield handle.call_service(f"/{name}/update_params", UpdateParams, request, TIMEOUT)
 
-    def _on_set(self, vehicle, names, writes):
-        errors = [error for write in writes if (error := write.exception()) is not None]
-        if errors:
-            self._finish(vehicle, errors[0])
-            return
-        answer = self._handle.call_service(
-            f"/{vehicle.name}/update_params", UpdateParams, UpdateParamsRequest(names), TIMEOUT
-        )
-        answer.add_done_callback(lambda done: self._finish(vehicle, done.exception()))
+    def _go_on(self, vehicle, calls, answer=None):
+        error = None if answer is None else answer.exception()
+        call = next(calls, None) if error is None else None
+        if call is None:
+            self._finish(vehicle, error)
+        else:
+            call.add_done_callback(partial(self._handle.submit, self._go_on, vehicle, calls))
 
     def _finish(self, vehicle, error):
         if error is None:

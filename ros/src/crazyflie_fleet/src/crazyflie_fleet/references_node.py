@@ -199,11 +199,6 @@ class TrackedVehicle:
         # Own references that this node has not received yet, by their identity.
         self._own: dict[int, PositionVelocityStateStamped] = {}
 
-    @property
-    def is_held(self) -> bool:
-        """Whether it is kept at its place, as another one is too near."""
-        return self.held_at is not None
-
     def register(self, handle: NodeHandle, frame: str) -> None:
         """Create the publishers and the subscriber; ``frame`` is the fixed frame."""
         top, message_type = f"/{self.name}/", PositionVelocityStateStamped
@@ -302,7 +297,7 @@ class TrackedVehicle:
 
     def _command(self, goal, header):
         self._commanded = goal
-        if not self.is_held:
+        if self.held_at is None:
             self._publish(goal, header)
 
     def _publish(self, goal, header=None):
@@ -406,14 +401,14 @@ class ReferencesNode(Node):
         for tracked in self.vehicles:
             if not in_flight[tracked.number]:
                 tracked.forget_heading()
-            if held[tracked.number] and not tracked.is_held:
+            if held[tracked.number] and tracked.held_at is None:
                 tracked.hold()
-            elif tracked.is_held and not held[tracked.number]:
+            elif tracked.held_at is not None and not held[tracked.number]:
                 tracked.release()
         self._publish_held()
 
     def _publish_held(self):
-        held = " ".join(tracked.name for tracked in self.vehicles if tracked.is_held)
+        held = " ".join(tracked.name for tracked in self.vehicles if tracked.held_at is not None)
         if held != self._published_held:
             self._published_held = held
             self._held.publish(String(held))

@@ -50,26 +50,21 @@ def byte(where: str, name: str, value: Any) -> int:
 
 def triple(where: str, name: str, value: Any, low: float = -math.inf) -> Triple:
     """Return three finite numbers, each at least ``low``."""
-    parts = _triple(value)
-    if parts is None or not all(math.isfinite(part) and part >= low for part in parts):
-        expected = "three finite numbers" + (f" >= {low:g}" if low > -math.inf else "")
+    expected = "three finite numbers" + (f" >= {low:g}" if low > -math.inf else "")
+    parts = corner(where, name, value, expected)
+    if not all(math.isfinite(part) and part >= low for part in parts):
         raise _error(where, name, value, expected)
     return parts
 
 
-def corner(where: str, name: str, value: Any) -> Triple:
+def corner(where: str, name: str, value: Any, expected: str = "three numbers") -> Triple:
     """Return three numbers, which may be infinite."""
-    parts = _triple(value)
-    if parts is None or any(map(math.isnan, parts)):
-        raise _error(where, name, value, "three numbers")
-    return parts
-
-
-def _triple(value):
     try:
         x, y, z = map(float, value)
     except (TypeError, ValueError):
-        return None
+        x = y = z = math.nan
+    if any(map(math.isnan, (x, y, z))):
+        raise _error(where, name, value, expected)
     return x, y, z
 
 
@@ -83,17 +78,15 @@ def pieces(where: str, trajectory: Any) -> list[PolynomialPiece]:
     result = []
     for index, piece in enumerate(found):
         duration = number(where, f"duration of piece {index}", piece.duration, 1e-3)
-        axes = [np.asarray(axis.p, dtype=float) for axis in _axes(piece)]
-        for name, axis in zip(("x", "y", "z", "yaw"), axes, strict=True):
+        axes = []
+        for name in ("x", "y", "z", "yaw"):
+            axis = np.asarray(getattr(piece, f"p{name}").p, dtype=float)
+            axes.append(axis.tolist())
             if len(axis) > COEFFICIENTS or not np.all(np.isfinite(axis)):
                 expected = f"at most {COEFFICIENTS} finite coefficients"
-                raise _error(where, f"{name} of piece {index}", axis.tolist(), expected)
-        result.append(PolynomialPiece(duration, *(axis.tolist() for axis in axes)))
+                raise _error(where, f"{name} of piece {index}", axis, expected)
+        result.append(PolynomialPiece(duration, *axes))
     return result
-
-
-def _axes(piece):
-    return piece.px, piece.py, piece.pz, piece.pyaw
 
 
 def instances(where: str, name: str, values: Any, expected: type) -> list[Any]:

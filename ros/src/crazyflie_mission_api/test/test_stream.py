@@ -81,12 +81,12 @@ def test_setpoints_go_on_until_the_command_is_accepted(bench):
     bench.answer()
     assert bench.setpoints(1.0) == []
     assert len(bench.asked) == 1
-    assert bench.stream.fault() == ""
+    assert bench.stream.fault == ""
 
 
 def test_setpoints_go_on_where_the_command_fails(bench):
     bench.answer("the vehicle has not replied")
-    assert bench.stream.fault() == (
+    assert bench.stream.fault == (
         "the trajectory has ended, and go_to has failed: the vehicle has not replied; "
         "setpoints go on at its end"
     )
@@ -94,7 +94,7 @@ def test_setpoints_go_on_where_the_command_fails(bench):
     assert len(bench.asked) == 2
     bench.answer()
     assert bench.setpoints(1.0) == []
-    assert bench.stream.fault() == ""
+    assert bench.stream.fault == ""
 
 
 def test_a_command_that_was_accepted_late_is_repeated(bench):

@@ -39,17 +39,18 @@ class CommandFollower:
 
     def __init__(self) -> None:
         self._uploads: dict[int, Pieces] = {}
-        self._trajectory: Trajectory | None = None
+        #: The present command's trajectory, from its beginning; None without one or in a stream.
+        self.trajectory: Trajectory | None = None
         self._setpoint: Goal[float] | None = None
         self._begin = 0.0
 
     def forget(self) -> None:
         """Delete the goal; uploaded trajectories stay."""
-        self._trajectory = self._setpoint = None
+        self.trajectory = self._setpoint = None
 
     def take_setpoint(self, time: float, goal: Goal[float]) -> None:
         """Replace any command by the goal of a setpoint."""
-        self._trajectory, self._setpoint = None, goal
+        self.trajectory, self._setpoint = None, goal
         self._begin = time
 
     def take_velocity(
@@ -76,18 +77,13 @@ class CommandFollower:
 
     def is_moving(self, time: float) -> bool:
         """Return whether a move or a trajectory has not ended."""
-        return self._trajectory is not None and time < self._begin + self._trajectory.duration
-
-    @property
-    def trajectory(self) -> Trajectory | None:
-        """The present command's trajectory, from its beginning; None without one or in a stream."""
-        return self._trajectory
+        return self.trajectory is not None and time < self._begin + self.trajectory.duration
 
     def goal(self, time: float) -> Goal[float] | None:
         """Return the goal at ``time`` (s), at rest after the end; None before any command."""
-        if self._trajectory is None:
+        if self.trajectory is None:
             return self._setpoint
-        return self._trajectory.evaluate(time - self._begin)
+        return self.trajectory.evaluate(time - self._begin)
 
     def go_to(
         self,
@@ -162,7 +158,7 @@ class CommandFollower:
         return present
 
     def _fly(self, time, trajectory):
-        self._trajectory, self._setpoint = trajectory, None
+        self.trajectory, self._setpoint = trajectory, None
         self._begin = time
 
 

@@ -1,12 +1,11 @@
 """Interfaces of a vehicle, and of its clock, for missions; commands and low-level setpoints."""
 
-import math
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, NamedTuple, Protocol
 
 from crazyflie_mission_api.limits import Bounds
-from crazyflie_model.angles import Triple
+from crazyflie_model.angles import Triple, rotate_by_yaw
 from crazyflie_model.trajectory import Pieces
 
 #: Age of a setpoint at which the firmware levels out, s (commander.h, WDT_TIMEOUT_STABILIZE).
@@ -45,11 +44,6 @@ class HoverSetpoint(NamedTuple):
     yaw_rate: float
     height: float
 
-    def velocity(self, yaw: float) -> tuple[float, float]:
-        """Return the velocity along x and y of the world, m/s, at a yaw (rad)."""
-        c, s = math.cos(yaw), math.sin(yaw)
-        return c * self.vx - s * self.vy, s * self.vx + c * self.vy
-
 
 class AttitudeSetpoint(NamedTuple):
     """Roll right, pitch forward (deg), yaw rate (deg/s, counter-clockwise), thrust (PWM)."""
@@ -86,7 +80,7 @@ def led_to(setpoint: Setpoint, place: Triple, yaw: float, duration: float) -> Tr
         vx, vy, vz = setpoint.velocity
         return x + vx * duration, y + vy * duration, z + vz * duration
     if isinstance(setpoint, HoverSetpoint):
-        vx, vy = setpoint.velocity(yaw)
+        vx, vy = rotate_by_yaw(setpoint.vx, setpoint.vy, yaw)
         return x + vx * duration, y + vy * duration, setpoint.height
     return None
 

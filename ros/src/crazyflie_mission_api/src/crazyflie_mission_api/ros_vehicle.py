@@ -348,7 +348,7 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
 
     @override
     def fault(self) -> str:
-        return super().fault() or ("" if self._stream is None else self._stream.fault())
+        return super().fault() or ("" if self._stream is None else self._stream.fault)
 
     # Commands.
 

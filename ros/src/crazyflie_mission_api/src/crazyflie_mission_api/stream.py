@@ -88,7 +88,8 @@ class SetpointStream:
         self._trajectory: TimedTrajectory | None = None
         self._commands: deque[_Command] = deque()
         self._next_hold = 0.0
-        self._fault = ""
+        #: Why ``hold`` has failed at the end of a trajectory; empty if it has not.
+        self.fault = ""
         self._publisher = handle.publisher(topic, FullState)
         handle.timer(STEP, self._on_timer)
 
@@ -115,10 +116,6 @@ class SetpointStream:
         """End the setpoints at once, without a command that takes over."""
         self._trajectory = None
 
-    def fault(self) -> str:
-        """Return why ``hold`` has failed at the end of a trajectory; empty if it has not."""
-        return self._fault
-
     def _enqueue(self, command):
         self._commands.append(command)
         if len(self._commands) == 1:
@@ -144,7 +141,7 @@ class SetpointStream:
         if self._commands:
             self._send()
         if error is None:
-            self._fault = ""
+            self.fault = ""
             command.outcome.set_result(answer.result())
         else:
             command.outcome.set_exception(error)
@@ -170,7 +167,7 @@ class SetpointStream:
 
     def _note_hold(self, held):
         if held.exception() is not None and self._trajectory is not None:
-            self._fault = (
+            self.fault = (
                 f"the trajectory has ended, and go_to has failed: {held.exception()}; setpoints "
                 "go on at its end"
             )

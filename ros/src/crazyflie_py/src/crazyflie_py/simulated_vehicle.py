@@ -22,13 +22,14 @@ from crazyflie_mission_api.mission_vehicle import (
     VelocityWorldSetpoint,
     done,
 )
-from crazyflie_model.angles import Triple
+from crazyflie_model.angles import Triple, rotate_by_yaw
 from crazyflie_model.collision_avoidance import AvoidanceSettings, CollisionAvoidance
 from crazyflie_model.polynomials import Goal
 from crazyflie_model.units import GRAVITY
 from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.simulated_parameters import SimulatedParameters
 from crazyflie_py.swarm import ScriptState
+from crazyflie_py.util import clamp_norm
 
 Array = NDArray[np.float64]
 
@@ -53,15 +54,9 @@ def attitude(acceleration: Array, yaw: float) -> Triple:
     Its thrust is along its z axis, its x axis above the heading. Acceleration of shape (3,), m/s^2.
     """
     ax, ay, az = acceleration
-    c, s = math.cos(yaw), math.sin(yaw)
-    ahead, left, up = c * ax + s * ay, c * ay - s * ax, az + GRAVITY
+    (ahead, left), up = rotate_by_yaw(ax, ay, -yaw), az + GRAVITY
     pitch = math.atan2(ahead, up)
     return math.atan2(-left, math.hypot(ahead, up)), pitch, yaw
-
-
-def _clamped(vector, limit):
-    length = float(np.linalg.norm(vector))
-    return vector * (limit / length) if length > limit else vector
 
 
 class SimulatedVehicle(IdealVehicle):
@@ -246,7 +241,8 @@ class SimulatedVehicle(IdealVehicle):
             return self._at_velocity(np.array(setpoint.velocity), setpoint.yaw_rate, dt)
         if isinstance(setpoint, HoverSetpoint):
             climb = (setpoint.height - self.motion.position[2]) / dt
-            velocity = np.array([*setpoint.velocity(self.motion.yaw), climb])
+            horizontal = rotate_by_yaw(setpoint.vx, setpoint.vy, self.motion.yaw)
+            velocity = np.array([*horizontal, climb])
             return self._at_velocity(velocity, setpoint.yaw_rate, dt)
         return self._stopped()
 
@@ -264,7 +260,7 @@ class SimulatedVehicle(IdealVehicle):
         if np.linalg.norm(way) <= reach:
             return goal
         return self._approached(
-            goal._replace(position=self.motion.position + _clamped(way, reach)), dt
+            goal._replace(position=self.motion.position + clamp_norm(way, reach)), dt
         )
 
     def _approached(self, goal, dt):
@@ -277,7 +273,7 @@ class SimulatedVehicle(IdealVehicle):
         if self._avoidance is not None:
             others = self._other_positions()
             velocity = self._avoidance.velocity_setpoint(position, others, velocity)
-        velocity = _clamped(velocity, self._max_speed)
+        velocity = clamp_norm(velocity, self._max_speed)
         if self._disturbance:
             velocity = velocity + self._disturbance * np.random.normal(size=3)
         yaw = self.motion.yaw + math.radians(yaw_rate) * dt

@@ -59,7 +59,6 @@ class FleetServicesNode(Node):
     def __init__(self, fleet: FleetConfig, states: VehicleStates):
         self._fleet = fleet
         self._states = states
-        self._numbers = {name: number for number, name in enumerate(states.names)}
         self._takeoffs: list[_Call] = []
         self._age = 0.0
 
@@ -128,9 +127,9 @@ class FleetServicesNode(Node):
     def _takeoff_refusals(self):
         """Return why vehicles that do not fly yet refuse to take off: name to reason."""
         reasons = {
-            name: self._states.takeoff_refusals[self._numbers[name]]
+            name: self._states.takeoff_refusals[self._states.numbers[name]]
             for name in self._fleet.names
-            if self._state(name) not in _FLYING
+            if self._states.flight_state(name) not in _FLYING
         }
         return {name: reason for name, reason in reasons.items() if reason}
 
@@ -144,7 +143,7 @@ class FleetServicesNode(Node):
             return True
         names = self._fleet.names
         # Vehicles in flight refuse /NAME/takeoff; they go to the height of the firmware's takeoff.
-        flying = [name for name in names if self._state(name) in _FLYING]
+        flying = [name for name in names if self._states.flight_state(name) in _FLYING]
         if flying and takeoff.service_type is Empty:
             names = tuple(name for name in names if name not in flying)
             if not names:
@@ -170,7 +169,7 @@ class FleetServicesNode(Node):
                 return
             if done.exception() is not None:
                 refusals[name] = str(done.exception())
-                if is_takeoff and self._state(name) in _NOT_BEGUN:
+                if is_takeoff and self._states.flight_state(name) in _NOT_BEGUN:
                     is_aborted = True
                     self._abort(call, [each for each in begun if each != name], refusals)
                     return
@@ -195,15 +194,12 @@ class FleetServicesNode(Node):
             failures = {
                 name: reason
                 for name, reason in done.result().items()
-                if self._state(name) != FlightStatus.ON_GROUND
+                if self._states.flight_state(name) != FlightStatus.ON_GROUND
             }
             left = f"; MAY STILL FLY: {self._text(failures)}" if failures else ""
             takeoff.answer.set_exception(ServiceError(text + left))
 
         self._lander.land(begun).add_done_callback(on_landed)
-
-    def _state(self, name):
-        return self._states.flight_states[self._numbers[name]]
 
     # Landings, and all else.
 

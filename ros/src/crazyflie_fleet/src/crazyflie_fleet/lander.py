@@ -103,7 +103,6 @@ class Lander(LandingSide):
     def __init__(self, handle: NodeHandle, fleet: FleetConfig, states: VehicleStates):
         self._handle = handle
         self._states = states
-        self._numbers = {name: number for number, name in enumerate(states.names)}
         radii = np.array([fleet[name].buffer for name in states.names])
         # At a smaller distance the collision avoidance would not release a vehicle.
         self._limits = RELEASE_RATIO * (radii[:, None] + radii)
@@ -125,7 +124,7 @@ class Lander(LandingSide):
         self._answers.append(answer)
         self._begin = self.time()
         for name in names:
-            position = self._states.positions[self._numbers[name]]
+            position = self._states.positions[self._states.numbers[name]]
             if self._is_up(name) and np.isfinite(position).all():
                 self._left += [name] * (name not in self._left)
             elif name not in self._calls:
@@ -157,7 +156,7 @@ class Lander(LandingSide):
         self._publisher.publish(String(" ".join(self._left)))
 
     def _is_up(self, name):
-        return self._states.flight_states[self._numbers[name]] in _UP
+        return self._states.flight_state(name) in _UP
 
     # Methods that `land_in_rounds` calls.
 
@@ -173,7 +172,7 @@ class Lander(LandingSide):
 
     @override
     def is_busy(self) -> bool:
-        numbers = [self._numbers[name] for name in self._left]
+        numbers = [self._states.numbers[name] for name in self._left]
         speeds = np.linalg.norm(self._states.velocities[numbers], axis=1)
         is_late = not 0.0 <= self.time() - self._begin < _BRAKING_TIMEOUT
         return bool(self._calls) or not (is_late or bool((speeds < _SLOW).all()))
@@ -197,7 +196,7 @@ class Lander(LandingSide):
 
     @override
     def distance(self, name: str, goal: Place) -> float:
-        return float(np.linalg.norm(self._states.positions[self._numbers[name]] - goal))
+        return float(np.linalg.norm(self._states.positions[self._states.numbers[name]] - goal))
 
     @override
     def go_aside(self, goals: Mapping[str, Place]) -> float:

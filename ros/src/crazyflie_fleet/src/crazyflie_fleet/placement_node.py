@@ -50,7 +50,7 @@ class PlacementNode(Node):
 
     def _reason(self, pair):
         """Return why the vehicles of a pair must not take off; empty if they are apart."""
-        numbers = [self._states.names.index(name) for name in pair]
+        numbers = [self._states.numbers[name] for name in pair]
         are_seen = self._states.are_fresh()[numbers].all()
         what = f"{pair[0]} and {pair[1]} start at one place by the fleet file"
         buffers = [self._fleet[name].buffer for name in pair]

@@ -45,6 +45,8 @@ class VehicleStates:
         vectorized: Mapping[str, Sequence[VehicleConfig]],
     ):
         self.names = [vehicle.name for vehicle in vehicles]
+        #: Name to number.
+        self.numbers = {name: number for number, name in enumerate(self.names)}
         #: Shape (n,); `FlightStatus.state` of each; UNKNOWN before the first.
         self.flight_states = np.full(len(vehicles), FlightStatus.UNKNOWN)
         #: Reason for which each vehicle would refuse a takeoff; empty if it would not.
@@ -76,13 +78,17 @@ class VehicleStates:
         for number, name in enumerate(self.names):
             on_status = partial(self._on_flight_status, number)
             handle.subscribe(f"/{name}/{FLIGHT_STATUS}", FlightStatus, on_status)
-        scalar = {name: number for number, name in enumerate(self.names)}
+        scalar = dict(self.numbers)
         for topic, vehicles in self._vectorized.items():
             numbers = np.array([scalar.pop(vehicle.name) for vehicle in vehicles])
             handle.subscribe(topic, Float64MultiArray, partial(self._on_states, numbers))
         for name, number in scalar.items():
             on_state = partial(self._on_state, number)
             handle.subscribe(f"/{name}/{STATE}", PositionVelocityYawStateStamped, on_state)
+
+    def flight_state(self, name: str) -> int:
+        """Return `FlightStatus.state` of a vehicle."""
+        return int(self.flight_states[self.numbers[name]])
 
     def are_fresh(self) -> NDArray[np.bool_]:
         """Return which positions are finite and younger than `MAX_POSITION_AGE`, shape (n,)."""
@@ -177,6 +183,7 @@ class TrackedVehicle:
         config: VehicleConfig,
         states: VehicleStates,
         timers: dict[float, SharedTimer],
+        is_unplaced: bool,
     ):
         self.number = number
         self._timers = timers  # Timers, by their periods (s).
@@ -192,7 +199,7 @@ class TrackedVehicle:
         #: Returns the position of its own references after a time (s), m; None if they do not move.
         self.ahead: Callable[[float], Triple | None] = lambda time: None
         #: End of its takeoffs by the fleet file, if the file has no start point for it (m).
-        self.hover_point: Triple | None = None
+        self.hover_point = config.hover_point if is_unplaced else None
         self._states = states
         self._commanded: Goal[float] | None = None
         self._heading: float | None = None  # Heading commanded in this flight (rad).
@@ -342,12 +349,9 @@ class ReferencesNode(Node):
         timers: dict[float, SharedTimer] = {}
         #: The vehicles of this process.
         self.vehicles = [
-            TrackedVehicle(number, vehicle, self.states, timers)
+            TrackedVehicle(number, vehicle, self.states, timers, vehicle.name in unplaced)
             for number, vehicle in enumerate(vehicles)
         ]
-        for tracked, vehicle in zip(self.vehicles, vehicles, strict=True):
-            if vehicle.name in unplaced:
-                tracked.hover_point = vehicle.hover_point
         self._published_held = ""
 
     @override

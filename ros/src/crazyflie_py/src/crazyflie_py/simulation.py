@@ -3,7 +3,7 @@
 import argparse
 import logging
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,39 +16,6 @@ from crazyflie_py.visualizer import visualizer_for
 _log = logging.getLogger(__name__)
 
 _ROUNDING = 1e-9  #: Fraction of a step by which a sleep may be too short, due to rounding.
-
-
-class CsvOutput:
-    """Files cfID_phaseN.csv in the working directory.
-
-    Columns: time since the beginning of the phase (s), position (m), roll, pitch, yaw (rad).
-    ``timeHelper.nextPhase()`` begins a phase; a script without phases has one, number 0.
-    """
-
-    def __init__(self) -> None:
-        self._phase = 0
-        self._rows: dict[int, list[list[float]]] = {}
-
-    def update(self, time: float, vehicles: Iterable[SimulatedVehicle]) -> None:
-        """Add a row for each vehicle."""
-        for vehicle in vehicles:
-            state = vehicle.state()
-            row = [time, *state.position, *state.rpy]
-            self._rows.setdefault(vehicle.config.id, []).append(row)
-
-    def next_phase(self) -> None:
-        """Write the present phase, and begin the next one."""
-        self.close()
-        self._phase += 1
-
-    def close(self) -> None:
-        """Write the present phase."""
-        for vehicle_id, rows in self._rows.items():
-            data = np.array(rows)
-            data[:, 0] -= data[0, 0]
-            name = f"cf{vehicle_id}_phase{self._phase}.csv"
-            np.savetxt(name, data, "%.9g", ",", header="t,x,y,z,roll,pitch,yaw")
-        self._rows.clear()
 
 
 class Simulation(Swarm):
@@ -74,7 +41,9 @@ class Simulation(Swarm):
         self.visualizer = visualizer_for(options.vis, has_video=options.video is not None)
         if options.video is not None:
             self.visualizer.startVideoOutput(options.video, self.dt)
-        self._output = CsvOutput() if options.writecsv else None
+        self._writes_csv: bool = options.writecsv
+        self._phase = 0
+        self._rows: dict[int, list[list[float]]] = {}  # Rows of the phase, by the vehicles' ids.
 
     def command(self, order: Order, vehicle: SimulatedVehicle | None) -> None:
         for each in self.vehicles if vehicle is None else [vehicle]:
@@ -102,8 +71,11 @@ class Simulation(Swarm):
     def _step(self):
         time = self.time()
         self.visualizer.update(time, self.vehicles)
-        if self._output is not None:
-            self._output.update(time, self.vehicles)
+        if self._writes_csv:
+            for vehicle in self.vehicles:
+                state = vehicle.state()
+                row = [time, *state.position, *state.rpy]
+                self._rows.setdefault(vehicle.config.id, []).append(row)
         self._steps += 1
         # All motions are computed from the same state, whatever the order.
         motions = [vehicle.next_motion(self.dt) for vehicle in self.vehicles]
@@ -134,10 +106,21 @@ class Simulation(Swarm):
     # The ends.
 
     def next_phase(self) -> None:
-        if self._output is not None:
-            self._output.next_phase()
+        self._write_phase()
+        self._phase += 1
 
     def close(self) -> None:
         self.visualizer.finishVideoOutput()
-        if self._output is not None:
-            self._output.close()
+        self._write_phase()
+
+    def _write_phase(self):
+        """Write the files cfID_phaseN.csv into the working directory, the first N is 0.
+
+        Columns: time since the beginning of the phase (s), position (m), roll, pitch, yaw (rad).
+        """
+        for vehicle_id, rows in self._rows.items():
+            data = np.array(rows)
+            data[:, 0] -= data[0, 0]
+            name = f"cf{vehicle_id}_phase{self._phase}.csv"
+            np.savetxt(name, data, "%.9g", ",", header="t,x,y,z,roll,pitch,yaw")
+        self._rows.clear()

@@ -23,6 +23,7 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters
+from crazyflie_fleet.high_level_services import in_turn
 from crazyflie_fleet.vehicle_nodes import PLACE
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import TEXT, ListOf
@@ -135,10 +136,11 @@ class FleetConnectNode(Node):
         for vehicle in self._vehicles:
             connection = self._connections[vehicle.name]
             handle.set_param(f"{connection.prefix}/{POSITIONING_PARAMETER}", connection.positioning)
-            self._go_on(vehicle, self._connect(vehicle))
+            connected = in_turn(self._connect(vehicle))
+            connected.add_done_callback(partial(handle.submit, self._finish, vehicle))
 
     def _connect(self, vehicle):
-        """Yield the calls that connect a vehicle, each after the answer of the one before."""
+        """Yield the calls that connect a vehicle; see `in_turn`."""
         handle, name = self._handle, vehicle.name
         yield handle.call_service(ADD, AddCrazyflie, self._connections[name].request(), TIMEOUT)
         if file := self._lighthouse_files.get(name):
@@ -160,16 +162,8 @@ class FleetConnectNode(Node):
             request = UpdateParamsRequest([*values])
             yield handle.call_service(f"/{name}/update_params", UpdateParams, request, TIMEOUT)
 
-    def _go_on(self, vehicle, calls, answer=None):
-        error = None if answer is None else answer.exception()
-        call = next(calls, None) if error is None else None
-        if call is None:
-            self._finish(vehicle, error)
-        else:
-            call.add_done_callback(partial(self._handle.submit, self._go_on, vehicle, calls))
-
-    def _finish(self, vehicle, error):
-        if error is None:
+    def _finish(self, vehicle, done):
+        if (error := done.exception()) is None:
             self._handle.info(f"{vehicle.name} is connected, {vehicle.uri}")
         else:
             self._failed.append(vehicle.name)

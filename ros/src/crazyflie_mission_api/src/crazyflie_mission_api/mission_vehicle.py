@@ -218,19 +218,3 @@ def forward(source: "Future[Any]", target: "Future[Any]") -> None:
             target.set_result(answer.result())
 
     source.add_done_callback(complete)
-
-
-def in_turn(*calls: Callable[[], "Future[Any]"]) -> "Future[Any]":
-    """Make calls one after the other; return the future of the last one, or of one that fails."""
-    outcome: Future[Any] = Future()
-
-    def go_on(answer, left):
-        if answer.exception() is not None:
-            outcome.set_exception(answer.exception())
-        elif not left:
-            outcome.set_result(answer.result())
-        else:
-            left[0]().add_done_callback(lambda next_one: go_on(next_one, left[1:]))
-
-    calls[0]().add_done_callback(lambda first: go_on(first, calls[1:]))
-    return outcome

@@ -13,7 +13,13 @@ from std_srvs.srv import Empty, SetBool
 from typing_extensions import override
 
 from crazyflie_driver import srv
-from crazyflie_fleet.high_level_services import HIGH_LEVEL, START_TOPIC, heading, to_message
+from crazyflie_fleet.high_level_services import (
+    HIGH_LEVEL,
+    START_TOPIC,
+    heading,
+    in_turn,
+    to_message,
+)
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.mission_vehicle import (
     MEMORY,
@@ -25,7 +31,6 @@ from crazyflie_mission_api.mission_vehicle import (
     Setpoint,
     done,
     forward,
-    in_turn,
 )
 from crazyflie_mission_api.stream import SetpointPublishers, SetpointStream
 from crazyflie_mission_api.trajectories import START_SKEW
@@ -357,19 +362,15 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
         place = self.position()
         self._ground = 0.0 if place is None else place[2]
 
-        def climb():
-            return super(RosVehicle, self).take_off(height, duration, group_mask)
+        def calls():
+            if self.uses_driver:
+                # This call waits until the driver has read the parameters, which it sets then.
+                yield self.call("update_params", srv.UpdateParams, [])
+                yield self._handle.set_param_later(f"{prefix(self.name)}/{_HIGH_LEVEL}", 1)
+                yield self.call("update_params", srv.UpdateParams, [_HIGH_LEVEL])
+            yield super(RosVehicle, self).take_off(height, duration, group_mask)
 
-        if not self.uses_driver:
-            return climb()
-        # The first call waits until the driver has read the parameters, which it sets then.
-        parameter = f"{prefix(self.name)}/{_HIGH_LEVEL}"
-        return in_turn(
-            lambda: self.call("update_params", srv.UpdateParams, []),
-            lambda: self._handle.set_param_later(parameter, 1),
-            lambda: self.call("update_params", srv.UpdateParams, [_HIGH_LEVEL]),
-            climb,
-        )
+        return in_turn(calls())
 
     @override
     def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_fleet import fleet_file
-from crazyflie_fleet.fleet_config import LogTopic
+from crazyflie_fleet.fleet_config import LogTopicSettings
 from crazyflie_fleet.vehicle_nodes import parameters
 from crazyflie_utils import ParameterError
 
@@ -53,11 +53,10 @@ def test_the_example():
     assert second.uri == "radio://0/80/2M/E7E7E7E702"
     assert second.mocap_frame == "cf2"
     assert second.firmware_params["locSrv.extPosStdDev"] == 0.001
-    assert second.log_topics == (
-        LogTopic("motors", 10.0, ("motor.m1", "motor.m2", "motor.m3", "motor.m4")),
-    )
+    motors = {"frequency": 10.0, "vars": ["motor.m1", "motor.m2", "motor.m3", "motor.m4"]}
+    assert second.log_topics == {"motors": LogTopicSettings.from_mapping(motors)}
     assert second.default_topics == ("battery", "pose")
-    assert fleet["cf1"].log_topics == ()
+    assert fleet["cf1"].log_topics == {}
     assert fleet.warnings == ()
 
 

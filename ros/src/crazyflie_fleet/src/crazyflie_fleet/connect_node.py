@@ -77,9 +77,9 @@ def connection(vehicle: VehicleConfig) -> VehicleParameters:
             "tf_prefix": vehicle.name,
             "positioning": vehicle.settings.positioning,
             **switches,
-            "genericLogTopics": [topic.name for topic in topics],
-            "genericLogTopicFrequencies": [round(1000.0 / topic.frequency) for topic in topics],
-            "genericLogTopic_NAME_Variables": [list(topic.variables) for topic in topics],
+            "genericLogTopics": [*topics],
+            "genericLogTopicFrequencies": [round(1000.0 / t.frequency) for t in topics.values()],
+            "genericLogTopic_NAME_Variables": [list(t.variables) for t in topics.values()],
         }
     )
 

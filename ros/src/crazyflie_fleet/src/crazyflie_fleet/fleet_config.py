@@ -319,15 +319,6 @@ BUFFER = "buffer"
 
 
 @dataclass(frozen=True)
-class LogTopic:
-    """A topic of firmware variables."""
-
-    name: str  # Below the vehicle's namespace.
-    frequency: float  # Frequency of the messages (Hz).
-    variables: tuple[str, ...]  # Such as "pm.vbat".
-
-
-@dataclass(frozen=True)
 class VehicleConfig:
     """One vehicle."""
 
@@ -338,7 +329,8 @@ class VehicleConfig:
     settings: RobotSettings
     firmware_params: Mapping[str, float] = dataclasses.field(default_factory=dict)
     default_topics: tuple[str, ...] = ("battery",)  # Standard topics that the driver publishes.
-    log_topics: tuple[LogTopic, ...] = ()
+    # Topics of firmware variables, by their names below the vehicle's namespace.
+    log_topics: Mapping[str, LogTopicSettings] = dataclasses.field(default_factory=dict)
 
     @property
     def uri(self) -> str | None:

@@ -18,7 +18,6 @@ from crazyflie_fleet.fleet_config import (
     DefaultTopicSettings,
     FirmwareNumber,
     FleetConfig,
-    LogTopic,
     LogTopicSettings,
     MachineSettings,
     PartialSettings,
@@ -306,7 +305,7 @@ class FleetParser:
             for key, value in inner.entries().items()
         }
         if "firmware_logging" not in parts:
-            return params, ("battery",), ()
+            return params, ("battery",), {}
         return params, *self._logging(parts["firmware_logging"])
 
     def _logging(self, entry):
@@ -323,18 +322,18 @@ class FleetParser:
                 standard.append(DEFAULT_TOPICS[key])
                 if "frequency" in inner:
                     self.remarks.idle(inner["frequency"], "frequency of a default topic")
-        custom = []
+        custom = {}
         for key, inner in _entries(parts, "custom_topics").items():
             topic = self._read(inner, LogTopicSettings)
             self._check_type(_VEHICLE_NAME, key, inner)
             if topic is not None:
-                custom.append(LogTopic(key, topic.frequency, topic.variables))
+                custom[key] = topic
         enabled = "enabled" not in parts or self._check_type(
             BOOLEAN, parts["enabled"].value, parts["enabled"]
         )
         # For safety, the battery is always monitored.
         names = ("battery", *standard) if enabled else ("battery",)
-        return tuple(dict.fromkeys(names)), tuple(custom) if enabled else ()
+        return tuple(dict.fromkeys(names)), custom if enabled else {}
 
 
 def _entries(parts, key):

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from typing_extensions import override
 from uav_trajectory import Trajectory
 
 from crazyflie_mission_api.mission_vehicle import (
@@ -105,7 +104,9 @@ class ScriptCommands:
 
     def _mask(self, where: str, mask: int) -> int:
         mask = check.byte(where, "groupMask", mask)
-        if mask and not mask & self._groups():
+        groups = functools.reduce(operator.or_, (vehicle.groups for vehicle in self._vehicles))
+        # A script may name any groups of one vehicle.
+        if mask and self._vehicle is None and not mask & groups:
             _log.warning(
                 "%s: groupMask is %d, and setGroupMask has put no vehicle into these groups; all "
                 "vehicles ignore the command",
@@ -113,10 +114,6 @@ class ScriptCommands:
                 mask,
             )
         return mask
-
-    def _groups(self) -> int:
-        """Return all groups that any vehicle may be in."""
-        return 0xFF
 
     def takeoff(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
         """Fly straight up to a height in a duration; returns at once.
@@ -482,10 +479,6 @@ class CrazyflieServer(ScriptCommands):
         self.crazyflies = [Crazyflie(swarm, vehicle) for vehicle in swarm.vehicles]
         self.crazyfliesById = _Found({cf.id: cf for cf in self.crazyflies})
         self.crazyfliesByName = _Found({cf.name: cf for cf in self.crazyflies})
-
-    @override
-    def _groups(self) -> int:
-        return functools.reduce(operator.or_, (vehicle.groups for vehicle in self._vehicles))
 
     def goTo(self, goal: ArrayLike, yaw: float, duration: float, groupMask: int = 0) -> None:
         """Fly by an offset (m) and an angle (rad); see `Crazyflie.goTo`."""

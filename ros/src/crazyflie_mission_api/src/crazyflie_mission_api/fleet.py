@@ -43,20 +43,6 @@ from crazyflie_utils.timers import Timer
 
 _FROZEN = 10.0  #: Longest time that /clock may stand still (s of the machine's clock).
 
-_SERVICES = (
-    "takeoff",
-    "land",
-    "go_to",
-    "upload_trajectory",
-    "start_trajectory",
-    "stop",
-    "emergency",
-    "update_params",
-    "set_group_mask",
-    "notify_setpoints_stop",
-    "arm",
-)
-
 #: Longest time to wait for messages of all missions at the start (s of the machine's clock): killed
 #: missions, whose nodes are still registered with the master, send none.
 _MISSIONS_LIMIT = 1.0
@@ -370,14 +356,14 @@ def _vehicle(process, handle, name, services, synchronized_start):
     commander = f"{top}/high_level"
     uses_driver, frames, has_yaw = _how_seen(handle, name, services)
     if uses_driver:
-        return RosVehicle(name, handle, _below(top), None, frames)
+        return RosVehicle(name, handle, top, None, frames)
     if f"{commander}/go_to" not in services:
         if not {f"{top}/takeoff", f"{top}/land"} <= services.keys():
             return None
         handle.set_param(f"{commander}/reference/yaw", has_yaw)
         if not HighLevelNode().initialize(process.handle(commander)):
             raise MissionError(f"{commander} could not be started; its reason is in the log")
-    return RosVehicle(name, handle, _below(commander), synchronized_start, frames, has_yaw)
+    return RosVehicle(name, handle, commander, synchronized_start, frames, has_yaw)
 
 
 def _frames(handle, commander):
@@ -401,10 +387,6 @@ def mission_nodes(handle: NodeHandle) -> int:
 
 def _program():
     return re.sub(r"\W", "_", Path(sys.argv[0]).stem) or "mission"
-
-
-def _below(top):
-    return {service: f"{top}/{service}" for service in _SERVICES}
 
 
 def catch_signals() -> None:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import genpy
 from geometry_msgs.msg import Point, PoseStamped
 from std_msgs.msg import String
-from std_srvs.srv import Empty, SetBool
+from std_srvs.srv import Empty, EmptyRequest, SetBool
 from typing_extensions import override
 
 from crazyflie_driver import srv
@@ -274,11 +274,12 @@ def common_services(services: Mapping[str, str], names: Collection[str]) -> str 
 
 
 class ServiceCommands(Commands):
-    """Commands by services: short names, such as go_to, to absolute names."""
+    """Commands by services below ``top``, of which ``emergency`` may be elsewhere."""
 
-    def __init__(self, handle: NodeHandle, services: Mapping[str, str]):
+    def __init__(self, handle: NodeHandle, top: str, emergency: str | None = None):
         self._handle = handle
-        self.services = services
+        self.top = top
+        self._emergency = emergency or f"{top}/emergency"
 
     @override
     def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
@@ -307,43 +308,43 @@ class ServiceCommands(Commands):
 
     @override
     def emergency(self) -> "Future[Any]":
-        return self.call("emergency", Empty)
+        request = EmptyRequest()
+        return self._handle.call_service(self._emergency, Empty, request, CALL_TIMEOUT)
 
     def call(
         self, name: str, service_type: Any, *arguments: Any, limit: float = CALL_TIMEOUT
     ) -> "Future[Any]":
-        """Call a service by its short name; ``limit`` is in s of the machine's clock."""
+        """Call a service below `top`; ``limit`` is in s of the machine's clock."""
         request = service_type._request_class(*arguments)
-        return self._handle.call_service(self.services[name], service_type, request, limit)
+        return self._handle.call_service(f"{self.top}/{name}", service_type, request, limit)
 
 
 class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
     """A vehicle by the services of the driver, or by those of `HighLevelNode`.
 
-    ``services`` are those of `ServiceCommands`. Vehicles that a controller
-    flies, and not the driver, have a ``synchronized_start``. The attribute ``broadcast`` starts
-    those of the driver together, if it is not None.
+    They are below ``top``. Vehicles that a controller flies, and not the driver, have a
+    ``synchronized_start``. The attribute ``broadcast`` starts those of the driver together, if it
+    is not None.
     """
 
     def __init__(
         self,
         name: str,
         handle: NodeHandle,
-        services: dict[str, str],
+        top: str,
         synchronized_start: SynchronizedStart | None = None,
         frames: tuple[str, str] | None = None,
         has_yaw: bool = True,
     ):
         uses_driver = synchronized_start is None
         RosVehicleState.__init__(self, name, handle, uses_driver, frames, has_yaw)
-        ServiceCommands.__init__(self, handle, services)
+        ServiceCommands.__init__(self, handle, top)
         self.bounds = fence(handle, prefix(name))
         self.start_skew = START_SKEW if uses_driver else 0.0
         self._synchronized_start = synchronized_start
         self.broadcast: BroadcastStart | None = None
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
-        top = services["go_to"].rpartition("/")[0]
         self._setpoints = SetpointPublishers(handle, top)
         if uses_driver:
             frame = "" if frames is None else frames[0]
@@ -403,7 +404,7 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
         if self._prepared is not None and self._stream is not None:
             return self._stream.start(self._prepared)
         if self._synchronized_start is not None:
-            self._synchronized_start.start(self.services["start_trajectory"].rpartition("/")[0])
+            self._synchronized_start.start(self.top)
             return done(None)
         return self._hand_over(self._start_with_others)
 

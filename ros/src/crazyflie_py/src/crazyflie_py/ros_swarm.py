@@ -85,10 +85,9 @@ class RosSwarm(Swarm):
         self._common: ServiceCommands | None = None
         self._shared: tuple[str, ...] = _COMMON
         if (top := common_services(services, names)) is not None:
-            paths = {name: f"{top}/{name}" for name in ("takeoff", *_COMMON)}
             # A fleet's emergency service is not one of its high-level services.
-            paths["emergency"] = f"{top.removesuffix(f'/{HIGH_LEVEL}')}/emergency"
-            self._common = ServiceCommands(handle, paths)
+            emergency = f"{top.removesuffix(f'/{HIGH_LEVEL}')}/emergency"
+            self._common = ServiceCommands(handle, top, emergency)
             if top == ALL_OF_FLEET:
                 # One call: a hundred calls would delay the fleet's callbacks.
                 self._shared = ("takeoff", *_COMMON)

@@ -353,8 +353,6 @@ def close_vehicles(
     vehicles: Sequence[VehicleConfig],
 ) -> list[tuple[int, int, float, float]]:
     """Return the pairs of vehicles whose start points are too close; see `close_pairs`."""
-    if not vehicles:
-        return []
     positions = np.array([vehicle.position for vehicle in vehicles])
     return sorted(close_pairs(positions, [vehicle.buffer for vehicle in vehicles]))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import yaml
 
 from crazyflie_fleet.fleet_config import SINGLE_MARKER, FleetConfig, RobotSettings, VehicleConfig
-from crazyflie_fleet.fleet_parser import FleetParser, close_vehicles, inner
+from crazyflie_fleet.fleet_parser import FleetParser, close_vehicles, entry_at
 from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.types import Integer
@@ -104,7 +104,7 @@ def _type(entry, types):
 
 def _points(types, configuration):
     """Return the number of points of a marker configuration; 0 without one."""
-    points = inner(types, f"markerConfigurations/{configuration}/points")
+    points = entry_at(types, f"markerConfigurations/{configuration}/points")
     return 0 if points is None else len(points.entries())
 
 

@@ -182,7 +182,7 @@ class FleetParser:
         if self._read(entry, PartialSettings, *_FIRMWARE, *extra_keys) is None:
             return
         for key in _WITHOUT_EFFECT:
-            if (idle := inner(entry, key)) is not None:
+            if (idle := entry_at(entry, key)) is not None:
                 self.remarks.idle(idle, key)
         with self._collecting():
             self._firmware(entry)
@@ -230,15 +230,15 @@ class FleetParser:
         for vehicle in vehicles:
             name, robot, frame = vehicle.name, robots[vehicle.name], vehicle.mocap_frame
             if vehicle.uri and (other := uris.setdefault(vehicle_key(vehicle.uri), name)) != name:
-                line = (inner(robots[other], "uri") or robots[other]).line
+                line = (entry_at(robots[other], "uri") or robots[other]).line
                 self._error(
-                    inner(robot, "uri") or robot,
+                    entry_at(robot, "uri") or robot,
                     f"is {vehicle.uri}, which is also that of {other} in line {line}; expected "
                     "an address of its own",
                 )
             if (other := frames.setdefault(frame, name)) != name:
                 self._error(
-                    inner(robot, "motion_capture/frame") or robot,
+                    entry_at(robot, "motion_capture/frame") or robot,
                     f"has the frame {frame} of motion capture, which is that of {other}; expected "
                     "a frame of its own",
                 )
@@ -340,7 +340,7 @@ def _entries(parts, key):
     return parts[key].entries() if key in parts else {}
 
 
-def inner(entry: Entry, path: str) -> Entry | None:
+def entry_at(entry: Entry, path: str) -> Entry | None:
     """Return the entry at a path, such as motion_capture/marker, or None."""
     for key in path.split("/"):
         if key not in entry:

@@ -87,8 +87,9 @@ def test_frozen_peer_still_looks_connected(serve, client):
     assert "connection_lost" not in someone.events
     # The vehicle flies on, and is heard again after the silence.
     assert server.vehicle.physics.position[2] > 0.2
-    server.switches.silence = 0.0
+    server.switches.silence = 0.2
     wait_until(lambda: len(rows) > heard)
+    assert server.switches.silence == 0.0
 
 
 def test_silence_while_streaming_meets_the_watchdogs(serve, client):

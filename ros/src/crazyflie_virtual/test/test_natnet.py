@@ -13,7 +13,7 @@ from natnet.version import Version
 from scipy.spatial.transform import Rotation
 
 from crazyflie_virtual import natnet
-from crazyflie_virtual.mocap import MocapScene, MocapSwitches
+from crazyflie_virtual.mocap import MocapScene, MocapSettings
 from crazyflie_virtual.natnet import Encoder, StreamedBody
 from crazyflie_virtual.server import Observation
 
@@ -120,7 +120,7 @@ def observation(time, body_id=1, **changes):
 
 
 def test_bodies_go_on_between_observations():
-    scene = MocapScene(MocapSwitches())
+    scene = MocapScene(MocapSettings())
     scene.observe(observation(10.0, velocity=(1.0, -2.0, 0.5), rates=(0.0, 0.0, 2.0)))
     (body,) = scene.bodies(10.01)
     np.testing.assert_allclose(body.position, (1.01, 1.98, 3.005))
@@ -130,7 +130,7 @@ def test_bodies_go_on_between_observations():
 
 
 def test_a_vehicle_that_is_gone_is_not_tracked():
-    scene = MocapScene(MocapSwitches())
+    scene = MocapScene(MocapSettings())
     scene.observe(observation(10.0))
     assert scene.bodies(10.4)[0].is_tracked
     (body,) = scene.bodies(10.6)
@@ -139,19 +139,18 @@ def test_a_vehicle_that_is_gone_is_not_tracked():
 
 
 def test_invalid_bodies_keep_the_pose_they_were_seen_at():
-    switches = MocapSwitches(invalid="2, 5")
-    scene = MocapScene(switches)
+    scene = MocapScene(MocapSettings(invalid="2, 5"))
     scene.observe(observation(10.0, 1))
     scene.observe(observation(10.0, 2))
     assert [b.is_tracked for b in scene.bodies(10.0)] == [True, False]
-    switches.invalid = "all"
+    scene.switches.invalid = "all"
     scene.observe(observation(10.1, 1, position=(9.0, 9.0, 9.0)))
     assert [b.is_tracked for b in scene.bodies(10.1)] == [False, False]
     assert scene.bodies(10.1)[0].position == (1.0, 2.0, 3.0)
 
 
 def test_dropout_takes_its_share():
-    scene = MocapScene(MocapSwitches(dropout=0.25))
+    scene = MocapScene(MocapSettings(dropout=0.25))
     tracked = 0
     for k in range(4000):
         scene.observe(observation(0.01 * k))
@@ -160,7 +159,8 @@ def test_dropout_takes_its_share():
 
 
 def test_noise_has_its_deviations():
-    scene = MocapScene(MocapSwitches(), position_noise=0.002, attitude_noise=0.01, seed=3)
+    settings = MocapSettings(position_noise=0.002, attitude_noise=0.01, seed=3)
+    scene = MocapScene(settings)
     positions, angles = [], []
     for k in range(2000):
         scene.observe(observation(0.01 * k))
@@ -173,7 +173,7 @@ def test_noise_has_its_deviations():
 
 
 def test_vehicles_with_one_marker_are_no_rigid_bodies():
-    scene = MocapScene(MocapSwitches(invalid="3"), single_markers="2, 3")
+    scene = MocapScene(MocapSettings(invalid="3", single_markers="2, 3"))
     for number in (1, 2, 3):
         scene.observe(observation(10.0, number, position=(float(number), 0.0, 1.0)))
     assert [body.body_id for body in scene.bodies(10.0)] == [1]
@@ -181,7 +181,7 @@ def test_vehicles_with_one_marker_are_no_rigid_bodies():
 
 
 def test_reflections_and_occlusions():
-    scene = MocapScene(MocapSwitches(ghosts=0.5, occlusions=1.0), single_markers="all")
+    scene = MocapScene(MocapSettings(ghosts=0.5, occlusions=1.0, single_markers="all"))
     shown = []
     for k in range(2400):
         scene.observe(observation(k / 120.0))

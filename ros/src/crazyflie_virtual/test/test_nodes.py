@@ -9,6 +9,7 @@ from tf2_msgs.msg import TFMessage
 
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_virtual.mocap import is_listed
 from crazyflie_virtual.nodes import VirtualCrazyflieNode, VirtualMocapNode
 
 LIMIT = 60.0
@@ -170,10 +171,10 @@ def test_mocap_answers(launch):
     answer = asked(node._server.address, struct.pack("<HH", 0, 0))
     assert struct.unpack_from("<H", answer) == (1,)
     assert answer[264:266] == b"\4\1"
-    assert node._server.switches.hides(3)
+    assert is_listed(3, node._server.switches.invalid)
     process.transport.set_param("/node/fault", {"invalid": "", "silent": True})
     process.advance(1.0)
-    assert not node._server.switches.hides(3)
+    assert not is_listed(3, node._server.switches.invalid)
     assert node._server.switches.silent
     process.reconfigure("/node", **{"fault/invalid": "all"})
-    assert node._server.switches.hides(3)
+    assert is_listed(3, node._server.switches.invalid)

@@ -239,7 +239,7 @@ def test_estimator_can_be_reset(flying):
     assert flying.firmware.estimator.variance_position > 1e3 * variance
 
 
-# FaultSwitches.
+# Fault switches.
 
 
 def test_motor_failure_ends_the_flight(flying):

@@ -8,7 +8,7 @@ from std_srvs.srv import TriggerRequest
 from swarm_scenes import RATE, SwapFlight, fly
 from test_mocap_node import launch, refusal
 
-from crazyflie_virtual.mocap import MocapScene, MocapSwitches
+from crazyflie_virtual.mocap import MocapScene, MocapSettings
 from crazyflie_virtual.natnet import Encoder
 from crazyflie_virtual.server import Observation
 from mocap_optitrack import natnet_messages
@@ -34,7 +34,8 @@ class VirtualCameras:
     """The virtual motion capture's frames, as bytes, and what the client makes of them."""
 
     def __init__(self, version, **switches):
-        self._scene = MocapScene(MocapSwitches(**switches), 0.0005, single_markers="all", rate=RATE)
+        settings = MocapSettings(position_noise=0.0005, single_markers="all", rate=RATE, **switches)
+        self._scene = MocapScene(settings)
         self._encoder, self._version = Encoder(version), version
 
     def see(self, time, positions):

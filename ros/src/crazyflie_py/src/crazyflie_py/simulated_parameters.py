@@ -10,7 +10,7 @@ from crazyflie_py.swarm import DEFAULT_COLOR, SwarmVehicle
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.parameters import Parameter, parameter_specs
-from crazyflie_virtual.settings import FaultSwitches, VehicleSettings
+from crazyflie_virtual.settings import VehicleSettings, switches
 
 _log = logging.getLogger(__name__)
 
@@ -98,7 +98,8 @@ def _specs():
 
 @functools.cache
 def _defaults():
-    firmware = Firmware(Physics(), FaultSwitches(), VehicleSettings.from_mapping({}))
+    settings = VehicleSettings.from_mapping({})
+    firmware = Firmware(Physics(), switches(settings), settings)
     parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
     return {parameter.full_name: parameter.default for parameter in parameters}
 

@@ -6,7 +6,6 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from typing_extensions import override
 
@@ -26,28 +25,11 @@ from crazyflie_virtual.server import (
     run_server,
     send,
 )
-from crazyflie_virtual.settings import OBSERVER_PORT
+from crazyflie_virtual.settings import OBSERVER_PORT, switches
 
 OCCLUSION = 0.3  #: Longest time for which a vehicle is hidden, s.
 _GHOST_MARGIN = 0.3  #: Largest distance of reflections from the vehicles, along each axis (m).
 _STALE = 0.5  #: Age of the last observation above which a body is not tracked (s).
-
-
-@dataclass
-class MocapSwitches:
-    """Faults, which may be changed at any time."""
-
-    dropout: float = 0.0  #: Probability with which a body is not tracked in a frame.
-    invalid: str = ""  #: Numbers of bodies that are not tracked, separated by commas; or "all".
-    silent: bool = False  #: Whether frames are held back.
-    #: Mean number of reflections in a frame: points near the vehicles that are no markers.
-    ghosts: float = 0.0
-    #: Rate at which occlusions of a vehicle begin (1/s); each takes up to `OCCLUSION` s.
-    occlusions: float = 0.0
-
-    def hides(self, body_id: int) -> bool:
-        """Return whether a body is one of those that are not tracked."""
-        return is_listed(body_id, self.invalid)
 
 
 def is_listed(body_id: int, text: str) -> bool:
@@ -56,115 +38,8 @@ def is_listed(body_id: int, text: str) -> bool:
     return "all" in names or str(body_id) in names
 
 
-class MocapScene:
-    """Rigid bodies at their last observation.
-
-    The noise is in standard deviations along and about each axis, m and rad. ``single_markers`` are
-    numbers of the vehicles with one marker, separated by commas, or "all": they are no rigid
-    bodies. ``rate`` is in frames per second.
-    """
-
-    def __init__(
-        self,
-        switches: MocapSwitches,
-        position_noise: float = 0.0,
-        attitude_noise: float = 0.0,
-        seed: int = 0,
-        single_markers: str = "",
-        rate: float = 120.0,
-    ):
-        self._switches = switches
-        self._noise = (position_noise, attitude_noise)
-        self._seed = seed
-        self._random = random.Random(seed)
-        self._observations: dict[int, Observation] = {}
-        self._cameras: dict[int, MotionCapture] = {}
-        self._seen: dict[int, tuple[Triple, Quaternion]] = {}
-        self._single_markers = single_markers
-        self._hidden_until: dict[int, float] = {}
-        self._frame_period = 1.0 / rate
-
-    def observe(self, observation: Observation) -> None:
-        """Process an `Observation`."""
-        body_id = observation.body_id
-        if body_id not in self._cameras:
-            self._cameras[body_id] = MotionCapture(*self._noise, seed=(self._seed, body_id))
-        self._observations[body_id] = observation
-
-    def bodies(self, time: float) -> list[StreamedBody]:
-        """Return every rigid body at ``time`` (s), in the order of their numbers.
-
-        A body that is not tracked has its last tracked pose.
-        """
-        return [
-            self._see(self._observations[number], time)
-            for number in sorted(self._observations)
-            if not is_listed(number, self._single_markers)
-        ]
-
-    def markers(self, time: float) -> list[Triple]:
-        """Return the markers of vehicles that have one, and reflections, in any order, m.
-
-        Markers that are not seen are missing.
-        """
-        found = [
-            self._see(self._observations[number], time)
-            for number in sorted(self._observations)
-            if is_listed(number, self._single_markers)
-        ]
-        points = [body.position for body in found if body.is_tracked]
-        if found and self._switches.ghosts:
-            ranges = [
-                (min(axis) - _GHOST_MARGIN, max(axis) + _GHOST_MARGIN)
-                for axis in zip(*(body.position for body in found), strict=True)
-            ]
-            ghosts = int(self._switches.ghosts + self._random.random())
-            points += [
-                tuple(self._random.uniform(*limits) for limits in ranges) for _ in range(ghosts)
-            ]
-        self._random.shuffle(points)
-        return points
-
-    def _is_hidden(self, body_id, time):
-        rate = self._switches.occlusions
-        if time < self._hidden_until.get(body_id, 0.0):
-            return True
-        if not rate or self._random.random() >= rate * self._frame_period:
-            return False
-        self._hidden_until[body_id] = time + self._random.uniform(0.0, OCCLUSION)
-        return True
-
-    def _see(self, observation, time):
-        body_id, name = observation.body_id, observation.name
-        lost = (
-            time - observation.time > _STALE
-            or self._switches.hides(body_id)
-            or self._random.random() < self._switches.dropout
-            or self._is_hidden(body_id, time)
-        )
-        if not lost:
-            camera = self._cameras[body_id]
-            camera.measure(time, *_extrapolate(observation, time))
-            _, position, quaternion = camera.arrivals(time)[-1]
-            self._seen[body_id] = (position, quaternion)
-        never = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-        position, quaternion = self._seen.get(body_id, never)
-        return StreamedBody(body_id, name, position, quaternion, not lost)
-
-
-def _extrapolate(observation, time):
-    # Observations come with a few milliseconds between them and not in step
-    # with the frames; between them the vehicle is extrapolated on a straight line.
-    dt = time - observation.time
-    position = tuple(
-        p + v * dt for p, v in zip(observation.position, observation.velocity, strict=True)
-    )
-    half_angles = (0.5 * dt * rate for rate in observation.rates)
-    return position, turned(observation.quaternion, *half_angles)
-
-
 class MocapSettings(Parameters):
-    """Settings of the NatNet server; the live ones are its `MocapSwitches`."""
+    """Settings of the NatNet server; the live ones are its faults, see `settings.switches`."""
 
     host: str = parameter(
         TEXT,
@@ -237,9 +112,102 @@ class MocapSettings(Parameters):
         "",
     )
 
-    def switches(self) -> MocapSwitches:
-        """Return the initial switches."""
-        return MocapSwitches(**{name: getattr(self, name) for name in vars(MocapSwitches())})
+
+class MocapScene:
+    """Rigid bodies at their last observation.
+
+    Vehicles with one marker are no rigid bodies.
+    """
+
+    def __init__(self, settings: MocapSettings):
+        self.switches = switches(settings)  #: Faults, which may be changed.
+        self._settings = settings
+        self._random = random.Random(settings.seed)
+        self._observations: dict[int, Observation] = {}
+        self._cameras: dict[int, MotionCapture] = {}
+        self._seen: dict[int, tuple[Triple, Quaternion]] = {}
+        self._hidden_until: dict[int, float] = {}
+
+    def observe(self, observation: Observation) -> None:
+        """Process an `Observation`."""
+        body_id = observation.body_id
+        if body_id not in self._cameras:
+            s = self._settings
+            self._cameras[body_id] = MotionCapture(
+                s.position_noise, s.attitude_noise, seed=(s.seed, body_id)
+            )
+        self._observations[body_id] = observation
+
+    def bodies(self, time: float) -> list[StreamedBody]:
+        """Return every rigid body at ``time`` (s), in the order of their numbers.
+
+        A body that is not tracked has its last tracked pose.
+        """
+        return [
+            self._see(self._observations[number], time)
+            for number in sorted(self._observations)
+            if not is_listed(number, self._settings.single_markers)
+        ]
+
+    def markers(self, time: float) -> list[Triple]:
+        """Return the markers of vehicles that have one, and reflections, in any order, m.
+
+        Markers that are not seen are missing.
+        """
+        found = [
+            self._see(self._observations[number], time)
+            for number in sorted(self._observations)
+            if is_listed(number, self._settings.single_markers)
+        ]
+        points = [body.position for body in found if body.is_tracked]
+        if found and self.switches.ghosts:
+            ranges = [
+                (min(axis) - _GHOST_MARGIN, max(axis) + _GHOST_MARGIN)
+                for axis in zip(*(body.position for body in found), strict=True)
+            ]
+            ghosts = int(self.switches.ghosts + self._random.random())
+            points += [
+                tuple(self._random.uniform(*limits) for limits in ranges) for _ in range(ghosts)
+            ]
+        self._random.shuffle(points)
+        return points
+
+    def _is_hidden(self, body_id, time):
+        rate = self.switches.occlusions
+        if time < self._hidden_until.get(body_id, 0.0):
+            return True
+        if not rate or self._random.random() >= rate / self._settings.rate:
+            return False
+        self._hidden_until[body_id] = time + self._random.uniform(0.0, OCCLUSION)
+        return True
+
+    def _see(self, observation, time):
+        body_id, name = observation.body_id, observation.name
+        lost = (
+            time - observation.time > _STALE
+            or is_listed(body_id, self.switches.invalid)
+            or self._random.random() < self.switches.dropout
+            or self._is_hidden(body_id, time)
+        )
+        if not lost:
+            camera = self._cameras[body_id]
+            camera.measure(time, *_extrapolate(observation, time))
+            _, position, quaternion = camera.arrivals(time)[-1]
+            self._seen[body_id] = (position, quaternion)
+        never = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        position, quaternion = self._seen.get(body_id, never)
+        return StreamedBody(body_id, name, position, quaternion, not lost)
+
+
+def _extrapolate(observation, time):
+    # Observations come with a few milliseconds between them and not in step
+    # with the frames; between them the vehicle is extrapolated on a straight line.
+    dt = time - observation.time
+    position = tuple(
+        p + v * dt for p, v in zip(observation.position, observation.velocity, strict=True)
+    )
+    half_angles = (0.5 * dt * rate for rate in observation.rates)
+    return position, turned(observation.quaternion, *half_angles)
 
 
 _CLIENT_LIMIT = 5.0  #: Age of a client's last message above which it receives no frames (s).
@@ -255,11 +223,8 @@ class MocapServer(Server):
     def __init__(self, settings: MocapSettings, warn: Callable[[str], None] | None = None):
         self._settings = settings
         _check_address("multicast_address", settings.multicast_address)
-        self.switches = settings.switches()
-        noise = (settings.position_noise, settings.attitude_noise)
-        self._scene = MocapScene(
-            self.switches, *noise, settings.seed, settings.single_markers, settings.rate
-        )
+        self._scene = MocapScene(settings)
+        self.switches = self._scene.switches
         self._encoder = Encoder(settings.version)
         self._commands = open_socket(settings.host, settings.command_port)
         try:

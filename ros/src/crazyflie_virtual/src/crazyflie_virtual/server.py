@@ -17,7 +17,8 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator
 from random import Random
-from typing import Any, NamedTuple
+from types import SimpleNamespace
+from typing import NamedTuple
 
 from typing_extensions import override
 
@@ -25,7 +26,7 @@ import crazyflie_utils
 from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parse_arguments
 from crazyflie_virtual.crtp import is_broadcast
-from crazyflie_virtual.settings import FIRST_PORT, FaultSwitches, VehicleSettings
+from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
 
 Address = tuple[str, int]  #: Host and port.
@@ -37,7 +38,7 @@ _STOP_LIMIT = 2.0  #: Longest wait of `Server.stop` for the thread (s).
 class Server(ABC):
     """A server in real time; `stop` closes its sockets."""
 
-    switches: Any  #: Its attributes are the live fields of the settings.
+    switches: SimpleNamespace  #: Live fields of the settings, which may be changed.
 
     def __init__(self, *sockets: socket.socket):
         self._sockets = sockets
@@ -107,7 +108,7 @@ Item = tuple[bytes, Address]  #: Datagram, and its sender or receiver.
 class Channel:
     """Datagrams in transit; ``random`` decides which are lost."""
 
-    def __init__(self, faults: FaultSwitches, random: Random):
+    def __init__(self, faults: SimpleNamespace, random: Random):
         self._faults = faults
         self._random = random
         self._on_the_way: deque[tuple[float, Item]] = deque()
@@ -274,7 +275,8 @@ class VehicleServer(Server):
         )
 
     def _process(self, now, datagrams):
-        self.vehicle.faults.pass_time(now - self._last_time)
+        faults = self.vehicle.faults
+        faults.silence = max(0.0, faults.silence - (now - self._last_time))
         self._last_time = now
         for item in datagrams:
             self._up.push(now, item)

@@ -1,31 +1,19 @@
 """The settings of a virtual vehicle, ROS parameters or a command line, and its faults."""
 
-from dataclasses import dataclass
+from types import SimpleNamespace
 
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, METRES, TEXT, Integer, Number, Text
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 
 
-@dataclass
-class FaultSwitches:
-    """Switches, which may be changed at any time."""
+def switches(settings: Parameters) -> SimpleNamespace:
+    """Return the values of the live settings, which may be changed at any time.
 
-    loss: float = 0.0  #: Probability in [0, 1] with which a packet, either way, is lost.
-    #: Delay of each packet in each direction (s). Remaining time for which the link is silent (s).
-    #: The vehicle's port stays open, and the
-    delay: float = 0.0
-    #: vehicle continues its flight.
-    silence: float = 0.0
-    low_battery: int = 0  #: If not 0, the battery is nearly empty, which cannot be undone.
-    motor_failure: int = 0  #: Number of the failed motor, 1 to 4; 0 for none.
-    occluded: int = 0  #: Bit mask of the base stations that the Lighthouse deck does not see.
-    smooth: float = 0.0  #: Radius of a patch of floor without texture (m).
-
-    def pass_time(self, dt: float) -> None:
-        """Reduce the remaining silence by ``dt`` (s)."""
-        if self.silence > 0.0:
-            self.silence = max(0.0, self.silence - dt)
+    The value of ``fault/silence`` is the remaining time.
+    """
+    names = (each.name.removeprefix("fault/") for each in settings.declarations() if each.live)
+    return SimpleNamespace(**{name: getattr(settings, name) for name in names})
 
 
 #: Positioning systems of a vehicle: decks that know the true pose, real decks, and none.
@@ -40,7 +28,7 @@ _UDP_PORT = Integer(0, 65535)
 
 
 class VehicleSettings(Parameters):
-    """Settings of a virtual vehicle; the live ones are its `FaultSwitches`."""
+    """Settings of a virtual vehicle; the live ones are its faults, see `switches`."""
 
     host: str = parameter(TEXT, "address on which the vehicle listens", "127.0.0.1")
     port: int = parameter(_UDP_PORT, "UDP port; 0 selects a free one, which is printed", FIRST_PORT)
@@ -150,7 +138,6 @@ class VehicleSettings(Parameters):
     motor_failure: int = parameter(
         Integer(0, 4), "the failed motor, 1 to 4; 0 for none", 0, "fault/motor_failure", live=True
     )
-
     occluded: int = parameter(
         Integer(0, 3),
         "base stations that the Lighthouse deck does not see: 1 the first, 2 the second, 3 both",
@@ -158,7 +145,6 @@ class VehicleSettings(Parameters):
         "fault/occluded",
         live=True,
     )
-
     smooth: float = parameter(
         Number("m", minimum=0.0),
         "radius of a patch of floor without texture: no optical flow there",
@@ -166,7 +152,3 @@ class VehicleSettings(Parameters):
         "fault/smooth",
         live=True,
     )
-
-    def switches(self) -> FaultSwitches:
-        """Return the initial fault switches."""
-        return FaultSwitches(**{name: getattr(self, name) for name in vars(FaultSwitches())})

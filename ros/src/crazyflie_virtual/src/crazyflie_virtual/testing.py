@@ -24,7 +24,7 @@ from crazyflie_virtual.firmware.setpoints import PRIORITY_CRTP
 from crazyflie_virtual.firmware.states import DISABLED
 from crazyflie_virtual.firmware.supervisor import LANDED_AFTER, State
 from crazyflie_virtual.server import VehicleServer
-from crazyflie_virtual.settings import FaultSwitches, VehicleSettings
+from crazyflie_virtual.settings import VehicleSettings, switches
 from crazyflie_virtual.toc import LOG_TYPES, PARAMETER_TYPES, Table
 
 
@@ -80,7 +80,7 @@ class FakeFlight(Firmware):
 
     def restart(self) -> None:
         """Begin as after a restart of the vehicle: on the ground, armed."""
-        super().__init__(Physics((0.0, 0.0, 0.0), 0.0), FaultSwitches(), self._settings)
+        super().__init__(Physics((0.0, 0.0, 0.0), 0.0), switches(self._settings), self._settings)
         self.starts = 0
         self._pinned: SupervisorState | None = None
         self._motors_ran = False

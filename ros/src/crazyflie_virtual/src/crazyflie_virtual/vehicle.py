@@ -4,6 +4,7 @@ import logging
 import math
 from collections.abc import Callable
 from functools import partial
+from types import SimpleNamespace
 
 from crazyflie_utils.parameters import vehicle_model
 from crazyflie_virtual import crtp, ports
@@ -15,7 +16,7 @@ from crazyflie_virtual.log import LogPort
 from crazyflie_virtual.memory import LighthouseMemory, MemoryPort, decks, eeprom, memories
 from crazyflie_virtual.parameters import ParameterPort
 from crazyflie_virtual.ports import LocalizationPort
-from crazyflie_virtual.settings import FaultSwitches, VehicleSettings
+from crazyflie_virtual.settings import VehicleSettings, switches
 from crazyflie_world import world_file
 
 _ADDRESS_PREFIX = 0xE7E7E7E700
@@ -40,7 +41,7 @@ class Board:
     def __init__(
         self,
         physics: Physics,
-        faults: FaultSwitches,
+        faults: SimpleNamespace,
         settings: VehicleSettings,
         storage: Storage,
         failure: str = "",
@@ -121,7 +122,7 @@ class VirtualVehicle:
 
     def __init__(self, settings: VehicleSettings):
         self._settings = settings
-        self.faults = settings.switches()
+        self.faults = switches(settings)
         #: The true state.
         self.physics = Physics(
             (settings.init_x, settings.init_y, 0.0),

@@ -9,6 +9,7 @@ import random
 import struct
 from dataclasses import dataclass
 from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.memory import LighthouseMemory
 from crazyflie_virtual.quaternions import from_matrix, product
-from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO, FaultSwitches, VehicleSettings
+from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO, VehicleSettings
 
 _POSITION_DEVIATION = 0.003  #: Deviation of the deck that knows the true pose (m).
 _ATTITUDE_DEVIATION = 0.003  #: Deviation of all decks (rad).
@@ -91,7 +92,7 @@ class PositioningDeck:
     """Corrects an estimator by measurements of the decks that a vehicle carries."""
 
     settings: VehicleSettings
-    faults: FaultSwitches
+    faults: SimpleNamespace
     estimator: Estimator
     physics: Physics
     #: Variance that is added to the estimator's own for the horizontal velocity, m^2/s^2: that of

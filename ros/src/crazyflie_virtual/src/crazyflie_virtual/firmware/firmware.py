@@ -1,5 +1,7 @@
 """The firmware: its parts and the order in which they run."""
 
+from types import SimpleNamespace
+
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.body import OFF, STEP, MotorCommands, Physics, RangingSensors, Sensors
 from crazyflie_virtual.crtp import Console, LinkStatistics
@@ -11,7 +13,7 @@ from crazyflie_virtual.firmware.stabilizer import IDLE_THRUST, Stabilizer
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
 from crazyflie_virtual.firmware.supervisor import Health, PowerMonitor, State, Supervisor
 from crazyflie_virtual.memory import MemoryTester
-from crazyflie_virtual.settings import FaultSwitches, VehicleSettings
+from crazyflie_virtual.settings import VehicleSettings
 
 #: First version of the protocol in which the supervisor has a port and reports the high-level
 #: commander.
@@ -35,7 +37,11 @@ class Firmware:
     """
 
     def __init__(
-        self, physics: Physics, faults: FaultSwitches, settings: VehicleSettings, failure: str = ""
+        self,
+        physics: Physics,
+        faults: SimpleNamespace,
+        settings: VehicleSettings,
+        failure: str = "",
     ):
         self._physics = physics
         self.faults = faults

@@ -12,13 +12,13 @@ has a time limit (1441), and the state before `State.READY_TO_FLY` (1641). The r
 
 from collections.abc import Callable
 from enum import Enum, Flag, auto
+from types import SimpleNamespace
 from typing import NamedTuple
 
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.body import OPEN_CIRCUIT_VOLTAGES, Sensors, sag
 from crazyflie_virtual.firmware.states import Setpoint
-from crazyflie_virtual.settings import FaultSwitches
 
 
 class State(Enum):
@@ -290,7 +290,7 @@ _LOAD = 1.0  #: Load of that test over the load of hover.
 class Health:
     """Self tests of motors and battery; here they take no time, and the motors stand still."""
 
-    def __init__(self, faults: FaultSwitches):
+    def __init__(self, faults: SimpleNamespace):
         self._faults = faults
         self.motors_asked = self.battery_asked = 0  #: If not 0, the test begins.
         self.motors_passed = 0  #: Bit mask of the motors that have passed.

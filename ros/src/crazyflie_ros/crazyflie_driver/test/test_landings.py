@@ -169,7 +169,7 @@ def test_a_landing_for_the_battery_that_something_else_ended_is_begun_again(weak
     weak.run(LIMIT, until=lambda: weak.height < 0.8 * HEIGHT)
     firmware = weak.virtual.vehicle.board.firmware
     # Of another client.
-    firmware.planner.go_to(firmware.time, (0.0, 0.0, 0.5), 0.0, 1.0, False, False)
+    firmware.planner.go_to(firmware.time, False, False, 0.0, 0.0, 0.5, 0.0, 1.0)
     assert weak.touches_down() < 1.0
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from crazyflie_virtual.crtp import MAX_DATA
 from crazyflie_virtual.firmware.firmware import Firmware
+from crazyflie_virtual.firmware.planner import Planner
 from crazyflie_virtual.firmware.setpoints import PRIORITY_CRTP, decode_generic
 from crazyflie_virtual.memory import LighthouseMemory
 from crazyflie_virtual.quaternions import decompress_quaternion
@@ -77,7 +78,10 @@ def handle_supervisor(firmware: Firmware, channel: int, data: bytes) -> bytes | 
     command = data[0]
     answer = None
     if channel == _SUPERVISOR_INFO and _FIRST_BIT <= command <= _ALL_BITS:
-        answer = _supervisor_info(firmware, command)
+        bits = firmware.info
+        answer = bytes([bits >> (command - _FIRST_BIT) & 1])
+        if command == _ALL_BITS:
+            answer = struct.pack("<H", bits)
     elif channel == _SUPERVISOR_COMMAND and _ARM <= command <= _EMERGENCY_WATCHDOG:
         answer = _command_supervisor(firmware, command, data[1:])
     else:
@@ -103,13 +107,6 @@ def _command_supervisor(firmware: Firmware, command: int, data: bytes) -> bytes 
     elif command == _EMERGENCY_WATCHDOG:
         supervisor.feed_watchdog(firmware.time)
     return None
-
-
-def _supervisor_info(firmware, command):
-    bits = firmware.info
-    if command == _ALL_BITS:
-        return struct.pack("<H", bits)
-    return bytes([bits >> (command - _FIRST_BIT) & 1])
 
 
 _PLATFORM_COMMAND, _VERSION = 0, 1
@@ -244,79 +241,35 @@ def _execute(f, command, data):
     if len(data) < struct.calcsize("<" + form):
         f.warn("command", f"HLC: command {command} is too short")
         return errno.EINVAL
-    values = struct.unpack_from("<" + form, data)
-    if command in _FOR_ALL:
-        return handler(f, *values)
+    values = list(struct.unpack_from("<" + form, data))
     if command in _PLANS and f.planner.blocked:
         f.warn("planner", f"HLC: refused command {command}: {f.supervisor.state.value}")
         return errno.EBUSY
     if command in _PLANS and f.commander.priority == PRIORITY_CRTP:
         f.warn("planner", f"HLC: command {command} has no effect before setpoints stop")
-    group, *arguments = values
-    is_meant = group == _ALL_GROUPS or group & f.planner.groups
-    return handler(f, *arguments) if is_meant else 0
-
-
-def _set_groups(f, groups):
-    f.planner.groups = groups
-    return 0
-
-
-def _take_off(f, height, yaw, keep_yaw, duration):
-    return f.planner.take_off(f.time, height, None if keep_yaw else yaw, duration)
-
-
-def _land(f, height, yaw, keep_yaw, duration):
-    return f.planner.land(f.time, height, None if keep_yaw else yaw, duration)
-
-
-def _take_off_at_speed(f, height, relative, yaw, keep_yaw, speed):
-    speed = speed if speed > 0.0 else f.planner.takeoff_speed
-    height, duration = f.planner.climb_time(height, relative, speed)
-    return _take_off(f, height, yaw, keep_yaw, duration)
-
-
-def _land_at_speed(f, height, relative, yaw, keep_yaw, speed):
-    speed = speed if speed > 0.0 else f.planner.landing_speed
-    height = -height if relative else height
-    height, duration = f.planner.climb_time(height, relative, speed)
-    return _land(f, height, yaw, keep_yaw, duration)
-
-
-def _go_to(f, relative, linear, x, y, z, yaw, duration):
-    return f.planner.go_to(f.time, (x, y, z), yaw, duration, relative, linear)
-
-
-def _spiral(f, sideways, clockwise, angle, first, last, ascent, duration):
-    radii = (first, last)
-    return f.planner.spiral(f.time, angle, radii, ascent, duration, sideways, clockwise)
-
-
-def _start(f, relative, relative_yaw, backwards, trajectory_id, time_scale):
-    reason = f.planner.unflyable(trajectory_id)
-    if reason:
-        f.console.write_line(f"HLC: no trajectory {trajectory_id}: {reason}")
-    elif not time_scale > 0.0:
-        f.console.write_line(f"HLC: the trajectory ends at once: time scale {time_scale:g}")
-    return f.planner.start(f.time, trajectory_id, time_scale, backwards, relative, relative_yaw)
+    if command not in _FOR_ALL:
+        group = values.pop(0)
+        if group != _ALL_GROUPS and not group & f.planner.groups:
+            return 0
+    return handler(f.planner, f.time, *values)
 
 
 #: Command -> (fields, handler). 1, 2, 4 and 5 are those of older clients.
 _COMMANDS: dict[int, tuple[str, Callable[..., int]]] = {
-    0: ("B", _set_groups),
-    1: ("Bff", lambda f, height, duration: _take_off(f, height, 0.0, False, duration)),
-    2: ("Bff", lambda f, height, duration: _land(f, height, 0.0, False, duration)),
-    3: ("B", lambda f: f.planner.stop()),
-    4: ("B?5f", lambda f, relative, *goal: _go_to(f, relative, False, *goal)),
-    5: ("B??Bf", lambda f, relative, *trajectory: _start(f, relative, False, *trajectory)),
-    6: ("3BIB", lambda f, *definition: f.planner.define(*definition)),
-    7: ("Bff?f", _take_off),
-    8: ("Bff?f", _land),
-    9: ("Bf?f?f", _take_off_at_speed),
-    10: ("Bf?f?f", _land_at_speed),
-    11: ("B??5f", _spiral),
-    12: ("B??5f", _go_to),
-    13: ("B???Bf", _start),
+    0: ("B", lambda planner, _, groups: planner.set_groups(groups)),
+    1: ("Bff", lambda planner, t, height, time: planner.take_off(t, height, 0.0, False, time)),
+    2: ("Bff", lambda planner, t, height, time: planner.land(t, height, 0.0, False, time)),
+    3: ("B", lambda planner, _: planner.stop()),
+    4: ("B?5f", lambda planner, t, relative, *goal: planner.go_to(t, relative, False, *goal)),
+    5: ("B??Bf", lambda planner, t, relative, *rest: planner.start(t, relative, False, *rest)),
+    6: ("3BIB", lambda planner, _, *definition: planner.define(*definition)),
+    7: ("Bff?f", Planner.take_off),
+    8: ("Bff?f", Planner.land),
+    9: ("Bf?f?f", Planner.take_off_at_speed),
+    10: ("Bf?f?f", Planner.land_at_speed),
+    11: ("B??5f", Planner.spiral),
+    12: ("B??5f", Planner.go_to),
+    13: ("B???Bf", Planner.start),
 }
 
 #: Commands that are refused while the vehicle cannot fly, for any group.

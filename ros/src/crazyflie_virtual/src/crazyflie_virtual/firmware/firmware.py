@@ -57,7 +57,7 @@ class Firmware:
         self.deck = PositioningDeck(settings, faults, self.estimator, physics)
         self.ranging = RangingSensors(physics, settings.multiranger, self.deck.has_flow)
         self.localization = Localization(self.estimator)
-        self.planner = Planner()
+        self.planner = Planner(self.console.write_line)
         self.commander = Commander(self.planner)
         self.attitude_decoder = AttitudeDecoder()
         self.supervisor = Supervisor(self.console.write_line, settings.auto_arm)

@@ -7,10 +7,10 @@ curve of degree 0, 1, 3 or 7: see "Trajectory formats" in the firmware's documen
 import errno
 import math
 import struct
+from collections.abc import Callable
 from enum import Enum
 from typing import Any
 
-from crazyflie_model.angles import Triple
 from crazyflie_model.planner import smooth_piece, spiral_piece, straight_piece
 from crazyflie_model.polynomials import PIECE_SIZE, Goal, PolynomialPiece, at_rest, bezier
 from crazyflie_model.trajectory import Trajectory
@@ -85,12 +85,13 @@ ACTIVE = (TrajectoryState.FLYING, TrajectoryState.LANDING)  #: States with setpo
 
 
 class Planner:
-    """Plans trajectories and evaluates them.
+    """Plans trajectories and evaluates them; ``write_line(text)`` prints on the console.
 
-    Commands return 0 or an error number.
+    Commands return 0 or an error number. Their arguments are in the order of port 8.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, write_line: Callable[[str], None]):
+        self._write_line = write_line
         self.memory = bytearray(MEMORY_SIZE)  #: Pieces of trajectories, uploaded by the client.
         self.state = TrajectoryState.IDLE
         self.blocked = False  #: Whether the vehicle cannot fly, and plans are refused.
@@ -110,18 +111,14 @@ class Planner:
         """Time at which the last plan ends, s; minus infinity without."""
         return -math.inf if self._trajectory is None else self._begin + self._trajectory.duration
 
-    def goal(self, time: float) -> Goal[float] | None:
-        """Return the goal of the last plan at ``time`` (s), at rest from its end on, or None."""
-        return None if self._trajectory is None else self._trajectory.evaluate(time - self._begin)
-
     def setpoint(self, time: float, estimate: Estimate) -> Setpoint | None:
         """Return the setpoint for ``time`` (s); None when disabled."""
         if self.state is TrajectoryState.LANDING and self.is_finished(time):
             self.state = TrajectoryState.IDLE
-        goal = self.goal(time)
-        if goal is None or self.state not in ACTIVE:
+        if self._trajectory is None or self.state not in ACTIVE:
             self.tell_state(estimate)
             return Setpoint(time=time) if self.state is TrajectoryState.IDLE else None
+        goal = self._trajectory.evaluate(time - self._begin)
         if not all(map(math.isfinite, goal.position)):
             self.state = TrajectoryState.DISABLED
             return None
@@ -156,60 +153,81 @@ class Planner:
             self.state = TrajectoryState.IDLE
         self.blocked = is_blocked
 
-    def take_off(self, time: float, height: float, yaw: float | None, duration: float) -> int:
-        """Climb to ``height`` (m) in ``duration`` (s), turning to ``yaw`` (rad) unless None."""
+    def set_groups(self, groups: int) -> int:
+        """Join the groups of a bit mask, and no others."""
+        self.groups = groups
+        return 0
+
+    def take_off(
+        self, time: float, height: float, yaw: float, keep_yaw: bool, duration: float
+    ) -> int:
+        """Climb to ``height`` (m) in ``duration`` (s), turning to ``yaw`` (rad) or keeping it."""
         if self.state is not TrajectoryState.IDLE:
             return REFUSED
-        return self._move_vertically(time, height, yaw, duration, TrajectoryState.FLYING)
+        return self._move_vertically(time, height, yaw, keep_yaw, duration, TrajectoryState.FLYING)
 
-    def land(self, time: float, height: float, yaw: float | None, duration: float) -> int:
+    def take_off_at_speed(
+        self, time: float, height: float, relative: bool, yaw: float, keep_yaw: bool, speed: float
+    ) -> int:
+        """Climb to, or by, ``height`` (m) at a mean speed (m/s), or that of the parameter."""
+        climb = self._climb(height, relative, speed if speed > 0.0 else self.takeoff_speed)
+        return self.take_off(time, climb[0], yaw, keep_yaw, climb[1])
+
+    def land(self, time: float, height: float, yaw: float, keep_yaw: bool, duration: float) -> int:
         """Descend to ``height`` (m) in ``duration`` (s), then stop the motors."""
         if self.state is TrajectoryState.LANDING:
             return REFUSED
-        return self._move_vertically(time, height, yaw, duration, TrajectoryState.LANDING)
+        return self._move_vertically(time, height, yaw, keep_yaw, duration, TrajectoryState.LANDING)
 
-    def climb_time(self, height: float, is_relative: bool, speed: float) -> tuple[float, float]:
-        """Return height (m) and duration (s) of a climb at a mean speed (m/s)."""
+    def land_at_speed(
+        self, time: float, height: float, relative: bool, yaw: float, keep_yaw: bool, speed: float
+    ) -> int:
+        """Descend to, or by, ``height`` (m) at a mean speed (m/s), or that of the parameter."""
+        height = -height if relative else height
+        climb = self._climb(height, relative, speed if speed > 0.0 else self.landing_speed)
+        return self.land(time, climb[0], yaw, keep_yaw, climb[1])
+
+    def _climb(self, height, is_relative, speed):
+        # Height (m) and duration (s).
         now = self._last.position[2]
         height = now + height if is_relative else height
-        if abs(speed) < _MIN_SPEED:
-            speed = _MIN_SPEED
-        return height, abs(height - now) / speed
+        return height, abs(height - now) / (_MIN_SPEED if abs(speed) < _MIN_SPEED else speed)
 
     def go_to(
         self,
         time: float,
-        position: Triple,
-        yaw: float,
-        duration: float,
         relative: bool,
         linear: bool,
+        x: float,
+        y: float,
+        z: float,
+        yaw: float,
+        duration: float,
     ) -> int:
         """Fly to a position (m) and heading (rad), or by them, in ``duration`` (s)."""
         start = self._last
         if relative:
-            dx, dy, dz = position
-            x, y, z = start.position
-            position = (dx + x, dy + y, dz + z)
+            x, y, z = x + start.position[0], y + start.position[1], z + start.position[2]
             yaw += start.yaw
         plan = straight_piece if linear else smooth_piece
-        move = (start, position, yaw, max(duration, _MIN_DURATION))
+        move = (start, (x, y, z), yaw, max(duration, _MIN_DURATION))
         return self._fly(time, TrajectoryState.FLYING, plan, *move)
 
     def spiral(
         self,
         time: float,
-        angle: float,
-        radii: tuple[float, float],
-        ascent: float,
-        duration: float,
         sideways: bool,
         clockwise: bool,
+        angle: float,
+        first: float,
+        last: float,
+        ascent: float,
+        duration: float,
     ) -> int:
         """Fly along a spiral; see `spiral_piece`. Radii are 0 at least, angles a turn at most."""
         # This order of arguments keeps NaN.
         angle = min(max(angle, -2.0 * math.pi), 2.0 * math.pi)
-        radii = (max(radii[0], 0.0), max(radii[1], 0.0))
+        radii = (max(first, 0.0), max(last, 0.0))
         form = (angle, radii, ascent, max(duration, _MIN_DURATION), sideways, clockwise)
         return self._fly(time, TrajectoryState.FLYING, spiral_piece, self._last, *form)
 
@@ -224,22 +242,14 @@ class Planner:
         self._definitions[trajectory_id] = (location, kind, offset, pieces)
         return 0
 
-    def unflyable(self, trajectory_id: int) -> str:
-        """Return why a trajectory cannot be flown; an empty text when it can."""
-        try:
-            self._pieces(trajectory_id)
-        except ValueError as error:
-            return str(error)
-        return ""
-
     def start(
         self,
         time: float,
-        trajectory_id: int,
-        time_scale: float,
-        backwards: bool,
         relative: bool,
         relative_yaw: bool,
+        backwards: bool,
+        trajectory_id: int,
+        time_scale: float,
     ) -> int:
         """Fly a trajectory that was defined; ``relative`` to the present position (and yaw).
 
@@ -248,8 +258,11 @@ class Planner:
         """
         try:
             pieces, is_compressed = self._pieces(trajectory_id)
-        except ValueError:
+        except ValueError as error:
+            self._write_line(f"HLC: no trajectory {trajectory_id}: {error}")
             return 0
+        if not time_scale > 0.0:
+            self._write_line(f"HLC: the trajectory ends at once: time scale {time_scale:g}")
         if is_compressed and (time_scale != 1.0 or backwards):
             return errno.ENOEXEC
         if time_scale > 0.0:
@@ -278,12 +291,11 @@ class Planner:
         chunks = (data[i * PIECE_SIZE :][:PIECE_SIZE] for i in range(count))
         return tuple(map(PolynomialPiece.unpack, chunks)), False
 
-    def _move_vertically(self, time, height, yaw, duration, state):
+    def _move_vertically(self, time, height, yaw, keep_yaw, duration, state):
         x, y, z = self._last.position
         start = at_rest((x, y, z), self._last.yaw)
-        yaw = start.yaw if yaw is None else yaw
-        move = (start, (x, y, height), yaw, max(duration, _MIN_DURATION))
-        return self._fly(time, state, smooth_piece, *move)
+        move = (start, (x, y, height), start.yaw if keep_yaw else yaw)
+        return self._fly(time, state, smooth_piece, *move, max(duration, _MIN_DURATION))
 
     def _fly(self, time, state, plan, *move):
         try:

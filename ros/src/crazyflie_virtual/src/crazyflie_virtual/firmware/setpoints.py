@@ -3,8 +3,6 @@
 import math
 import struct
 from collections.abc import Callable
-from dataclasses import replace
-from typing import NamedTuple
 
 from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_virtual.crtp import FirmwareAssertionError
@@ -51,12 +49,8 @@ class AttitudeDecoder:
         if thrust == 0:
             self.is_locked = False
         used = 0.0 if self.is_locked or thrust < _LEAST_THRUST else min(thrust, MAX_SETPOINT_PWM)
-        setpoint = Setpoint(
-            mode=Modes(yaw=VELOCITY), yaw_rate=-yaw_rate, thrust=float(used), time=time
-        )
-        return _with_tilt(
-            setpoint, roll, self.roll_mode == _RATE_MODE, pitch, self.pitch_mode == _RATE_MODE
-        )
+        tilt = _tilt(roll, self.roll_mode == _RATE_MODE, pitch, self.pitch_mode == _RATE_MODE)
+        return Setpoint(**tilt, yaw_rate=-yaw_rate, thrust=float(used), time=time)
 
 
 def decode_generic(data: bytes, time: float) -> Setpoint | None:
@@ -77,63 +71,40 @@ def decode_generic(data: bytes, time: float) -> Setpoint | None:
     return setpoint
 
 
-def _with_tilt(setpoint, roll, roll_is_rate, pitch, pitch_is_rate):
-    # Each of roll and pitch is an angle or a rate.
-    mode = setpoint.mode._replace(
-        roll=VELOCITY if roll_is_rate else ABSOLUTE, pitch=VELOCITY if pitch_is_rate else ABSOLUTE
-    )
-    values = {
+def _tilt(roll, roll_is_rate, pitch, pitch_is_rate):
+    # Fields of a setpoint whose roll and pitch are each an angle or a rate, the yaw is a rate.
+    return {
+        "mode": Modes(
+            roll=VELOCITY if roll_is_rate else ABSOLUTE,
+            pitch=VELOCITY if pitch_is_rate else ABSOLUTE,
+            yaw=VELOCITY,
+        ),
         "roll_rate" if roll_is_rate else "roll": roll,
         "pitch_rate" if pitch_is_rate else "pitch": pitch,
     }
-    return replace(setpoint, mode=mode, **values)
 
 
-class _FourFloats(NamedTuple):
-    """A type of setpoint whose payload is four floats."""
+def _four_floats(
+    *fields: str, in_body: bool = False, is_clockwise: bool = False, any_size: bool = False
+) -> Callable[[bytes], Setpoint]:
+    """Return the decoder of a payload of four floats, which set these fields of the setpoint.
 
-    fields: tuple[str, str, str, str]  #: Names of the setpoint's fields that the floats set.
-    mode: Modes
-    velocity_body: bool = False
+    Velocities may be in the body's heading. The yaw rate of older clients is clockwise. Where the
+    firmware does not check the size, missing bytes are 0 here; in the firmware they are those of
+    an earlier packet.
+    """
+    axes = {name.removeprefix("v").removesuffix("_rate"): name for name in fields}
+    mode = Modes(**{axis: ABSOLUTE if axis == name else VELOCITY for axis, name in axes.items()})
 
-    def decode(self, data: bytes) -> Setpoint:
-        """Return the setpoint in a payload."""
-        values = zip(self.fields, _FOUR.unpack(data), strict=True)
-        setpoint = Setpoint(mode=self.mode, velocity_body=self.velocity_body)
-        return replace(setpoint, **dict(values))
+    def decode(data: bytes) -> Setpoint:
+        if any_size:
+            data = data[: _FOUR.size].ljust(_FOUR.size, b"\0")
+        values = dict(zip(fields, _FOUR.unpack(data), strict=True))
+        if is_clockwise:
+            values["yaw_rate"] = -values["yaw_rate"]
+        return Setpoint(**values, mode=mode, velocity_body=in_body)
 
-    def decode_any_size(self, data: bytes) -> Setpoint:
-        """Return the setpoint in a payload whose size the firmware does not check.
-
-        Missing bytes are 0 here; in the firmware they are those of an earlier packet.
-        """
-        return self.decode(data[: _FOUR.size].ljust(_FOUR.size, b"\0"))
-
-    def decode_clockwise(self, data: bytes) -> Setpoint:
-        """Return the setpoint in a payload of an older client, whose yaw rate is clockwise."""
-        setpoint = self.decode(data)
-        return replace(setpoint, yaw_rate=-setpoint.yaw_rate)
-
-
-_VELOCITY_WORLD = _FourFloats(
-    ("vx", "vy", "vz", "yaw_rate"), Modes(x=VELOCITY, y=VELOCITY, z=VELOCITY, yaw=VELOCITY)
-)
-_Z_DISTANCE = _FourFloats(
-    ("roll", "pitch", "yaw_rate", "z"),
-    Modes(z=ABSOLUTE, roll=ABSOLUTE, pitch=ABSOLUTE, yaw=VELOCITY),
-)
-_VERTICAL_SPEED = _FourFloats(
-    ("roll", "pitch", "yaw_rate", "vz"),
-    Modes(z=VELOCITY, roll=ABSOLUTE, pitch=ABSOLUTE, yaw=VELOCITY),
-)
-_HOVER = _FourFloats(
-    ("vx", "vy", "yaw_rate", "z"),
-    Modes(x=VELOCITY, y=VELOCITY, z=ABSOLUTE, yaw=VELOCITY),
-    velocity_body=True,
-)
-_POSITION = _FourFloats(
-    ("x", "y", "z", "yaw"), Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
-)
+    return decode
 
 
 def _stop(data):
@@ -155,22 +126,26 @@ def _full_state(data):
 
 def _manual(data):
     roll, pitch, yaw_rate, thrust, is_rate = _MANUAL.unpack(data)
-    setpoint = Setpoint(mode=Modes(yaw=VELOCITY), yaw_rate=yaw_rate, thrust=float(thrust))
-    return _with_tilt(setpoint, roll, bool(is_rate), pitch, bool(is_rate))
+    tilt = _tilt(roll, bool(is_rate), pitch, bool(is_rate))
+    return Setpoint(**tilt, yaw_rate=yaw_rate, thrust=float(thrust))
 
+
+_VELOCITY_WORLD = ("vx", "vy", "vz", "yaw_rate")
+_Z_DISTANCE = ("roll", "pitch", "yaw_rate", "z")
+_HOVER = ("vx", "vy", "yaw_rate", "z")
 
 #: Type -> decoder. 1, 2 and 5 are 8, 9 and 10 of older clients.
 _DECODERS: dict[int, Callable[[bytes], Setpoint]] = {
     0: _stop,
-    1: _VELOCITY_WORLD.decode_clockwise,
-    2: _Z_DISTANCE.decode_clockwise,
-    4: _VERTICAL_SPEED.decode,
-    5: _HOVER.decode_clockwise,
+    1: _four_floats(*_VELOCITY_WORLD, is_clockwise=True),
+    2: _four_floats(*_Z_DISTANCE, is_clockwise=True),
+    4: _four_floats("roll", "pitch", "yaw_rate", "vz"),
+    5: _four_floats(*_HOVER, in_body=True, is_clockwise=True),
     6: _full_state,
-    7: _POSITION.decode_any_size,
-    8: _VELOCITY_WORLD.decode,
-    9: _Z_DISTANCE.decode,
-    10: _HOVER.decode,
+    7: _four_floats("x", "y", "z", "yaw", any_size=True),
+    8: _four_floats(*_VELOCITY_WORLD),
+    9: _four_floats(*_Z_DISTANCE),
+    10: _four_floats(*_HOVER, in_body=True),
     11: _manual,
 }
 

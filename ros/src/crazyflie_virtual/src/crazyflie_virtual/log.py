@@ -4,6 +4,7 @@ import errno
 import math
 import struct
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -239,16 +240,15 @@ def packed(value: float, stored: NumberType, sent: NumberType) -> bytes:
     return (whole & 0xFFFFFFFF).to_bytes(4, "little")[: sent.size]
 
 
+@dataclass(eq=False)
 class _Block:
-    def __init__(self) -> None:
-        self.variables: list[tuple[LogVariable, NumberType | None]] = []
-        self.size = 0
-        self.period = 0
-        self.due: int | None = None
+    variables: list[tuple[LogVariable, NumberType | None]] = field(default_factory=list)
+    period: int = 0  # ms.
+    due: int | None = None  # ms; None for a block that is not started.
 
-    def add(self, variable, number_type):
-        self.variables.append((variable, number_type))
-        self.size += number_type.size if number_type else 0
+    @property
+    def size(self):
+        return sum(sent.size for _, sent in self.variables if sent)
 
 
 class LogPort:
@@ -260,7 +260,6 @@ class LogPort:
         entries = [(v.group, v.name, LOG_CODES[v.number_type]) for v in self._variables]
         self.table = Table(entries, bytes([MAX_BLOCKS, MAX_VARIABLES]))
         self._blocks: dict[int, _Block] = {}
-        self._due: int | None = None
         self._once: list[_Block] = []
 
     def handle(self, channel: int, data: bytes) -> bytes | None:
@@ -278,20 +277,16 @@ class LogPort:
         now = self._firmware.milliseconds
         once, self._once = self._once, []
         packets = [self._data_packet(i, b, now) for i, b in self._blocks.items() if b in once]
-        if self._due is None or now < self._due:
-            return packets
         for block_id, block in self._blocks.items():
             if block.due is not None and now >= block.due:
                 # The phase is kept; missed values are skipped.
                 block.due += (1 + (now - block.due) // block.period) * block.period
                 packets.append(self._data_packet(block_id, block, now))
-        self._schedule()
         return packets
 
     def _control(self, command, block_id, data):
         if command == _RESET:
             self._blocks.clear()
-            self._schedule()
             return 0
         if command == _CREATE:
             if block_id in self._blocks:
@@ -317,7 +312,6 @@ class LogPort:
             self._start(block, int.from_bytes(data[:2], "little"))
         else:
             block.due = None
-        self._schedule()
         return 0
 
     def _start(self, block, period):
@@ -338,12 +332,8 @@ class LogPort:
                 return errno.E2BIG
             if sum(len(b.variables) for b in self._blocks.values()) >= MAX_VARIABLES:
                 return errno.ENOMEM
-            block.add(variable, number_type)
+            block.variables.append((variable, number_type))
         return 0
-
-    def _schedule(self):
-        dues = [block.due for block in self._blocks.values() if block.due is not None]
-        self._due = min(dues, default=None)
 
     def _data_packet(self, block_id, block, now):
         firmware = self._firmware

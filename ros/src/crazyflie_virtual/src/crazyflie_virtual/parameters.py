@@ -9,6 +9,7 @@ import errno
 import math
 import struct
 from operator import attrgetter
+from types import SimpleNamespace
 from typing import NamedTuple
 
 from crazyflie_virtual.crtp import MAX_DATA
@@ -280,33 +281,26 @@ class Parameter:
     def __init__(self, spec: ParameterSpec, firmware: Firmware):
         self.spec = spec
         self.full_name = f"{spec.group}.{spec.name}"
-        self._owner = None
+        #: Whether the value has an effect on the vehicle.
+        self.has_effect = isinstance(spec.source, str)
+        self._owner: object = SimpleNamespace(value=spec.source)
+        self._attribute = "value"
         if isinstance(spec.source, str):
             path, _, self._attribute = spec.source.rpartition(".")
             self._owner = attrgetter(path)(firmware) if path else firmware
-        else:
-            self._value = spec.source
         self.default = self.value
 
     @property
     def value(self) -> float:
         """The present value."""
-        return self._value if self._owner is None else getattr(self._owner, self._attribute)
-
-    @property
-    def has_effect(self) -> bool:
-        """Whether the value has an effect on the vehicle."""
-        return self._owner is not None
+        return getattr(self._owner, self._attribute)
 
     def set(self, value: float) -> None:
         """Change the value; ValueError if it is out of its limits."""
         low, high = self.spec.limits
         if not low <= value <= high and self.spec.limits != NO_LIMITS:
             raise ValueError(f"is {low:g} to {high:g}, not {value:g}")
-        if self._owner is None:
-            self._value = value
-        else:
-            setattr(self._owner, self._attribute, value)
+        setattr(self._owner, self._attribute, value)
 
     @property
     def code(self) -> int:
@@ -386,8 +380,9 @@ class ParameterPort:
             self._warn("parameter command", f"PARAM: unknown command {data.hex()}")
             return None
         parameter = self._find(data, 1)
-        answer = None if parameter is None else _MISC_HANDLERS[data[0]](self, parameter)
-        return data[:3] + (_NO_ENTRY if answer is None else answer)
+        status, handler = _MISC_HANDLERS[data[0]]
+        answer = None if parameter is None else handler(self, parameter)
+        return data[:3] + (_NO_ENTRY if answer is None else status + answer)
 
     def _set_by_name(self, data):
         parts = data[1:].split(b"\0", 2)
@@ -434,21 +429,13 @@ class ParameterPort:
         return b"\1" + default + number_type.pack(self._stored[parameter.full_name])
 
 
-def _with_status(handler):
-    # The later commands put a 0 before an answer that is not an error.
-    def handle(port, parameter):
-        answer = handler(port, parameter)
-        return None if answer is None else b"\0" + answer
-
-    return handle
-
-
+#: Command -> what precedes an answer that is no error, and the answer.
 _MISC_HANDLERS = {
-    _EXTENDED_TYPE: ParameterPort._extended_type,
-    _STORE: ParameterPort._store,
-    _STATE: ParameterPort._state,
-    _CLEAR: ParameterPort._clear,
-    _DEFAULT: ParameterPort._default,
-    _EXTENDED_TYPE_2: _with_status(ParameterPort._extended_type),
-    _DEFAULT_2: _with_status(ParameterPort._default),
+    _EXTENDED_TYPE: (b"", ParameterPort._extended_type),
+    _STORE: (b"", ParameterPort._store),
+    _STATE: (b"", ParameterPort._state),
+    _CLEAR: (b"", ParameterPort._clear),
+    _DEFAULT: (b"", ParameterPort._default),
+    _EXTENDED_TYPE_2: (b"\0", ParameterPort._extended_type),
+    _DEFAULT_2: (b"\0", ParameterPort._default),
 }

@@ -232,8 +232,13 @@ class MocapServer(Server):
         except OSError:
             self._commands.close()
             raise
-        super().__init__(self._commands, self._observations)
         self.address = self._commands.getsockname()  #: Host and port for commands.
+        way = "unicast"
+        if settings.multicast:
+            way = f"multicast to {settings.multicast_address}:{settings.data_port}"
+        host, port = self.address
+        text = f"virtual motion capture: NatNet {settings.version} at {host}:{port}, {way}"
+        super().__init__(text, self._commands, self._observations)
         #: Address at which the true poses of the vehicles arrive.
         self.observer_port = self._observations.getsockname()[1]
         if settings.multicast:
@@ -244,14 +249,6 @@ class MocapServer(Server):
         self._begin = time.monotonic()
         self._frames = 0
         self._pending: deque[tuple[float, float, int, list[StreamedBody], list[Triple]]] = deque()
-
-    @property
-    @override
-    def description(self) -> str:
-        s = self._settings
-        host, port = self.address
-        way = f"multicast to {s.multicast_address}:{s.data_port}" if s.multicast else "unicast"
-        return f"virtual motion capture: NatNet {s.version} at {host}:{port}, {way}"
 
     @override
     def serve(self) -> None:

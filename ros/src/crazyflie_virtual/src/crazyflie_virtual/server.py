@@ -36,19 +36,18 @@ _STOP_LIMIT = 2.0  #: Longest wait of `Server.stop` for the thread (s).
 
 
 class Server(ABC):
-    """A server in real time; `stop` closes its sockets."""
+    """A server in real time; `stop` closes its sockets.
+
+    ``description`` names the server and its address, for the log.
+    """
 
     switches: SimpleNamespace  #: Live fields of the settings, which may be changed.
 
-    def __init__(self, *sockets: socket.socket):
+    def __init__(self, description: str, *sockets: socket.socket):
+        self.description = description
         self._sockets = sockets
         self._is_stopping = False
         self._thread = threading.Thread(target=self.run, name=type(self).__name__, daemon=True)
-
-    @property
-    @abstractmethod
-    def description(self) -> str:
-        """The server and its address, for the log."""
 
     @abstractmethod
     def serve(self) -> None:
@@ -227,8 +226,8 @@ class VehicleServer(Server):
 
     def __init__(self, settings: VehicleSettings, warn: Callable[[str], None] = lambda text: None):
         self._socket = open_socket(settings.host, settings.port)
-        super().__init__(self._socket)
         self.address = self._socket.getsockname()  #: Host and port.
+        super().__init__("virtual Crazyflie at udp://{}:{}".format(*self.address), self._socket)
         self._warn = warn
         self.vehicle = VirtualVehicle(settings)
         self.switches = self.vehicle.faults
@@ -244,12 +243,6 @@ class VehicleServer(Server):
         number = _number(self.address[1])
         self._body_id = settings.body_id or number
         self._body_name = settings.body_name or f"cf{number}"
-
-    @property
-    @override
-    def description(self) -> str:
-        host, port = self.address
-        return f"virtual Crazyflie at udp://{host}:{port}"
 
     @override
     def serve(self) -> None:

@@ -1,6 +1,5 @@
 """The body of a virtual vehicle: battery, airframe on its feet, ranging and inertial sensors."""
 
-import bisect
 import math
 import random
 from collections import deque
@@ -20,6 +19,7 @@ from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
 from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe, QuadrotorParameters
 from crazyflie_model.units import GRAVITY
+from crazyflie_virtual.quaternions import product
 from crazyflie_world.world import World
 
 _CAPACITY = 900.0  #: Charge of the stock battery, C: 250 mAh [Bitcraze, data sheet].
@@ -28,9 +28,8 @@ _RESISTANCE = 0.14
 _HOVER_CURRENT = 2.1  #: Current at hover (A), from the 7 minutes of flight of the data sheet.
 _IDLE_CURRENT = 0.12  #: Current of the electronics (A).
 
-_CHARGES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-#: Open-circuit voltage (V) over state of charge: the firmware's table of the stock battery, and 4.2
-#: V when full.
+#: Open-circuit voltage (V) at a state of charge of 0, 0.1, ..., 1: the firmware's table of the
+#: stock battery, and 4.2 V when full.
 OPEN_CIRCUIT_VOLTAGES = (3.00, 3.78, 3.83, 3.87, 3.89, 3.92, 3.96, 4.00, 4.04, 4.10, 4.20)
 
 FULL_VOLTAGE = OPEN_CIRCUIT_VOLTAGES[-1]
@@ -65,10 +64,9 @@ def sag(load: float) -> float:
 
 def open_circuit_voltage(charge: float) -> float:
     """Return the voltage without load, V, at a state of charge from 0 to 1."""
-    i = min(max(bisect.bisect_right(_CHARGES, charge) - 1, 0), len(_CHARGES) - 2)
-    part = (charge - _CHARGES[i]) / (_CHARGES[i + 1] - _CHARGES[i])
+    i = min(int(10.0 * charge), 9)
     low, high = OPEN_CIRCUIT_VOLTAGES[i : i + 2]
-    return low + part * (high - low)
+    return low + (10.0 * charge - i) * (high - low)
 
 
 def tip(
@@ -191,13 +189,8 @@ class _Lags:
         attitude = quaternion_from_zyx(y[6], y[7], y[8])
         # Twice the vector part of the rotation of a step, in the body frame, is its angle.
         a, b, c, d = x[6:10]
-        e, f, g, h = attitude
-        turned = (
-            d * e - a * h - b * g + c * f,
-            d * f + a * g - b * h - c * e,
-            d * g - a * f + b * e - c * h,
-        )
-        rates = [math.copysign(2.0, a * e + b * f + c * g + d * h) / STEP * t for t in turned]
+        *turned, w = product((-a, -b, -c, d), attitude)
+        rates = [math.copysign(2.0, w) / STEP * part for part in turned]
         return [*y[:6], *attitude, *rates, *[y[10] / math.sqrt(lift)] * 4]
 
 

@@ -46,8 +46,6 @@ class Estimator:
         self.estimate = self._estimate = estimate
         #: Pose after `reset`, m and rad.
         self.initial_x = self.initial_y = self.initial_z = self.initial_yaw = 0.0
-        self._sums = [0.0] * 6
-        self._samples = 0
         self.reset()
 
     def reset(self) -> None:
@@ -59,7 +57,7 @@ class Estimator:
         e.qz, e.qw = math.sin(self.initial_yaw / 2.0), math.cos(self.initial_yaw / 2.0)
         self._covariance = _FIRST_VARIANCES
         self.variance_attitude = _FIRST_ATTITUDE_VARIANCE
-        self._clear_samples()
+        self._samples: list[tuple[float, ...]] = []
         self._update_angles()
 
     @property
@@ -75,14 +73,12 @@ class Estimator:
     def sample(self, sensors: Sensors) -> None:
         """Add a sample of the inertial sensors for the next `predict`."""
         s = sensors
-        sample = (s.gyro_x, s.gyro_y, s.gyro_z, s.acc_x, s.acc_y, s.acc_z)
-        self._sums = [a + b for a, b in zip(self._sums, sample, strict=True)]
-        self._samples += 1
+        self._samples.append((s.gyro_x, s.gyro_y, s.gyro_z, s.acc_x, s.acc_y, s.acc_z))
 
     def predict(self, dt: float) -> None:
         """Predict by ``dt`` (s) with the mean of its samples."""
-        mean = [total / self._samples for total in self._sums]
-        self._clear_samples()
+        mean = [sum(parts) / len(parts) for parts in zip(*self._samples, strict=True)]
+        self._samples = []
         e = self._estimate
         half = 0.5 * dt * math.pi / 180.0
         e.qx, e.qy, e.qz, e.qw = turned(e.quaternion, *(half * rate for rate in mean[:3]))
@@ -96,10 +92,6 @@ class Estimator:
         e.vy += dvy
         e.vz += dvz
         self._update_angles()
-
-    def _clear_samples(self) -> None:
-        self._sums = [0.0] * 6
-        self._samples = 0
 
     def grow_variances(self, dt: float) -> None:
         """Add the process noise of ``dt`` (s) to the variances."""

@@ -18,55 +18,6 @@ _FAMILY = 0x0D  #: First byte of the serial numbers of this kind of memory.
 _HEADER_MARK, _NAME, _REVISION = 0xEB, 1, 2
 
 
-class Deck(NamedTuple):
-    """A deck."""
-
-    name: str  #: Name of the deck, and of its parameter in the group ``deck``.
-    product: int
-    revision: str
-
-    @property
-    def serial(self) -> bytes:
-        """Serial number of its memory, 8 bytes."""
-        return bytes([_FAMILY, self.product, 0, 0, 0, 0, 0, 0])
-
-    def one_wire(self) -> bytearray:
-        """Return the content of its memory.
-
-        Header: mark, pins, vendor, product; elements: version, size, and each as
-        number, size, text; after both the low byte of their CRC-32.
-        """
-        header = struct.pack("<BIBB", _HEADER_MARK, 0, _BITCRAZE, self.product)
-        texts = ((_NAME, self.name), (_REVISION, self.revision))
-        elements = b"".join(bytes([n, len(text)]) + text.encode() for n, text in texts)
-        elements = bytes([0, len(elements)]) + elements
-        content = b"".join(part + bytes([zlib.crc32(part) & 0xFF]) for part in (header, elements))
-        return bytearray(content.ljust(_SIZE, b"\xff"))
-
-
-LED_RING_DECK = Deck("bcLedRing", 0x01, "D1")
-MULTIRANGER_DECK = Deck("bcMultiranger", 0x0C, "D")
-FLOW_DECK = Deck("bcFlow2", 0x0F, "C")
-LIGHTHOUSE_DECK = Deck("bcLighthouse4", 0x10, "D")
-LOCO_DECK = Deck("bcDWM1000", 0x06, "B")
-
-_POSITIONING_DECKS = {
-    settings.DECK: (FLOW_DECK, LIGHTHOUSE_DECK),
-    settings.FLOW: (FLOW_DECK,),
-    settings.LIGHTHOUSE: (LIGHTHOUSE_DECK,),
-    settings.LOCO: (LOCO_DECK,),
-}
-
-
-def decks(positioning: str, has_multiranger: bool) -> list[Deck]:
-    """Return the decks of a vehicle with a positioning system of its settings."""
-    return [
-        LED_RING_DECK,
-        *_POSITIONING_DECKS.get(positioning, ()),
-        *((MULTIRANGER_DECK,) if has_multiranger else ()),
-    ]
-
-
 EEPROM, ONE_WIRE, LED_RING, TRAJECTORY, LIGHTHOUSE = 0x00, 0x01, 0x10, 0x12, 0x14
 TESTER, LED_TIMINGS, DECKS = 0x15, 0x17, 0x19  #: Types.
 
@@ -192,37 +143,59 @@ class LighthouseMemory(Memory):
 _NO_PAGE = Memory(LIGHTHOUSE, b"")
 
 
-def _deck_memory():
-    # Describes the decks' own firmware, which none of them has.
+class Deck(NamedTuple):
+    """A deck."""
+
+    name: str  #: Name of the deck, and of its parameter in the group ``deck``.
+    product: int
+    revision: str
+
+    def memory(self) -> Memory:
+        """Return its memory, as it leaves the factory.
+
+        Header: mark, pins, vendor, product; elements: version, size, and each as
+        number, size, text; after both the low byte of their CRC-32.
+        """
+        header = struct.pack("<BIBB", _HEADER_MARK, 0, _BITCRAZE, self.product)
+        texts = ((_NAME, self.name), (_REVISION, self.revision))
+        elements = b"".join(bytes([n, len(text)]) + text.encode() for n, text in texts)
+        elements = bytes([0, len(elements)]) + elements
+        content = b"".join(part + bytes([zlib.crc32(part) & 0xFF]) for part in (header, elements))
+        serial = bytes([_FAMILY, self.product, 0, 0, 0, 0, 0, 0])
+        return Memory(ONE_WIRE, bytearray(content.ljust(_SIZE, b"\xff")), serial)
+
+
+LED_RING_DECK = Deck("bcLedRing", 0x01, "D1")
+MULTIRANGER_DECK = Deck("bcMultiranger", 0x0C, "D")
+FLOW_DECK = Deck("bcFlow2", 0x0F, "C")
+LIGHTHOUSE_DECK = Deck("bcLighthouse4", 0x10, "D")
+LOCO_DECK = Deck("bcDWM1000", 0x06, "B")
+
+_POSITIONING_DECKS = {
+    settings.DECK: (FLOW_DECK, LIGHTHOUSE_DECK),
+    settings.FLOW: (FLOW_DECK,),
+    settings.LIGHTHOUSE: (LIGHTHOUSE_DECK,),
+    settings.LOCO: (LOCO_DECK,),
+}
+
+
+def decks(positioning: str, has_multiranger: bool) -> list[Deck]:
+    """Return the decks of a vehicle with a positioning system of its settings."""
+    return [
+        LED_RING_DECK,
+        *_POSITIONING_DECKS.get(positioning, ()),
+        *((MULTIRANGER_DECK,) if has_multiranger else ()),
+    ]
+
+
+def decks_firmware() -> Memory:
+    """Return the memory that describes the decks' own firmware, which none of them has."""
     places, version, info_size = 4, 3, 0x20
     info = bytes([version]) + bytes(2 * places * info_size)
     return Memory(DECKS, info, size=0x10000000 * (places + 1))
 
 
-def memories(
-    eeprom: bytearray,
-    trajectories: bytearray,
-    tester: MemoryTester,
-    lighthouse: LighthouseMemory,
-    one_wire: Iterable[tuple[bytes, bytearray]],
-) -> list[Memory]:
-    """Return all memories in the order of their numbers.
-
-    ``one_wire`` has serial number and content of the decks' memories.
-    """
-    return [
-        Memory(EEPROM, eeprom, EEPROM_SERIAL),
-        Memory(TRAJECTORY, trajectories),
-        tester,
-        Memory(LED_RING, bytearray(LED_RING_SIZE)),
-        Memory(LED_TIMINGS, bytearray(LED_TIMINGS_SIZE)),
-        lighthouse,
-        _deck_memory(),
-        *(Memory(ONE_WIRE, content, serial) for serial, content in one_wire),
-    ]
-
-
-def eeprom(radio_address: int) -> bytearray:
+def eeprom(radio_address: int) -> Memory:
     """Return the configuration memory as it leaves the factory.
 
     Token, version 1, radio channel 80, 2 Mbit/s, pitch and roll trim, address of
@@ -232,7 +205,7 @@ def eeprom(radio_address: int) -> bytearray:
         "<BBBffBI", 1, 80, 2, 0.0, 0.0, radio_address >> 32, radio_address & 0xFFFFFFFF
     )
     content += bytes([sum(content) & 0xFF])
-    return bytearray(content.ljust(_EEPROM_SIZE, b"\0"))
+    return Memory(EEPROM, bytearray(content.ljust(_EEPROM_SIZE, b"\0")), EEPROM_SERIAL)
 
 
 _INFO, _READ, _WRITE = 0, 1, 2

@@ -7,13 +7,13 @@ from functools import partial
 from types import SimpleNamespace
 
 from crazyflie_utils.parameters import vehicle_model
-from crazyflie_virtual import crtp, ports
+from crazyflie_virtual import crtp, memory, ports
 from crazyflie_virtual.body import LOW_CHARGE, OFF, STEP, Battery, Physics
 from crazyflie_virtual.crtp import FirmwareAssertionError, Packet, Port
 from crazyflie_virtual.firmware.decks import lighthouse_pages
 from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
 from crazyflie_virtual.log import LogPort
-from crazyflie_virtual.memory import LighthouseMemory, MemoryPort, decks, eeprom, memories
+from crazyflie_virtual.memory import LighthouseMemory, Memory, MemoryPort
 from crazyflie_virtual.parameters import ParameterPort
 from crazyflie_virtual.ports import LocalizationPort
 from crazyflie_virtual.settings import VehicleSettings, switches
@@ -26,11 +26,9 @@ class Storage:
     """Memories and stored parameters, which persist over a restart."""
 
     def __init__(self, settings: VehicleSettings):
-        self.eeprom = eeprom(_ADDRESS_PREFIX | settings.address)
-        self.one_wire = [
-            (deck.serial, deck.one_wire())
-            for deck in decks(settings.positioning, settings.multiranger)
-        ]
+        self.eeprom = memory.eeprom(_ADDRESS_PREFIX | settings.address)
+        carried = memory.decks(settings.positioning, settings.multiranger)
+        self.one_wire = [deck.memory() for deck in carried]
         self.lighthouse = lighthouse_pages(settings)
         self.parameters: dict[str, float] = {}
 
@@ -49,22 +47,22 @@ class Board:
         firmware = self.firmware = Firmware(physics, faults, settings, failure)
         self._log = LogPort(firmware)
         lighthouse = firmware.deck.memory = LighthouseMemory(storage.lighthouse)
-        memory = MemoryPort(
-            memories(
-                storage.eeprom,
-                firmware.planner.memory,
-                firmware.memory_tester,
-                lighthouse,
-                storage.one_wire,
-            ),
-            firmware.warn,
-        )
+        memories = [
+            storage.eeprom,
+            Memory(memory.TRAJECTORY, firmware.planner.memory),
+            firmware.memory_tester,
+            Memory(memory.LED_RING, bytearray(memory.LED_RING_SIZE)),
+            Memory(memory.LED_TIMINGS, bytearray(memory.LED_TIMINGS_SIZE)),
+            lighthouse,
+            memory.decks_firmware(),
+            *storage.one_wire,
+        ]
         self._handlers: dict[int, Callable[[int, bytes], bytes | None]] = {
             Port.LINK: partial(ports.handle_link, firmware),
             Port.PLATFORM: partial(ports.handle_platform, firmware),
             Port.LOG: self._log.handle,
             Port.PARAMETERS: ParameterPort(firmware, storage.parameters).handle,
-            Port.MEMORY: memory.handle,
+            Port.MEMORY: MemoryPort(memories, firmware.warn).handle,
             Port.SETPOINT: partial(ports.handle_attitude, firmware),
             Port.GENERIC_SETPOINT: partial(ports.handle_generic, firmware),
             Port.HIGH_LEVEL: partial(ports.handle_high_level, firmware),

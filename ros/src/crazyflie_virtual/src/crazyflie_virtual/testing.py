@@ -23,6 +23,7 @@ from crazyflie_virtual.firmware.planner import ACTIVE, TrajectoryState
 from crazyflie_virtual.firmware.setpoints import PRIORITY_CRTP
 from crazyflie_virtual.firmware.states import DISABLED
 from crazyflie_virtual.firmware.supervisor import LANDED_AFTER, State
+from crazyflie_virtual.memory import TRAJECTORY, Memory, MemoryPort
 from crazyflie_virtual.server import VehicleServer
 from crazyflie_virtual.settings import VehicleSettings, switches
 from crazyflie_virtual.toc import LOG_TYPES, PARAMETER_TYPES, Table
@@ -41,7 +42,7 @@ def virtual_vehicle(**settings: Any) -> Iterator[tuple[VehicleServer, str]]:
 
 READ_ONLY, EXTENDED = 0x40, 0x10
 
-TRAJECTORY_MEMORY = (1, 0x12, 4096)  #: Number, type and size in bytes of the only memory.
+_OTHER_MEMORY = 0x18  #: Type of the memory that precedes that of trajectories.
 
 _LOG_CODES = {each.format: code for code, each in LOG_TYPES.items()}
 _PARAMETER_CODES = {each.format: code for code, each in PARAMETER_TYPES.items()}
@@ -299,6 +300,8 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
     def _answer(self, port, channel, data):
         if (port, channel) in _FIRMWARE_HANDLERS:
             return _FIRMWARE_HANDLERS[port, channel](self.flight, channel, data)
+        if port == Port.MEMORY:
+            return self._memory(channel, data)
         method = getattr(self, f"_on_{port}_{channel}", None)
         return None if method is None else method(data)
 
@@ -343,20 +346,10 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         code, value = self.log[name]
         return code, int(self.flight.state) if name == "supervisor.info" else value
 
-    # Memory.
-
-    def _on_4_0(self, data):
-        number, code, size = TRAJECTORY_MEMORY
-        if data[0] == 1:
-            return b"\x01\x02"
-        # The first memory is never read.
-        details = (number, code, size) if data[1] == number else (data[1], 0x18, 0)
-        return b"\x02" + struct.pack("<BBI", *details) + bytes(8)
-
-    def _on_4_2(self, data):
-        (begin,) = struct.unpack_from("<I", data, 1)
-        self.flight.planner.memory[begin : begin + len(data) - 5] = data[5:]
-        return data[:5] + b"\0"
+    def _memory(self, channel, data):
+        # The first one is never read.
+        memories = (Memory(_OTHER_MEMORY, b""), Memory(TRAJECTORY, self.flight.planner.memory))
+        return MemoryPort(memories, self.flight.warn).handle(channel, data)
 
     # Parameters.
 

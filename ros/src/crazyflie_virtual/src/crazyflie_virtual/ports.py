@@ -8,11 +8,10 @@ import math
 import struct
 from collections.abc import Callable
 
-from crazyflie_virtual.crtp import MAX_DATA
+from crazyflie_virtual.crtp import MAX_DATA, Port
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.firmware.planner import Planner
 from crazyflie_virtual.firmware.setpoints import PRIORITY_CRTP, decode_generic
-from crazyflie_virtual.memory import LighthouseMemory
 from crazyflie_virtual.quaternions import decompress_quaternion
 
 _ECHO, _SOURCE, _SINK = 0, 1, 2
@@ -151,76 +150,65 @@ _PACKED_POSITION = struct.Struct("<B3h")
 _PACKED_POSE = struct.Struct("<B3hI")
 
 
-class LocalizationPort:
-    """Passes external measurements to the estimator.
-
-    ``address`` is the last byte of the radio's: packed positions and poses of several vehicles are
-    marked with it.
-    """
-
-    def __init__(self, firmware: Firmware, address: int, lighthouse: LighthouseMemory):
-        self._firmware = firmware
-        self._address = address
-        self._lighthouse = lighthouse
-
-    def handle(self, channel: int, data: bytes) -> bytes | None:
-        """Process a measurement; only the storing of lighthouse data is answered."""
-        if channel == _POSITION and len(data) == 12:
-            self._take_position(struct.unpack("<fff", data))
-        elif channel == _PACKED_POSITIONS:
-            for values in _each(_PACKED_POSITION, data):
-                if values[0] == self._address:
-                    self._take_position([part / 1000.0 for part in values[1:]])
-        elif channel == GENERIC and len(data) == 5 and data[0] == _STORE_LIGHTHOUSE:
-            done = self._lighthouse.store(*struct.unpack_from("<HH", data, 1))
-            return bytes([_STORE_LIGHTHOUSE, done])
-        elif channel == GENERIC and data:
-            self._generic(data[0], data[1:])
-        else:
-            text = f"LOC: nothing done with {len(data)} bytes on channel {channel}"
-            self._firmware.warn("location", text)
-        return None
-
-    def _generic(self, command, data):
-        supervisor = self._firmware.supervisor
-        if command == _POSE and len(data) == 28:
-            values = struct.unpack("<7f", data)
-            self._take_pose(values[:3], values[3:])
-        elif command == _PACKED_POSES:
-            for values in _each(_PACKED_POSE, data):
-                if values[0] == self._address:
-                    position = [part / 1000.0 for part in values[1:4]]
-                    self._take_pose(position, decompress_quaternion(values[4]))
-        elif command == _STOP_MESSAGE:
-            supervisor.stop()
-        elif command == _WATCHDOG_MESSAGE:
-            supervisor.feed_watchdog(self._firmware.time)
-        else:
-            self._firmware.warn("location", f"LOC: ignoring a message {command}")
-
-    def _take_position(self, position):
-        if all(map(math.isfinite, position)):
-            self._firmware.localization.take_position(self._firmware.time, position)
-        else:
-            self._refuse()
-
-    def _take_pose(self, position, quaternion):
-        norm = math.hypot(*quaternion)
-        # Not a rotation, or not a number.
-        if not (all(map(math.isfinite, position)) and 0.5 < norm < 2.0):
-            self._refuse()
-            return
-        unit = tuple(part / norm for part in quaternion)
-        self._firmware.localization.take_pose(self._firmware.time, position, unit)
-
-    def _refuse(self):
-        self._firmware.warn(
-            "location", "LOC: a measurement that is not a number, or not a rotation"
-        )
+def handle_localization(firmware: Firmware, channel: int, data: bytes) -> bytes | None:
+    """Process an external measurement; only the storing of lighthouse data is answered."""
+    f = firmware
+    if channel == _POSITION and len(data) == 12:
+        _take_position(f, struct.unpack("<fff", data))
+    elif channel == _PACKED_POSITIONS:
+        for values in _own(_PACKED_POSITION, data, f.address):
+            _take_position(f, [part / 1000.0 for part in values])
+    elif channel == GENERIC and len(data) == 5 and data[0] == _STORE_LIGHTHOUSE:
+        done = f.deck.memory.store(*struct.unpack_from("<HH", data, 1))
+        return bytes([_STORE_LIGHTHOUSE, done])
+    elif channel == GENERIC and data:
+        _handle_generic_location(f, data[0], data[1:])
+    else:
+        f.warn("location", f"LOC: nothing done with {len(data)} bytes on channel {channel}")
+    return None
 
 
-def _each(form, data):
-    return form.iter_unpack(data[: len(data) // form.size * form.size])
+def _handle_generic_location(f, command, data):
+    if command == _POSE and len(data) == 28:
+        values = struct.unpack("<7f", data)
+        _take_pose(f, values[:3], values[3:])
+    elif command == _PACKED_POSES:
+        for *position, word in _own(_PACKED_POSE, data, f.address):
+            _take_pose(f, [part / 1000.0 for part in position], decompress_quaternion(word))
+    elif command == _STOP_MESSAGE:
+        f.supervisor.stop()
+    elif command == _WATCHDOG_MESSAGE:
+        f.supervisor.feed_watchdog(f.time)
+    else:
+        f.warn("location", f"LOC: ignoring a message {command}")
+
+
+def _take_position(f, position):
+    if all(map(math.isfinite, position)):
+        f.localization.take_position(f.time, position)
+    else:
+        _refuse(f)
+
+
+def _take_pose(f, position, quaternion):
+    norm = math.hypot(*quaternion)
+    # Not a rotation, or not a number.
+    if not (all(map(math.isfinite, position)) and 0.5 < norm < 2.0):
+        _refuse(f)
+        return
+    unit = tuple(part / norm for part in quaternion)
+    f.localization.take_pose(f.time, position, unit)
+
+
+def _refuse(f):
+    f.warn("location", "LOC: a measurement that is not a number, or not a rotation")
+
+
+def _own(form, data, address):
+    # Packed measurements of several vehicles: those that are marked with an address.
+    for mark, *values in form.iter_unpack(data[: len(data) // form.size * form.size]):
+        if mark == address:
+            yield values
 
 
 _ALL_GROUPS = 0
@@ -275,3 +263,15 @@ _COMMANDS: dict[int, tuple[str, Callable[..., int]]] = {
 #: Commands that are refused while the vehicle cannot fly, for any group.
 _PLANS = tuple(command for command in _COMMANDS if command not in (0, 3, 6))
 _FOR_ALL = (0, 6)  #: Commands that do not begin with a group of vehicles.
+
+#: Port -> handler, called with firmware, channel and data; it returns the data of the answer, or
+#: None. Ports with a state have classes of their own.
+HANDLERS: dict[int, Callable[[Firmware, int, bytes], bytes | None]] = {
+    Port.LINK: handle_link,
+    Port.PLATFORM: handle_platform,
+    Port.SETPOINT: handle_attitude,
+    Port.GENERIC_SETPOINT: handle_generic,
+    Port.HIGH_LEVEL: handle_high_level,
+    Port.LOCALIZATION: handle_localization,
+    Port.SUPERVISOR: handle_supervisor,
+}

@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_virtual import ports
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.crtp import Packet, Port, decode, is_broadcast
 from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
@@ -24,6 +23,7 @@ from crazyflie_virtual.firmware.setpoints import PRIORITY_CRTP
 from crazyflie_virtual.firmware.states import DISABLED
 from crazyflie_virtual.firmware.supervisor import LANDED_AFTER, State
 from crazyflie_virtual.memory import TRAJECTORY, Memory, MemoryPort
+from crazyflie_virtual.ports import HANDLERS
 from crazyflie_virtual.server import VehicleServer
 from crazyflie_virtual.settings import VehicleSettings, switches
 from crazyflie_virtual.toc import LOG_TYPES, PARAMETER_TYPES, Table
@@ -50,15 +50,10 @@ _PARAMETER_CODES = {each.format: code for code, each in PARAMETER_TYPES.items()}
 _EMERGENCY_STOP = 0x03
 _NULL_PACKET = (15, 3)  #: Port and channel of the packet by which vehicles are searched.
 
-#: Port and channel -> handler of the firmware. Other ports are those of the fake vehicle.
-_FIRMWARE_HANDLERS: dict[tuple[int, int], Callable[[Firmware, int, bytes], bytes | None]] = {
-    (Port.SETPOINT, 0): ports.handle_attitude,
-    (Port.GENERIC_SETPOINT, 0): ports.handle_generic,
-    (Port.GENERIC_SETPOINT, 1): ports.handle_generic,
-    (Port.HIGH_LEVEL, 0): ports.handle_high_level,
-    (Port.PLATFORM, 1): ports.handle_platform,
-    (Port.LINK, 0): ports.handle_link,
-    (Port.LINK, 1): ports.handle_link,
+#: Ports and channels on which the firmware answers. Others are those of the fake vehicle.
+_FIRMWARE_CHANNELS = {
+    *((Port.SETPOINT, 0), (Port.GENERIC_SETPOINT, 0), (Port.GENERIC_SETPOINT, 1)),
+    *((Port.HIGH_LEVEL, 0), (Port.PLATFORM, 1), (Port.LINK, 0), (Port.LINK, 1)),
 }
 
 _THAW = bytes(40)  #: A datagram that ends a freeze; packets are shorter.
@@ -298,8 +293,8 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
             self.send(port, channel, answer)
 
     def _answer(self, port, channel, data):
-        if (port, channel) in _FIRMWARE_HANDLERS:
-            return _FIRMWARE_HANDLERS[port, channel](self.flight, channel, data)
+        if (port, channel) in _FIRMWARE_CHANNELS:
+            return HANDLERS[port](self.flight, channel, data)
         if port == Port.MEMORY:
             return self._memory(channel, data)
         method = getattr(self, f"_on_{port}_{channel}", None)

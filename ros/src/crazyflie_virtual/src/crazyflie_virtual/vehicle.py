@@ -15,7 +15,6 @@ from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
 from crazyflie_virtual.log import LogPort
 from crazyflie_virtual.memory import LighthouseMemory, Memory, MemoryPort
 from crazyflie_virtual.parameters import ParameterPort
-from crazyflie_virtual.ports import LocalizationPort
 from crazyflie_virtual.settings import VehicleSettings, switches
 from crazyflie_world import world_file
 
@@ -58,18 +57,13 @@ class Board:
             *storage.one_wire,
         ]
         self._handlers: dict[int, Callable[[int, bytes], bytes | None]] = {
-            Port.LINK: partial(ports.handle_link, firmware),
-            Port.PLATFORM: partial(ports.handle_platform, firmware),
+            **{port: partial(handler, firmware) for port, handler in ports.HANDLERS.items()},
             Port.LOG: self._log.handle,
             Port.PARAMETERS: ParameterPort(firmware, storage.parameters).handle,
             Port.MEMORY: MemoryPort(memories, firmware.warn).handle,
-            Port.SETPOINT: partial(ports.handle_attitude, firmware),
-            Port.GENERIC_SETPOINT: partial(ports.handle_generic, firmware),
-            Port.HIGH_LEVEL: partial(ports.handle_high_level, firmware),
-            Port.LOCALIZATION: LocalizationPort(firmware, settings.address, lighthouse).handle,
         }
-        if settings.protocol >= SUPERVISOR_PROTOCOL:
-            self._handlers[Port.SUPERVISOR] = partial(ports.handle_supervisor, firmware)
+        if settings.protocol < SUPERVISOR_PROTOCOL:
+            del self._handlers[Port.SUPERVISOR]
 
     def receive(self, packet: Packet, is_broadcast: bool = False) -> Packet | None:
         """Return the answer to a packet, from the same port and channel; None for no answer."""

@@ -47,6 +47,7 @@ class Firmware:
         self.faults = faults
         self.hand = physics.hand
         self.protocol = settings.protocol
+        self.address = settings.address  #: Last byte of the radio's address.
         self._steps = 0
         self.time = 0.0  #: Time since the start (s).
         self.console = Console(lambda: self.time)

@@ -12,7 +12,6 @@ vehicle (syslink, 1 Mbit/s).
 
 from dataclasses import dataclass
 from random import Random
-from typing import Any
 
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
@@ -131,16 +130,11 @@ class RadioSwarm:
         self.channel = channel
         self._loss = loss
         self._random = Random(seed)
-        self.vehicles = [self._vehicle(number) for number in range(1, vehicles + 1)]
-
-    @staticmethod
-    def _vehicle(number: int) -> VirtualVehicle:
-        settings: dict[str, Any] = {
-            "address": number,
-            "init_y": SPACING * number,
-            "positioning": "none",
-        }
-        return VirtualVehicle(VehicleSettings(**settings))
+        settings = (
+            {"address": n, "init/y": SPACING * n, "positioning": "none"}
+            for n in range(1, vehicles + 1)
+        )
+        self.vehicles = [VirtualVehicle(VehicleSettings.from_mapping(each)) for each in settings]
 
     def broadcast(self, time: float, datagram: bytes) -> dict[int, tuple[float, list[bytes]]]:
         """Send a packet to all from ``time`` (s) on.

@@ -160,7 +160,7 @@ class Firmware:
     def _supervise(self):
         idle = self.stabilizer.idle_thrust
         motors_run = max(self.stabilizer.commands) > idle
-        age = self.commander.age(self.time)
+        age = self.time - self.commander.setpoint.time
         self.supervisor.update(self.time, self.sensors, age, motors_run)
         if self.supervisor.can_fly:
             self._warned_state = None

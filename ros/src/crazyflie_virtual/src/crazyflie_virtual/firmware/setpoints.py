@@ -187,7 +187,3 @@ class Commander:
         if setpoint is not None and self.priority <= PRIORITY_HIGHLEVEL:
             self.setpoint = setpoint
             self.priority = PRIORITY_HIGHLEVEL
-
-    def age(self, time: float) -> float:
-        """Return the age of the setpoint at ``time``, s."""
-        return time - self.setpoint.time

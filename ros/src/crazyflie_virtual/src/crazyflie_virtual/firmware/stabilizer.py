@@ -104,8 +104,9 @@ class Stabilizer:
         if setpoint.mode != self._mode:
             self._mode = setpoint.mode
             self._reset(estimate)
-        if with_position:
-            self._control_position(setpoint, estimate)
+        controls_position = self._mode[:3] != (DISABLED,) * 3
+        if with_position and controls_position:
+            self._automatic = self.position.update(setpoint, estimate)
         self._update_desired_yaw(setpoint, estimate)
         self._update_desired_tilt(setpoint)
         if self.thrust <= 0.0:
@@ -117,10 +118,6 @@ class Stabilizer:
         self.attitude.reset()
         self.position.reset()
         self._automatic = (estimate.roll, estimate.pitch, 0.0)
-
-    def _control_position(self, setpoint, estimate):
-        if (setpoint.mode.x, setpoint.mode.y, setpoint.mode.z) != (DISABLED,) * 3:
-            self._automatic = self.position.update(setpoint, estimate)
 
     def _update_desired_yaw(self, setpoint, estimate):
         if setpoint.mode.yaw == VELOCITY:

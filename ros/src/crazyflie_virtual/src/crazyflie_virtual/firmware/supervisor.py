@@ -12,6 +12,8 @@ has a time limit (1441), and the state before `State.READY_TO_FLY` (1641). The r
 
 from collections.abc import Callable
 from enum import Enum, Flag, auto
+from functools import reduce
+from operator import or_
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -251,11 +253,7 @@ class Supervisor:
             Condition.PREFLIGHT_TIMEOUT: self._waited(time, self.preflight_timeout),
             Condition.LANDING_TIMEOUT: self._waited(time, self.landed_timeout),
         }
-        conditions = Condition.ALWAYS
-        for condition, holds in holding.items():
-            if holds:
-                conditions |= condition
-        return conditions
+        return reduce(or_, (each for each in holding if holding[each]), Condition.ALWAYS)
 
     def _waited(self, time, timeout):
         return time - self._state_time > timeout / 1000.0

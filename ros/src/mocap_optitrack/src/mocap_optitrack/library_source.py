@@ -1,8 +1,7 @@
 """Vicon, Qualisys and VRPN, over the motioncapture package in a process of its own."""
 
+import contextlib
 import json
-import os
-import select
 import signal
 import socket
 import subprocess
@@ -20,7 +19,7 @@ from mocap_optitrack.source import Source, SourceError
 SYSTEMS = ("vicon", "qualisys", "vrpn")  #: Systems other than NatNet.
 _MARGIN = 2.0  #: Time that is added to the worker's own limit of connecting (s).
 
-_CHUNK = 65536
+_LARGEST = 2**18  #: Largest packet (bytes): a frame of 2000 bodies has as many.
 
 
 class LibrarySource(Source):
@@ -37,6 +36,8 @@ class LibrarySource(Source):
     markers is refused.
     """
 
+    _socket: socket.socket  # Each packet is a value; see `library_worker`.
+
     def __init__(
         self, system: str, host: str, clock: Callable[[], float], needs_points: bool = False
     ):
@@ -45,8 +46,7 @@ class LibrarySource(Source):
         self._system = system
         self._host = host
         self._clock = clock
-        self._worker: subprocess.Popen[bytes] | None = None
-        self._received = b""
+        self._opened = contextlib.ExitStack()
         self._times = ArrivalTimes()
         self._last: dict[str, tuple[float, ...]] = {}
 
@@ -60,13 +60,18 @@ class LibrarySource(Source):
             text = f"motioncapture_config/hostname {self._host!r} is unknown: {error}"
             raise SourceError(text) from None
         command = [sys.executable, "-m", library_worker.__name__, self._system, address]
-        self._worker = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, bufsize=0
-        )
-        line = self._read_line(library_worker.CONNECT_LIMIT + _MARGIN)
-        if line is None:
+        self._socket, output = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._opened.callback(self._socket.close)
+        with output:
+            self._worker = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=output.fileno()
+            )
+        self._opened.callback(self._worker.wait)
+        self._opened.callback(self._worker.kill)
+        packet = self._receive(library_worker.CONNECT_LIMIT + _MARGIN)
+        if packet is None:
             raise SourceError(self._no_answer())
-        if not self._parse(line) and self._needs_points:
+        if not self._parse(packet) and self._needs_points:
             raise SourceError(
                 "the installed motioncapture package sends no unlabelled markers of "
                 f"{self._system}, which single_markers need; use a version with pointCloud"
@@ -75,10 +80,10 @@ class LibrarySource(Source):
 
     @override
     def read(self, limit: float) -> Frame | None:
-        line = self._read_line(limit)
-        if line is None:
+        packet = self._receive(limit)
+        if packet is None:
             return None
-        moment, entries, points = self._parse(line)
+        moment, entries, points = self._parse(packet)
         waited, arrival = time.monotonic() - moment, self._clock()
         time_of_arrival = self._times.update(moment)
         bodies = [self._body(*entry) for entry in entries]
@@ -102,38 +107,28 @@ class LibrarySource(Source):
 
     @override
     def close(self) -> None:
-        if self._worker is not None:
-            self._worker.kill()
-            self._worker.wait()
-            if self._worker.stdout is not None:
-                self._worker.stdout.close()
-            self._worker = None
+        self._opened.close()
 
     def _body(self, name, *pose):
         is_new = self._last.get(name, pose) != pose
         self._last[name] = pose
         return SeenBody(None, name, tuple(pose[:3]), tuple(pose[3:]), is_new)
 
-    def _parse(self, line):
-        value = json.loads(line)
+    def _parse(self, packet):
+        value = json.loads(packet)
         if isinstance(value, dict):
             raise SourceError(f"{self._system} at {self._host}: {value['error']}")
         return value
 
-    def _read_line(self, limit):
-        worker = self._worker
-        if worker is None or worker.stdout is None:
-            raise SourceError(f"{self._system} at {self._host} is not open")
-        output = worker.stdout
-        while b"\n" not in self._received:
-            if not select.select([output], [], [], limit)[0]:
-                return None
-            chunk = os.read(output.fileno(), _CHUNK)
-            if not chunk:
-                raise SourceError(self._why_it_ended(worker.wait()))
-            self._received += chunk
-        line, _, self._received = self._received.partition(b"\n")
-        return line
+    def _receive(self, limit):
+        self._socket.settimeout(limit)
+        try:
+            packet = self._socket.recv(_LARGEST)
+        except TimeoutError:
+            return None
+        if not packet:
+            raise SourceError(self._why_it_ended(self._worker.wait()))
+        return packet
 
     def _why_it_ended(self, status):
         if status == -signal.SIGALRM:

@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from typing_extensions import override
 
@@ -50,6 +51,7 @@ class Body:
 
     key: str  #: Its entry in the dictionary.
     parameters: OutputParameters  #: Its topics and frames.
+    kind: ClassVar = "rigid body"  #: What it is, in messages.
 
     @property
     def name(self) -> str | None:
@@ -64,7 +66,7 @@ class Body:
     @property
     def component(self) -> str:
         """Name of the body in the diagnostics."""
-        return f"rigid body {self.label}"
+        return f"{self.kind} {self.label}"
 
 
 @dataclass(frozen=True)
@@ -133,11 +135,7 @@ class SingleMarker(Body):
     """A vehicle with one marker, which is to be published."""
 
     parameters: SingleMarkerParameters
-
-    @property
-    @override
-    def component(self) -> str:
-        return f"single marker {self.key}"
+    kind = "single marker"
 
     @property
     def vehicle(self) -> MarkerVehicle:

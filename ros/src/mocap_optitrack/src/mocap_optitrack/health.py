@@ -55,8 +55,7 @@ class Health:
         rate_limits: tuple[float, float] | None = None,
     ):
         self._rate_limits = rate_limits or (0.0, math.inf)
-        self._bodies = {body.key: _BodyCount() for body in bodies}
-        self._labels = {body.key: body.component for body in bodies}
+        self._bodies = {body.key: _BodyCount(body.component) for body in bodies}
         self.stale_after = stale_after  #: Used from the next report on.
         self._server: str | None = None
         self._failure = "not connected so far"
@@ -68,8 +67,7 @@ class Health:
 
     def add(self, body: Body) -> None:
         """Also report on a body."""
-        self._bodies[body.key] = _BodyCount()
-        self._labels[body.key] = body.component
+        self._bodies[body.key] = _BodyCount(body.component)
         self._others.pop((None, body.key), None)
 
     def count(self, event: FrameEvent) -> None:
@@ -123,8 +121,8 @@ class Health:
 
         Counting starts again at ``now`` (s).
         """
-        statuses = [self._stream_status(now)]
-        statuses += [self._body_status(key, now) for key in self._bodies]
+        bodies = [self._body_status(count, now) for count in self._bodies.values()]
+        statuses = [self._stream_status(now), *bodies]
         self._begin_period(now)
         return statuses
 
@@ -182,13 +180,12 @@ class Health:
             f"{values['rate (Hz)']} frames per second, {values['latency, mean (ms)']} ms old"
         )
 
-    def _body_status(self, key, now):
-        count = self._bodies[key]
+    def _body_status(self, count, now):
         values = {"frames": str(count.frames), "tracked": str(count.tracked)}
         if count.last is not None:
             values["last seen (s ago)"] = f"{now - count.last:.2f}"
         level, message = self._body_assessment(count, now)
-        return Status(self._labels[key], level, message, values)
+        return Status(count.component, level, message, values)
 
     def _body_assessment(self, count, now):
         if self._last_frame is None or now - self._last_frame > self.stale_after:
@@ -215,7 +212,8 @@ class Health:
 
 
 class _BodyCount:
-    def __init__(self) -> None:
+    def __init__(self, component: str):
+        self.component = component
         self.last: float | None = None
         self.why = ""
         self.begin_period()

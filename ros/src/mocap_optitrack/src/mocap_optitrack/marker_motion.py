@@ -67,15 +67,14 @@ class MarkerMotion:
         """
         dt, variance = time - self.time, self.variance(time)
         squares = np.sum((points - self.position - dt * self.velocity) ** 2, axis=1) / variance
-        reach = np.array(self.limits.max_velocity) * dt + _BOX_MARGIN
-        is_possible = np.all(abs(points - self.measured) <= reach, axis=1) & (squares <= GATE**2)
+        is_possible = self.can_reach(points, dt) & (squares <= GATE**2)
         spread = 3.0 * math.log(variance / _MEASUREMENT_VARIANCE)
         return np.where(is_possible, squares + spread, np.inf)
 
-    def can_reach(self, point: Point, dt: float) -> bool:
-        """Return whether a point (3,) can be reached in a time (s) by the maximum velocity."""
+    def can_reach(self, points: Point, dt: float) -> npt.NDArray[np.bool_]:
+        """Return whether points (n, 3) can be reached in a time (s) by the maximum velocity."""
         reach = np.array(self.limits.max_velocity) * dt + _BOX_MARGIN
-        return bool(np.all(abs(point - self.measured) <= reach))
+        return np.all(abs(points - self.measured) <= reach, axis=-1)
 
     def update(self, time: float, measured: Point) -> None:
         """Process a measurement (m)."""

@@ -152,7 +152,7 @@ class TrackedVehicle:
             return bool(np.isfinite(self.motion.costs(time, point[np.newaxis])[0]))
         unseen = time - self.motion.time
         if not self.rested and unseen < _FALL_TIME:
-            return self.motion.can_reach(point, min(unseen, _STOP_TIME))
+            return bool(self.motion.can_reach(point, min(unseen, _STOP_TIME)))
         # On the ground a vehicle may be carried anywhere.
         return self._is_low(marker)
 

@@ -73,7 +73,8 @@ class Recording:
     #: Roll and pitch (rad), yaw rate (rad/s, counter-clockwise), thrust (PWM), shape (n, 4).
     commands: Array
     pose_times: Array  #: When poses were measured, shape (m,).
-    #: x, y, z (m), roll, pitch, yaw (rad, Z-Y-X), shape (m, 6).
+    #: x, y, z (m), roll, pitch, yaw (rad, Z-Y-X), shape (m, 6); for `predict` and what compares
+    #: with it, the yaw goes on where it passes pi.
     poses: Array
 
     def between(self, start: float, end: float) -> "Recording":
@@ -125,7 +126,7 @@ def predict(values: Array, kind: QuadrotorParameters, thrust: float, part: Recor
     lift = _lagged(np.sqrt(np.maximum(force, 0.0)), motor) ** 2
     # The heading is the predicted one, too: noise of the measured one would turn the tilt.
     turned = _integral(turn)
-    difference = np.unwrap(part.poses[:, 5]) - np.interp(part.pose_times, times, turned)
+    difference = part.poses[:, 5] - np.interp(part.pose_times, times, turned)
     beginnings = _beginnings(difference, part.pose_times, 1.0 / yaw_lag)
     heading = turned + np.interp(times, part.pose_times, beginnings)
     c, s = np.cos(heading), np.sin(heading)
@@ -196,10 +197,8 @@ def fitted(values: Array, kind: QuadrotorParameters, thrust: float, part: Record
     predicted = predict(values, kind, thrust, part)
     drag, yaw_lag = values[7], values[5]
     vertical = drag * kind.drag_vertical / kind.drag_horizontal
-    measured = part.poses.copy()
-    measured[:, 5] = np.unwrap(measured[:, 5])
     for k, rate in ((0, drag), (1, drag), (2, vertical), (5, 1.0 / yaw_lag)):
-        predicted[:, k] += _beginnings(measured[:, k] - predicted[:, k], part.pose_times, rate)
+        predicted[:, k] += _beginnings(part.poses[:, k] - predicted[:, k], part.pose_times, rate)
     return predicted
 
 
@@ -219,9 +218,7 @@ def _beginnings(difference, times, rate):
 
 def residuals(values: Array, kind: QuadrotorParameters, thrust: float, part: Recording) -> Array:
     """Return measured minus predicted poses, shape (m, 6)."""
-    measured = part.poses.copy()
-    measured[:, 5] = np.unwrap(measured[:, 5])
-    return measured - fitted(values, kind, thrust, part)
+    return part.poses - fitted(values, kind, thrust, part)
 
 
 def identify(recording: Recording, kind: QuadrotorParameters) -> Fit:
@@ -235,6 +232,7 @@ def identify(recording: Recording, kind: QuadrotorParameters) -> Fit:
         recording,
         command_times=recording.command_times - origin,
         pose_times=recording.pose_times - origin,
+        poses=np.column_stack([recording.poses[:, :5], np.unwrap(recording.poses[:, 5])]),
     )
     times = recording.pose_times
     duration = times[-1] - times[0] if len(times) else 0.0
@@ -325,8 +323,4 @@ def _model(values, kind, thrust):
     )
     per_speed = max(0.0, drag) * mass / (4.0 * model.hover_speed)
     vertical = kind.drag_vertical / kind.drag_horizontal
-    return replace(
-        model,
-        drag_horizontal=per_speed,
-        drag_vertical=per_speed * vertical,
-    )
+    return replace(model, drag_horizontal=per_speed, drag_vertical=per_speed * vertical)

@@ -27,8 +27,6 @@ def page(fit: Fit, kind: QuadrotorParameters, title: str) -> str:
     """Return a page of HTML with plots of the part of the flight that was not used."""
     part = fit.unused
     predicted = fitted(fit.values, kind, fit.thrust, part)
-    measured = part.poses.copy()
-    measured[:, 5] = np.unwrap(measured[:, 5])
     used, unused = (
         residuals(fit.values, kind, fit.thrust, each).std(axis=0) for each in (fit.used, part)
     )
@@ -38,7 +36,7 @@ def page(fit: Fit, kind: QuadrotorParameters, title: str) -> str:
     )
     plots = "".join(
         f"<h3>{name} ({unit})</h3>"
-        + _plot(part.pose_times, factor * measured[:, k], factor * predicted[:, k])
+        + _plot(part.pose_times, factor * part.poses[:, k], factor * predicted[:, k])
         for k, (name, unit, factor) in enumerate(_AXES)
     )
     return (

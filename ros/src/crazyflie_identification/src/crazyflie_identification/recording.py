@@ -1,6 +1,7 @@
 """Commands and poses of a flight in a bag, for the fit."""
 
 import tempfile
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -42,8 +43,7 @@ def of_bag(path: Path, kind: QuadrotorParameters, name: str = "") -> Recording:
         raise IdentificationError(
             f"{path} has no flight; expected one of {LEAST_TIME:g} s and more"
         )
-    _, start, vehicle = max(found, key=lambda each: each[0])
-    duration = max(found, key=lambda each: each[0])[0]
+    duration, start, vehicle = max(found, key=itemgetter(0))
     return _recording(path, vehicle, kind).between(start + _BEGINNING, start + duration)
 
 

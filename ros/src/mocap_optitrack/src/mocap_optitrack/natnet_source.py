@@ -83,13 +83,11 @@ class NatNetSource(Source):
         self._sockets: list[socket.socket] = []
         self._server: tuple[str, int] | None = None
         self._sender: str | None = None
-        self._foreign_warned_at: float | None = None
+        self._foreign_warned_at = -math.inf
         self._group: tuple[str, int] | None = None
         self._names: dict[int, str] = {}
         self._wants_names = True
-        self._asked_names_at: float | None = None
-        self._kept_alive_at: float | None = None
-        self._frame_at = -math.inf
+        self._asked_names_at = self._kept_alive_at = self._frame_at = -math.inf
 
     @override
     def open(self) -> str:
@@ -235,13 +233,13 @@ class NatNetSource(Source):
 
     def _send_requests(self):
         now = time.monotonic()
-        if not self._info.is_multicast and _is_due(self._kept_alive_at, _KEEP_ALIVE, now):
+        if not self._info.is_multicast and now - self._kept_alive_at >= _KEEP_ALIVE:
             self._kept_alive_at = now
             self._send(natnet.KEEP_ALIVE)
-        if self._wants_names and _is_due(self._asked_names_at, _NAMES_AGAIN, now):
+        if self._wants_names and now - self._asked_names_at >= _NAMES_AGAIN:
             self._asked_names_at = now
             self._send(natnet.REQUEST_MODEL)
-        if _is_due(self._frame_at, _SILENCE, now):
+        if now - self._frame_at >= _SILENCE:
             self._frame_at = now
             self._send(natnet.CONNECT, "Ping")
 
@@ -271,7 +269,7 @@ class NatNetSource(Source):
 
     def _warn_of_sender(self, address):
         now = time.monotonic()
-        if _is_due(self._foreign_warned_at, _FOREIGN_AGAIN, now):
+        if now - self._foreign_warned_at >= _FOREIGN_AGAIN:
             self._foreign_warned_at = now
             self._warn(
                 f"ignoring a datagram from {address}: the NatNet server is at {self._sender}; if "
@@ -306,7 +304,3 @@ class NatNetSource(Source):
         if None not in configured and configured != self._group:
             text += f" (which overrules the configured {configured[0]}:{configured[1]})"
         return text
-
-
-def _is_due(last, period, now):
-    return last is None or now - last >= period

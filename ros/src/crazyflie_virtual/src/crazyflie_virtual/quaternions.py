@@ -1,4 +1,4 @@
-"""Quaternions (x, y, z, w): turned by a small angle, and in 32 bits as they are on the wire."""
+"""Quaternions (x, y, z, w): products, and in 32 bits as they are on the wire."""
 
 import math
 
@@ -12,17 +12,6 @@ _MASK = (1 << _BITS) - 1
 _ROOT_HALF = math.sqrt(0.5)
 
 
-def turned(quaternion: Quaternion, a: float, b: float, c: float) -> Quaternion:
-    """Return a unit quaternion turned about the body axes, by twice ``(a, b, c)`` (small, rad)."""
-    x, y, z, w = quaternion
-    return normalized(
-        x + w * a + y * c - z * b,
-        y + w * b + z * a - x * c,
-        z + w * c + x * b - y * a,
-        w - x * a - y * b - z * c,
-    )
-
-
 def normalized(x: float, y: float, z: float, w: float) -> Quaternion:
     """Return the unit quaternion in a direction."""
     scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
@@ -30,7 +19,10 @@ def normalized(x: float, y: float, z: float, w: float) -> Quaternion:
 
 
 def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return the product of two unit quaternions: the rotation q, then p."""
+    """Return the unit quaternion of a product: the rotation q, then p.
+
+    The rotation by twice (a, b, c), small, rad, is (a, b, c, 1).
+    """
     (a, b, c, d), (x, y, z, w) = p, q
     return normalized(
         d * x + a * w + b * z - c * y,

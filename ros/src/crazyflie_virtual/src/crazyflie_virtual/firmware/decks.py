@@ -183,21 +183,14 @@ class PositioningDeck:
     def _measured_angles(self, station):
         # A packet with the horizontal and the vertical angle of each sensor (rad), those of the
         # second to the fourth as differences from the first in half precision.
-        quaternion, columns = self.physics.quaternion, list(zip(*_ROTATIONS[station], strict=True))
-        angles = []
-        for sensor in _SENSORS:
-            place = zip(
-                self.physics.position, rotate(quaternion, sensor), _STATIONS[station], strict=True
-            )
-            way = [middle + arm - origin for middle, arm, origin in place]
-            x, y, z = (sum(a * b for a, b in zip(axis, way, strict=True)) for axis in columns)
-            angles.append([math.atan2(y, x), math.atan2(z, x)])
-        noise = self._random.gauss
+        arms = np.array([rotate(self.physics.quaternion, sensor) for sensor in _SENSORS])
+        ways = arms + self.physics.position - _STATIONS[station]
+        x, y, z = (ways @ _ROTATIONS[station]).T
         fields = []
-        for first, *others in zip(*angles, strict=True):
-            measured = first + noise(0.0, _ANGLE_DEVIATION)
-            fields.append(measured)
-            fields += [measured - each - noise(0.0, _ANGLE_DEVIATION) for each in others]
+        for angles in np.arctan2((y, z), x):
+            noise = [self._random.gauss(0.0, _ANGLE_DEVIATION) for _ in _SENSORS]
+            first, *others = angles + noise
+            fields += [first, *(first - other for other in others)]
         return struct.pack("<BBf3ef3e", _ANGLES, station, *fields)
 
     def _noisy(self, deviation: float) -> Triple:

@@ -23,7 +23,7 @@ from crazyflie_model.angles import Quaternion, Triple, rotate, zyx_from_quaterni
 from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.body import Sensors
 from crazyflie_virtual.firmware.states import Estimate
-from crazyflie_virtual.quaternions import normalized, turned
+from crazyflie_virtual.quaternions import normalized, product
 
 _ACCELERATION_NOISE = 3.7e-4  #: Process noise, m^2/s^3: 0.6 m/s^2, held for 1 ms each.
 _RATE_NOISE = 1e-5  #: Process noise, rad^2/s: 0.1 rad/s, held for 1 ms each.
@@ -81,7 +81,8 @@ class Estimator:
         self._samples = []
         e = self._estimate
         half = 0.5 * dt * math.pi / 180.0
-        e.qx, e.qy, e.qz, e.qw = turned(e.quaternion, *(half * rate for rate in mean[:3]))
+        x, y, z = (half * rate for rate in mean[:3])
+        e.qx, e.qy, e.qz, e.qw = product(e.quaternion, (x, y, z, 1.0))
         e.ax, e.ay, up = rotate(e.quaternion, mean[3:])
         e.az = up - 1.0
         dvx, dvy, dvz = GRAVITY * dt * e.ax, GRAVITY * dt * e.ay, GRAVITY * dt * e.az
@@ -125,26 +126,22 @@ class Estimator:
 
     def correct_attitude(self, x: float, y: float, z: float, w: float, deviation: float) -> None:
         """Correct with a measured attitude, a unit quaternion, of a deviation (rad)."""
-        e = self._estimate
         variance = max(deviation * deviation, _LEAST_VARIANCE)
         gain = self.variance_attitude / (self.variance_attitude + variance)
-        if e.qx * x + e.qy * y + e.qz * z + e.qw * w < 0.0:
-            x, y, z, w = -x, -y, -z, -w
         self._blend(x, y, z, w, gain)
         self.variance_attitude *= 1.0 - gain
 
     def correct_on_ground(self, dt: float) -> None:
         """Correct towards the initial attitude, near which a vehicle on the ground is."""
-        e = self._estimate
         z, w = math.sin(self.initial_yaw / 2.0), math.cos(self.initial_yaw / 2.0)
-        if e.qz * z + e.qw * w < 0.0:
-            z, w = -z, -w
         self._blend(0.0, 0.0, z, w, dt / _REVERSION_TIME)
 
     def _blend(self, x, y, z, w, gain):
-        # Towards another quaternion of the same sign; for small angles a straight line approximates
-        # the great circle.
+        # Towards another quaternion; for small angles a straight line approximates the great
+        # circle.
         e = self._estimate
+        if e.qx * x + e.qy * y + e.qz * z + e.qw * w < 0.0:
+            x, y, z, w = -x, -y, -z, -w
         e.qx, e.qy, e.qz, e.qw = normalized(
             e.qx + gain * (x - e.qx),
             e.qy + gain * (y - e.qy),

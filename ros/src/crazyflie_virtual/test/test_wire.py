@@ -83,8 +83,6 @@ def test_table_answers():
     assert table.answer(b"\x02\x01\x00") == b"\x02\x01\x00\x07group\x00b\x00"
     assert table.answer(b"\x02\x02\x00") == b"\x02"
     assert table.answer(b"\x00") is None
-    assert table.index("group", "b") == 1
-    assert table.index("group", "c") is None
 
 
 def test_checksum_changes_with_the_table():

@@ -143,22 +143,14 @@ class MocapScene:
 
         A body that is not tracked has its last tracked pose.
         """
-        return [
-            self._see(self._observations[number], time)
-            for number in sorted(self._observations)
-            if not is_listed(number, self._settings.single_markers)
-        ]
+        return self._see_all(time, has_single_marker=False)
 
     def markers(self, time: float) -> list[Triple]:
         """Return the markers of vehicles that have one, and reflections, in any order, m.
 
         Markers that are not seen are missing.
         """
-        found = [
-            self._see(self._observations[number], time)
-            for number in sorted(self._observations)
-            if is_listed(number, self._settings.single_markers)
-        ]
+        found = self._see_all(time, has_single_marker=True)
         points = [body.position for body in found if body.is_tracked]
         if found and self.switches.ghosts:
             ranges = [
@@ -171,6 +163,13 @@ class MocapScene:
             ]
         self._random.shuffle(points)
         return points
+
+    def _see_all(self, time, has_single_marker):
+        return [
+            self._see(self._observations[number], time)
+            for number in sorted(self._observations)
+            if is_listed(number, self._settings.single_markers) == has_single_marker
+        ]
 
     def _is_hidden(self, body_id, time):
         rate = self.switches.occlusions

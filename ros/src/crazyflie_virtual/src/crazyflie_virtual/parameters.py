@@ -320,11 +320,11 @@ class ParameterPort:
 
     def __init__(self, firmware: Firmware, stored: dict[str, float]):
         self._parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
+        self._by_name = {parameter.full_name: parameter for parameter in self._parameters}
         self._stored = stored
         self._warn = firmware.warn
-        for parameter in self._parameters:
-            if parameter.full_name in stored:
-                parameter.set(stored[parameter.full_name])
+        for name, value in stored.items():
+            self._by_name[name].set(value)
         self.table = Table([(p.spec.group, p.spec.name, p.code) for p in self._parameters])
 
     def handle(self, channel: int, data: bytes) -> bytes | None:
@@ -388,18 +388,16 @@ class ParameterPort:
         parts = data[1:].split(b"\0", 2)
         if len(parts) < 3 or not parts[2]:
             return None
-        group, name = parts[0].decode("latin1"), parts[1].decode("latin1")
-        index = self.table.index(group, name)
-        number_type = PARAMETER_TYPES.get(parts[2][0])
+        parameter = self._by_name.get(b".".join(parts[:2]).decode("latin1"))
         error = 0
-        if index is None:
+        if parameter is None:
             error = errno.ENOENT
-        elif number_type is not self._parameters[index].spec.number_type:
+        elif PARAMETER_TYPES.get(parts[2][0]) is not parameter.spec.number_type:
             error = errno.EINVAL
-        elif self._parameters[index].spec.read_only:
+        elif parameter.spec.read_only:
             error = errno.EACCES
         else:
-            self._set(self._parameters[index], parts[2][1:])
+            self._set(parameter, parts[2][1:])
         names = data[: 1 + len(parts[0]) + 1 + len(parts[1]) + 1]
         return (names + bytes([error]))[:MAX_DATA]
 

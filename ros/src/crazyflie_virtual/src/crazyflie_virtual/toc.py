@@ -91,13 +91,8 @@ class Table:
             bytes([code]) + f"{group}\0{name}\0".encode() for group, name, code in entries
         ]
         self._limits = limits
-        self._index = {(group, name): i for i, (group, name, _) in enumerate(entries)}
         #: Checksum of the table, by which clients cache tables.
         self.crc = zlib.crc32(b"".join(self._items))
-
-    def index(self, group: str, name: str) -> int | None:
-        """Return the number of an entry, or None."""
-        return self._index.get((group, name))
 
     def answer(self, request: bytes) -> bytes | None:
         """Return the answer to a request on the table's channel.

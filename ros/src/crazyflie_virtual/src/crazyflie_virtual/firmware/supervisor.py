@@ -10,6 +10,7 @@ has a time limit (1441), and the state before `State.READY_TO_FLY` (1641). The r
 `State.WARNING_LEVEL_OUT` by disarming and tumbling, and those of `State.CRASHED`.
 """
 
+import math
 from collections.abc import Callable
 from enum import Enum, Flag, auto
 from functools import reduce
@@ -155,9 +156,8 @@ class Supervisor:
         #: take off, and after landing. With automatic arming it cannot fly for four updates then.
         self.preflight_timeout, self.landed_timeout = 30000, 3000
         self._emergency = False
-        self._watchdog_time: float | None = None
-        self._thrust_time: float | None = None
-        self._tumble_time: float | None = None
+        # Of the last watchdog message, the last thrust, and the beginning of a tumble (s).
+        self._watchdog_time, self._thrust_time, self._tumble_time = math.inf, -math.inf, math.inf
         self._state_time = 0.0
 
     @property
@@ -218,7 +218,7 @@ class Supervisor:
         """
         if motors_run:
             self._thrust_time = time
-        runs = self._thrust_time is not None and time - self._thrust_time < LANDED_AFTER
+        runs = time - self._thrust_time < LANDED_AFTER
         self.is_tumbled = bool(self.tumble_check) and self._has_tumbled(time, sensors)
         state = next_state(self.state, self._conditions(time, setpoint_age, runs))
         if state is self.state:
@@ -259,18 +259,16 @@ class Supervisor:
         return time - self._state_time > timeout / 1000.0
 
     def _is_emergency(self, time):
-        fed = self._watchdog_time
-        starved = fed is not None and time - fed > EMERGENCY_WATCHDOG
+        starved = time - self._watchdog_time > EMERGENCY_WATCHDOG
         return self._emergency or starved or bool(self.emergency_stop)
 
     def _has_tumbled(self, time, sensors):
         forces = (sensors.acc_x, sensors.acc_y, sensors.acc_z)
         is_falling = all(abs(force) < _FREE_FALL for force in forces)
         if is_falling or sensors.acc_z >= _TILTED[0]:
-            self._tumble_time = None
+            self._tumble_time = math.inf
             return False
-        if self._tumble_time is None:
-            self._tumble_time = time
+        self._tumble_time = min(self._tumble_time, time)
         lasted = time - self._tumble_time
         return lasted > _TILTED[1] or (sensors.acc_z < _UPSIDE_DOWN[0] and lasted > _UPSIDE_DOWN[1])
 
@@ -320,7 +318,7 @@ class PowerMonitor:
         #: low_voltage, critical_voltage: V. The second has no effect: the default build does not
         #: switch itself off.
         self.low_voltage, self.critical_voltage = 3.2, 3.0
-        self._good_time: float | None = None
+        self._good_time = math.inf
 
     @property
     def millivolts(self) -> float:
@@ -331,6 +329,5 @@ class PowerMonitor:
         """Update with the voltage (V) at a time (s)."""
         self.voltage = voltage
         self.level = 10 * min(9, sum(voltage > level for level in _LEVELS))
-        if voltage > self.low_voltage or self._good_time is None:
-            self._good_time = time
+        self._good_time = time if voltage > self.low_voltage else min(self._good_time, time)
         self.state = LOW if time - self._good_time > _LOW_AFTER else ON_BATTERY

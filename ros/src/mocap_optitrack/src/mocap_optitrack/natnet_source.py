@@ -16,15 +16,6 @@ from mocap_optitrack.parameters import NatNetParameters
 from mocap_optitrack.source import Source, SourceError
 
 
-def any_address_may_answer(address: str) -> bool:
-    """Return whether an IPv4 address is that of a group or a broadcast."""
-    if ipaddress.ip_address(address).is_multicast:
-        return True
-    with contextlib.suppress(OSError):
-        return interface_towards(address) is None
-    return False
-
-
 def interface_towards(address: str) -> str | None:
     """Return the address of this machine's interface that leads to another address.
 
@@ -159,9 +150,14 @@ class NatNetSource(Source):
             ) from None
 
     def _configured_sender(self, targets):
-        if self._parameters.server_address is None or any_address_may_answer(targets[0]):
+        # None where any address may answer: without an address, to a group or a broadcast.
+        address = targets[0]
+        if self._parameters.server_address is None or ipaddress.ip_address(address).is_multicast:
             return None
-        return targets[0]
+        with contextlib.suppress(OSError):
+            if interface_towards(address) is None:
+                return None
+        return address
 
     def _interface(self):
         if self._parameters.local_address is not None:

@@ -77,7 +77,6 @@ _ANGLES = ("roll", "pitch", "yaw")
 _QUATERNION = ("qx", "qy", "qz", "qw")
 
 _ATTITUDE_OUTPUTS = ("_outP", "_outI", "_outD", "_outFF")
-_POSITION_OUTPUTS = ("p", "i", "d", "ff")
 
 _RADIAN = math.pi / 180.0
 _MILLIRADIAN = 1000.0 * _RADIAN
@@ -203,7 +202,7 @@ _GROUPS: dict[str, list[tuple[str, NumberType, Read]]] = {
         ),
         *_pids(
             "stabilizer.position",
-            _POSITION_OUTPUTS,
+            ("p", "i", "d", "ff"),
             **{pid.upper(): pid for pid in ("x", "y", "z", "vx", "vy", "vz")},
         ),
     ],

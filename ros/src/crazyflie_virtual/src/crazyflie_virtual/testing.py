@@ -332,14 +332,12 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
             if now < due:
                 continue
             started[block] = (period, max(due + period, now))
-            values = [self._log_value(name) for name in self._blocks[block]]
-            packed = struct.pack("<" + "".join(code for code, _ in values), *(v for _, v in values))
+            form = "<" + "".join(self.log[name][0] for name in self._blocks[block])
+            values = {name: value for name, (_, value) in self.log.items()}
+            values["supervisor.info"] = int(self.flight.state)
+            packed = struct.pack(form, *(values[name] for name in self._blocks[block]))
             stamp = (int(now * 1000) + self.clock_ahead_ms & 0xFFFFFF).to_bytes(3, "little")
             self.send(5, 2, bytes([block]) + stamp + packed)
-
-    def _log_value(self, name):
-        code, value = self.log[name]
-        return code, int(self.flight.state) if name == "supervisor.info" else value
 
     def _memory(self, channel, data):
         # The first one is never read.

@@ -191,19 +191,16 @@ class VirtualVehicle:
         if failed:
             commands = commands._replace(**{f"m{failed}": 0.0})
         self.physics.step(commands, self.battery.voltage)
+        if self.faults.low_battery:
+            self.battery.charge = min(self.battery.charge, LOW_CHARGE)
         if self._steps % _BATTERY_STEPS == 0:
-            self._drain()
+            self.battery.step(_BATTERY_STEPS * STEP, self.physics.load)
         return datagrams
 
     def _restart(self, failure):
         self.board = None
         self._failure = failure
         self._restart_time = self.time + _RESTART_TIME
-
-    def _drain(self):
-        if self.faults.low_battery:
-            self.battery.charge = min(self.battery.charge, LOW_CHARGE)
-        self.battery.step(_BATTERY_STEPS * STEP, self.physics.load)
 
     def _command_radio(self, data):
         if data[:1] != bytes([_RADIO_COMMAND]) or len(data) < 2:

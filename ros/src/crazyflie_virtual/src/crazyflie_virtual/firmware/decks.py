@@ -202,7 +202,8 @@ class PositioningDeck:
 
     def _measure_flow(self, dt):
         e, (x, y, z) = self.estimator.estimate, self.physics.position
-        has_texture = self._has_texture(x, y)
+        s = self.settings
+        has_texture = math.hypot(x - s.smooth_x, y - s.smooth_y) >= self.faults.smooth
         if not (has_texture and self._is_drift_known):
             # Only the motion from here on is measured, not the position of this point.
             self._drift = [e.x - x, e.y - y]
@@ -215,10 +216,6 @@ class PositioningDeck:
         else:
             self.unmeasured += _UNMEASURED * dt
         self._correct((x + self._drift[0], y + self._drift[1], z), _POSITION_DEVIATION)
-
-    def _has_texture(self, x, y):
-        s = self.settings
-        return math.hypot(x - s.smooth_x, y - s.smooth_y) >= self.faults.smooth
 
     def _correct(self, position: Triple, deviation: float, q: Quaternion | None = None) -> None:
         self.estimator.correct_position(*position, deviation)

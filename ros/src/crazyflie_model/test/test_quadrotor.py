@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from crazyflie_model.elementwise import join, split
-from crazyflie_model.quadrotor import CRAZYFLIE, Airframe
+from crazyflie_model.quadrotor import CRAZYFLIE
+from crazyflie_model.stabilized_quadrotor import Airframe
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 
 AIRFRAME = Airframe(CRAZYFLIE)

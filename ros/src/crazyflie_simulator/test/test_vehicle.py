@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from crazyflie_model.dynamics import Coupled7D, NearHover
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import GRAVITY
-from crazyflie_simulator.disturbances import Wind
 from crazyflie_simulator.vehicle import SimulatedVehicle
+from crazyflie_simulator.wind import Wind
 
 HOVER = np.array([0.0, 0.0, 0.0, GRAVITY])
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from crazyflie_simulator.disturbances import Wind
+from crazyflie_simulator.wind import Wind
 
 
 def velocities(wind, times):

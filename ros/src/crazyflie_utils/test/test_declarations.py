@@ -5,13 +5,8 @@ import math
 
 import pytest
 
-from crazyflie_utils.parameters.declaration import (
-    ParameterError,
-    Parameters,
-    group,
-    parameter,
-    parse_arguments,
-)
+from crazyflie_utils.parameters.command_line import parse_arguments
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters, group, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, METRES, TOPIC, Integer, Number, Text
 from crazyflie_utils.testing import FakeProcess
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from test_cflib_examples import OTHERS, RUNNING
 
-from crazyflie_utils.parameters.declaration import parse_arguments
+from crazyflie_utils.parameters.command_line import parse_arguments
 from crazyflie_virtual.log import log_variables
 from crazyflie_virtual.mocap import MocapSettings
 from crazyflie_virtual.parameters import parameter_specs

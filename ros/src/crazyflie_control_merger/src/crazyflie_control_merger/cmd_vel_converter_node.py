@@ -5,15 +5,14 @@ import math
 from geometry_msgs.msg import Twist, Vector3
 from typing_extensions import override
 
+from crazyflie_model.angles import Triple
 from crazyflie_model.quadrotor import CRAZYFLIE, QuadrotorParameters
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.types import TOPIC
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
-from crazyflie_utils.vectors import to_vector
-
-Vector = tuple[float, float, float]
+from crazyflie_utils.vectors import to_tuple
 
 
 def cmd_vel_from_control(
@@ -22,7 +21,7 @@ def cmd_vel_from_control(
     yaw_dot: float,
     thrust: float,
     model: QuadrotorParameters = CRAZYFLIE,
-) -> tuple[Vector, Vector]:
+) -> tuple[Triple, Triple]:
     """Return the two vectors of the twist that carries a control for a vehicle.
 
     From rad, rad/s (counter-clockwise) and m/s^2 to linear (pitch in degrees, roll in degrees,
@@ -69,6 +68,6 @@ class CmdVelConverterNode(Node):
         )
 
     def _on_control(self, message):
-        roll, pitch, yaw_dot, thrust = map(float, to_vector(message.control))
+        roll, pitch, yaw_dot, thrust = to_tuple(message.control)
         linear, angular = cmd_vel_from_control(roll, pitch, yaw_dot, thrust, self._model)
         self._publisher.publish(Twist(linear=Vector3(*linear), angular=Vector3(*angular)))

@@ -11,7 +11,7 @@ from crazyflie_doctor import computer, graph, installation, running_graph, timin
 from crazyflie_doctor.finding import ERROR, WARN, Check, Finding, lines, warn
 from crazyflie_doctor.running_graph import record
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameters.declaration import parse_arguments
+from crazyflie_utils.parameters.command_line import parse_arguments
 from crazyflie_utils.parameters.types import BOOLEAN, Number, Text
 
 _SECONDS = Number(unit="s", above=0.0)

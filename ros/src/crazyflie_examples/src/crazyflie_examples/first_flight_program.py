@@ -43,7 +43,7 @@ from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils import Parameters, ServiceError, parameter
 from crazyflie_utils.main import begin_script
-from crazyflie_utils.parameters.declaration import parse_arguments
+from crazyflie_utils.parameters.command_line import parse_arguments
 from crazyflie_utils.parameters.types import BOOLEAN, FINITE, FRAME, Text
 
 PREFIX = "/crazyflie"

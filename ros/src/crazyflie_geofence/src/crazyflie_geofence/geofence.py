@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_model.angles import rotate_by_yaw
+from crazyflie_model.elementwise import clip
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 
@@ -145,7 +146,7 @@ def acceleration_from_control(control: Vector, yaw: float) -> Vector:
     heading frame, with tilt limited to `MAX_TILT`.
     """
     roll, pitch, _, thrust = control
-    roll, pitch = _limited_tilt(roll), _limited_tilt(pitch)
+    roll, pitch = clip(roll, -MAX_TILT, MAX_TILT), clip(pitch, -MAX_TILT, MAX_TILT)
     x, y = rotate_by_yaw(GRAVITY * math.tan(pitch), -GRAVITY * math.tan(roll), yaw)
     return np.array([x, y, thrust * math.cos(roll) * math.cos(pitch) - GRAVITY])
 
@@ -157,11 +158,7 @@ def control_from_acceleration(acceleration: Vector, yaw: float, yaw_dot: float) 
     """
     x, y, z = acceleration
     forward, left = rotate_by_yaw(x, y, -yaw)
-    roll = _limited_tilt(-math.atan(left / GRAVITY))
-    pitch = _limited_tilt(math.atan(forward / GRAVITY))
+    roll = clip(-math.atan(left / GRAVITY), -MAX_TILT, MAX_TILT)
+    pitch = clip(math.atan(forward / GRAVITY), -MAX_TILT, MAX_TILT)
     thrust = (GRAVITY + z) / (math.cos(roll) * math.cos(pitch))
-    return np.array([roll, pitch, yaw_dot, min(max(thrust, MIN_THRUST), MAX_THRUST)])
-
-
-def _limited_tilt(angle):
-    return min(max(angle, -MAX_TILT), MAX_TILT)
+    return np.array([roll, pitch, yaw_dot, clip(thrust, MIN_THRUST, MAX_THRUST)])

@@ -17,16 +17,14 @@ from typing_extensions import override
 
 from crazyflie_lqr.control_law import (
     MAX_GAP,
-    PITCH,
-    ROLL,
     THRUST,
-    YAW_DOT,
     heading_error,
     integrate,
     limited,
     linear_control,
     with_integrals,
 )
+from crazyflie_model.elementwise import clip
 
 SPEED = 0.4  #: Speed of the reference (m/s).
 ACCELERATION = 0.5  #: Acceleration of the reference (m/s^2).
@@ -65,7 +63,7 @@ class Climb:
     def set_limit(self, limit: float) -> None:
         """Change the largest disturbance, m/s^2, and limit the present estimate."""
         self._limit = limit
-        self.disturbance = _within(self.disturbance, limit)
+        self.disturbance = clip(self.disturbance, -limit, limit)
 
     def advance(self, dt: float, z: float, z_dot: float, goal: float, excess: float) -> None:
         """Advance to the next state.
@@ -78,7 +76,7 @@ class Climb:
             self.z, self.z_dot = z, z_dot
         else:
             gain = RATE * (z_dot - self._last_z_dot - (excess + self.disturbance) * dt)
-            self.disturbance = _within(self.disturbance + gain, self._limit)
+            self.disturbance = clip(self.disturbance + gain, -self._limit, self._limit)
             self._advance_reference(dt, z, goal)
         self._last_z_dot = z_dot
         self._elapsed += dt
@@ -92,15 +90,11 @@ class Climb:
         braking = math.sqrt(2.0 * ACCELERATION * max(goal - self.z, 0.0))
         z_dot = min(self.z_dot + ACCELERATION * dt, SPEED, braking)
         # A larger acceleration is a jump of the reference.
-        self.z_ddot = _within((z_dot - self.z_dot) / dt, 2.0 * ACCELERATION)
+        self.z_ddot = clip((z_dot - self.z_dot) / dt, -2.0 * ACCELERATION, 2.0 * ACCELERATION)
         self.z_dot = z_dot
         self.z = min(self.z + z_dot * dt, z + LEAD)
         if goal - self.z < 1e-3:
             self.z, self.z_dot, self.z_ddot = goal, 0.0, 0.0
-
-
-def _within(value, limit):
-    return min(max(value, -limit), limit)
 
 
 LIFTED = 0.05  #: Height of a flying vehicle above the lowest one that was measured (m).
@@ -125,16 +119,6 @@ class GroundGuess:
             self._moved_at = time
         return z > self._lowest + LIFTED or time - self._moved_at < LIFTOFF_TIMEOUT
 
-
-__all__ = [
-    "PITCH",
-    "ROLL",
-    "THRUST",
-    "YAW_DOT",
-    "IntegralStateFeedback",
-    "LinearFeedback",
-    "heading_error",
-]
 
 _LEAST_DAMPING = 0.7  #: A height loop with this damping ratio overshoots a step by 5 %.
 #: A state or a control; for so few numbers, plain floats are several times quicker than arrays.

@@ -151,8 +151,7 @@ class LinearFeedbackNode(Node):
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(self.parameters_type, self._reconfigure)
         self._completes_itself = _overrides(self, LinearFeedbackNode, "complete_reference")
-        self._set_controller(self.make_controller(self._parameters))
-        self._limit_reference(self._parameters)
+        self._apply(self._parameters, self.make_controller(self._parameters))
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -179,14 +178,11 @@ class LinearFeedbackNode(Node):
     def _reconfigure(self, parameters):
         controller = self.make_controller(parameters)
         controller.take_over(self._controller)
-        self._set_controller(controller)
-        self._limit_reference(parameters)
+        self._apply(parameters, controller)
 
-    def _limit_reference(self, parameters):
+    def _apply(self, parameters, controller):
         self._reference.max_jump = parameters.max_jump
         self._reference.max_speed = parameters.max_speed
-
-    def _set_controller(self, controller):
         uses_arrays = _overrides(controller, LinearFeedback, "control")
         self._controller = controller
         self._law = self._control_by_arrays if uses_arrays else controller.law

@@ -1,7 +1,5 @@
 """Gains for a vehicle with a model: as quick as its delay and its lags allow."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -77,8 +75,3 @@ def _margins(
 def gains(model: QuadrotorParameters) -> NDArray[np.float64]:
     """Return the gains of `design`, shape (4, 7)."""
     return design(model)[0].K
-
-
-def bandwidth(K: NDArray[np.float64]) -> float:
-    """Return the bandwidth of the horizontal position loop of gains, rad/s."""
-    return math.sqrt(GRAVITY * abs(K[1, 0]))

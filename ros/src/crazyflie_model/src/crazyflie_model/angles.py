@@ -9,11 +9,10 @@ of tf's helpers, so nodes convert with this module only. Quaternions are
 
 import math
 from collections.abc import Sequence
-from typing import overload
 
 import numpy as np
 
-from crazyflie_model.elementwise import Many, Number, clip, functions
+from crazyflie_model.elementwise import Number, clip, functions
 
 Triple = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -21,15 +20,7 @@ Quaternion = tuple[float, float, float, float]
 _SMALLEST_COSINE = 1e-6  #: Least cosine of a pitch at which roll and yaw are distinct.
 
 
-@overload
-def wrap_to_pi(angle: float) -> float: ...
-
-
-@overload
-def wrap_to_pi(angle: Many) -> Many: ...
-
-
-def wrap_to_pi(angle: Many) -> Many:
+def wrap_to_pi(angle: Number) -> Number:
     """Return the angle in [-pi, pi] that points the same way as a finite one, rad."""
     turned = angle + math.pi
     if isinstance(turned, float):

@@ -77,15 +77,7 @@ def nowhere(condition: bool | NDArray[np.bool_]) -> bool:
     return isinstance(condition, np.ndarray) and not condition.any()
 
 
-@overload
-def clip(value: float, low: float, high: float) -> float: ...
-
-
-@overload
-def clip(value: Many, low: Many, high: Many) -> Many: ...
-
-
-def clip(value: Many, low: Many, high: Many) -> Many:
+def clip(value: Number, low: Number, high: Number) -> Number:
     """Return ``value`` limited to [low, high]."""
     if isinstance(value, float):
         return low if value < low else high if value > high else value

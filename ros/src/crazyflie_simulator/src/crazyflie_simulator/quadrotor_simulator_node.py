@@ -5,10 +5,9 @@ from typing_extensions import override
 from crazyflie_model.dynamics import Dynamics
 from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
 from crazyflie_model.limits import CRASH_TILT
-from crazyflie_model.quadrotor import Airframe
-from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
-from crazyflie_simulator.disturbances import Wind
+from crazyflie_model.stabilized_quadrotor import Airframe, StabilizedQuadrotor
 from crazyflie_simulator.simulator_node import SimulatorNode, SimulatorParameters
+from crazyflie_simulator.wind import Wind
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.declaration import group

@@ -58,7 +58,7 @@ class ConstantAccelerationFilter(RateFilter):
         self._first_variances = first_rate**2, 0.0, first_acceleration**2
         self._value: list[float] = []
         self._rate: list[float] = []
-        self._acceleration: list[float] = []
+        self.acceleration: list[float] = []  #: Estimate, the known part included, units / s^2.
         # The upper half, by rows.
         self._covariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._known: Components | None = None
@@ -74,18 +74,13 @@ class ConstantAccelerationFilter(RateFilter):
         p00, p01, p02, p11, p12, p22 = self._covariance
         return [[p00, p01, p02], [p01, p11, p12], [p02, p12, p22]]
 
-    @property
-    def acceleration(self) -> Components:
-        """Estimated acceleration, the known part included, in units / s^2."""
-        return self._acceleration
-
     @override
     def start(self, value: Components, acceleration: Components | None = None) -> None:
         """Start with the first sample, and the expected acceleration if it is not zero."""
         self._begin(value, [0.0] * len(value))
         self._known = acceleration
         if acceleration is not None:
-            self._acceleration = list(acceleration)
+            self.acceleration = list(acceleration)
 
     @override
     def step(
@@ -101,16 +96,16 @@ class ConstantAccelerationFilter(RateFilter):
 
     def _begin(self, value, rate):
         self._value, self._rate = list(value), rate
-        self._acceleration = [0.0] * len(rate)
+        self.acceleration = [0.0] * len(rate)
         self._covariance = (self._noise_variance, 0.0, 0.0, *self._first_variances)
         self._known = None
 
     def _take_over(self, known):
         if known is not None and self._known is not None:
-            self._acceleration = [
+            self.acceleration = [
                 acceleration + new - old
                 for acceleration, new, old in zip(
-                    self._acceleration, known, self._known, strict=True
+                    self.acceleration, known, self._known, strict=True
                 )
             ]
         self._known = known
@@ -118,7 +113,7 @@ class ConstantAccelerationFilter(RateFilter):
     def _predict(self, dt):
         # x = F x, P = F P F' + Q, written out; F = [[1, dt, dt^2 / 2], [0, 1, dt], [0, 0, 1]].
         half, third, walk = dt * dt / 2.0, dt * dt * dt, self._walk_density
-        axes = list(zip(self._value, self._rate, self._acceleration, strict=True))
+        axes = list(zip(self._value, self._rate, self.acceleration, strict=True))
         self._value = [x + dt * v + half * a for x, v, a in axes]
         self._rate = [v + dt * a for _, v, a in axes]
         p00, p01, p02, p11, p12, p22 = self._covariance
@@ -144,8 +139,8 @@ class ConstantAccelerationFilter(RateFilter):
         innovations = [z - x for z, x in zip(value, self._value, strict=True)]
         self._value = [x + g0 * y for x, y in zip(self._value, innovations, strict=True)]
         self._rate = [v + g1 * y for v, y in zip(self._rate, innovations, strict=True)]
-        self._acceleration = [
-            a + g2 * y for a, y in zip(self._acceleration, innovations, strict=True)
+        self.acceleration = [
+            a + g2 * y for a, y in zip(self.acceleration, innovations, strict=True)
         ]
         self._covariance = (
             p00 - g0 * p00,

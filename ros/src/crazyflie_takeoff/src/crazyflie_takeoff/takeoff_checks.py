@@ -140,17 +140,17 @@ class TakeoffServerParameters(FlightTopicParameters):
     @property
     def vehicle_status_topic(self) -> str | None:
         """The driver's status of the vehicle; None without a driver."""
-        if self.own_vehicle_status_topic is not None or self.connected_topic is None:
-            return self.own_vehicle_status_topic
-        return self._of_driver("vehicle_status")
+        return self.own_vehicle_status_topic or self._of_driver("vehicle_status")
 
     @property
     def positioning_topic(self) -> str | None:
         """Why the vehicle's own estimate cannot be flown by; None without a driver."""
-        return None if self.connected_topic is None else self._of_driver("positioning")
+        return self._of_driver("positioning")
 
     def _of_driver(self, name):
-        namespace, slash, _ = (self.connected_topic or "").rpartition("/")
+        if self.connected_topic is None:
+            return None
+        namespace, slash, _ = self.connected_topic.rpartition("/")
         return f"{namespace}{slash}{name}"
 
     @override

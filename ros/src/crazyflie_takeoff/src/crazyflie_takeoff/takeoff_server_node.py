@@ -37,7 +37,7 @@ from crazyflie_takeoff.takeoff_checks import (
     hover_complaint,
 )
 from crazyflie_takeoff.transition_table import FlightState, flight_state
-from crazyflie_utils import Node, NodeHandle, ParameterError, ServiceError
+from crazyflie_utils import Node, NodeHandle, ParameterError, ServiceError, flight_status
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import from_vector, stamped
 
@@ -68,13 +68,7 @@ _EVENTS = {
 }
 
 # For an operator, both parts of a landing are one.
-_LOG_WORDS = {
-    FlightState.ON_GROUND: "on the ground",
-    FlightState.TAKING_OFF: "taking off",
-    FlightState.FLYING: "flying",
-    FlightState.DESCENDING: "landing",
-    FlightState.LANDING: "landing",
-}
+_LOG_WORDS = flight_status.WORDS | {FlightStatus.DESCENDING: "landing"}
 
 
 class Calls:
@@ -86,7 +80,7 @@ class Calls:
 
     def __init__(self) -> None:
         self.waiting: list[tuple[ServerEvent, Future[EmptyResponse]]] = []
-        self._under_way: Future[EmptyResponse] | None = None
+        self._under_way: Future[EmptyResponse] = Future()
 
     def begin(self, future: "Future[EmptyResponse]", reason: Exception) -> None:
         """Start a call; one that is under way fails with a reason."""
@@ -95,15 +89,13 @@ class Calls:
 
     def finish(self) -> None:
         """Answer the call that is under way, if there is one."""
-        future, self._under_way = self._under_way, None
-        if future is not None:
-            future.set_result(EmptyResponse())
+        if not self._under_way.done():
+            self._under_way.set_result(EmptyResponse())
 
     def fail(self, reason: Exception) -> None:
         """Fail the call that is under way, if there is one."""
-        future, self._under_way = self._under_way, None
-        if future is not None:
-            future.set_exception(reason)
+        if not self._under_way.done():
+            self._under_way.set_exception(reason)
 
     def fail_all(self, reason: Exception) -> None:
         """Fail all calls."""

@@ -20,49 +20,6 @@ from crazyflie_utils.timers import (
 from crazyflie_utils.topics import Publisher, Topics, Transport
 
 
-class ClockSource:
-    """Publishes /clock, of simulated time, from a process with a simulated clock and timers."""
-
-    def __init__(
-        self,
-        transport: Transport,
-        topics: Topics,
-        clock: SimulatedClock | SteadyClock,
-        timers: TimerQueue,
-    ):
-        self._transport = transport
-        self._topics = topics
-        self._clock = clock
-        self._timers = timers
-        self._publisher: Publisher | None = None
-
-    def publisher(self) -> Callable[..., None]:
-        """Return ``set_clock(*moments)``, which moves simulated time to moments (s).
-
-        Other processes receive all of them at once. In this process time moves to the last one,
-        after the present callback; then the due timers run.
-        """
-        publisher = self._publisher = self._topics.publisher("/clock", Clock, latch=False)
-
-        def set_clock(*moments: float) -> None:
-            stamp = self._clock.stamp(moments[-1])
-            self._transport.clock_was_set(stamp)
-            passed = moments[:-1] if publisher.is_heard_outside() else ()
-            publisher.publish(Clock(stamp), [Clock(self._clock.stamp(each)) for each in passed])
-
-        return set_clock
-
-    def next_event(self) -> float:
-        """Return the next moment, s, at which simulated time must stop.
-
-        That is when a timer of this process is due; or at once, if /clock has a subscriber in this
-        process in addition to the process itself.
-        """
-        if self._publisher is None or self._publisher.is_read_here(excluding=1):
-            return -math.inf
-        return self._timers.next_deadline()
-
-
 class ProcessContext:
     """One executor, one clock, one set of topics and one tf buffer for all nodes of a process.
 
@@ -91,7 +48,7 @@ class ProcessContext:
         tf = self.transforms.gather, self.transforms.send_gathered
         self._steady = SteadyTimers(TimerQueue(self.executor, *tf), SteadyClock())
         self._simulated = TimerQueue(self.executor, *tf)
-        self.clock_source = ClockSource(transport, self.topics, self.clock, self._simulated)
+        self._clock_publisher: Publisher | None = None
         self._inhibitors: list[ShutdownInhibitor] = []
         #: Exit status with which the process is to end; None while it is not to end.
         self.exit_status: int | None = None
@@ -142,6 +99,33 @@ class ProcessContext:
     def next_simulated_deadline(self) -> float:
         """Return when the next timer by simulated time is due, s."""
         return self._simulated.next_deadline()
+
+    def clock_publisher(self) -> Callable[..., None]:
+        """Return ``set_clock(*moments)``, which moves simulated time to moments (s).
+
+        Other processes receive all of them at once. In this process time moves to the last one,
+        after the present callback; then the due timers run.
+        """
+        publisher = self._clock_publisher = self.topics.publisher("/clock", Clock, latch=False)
+
+        def set_clock(*moments: float) -> None:
+            stamp = self.clock.stamp(moments[-1])
+            self.transport.clock_was_set(stamp)
+            passed = moments[:-1] if publisher.is_heard_outside() else ()
+            publisher.publish(Clock(stamp), [Clock(self.clock.stamp(each)) for each in passed])
+
+        return set_clock
+
+    def next_event(self) -> float:
+        """Return the next moment, s, at which the publisher of simulated time must stop.
+
+        That is when a timer of this process is due; or at once, if /clock has a subscriber in this
+        process in addition to the process itself.
+        """
+        publisher = self._clock_publisher
+        if publisher is None or publisher.is_read_here(excluding=1):
+            return -math.inf
+        return self.next_simulated_deadline()
 
     def _on_clock(self, clock, message):
         # Queued with all other work: time does not move within a callback, and a reset does not

@@ -57,9 +57,8 @@ class NodeHandle:
         clock = process.clock
         #: Seconds for intervals, ROS time for headers; see `SteadyClock` and `SimulatedClock`.
         self.time, self.stamp, self.nanoseconds = clock.time, clock.stamp, clock.nanoseconds
-        source = process.clock_source
-        #: For the node that publishes /clock; see `ClockSource`.
-        self.clock_publisher, self.next_event = source.publisher, source.next_event
+        #: For the node that publishes /clock; see `ProcessContext`.
+        self.clock_publisher, self.next_event = process.clock_publisher, process.next_event
         tf = process.transforms
         self.broadcast_transforms = tf.broadcaster  #: Methods of `Transforms`, like the next five.
         self.broadcast_static_transforms = tf.static_broadcaster
@@ -192,7 +191,7 @@ class NodeHandle:
                     )
                     answer.set_exception(ServiceError(f"{full_name}: the call was withdrawn"))
                 else:
-                    serve(callback, request, answer, self)
+                    self._serve(callback, request, answer)
 
             for latest in self._latest:
                 self._submit(latest.deliver)
@@ -201,6 +200,39 @@ class NodeHandle:
 
         advertise = self._process.transport.advertise_service
         self._undo.append(advertise(full_name, service_type, begin, self.time))
+
+    def _serve(self, callback, request, answer):
+        if self.is_closed:
+            answer.set_exception(ServiceError(f"{self.name} has ended this service"))
+            return
+        try:
+            response = callback(request)
+        except (ServiceError, RefusalError) as reason:
+            answer.set_exception(ServiceError(str(reason)))
+        except Exception as error:
+            self.report_fault(callback, error)
+            answer.set_exception(ServiceError(f"{self.name}: {error!r}"))
+        else:
+            if isinstance(response, Future):
+                response.add_done_callback(lambda done: self._forward(done, answer))
+            else:
+                answer.set_result(response)
+
+    def _forward(self, done, to):
+        """Complete a future with the outcome of another, any error as a `ServiceError`."""
+        if not to.set_running_or_notify_cancel():
+            return
+        if done.cancelled():
+            to.set_exception(ServiceError(f"{self.name}: cancelled"))
+            return
+        error = done.exception()
+        if error is None:
+            to.set_result(done.result())
+        elif isinstance(error, (ServiceError, RefusalError)):
+            to.set_exception(ServiceError(str(error)))
+        else:
+            self.error(f"a service failed\n{''.join(traceback.format_exception(error))}")
+            to.set_exception(ServiceError(f"{self.name}: {error!r}"))
 
     def claim_controls(self, topic: str, kind: str) -> None:
         """Claim a topic's controls for this node's vehicle, which is "simulated" or "real".
@@ -240,11 +272,11 @@ class NodeHandle:
         it goes on. Functions that are added with ``add_done_callback`` run like any callback; no
         callback may wait for the future.
         """
-        transport, outcome = self._process.transport, Reply(self)
+        transport, outcome = self._process.transport, _Reply(self)
         reply = transport.call_service(
             self.resolve(name), service_type, request, limit, start_limit
         )
-        reply.add_done_callback(lambda reply: self._submit(forward, reply, outcome, self))
+        reply.add_done_callback(lambda reply: self._submit(self._forward, reply, outcome))
         return outcome
 
     @property
@@ -342,32 +374,7 @@ class NodeHandle:
         return guarded
 
 
-def serve(
-    callback: Callable[[Any], Any], request: Any, answer: Future[Any], handle: NodeHandle
-) -> None:
-    """Give ``answer`` the response to a request, or a `ServiceError`.
-
-    That is now, or when the future that the callback returns is done; see
-    `NodeHandle.advertise_service`.
-    """
-    if handle.is_closed:
-        answer.set_exception(ServiceError(f"{handle.name} has ended this service"))
-        return
-    try:
-        response = callback(request)
-    except (ServiceError, RefusalError) as reason:
-        answer.set_exception(ServiceError(str(reason)))
-    except Exception as error:
-        handle.report_fault(callback, error)
-        answer.set_exception(ServiceError(f"{handle.name}: {error!r}"))
-    else:
-        if isinstance(response, Future):
-            response.add_done_callback(lambda done: forward(done, answer, handle))
-        else:
-            answer.set_result(response)
-
-
-class Reply(Future[Any]):
+class _Reply(Future[Any]):
     """The response to a call; functions added to it are callbacks of the node.
 
     A plain future would only log their exceptions, and the node would not enter its safe state.
@@ -380,20 +387,3 @@ class Reply(Future[Any]):
     @override
     def add_done_callback(self, fn: Callable[[Future[Any]], object]) -> None:
         super().add_done_callback(self._guard(fn))
-
-
-def forward(done: Future[Any], to: Future[Any], handle: NodeHandle) -> None:
-    """Complete a future with the outcome of another, any error as a `ServiceError`."""
-    if not to.set_running_or_notify_cancel():
-        return
-    if done.cancelled():
-        to.set_exception(ServiceError(f"{handle.name}: cancelled"))
-        return
-    error = done.exception()
-    if error is None:
-        to.set_result(done.result())
-    elif isinstance(error, (ServiceError, RefusalError)):
-        to.set_exception(ServiceError(str(error)))
-    else:
-        handle.error(f"a service failed\n{''.join(traceback.format_exception(error))}")
-        to.set_exception(ServiceError(f"{handle.name}: {error!r}"))

@@ -1,8 +1,7 @@
-"""Values and names in messages; text files, and numbers in them."""
+"""Values and names in messages; numbers in texts."""
 
 import re
 import reprlib
-from pathlib import Path
 
 _VALUE_LENGTH = 80  #: Length of a value in a message (characters); a short list fits.
 _NAME_LENGTH = 200  #: Length of a name, or of a list of names, in a message (characters).
@@ -41,46 +40,7 @@ def shortened(text: str, length: int = _NAME_LENGTH) -> str:
     return f"{text[: length - 3 - end]}...{text[len(text) - end :]}"
 
 
-MAX_SIZE = 10_000_000  #: Largest text file (bytes).
-
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-
-
-class TextFileError(Exception):
-    """A file is not a text; ``line`` is the number of the line at fault, from 1, or None."""
-
-    def __init__(self, reason: str, line: int | None = None):
-        super().__init__(reason)
-        self.line = line
-
-
-def read_text(path: str | Path, max_size: int = MAX_SIZE) -> str:
-    """Return the text of a file in UTF-8, without a byte order mark.
-
-    `TextFileError`: it cannot be read, is longer than ``max_size`` bytes, is not in UTF-8, or has a
-    NUL.
-    """
-    try:
-        with open(path, "rb") as file:
-            content = file.read(max_size + 1)
-    except OSError as error:
-        raise TextFileError(f"cannot be read: {error.strerror}") from None
-    except ValueError as error:
-        # A path with a NUL.
-        raise TextFileError(f"cannot be read: {error}") from None
-    if len(content) > max_size:
-        raise TextFileError(f"is too long; expected at most {max_size} bytes")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        # The bytes that failed are counted without the byte order mark.
-        failed = error.object[: error.start]
-        line = bytes(failed).count(b"\n") + 1
-        raise TextFileError(f"is not text in UTF-8: {error.reason}", line) from None
-    before, nul, _ = text.partition("\0")
-    if nul:
-        raise TextFileError("has a NUL character; expected text", before.count("\n") + 1)
-    return text
 
 
 def number_from_text(text: str) -> float:

@@ -17,7 +17,8 @@ from crazyflie_model.dynamics import rk4_step
 from crazyflie_model.elementwise import Vector
 from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
 from crazyflie_model.inner_loops import PERIOD
-from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe, QuadrotorParameters
+from crazyflie_model.quadrotor import CRAZYFLIE, QuadrotorParameters
+from crazyflie_model.stabilized_quadrotor import STILL_AIR, Airframe
 from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.quaternions import product
 from crazyflie_world.world import World

@@ -24,7 +24,8 @@ from typing_extensions import override
 
 import crazyflie_utils
 from crazyflie_model.angles import Quaternion, Triple
-from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parse_arguments
+from crazyflie_utils.parameters.command_line import parse_arguments
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters
 from crazyflie_virtual.crtp import is_broadcast
 from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle

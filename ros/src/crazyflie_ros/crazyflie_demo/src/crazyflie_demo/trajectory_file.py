@@ -10,7 +10,8 @@ import numpy as np
 
 from crazyflie_model.elementwise import join
 from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
-from crazyflie_utils.text import TextFileError, number_from_text, read_text, shortened, shown
+from crazyflie_utils.text import number_from_text, shortened, shown
+from crazyflie_utils.text_file import TextFileError, read_text
 
 #: Numbers in a line of a file: duration, then the coefficients of x, y, z and yaw.
 COLUMNS = 1 + 4 * COEFFICIENTS

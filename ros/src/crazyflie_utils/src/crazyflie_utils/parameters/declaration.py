@@ -8,10 +8,9 @@ parameters that dynamic_reconfigure may change in flight::
         control_topic: str = parameter(TOPIC, "where controls come from", name="topics/control")
 """
 
-import argparse
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, Self, TypeVar, dataclass_transform
+from typing import Any, Self, dataclass_transform
 
 from crazyflie_utils.parameters.types import ParameterType
 from crazyflie_utils.text import shown
@@ -170,50 +169,3 @@ def _read_field(declaration, get, full_name):
         lambda name: get(f"{declaration.prefix}/{name}"),
         lambda name: full_name(f"{declaration.prefix}/{name}"),
     )
-
-
-P = TypeVar("P", bound=Parameters)
-
-
-def parse_arguments(parameters: type[P], arguments: list[str], program: str, description: str) -> P:
-    """Return the parameters on a command line: ``init/x`` is the argument ``--init-x``.
-
-    ``program`` and ``description`` are for ``--help``. Exits with status 2 and a message that lists
-    all errors.
-    """
-    parser = argparse.ArgumentParser(prog=program, description=description)
-    declarations = {_option(d.name): d for d in parameters.declarations()}
-    for option, declaration in declarations.items():
-        parser.add_argument(
-            option,
-            dest=declaration.name,
-            default=argparse.SUPPRESS,
-            metavar=declaration.type.label.upper(),
-            help=_help(declaration),
-        )
-    given = vars(parser.parse_args(arguments))
-
-    def get(name):
-        text = given[name]
-        try:
-            return types[name].from_text(text)
-        except ValueError:
-            # The type refuses the text, too, and names the expected value.
-            return text
-
-    types = {declaration.name: declaration.type for declaration in declarations.values()}
-    try:
-        return parameters.read(get, _option)
-    except ParameterError as error:
-        parser.error(str(error))
-
-
-def _option(name):
-    return "--" + name.replace("/", "-").replace("_", "-")
-
-
-def _help(declaration):
-    unit = f", {declaration.type.unit}" if declaration.type.unit else ""
-    default = "" if declaration.default is REQUIRED else f" (default: {declaration.default})"
-    # argparse formats the text with %.
-    return f"{declaration.help}{unit}{default}".replace("%", "%%")

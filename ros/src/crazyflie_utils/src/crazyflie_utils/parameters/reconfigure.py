@@ -21,8 +21,8 @@ from dynamic_reconfigure.msg import (
 )
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
-from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, ParameterError, Parameters
-from crazyflie_utils.parameters.types import Boolean, Integer, Number, Text
+from crazyflie_utils.parameters.declaration import REQUIRED, ParameterError, Parameters
+from crazyflie_utils.parameters.types import Boolean, Integer, Number, ParameterType, Text
 from crazyflie_utils.refusal import ServiceError
 
 
@@ -89,11 +89,8 @@ class Reconfiguration:
         return {name: self._value(declaration) for name, declaration in self._live.items()}
 
     def _value(self, declaration):
-        raw = self._values.get(declaration.name, declaration.default)
-        return _PYTHON_TYPES[_wire_type(declaration)](raw)
-
-
-_PYTHON_TYPES = {"double": float, "int": int, "bool": bool, "str": str}
+        _, python_type, _, _ = _wire_format(declaration.type)
+        return python_type(self._values.get(declaration.name, declaration.default))
 
 
 def _read(declarations, get):
@@ -104,11 +101,15 @@ def _read(declarations, get):
     return values
 
 
-def _wire_type(declaration: Declaration) -> str:
-    for parameter_type, name in ((Number, "double"), (Integer, "int"), (Boolean, "bool")):
-        if isinstance(declaration.type, parameter_type):
-            return name
-    return "str"
+def _wire_format(kind: ParameterType) -> tuple[str, type, Any, Any]:
+    """Return how a parameter is sent: its type's name there and in Python, and its limits."""
+    if isinstance(kind, Number):
+        return "double", float, max(kind.minimum, kind.above), kind.maximum
+    if isinstance(kind, Integer):
+        return "int", int, kind.minimum, kind.maximum
+    if isinstance(kind, Boolean):
+        return "bool", bool, False, True
+    return "str", str, "", ""
 
 
 def config_message(values: Mapping[str, bool | int | float | str]) -> Config:
@@ -131,10 +132,10 @@ def _description(live, config):
     low, high, defaults = {}, {}, {}
     group = Group(name="Default")
     for declaration in live:
-        name, wire_type = declaration.name, _wire_type(declaration)
-        low[name], high[name] = _limits(declaration, wire_type)
+        name = declaration.name
+        wire_type, python_type, low[name], high[name] = _wire_format(declaration.type)
         has_default = declaration.default is not REQUIRED
-        defaults[name] = type(config[name])(declaration.default) if has_default else config[name]
+        defaults[name] = python_type(declaration.default) if has_default else config[name]
         unit = f", {declaration.type.unit}" if declaration.type.unit else ""
         edit_method = _choices(declaration.type)
         group.parameters.append(
@@ -143,14 +144,6 @@ def _description(live, config):
     return ConfigDescription(
         [group], config_message(high), config_message(low), config_message(defaults)
     )
-
-
-def _limits(declaration, wire_type):
-    if wire_type == "double":
-        return max(declaration.type.minimum, declaration.type.above), declaration.type.maximum
-    if wire_type == "int":
-        return declaration.type.minimum, declaration.type.maximum
-    return (False, True) if wire_type == "bool" else ("", "")
 
 
 def _choices(parameter_type):

@@ -7,8 +7,6 @@ from typing import Any
 
 from typing_extensions import override
 
-from crazyflie_utils.text import number_from_text
-
 
 class ParameterType:
     """Base class of parameter types."""
@@ -23,10 +21,6 @@ class ParameterType:
         Raises ValueError if it is invalid; with a reason if ``str(type)`` does not contain it.
         """
         raise NotImplementedError
-
-    def from_text(self, text: str) -> Any:
-        """Return the raw value of a word on a command line, or raise ValueError."""
-        return text
 
 
 @dataclass(frozen=True)
@@ -48,10 +42,6 @@ class Number(ParameterType):
             if math.isfinite(limit)
         ]
         return " and ".join(limits)
-
-    def from_text(self, text: str) -> float:
-        """Return the number in a text."""
-        return number_from_text(text)
 
     @override
     def __call__(self, value: Any) -> float:
@@ -87,13 +77,6 @@ class Integer(ParameterType):
             return f"{self.minimum}"
         return f"{self.minimum} to {self.maximum}"
 
-    def from_text(self, text: str) -> int:
-        """Return the integer in a text; 0x begins a hexadecimal one."""
-        # Only Python allows underscores in numbers.
-        if "_" in text:
-            raise ValueError
-        return int(text, 0)
-
     @override
     def __call__(self, value: Any) -> int:
         number = Number(minimum=self.minimum, maximum=self.maximum)(value)
@@ -112,12 +95,6 @@ class Boolean(ParameterType):
     """true or false."""
 
     label = "bool"
-
-    def from_text(self, text: str) -> bool:
-        """Return the Boolean of "true" or "false"."""
-        if text.lower() not in ("true", "false"):
-            raise ValueError
-        return text.lower() == "true"
 
     @override
     def __call__(self, value: Any) -> bool:

@@ -16,7 +16,8 @@ import yaml
 from typing_extensions import override
 
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters
-from crazyflie_utils.text import TextFileError, read_text, shortened, shown
+from crazyflie_utils.text import shortened, shown
+from crazyflie_utils.text_file import TextFileError, read_text
 
 MAX_SIZE = 1_000_000  #: Largest file (bytes): three times that of a thousand vehicles.
 MAX_DEPTH = 50  #: Largest number of nested lists and mappings.
@@ -88,7 +89,7 @@ def load(path: str | Path) -> "Entry":
     """Return the content of a file, which is a mapping.
 
     `ParameterError`: it cannot be read, is not a YAML mapping, has a key twice, or exceeds the
-    limits of a file of settings, see `yaml_loader`.
+    limits of a file of settings, see `compose`.
     """
     try:
         text = read_text(path, MAX_SIZE)

@@ -18,7 +18,6 @@ import struct
 import sys
 import threading
 import time
-from types import TracebackType
 from xmlrpc.server import SimpleXMLRPCServer
 
 import genpy
@@ -71,12 +70,7 @@ class HostilePublisher:
     def __enter__(self) -> "HostilePublisher":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with contextlib.suppress(OSError, rosgraph.MasterException):
             self._master.unregisterPublisher(self._topic, self._uri)
         self._slave.shutdown()

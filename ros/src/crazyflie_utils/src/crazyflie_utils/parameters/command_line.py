@@ -1,0 +1,66 @@
+"""Command lines of declared parameters."""
+
+import argparse
+from typing import TypeVar
+
+from crazyflie_utils.parameters.declaration import REQUIRED, ParameterError, Parameters
+from crazyflie_utils.parameters.types import Boolean, Integer, Number
+from crazyflie_utils.text import number_from_text
+
+P = TypeVar("P", bound=Parameters)
+
+
+def parse_arguments(parameters: type[P], arguments: list[str], program: str, description: str) -> P:
+    """Return the parameters on a command line: ``init/x`` is the argument ``--init-x``.
+
+    ``program`` and ``description`` are for ``--help``. Exits with status 2 and a message that lists
+    all errors.
+    """
+    parser = argparse.ArgumentParser(prog=program, description=description)
+    declarations = {_option(d.name): d for d in parameters.declarations()}
+    for option, declaration in declarations.items():
+        parser.add_argument(
+            option,
+            dest=declaration.name,
+            default=argparse.SUPPRESS,
+            metavar=declaration.type.label.upper(),
+            help=_help(declaration),
+        )
+    given = vars(parser.parse_args(arguments))
+
+    def get(name):
+        text = given[name]
+        try:
+            return _raw(types[name], text)
+        except ValueError:
+            # The type refuses the text, too, and names the expected value.
+            return text
+
+    types = {declaration.name: declaration.type for declaration in declarations.values()}
+    try:
+        return parameters.read(get, _option)
+    except ParameterError as error:
+        parser.error(str(error))
+
+
+def _raw(parameter_type, text):
+    """Return the raw value of a word on a command line, or raise ValueError."""
+    if isinstance(parameter_type, Number):
+        return number_from_text(text)
+    # Only Python allows underscores in numbers.
+    if isinstance(parameter_type, Integer) and "_" not in text:
+        return int(text, 0)
+    if isinstance(parameter_type, Boolean):
+        return {"true": True, "false": False}.get(text.lower(), text)
+    return text
+
+
+def _option(name):
+    return "--" + name.replace("/", "-").replace("_", "-")
+
+
+def _help(declaration):
+    unit = f", {declaration.type.unit}" if declaration.type.unit else ""
+    default = "" if declaration.default is REQUIRED else f" (default: {declaration.default})"
+    # argparse formats the text with %.
+    return f"{declaration.help}{unit}{default}".replace("%", "%%")

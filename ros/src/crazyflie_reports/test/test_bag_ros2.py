@@ -39,11 +39,11 @@ def test_a_flight_of_crazyswarm2(tmp_path, storage, compression, is_folder):
     (log,) = read(tmp_path / "a" if is_folder else file, tmp_path)
     assert log.remarks == []
     (flight,) = flights_of(log)
-    assert flight.vehicle == "cf1"
+    assert flight.vehicle.name == "cf1"
     assert flight.record.state.column("z").max() == pytest.approx(1.0 + bags.OFFSET)
     assert flight.record.reference.values[-1, :3] == pytest.approx([0.0, 0.0, 1.0])
-    assert flight.battery[:, 1] == pytest.approx([3.9])
-    assert flight.is_driven
+    assert flight.during(flight.vehicle.battery)[:, 1] == pytest.approx([3.9])
+    assert flight.vehicle.is_driven
     assert [(each.kind.value, each.text) for each in flight.events] == [
         ("warning", "/cf1/link: latency is high"),
     ]  # fmt: skip

@@ -61,8 +61,7 @@ def test_hover_error():
 
 def test_touchdown_speed():
     assert flight(sink=0.3).touchdown_speed() == pytest.approx(0.3)
-    with pytest.raises(ValueError, match="did not reach the ground"):
-        flight(sink=0.01).touchdown_speed()
+    assert math.isnan(flight(sink=0.01).touchdown_speed())
 
 
 @pytest.mark.parametrize("overshoot", [0.0, 0.09])

@@ -81,7 +81,7 @@ def draw_from_above(flights: list[Flight]) -> Figure:
     axes = figure.add_subplot(aspect="equal", xlabel="x (m)", ylabel="y (m)")
     for flight in flights:
         x, y = flight.record.state.column("x"), flight.record.state.column("y")
-        (line,) = axes.plot(x, y, linewidth=1.0, label=flight.vehicle)
+        (line,) = axes.plot(x, y, linewidth=1.0, label=flight.vehicle.name)
         axes.plot(x[:1], y[:1], "o", color=line.get_color())
         axes.plot(x[-1:], y[-1:], "x", color=line.get_color())
     axes.grid(visible=True, linewidth=0.3)

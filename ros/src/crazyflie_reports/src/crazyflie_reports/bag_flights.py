@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,18 +214,10 @@ class Phase:
 class Flight:
     """A flight of a vehicle."""
 
-    vehicle: str  #: Its name.
+    vehicle: Vehicle  #: With all its flights.
     number: int  #: Number of the flight among the vehicle's flights in the recording, from 1.
     phases: list[Phase]
     record: FlightRecord  #: States with `MARGIN` before and after.
-    #: attitude, true_pose, battery, link, delays: As in `Vehicle`.
-    attitude: Rows
-    true_pose: Rows
-    battery: Rows
-    link: Rows
-    delays: Rows
-    lost: int | None  #: As in `Vehicle`.
-    is_driven: bool  #: As in `Vehicle`.
     events: list[Event]
 
     @property
@@ -236,6 +229,14 @@ class Flight:
     def end(self) -> float:
         """When the last phase ends, s."""
         return self.phases[-1].end
+
+    def during(self, rows: Rows, margin: float = 0.0) -> Rows:
+        """Return the rows, with times (s) in the first column, in the flight, and around it."""
+        return between(rows, self.start - margin, self.end + margin)
+
+    def event_rows(self) -> list[list[Any]]:
+        """Return time after the start (s), kind, text and repetitions of each event."""
+        return [[round(e.time - self.start, 3), e.kind.value, e.text, e.count] for e in self.events]
 
 
 def flights(
@@ -251,20 +252,8 @@ def flights(
     lasting = (phases for phases in known if phases[-1].end > phases[0].start)
     for number, phases in enumerate(lasting, 1):
         first, last = phases[0].start - MARGIN, phases[-1].end + MARGIN
-        yield Flight(
-            vehicle.name,
-            number,
-            phases,
-            _record(vehicle, phases, first, last),
-            _between(vehicle.attitude, first, last),
-            _between(vehicle.true_pose, first, last),
-            _between(vehicle.battery, first, last),
-            _between(vehicle.link, first, last),
-            _between(vehicle.delays, phases[0].start, phases[-1].end),
-            vehicle.lost,
-            vehicle.is_driven,
-            [each for each in events if first <= each.time <= last],
-        )
+        own = [each for each in events if first <= each.time <= last]
+        yield Flight(vehicle, number, phases, _record(vehicle, phases, first, last), own)
 
 
 def _phases(states, end):
@@ -322,13 +311,14 @@ def _record(vehicle, phases, first, last):
 
 
 def _series(rows, fields, first, last):
-    rows = _between(rows, first, last)
+    rows = between(rows, first, last)
     # Positions or controls that are not finite, which every node also rejects.
     rows = rows[np.isfinite(rows[:, :4]).all(axis=1)]
     rows[np.isinf(rows)] = np.nan
     return Series.of(fields, rows[:, 0], rows[:, 1:])
 
 
-def _between(rows, first, last):
+def between(rows: Rows, first: float, last: float) -> Rows:
+    """Return the rows whose times, in the first column, are within two times (s)."""
     begin, end = np.searchsorted(rows[:, 0], first), np.searchsorted(rows[:, 0], last, "right")
     return rows[begin:end]

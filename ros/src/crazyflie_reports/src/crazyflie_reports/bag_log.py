@@ -17,10 +17,10 @@ from crazyflie_reports.bag_topics import (
     Role,
     Topic,
     expected,
+    placed,
     pose_row,
     seconds,
     topic_of,
-    transform_row,
 )
 from crazyflie_reports.usd_log import UsdConnection, UsdLogFile, is_usd_log
 
@@ -75,7 +75,6 @@ class Spool:
 class Source:
     """The series of a topic."""
 
-    topic: str
     namespace: str
     role: Role
     spool: Spool
@@ -147,12 +146,8 @@ def read(
     logs = [each for each in reader.logs if each.sources or each.frames]
     if not logs:
         there = sorted({f"{each.topic} ({each.datatype})" for each in connections})
-        raise BagError(
-            "\n".join(
-                [f"{path} has no topics of a flight; expected {expected()}, or /tf.",
-                 f"There are: {', '.join(there)}", *remarks]
-            )
-        )  # fmt: skip
+        text = f"{path} has no topics of a flight; expected {expected()}, or /tf."
+        raise BagError("\n".join([text, f"There are: {', '.join(there)}", *remarks]))
     logs[0].remarks += remarks
     for number, log in enumerate(logs, 1):
         if len(logs) > 1:
@@ -207,9 +202,8 @@ class _Reader:
             elif hasattr(content, "transforms") or hasattr(content, "poses"):
                 self._add_transforms(time, content)
             else:
-                log.events.add(
-                    time, connection.topic, topic.namespace, connection.datatype, content
-                )
+                names = connection.topic, topic.namespace, connection.datatype
+                log.events.add(time, *names, content)
         except Exception as error:  # Damaged fields of a bag may raise any error.
             self._errors.setdefault(connection.topic, f"{connection.topic}: {error}")
             self._bad[connection.topic] = self._bad.get(connection.topic, 0) + 1
@@ -225,7 +219,7 @@ class _Reader:
         sources = self.logs[-1].sources
         if name not in sources:
             spool = self._new_spool(topic.role.fields)
-            sources[name] = Source(name, topic.namespace, topic.role, spool)
+            sources[name] = Source(topic.namespace, topic.role, spool)
         return sources[name].spool
 
     def _add_transforms(self, time, message):
@@ -249,4 +243,5 @@ def _poses_of(message):
             yield each.name, message.header.stamp, pose_row(each.pose)
         return
     for each in message.transforms:
-        yield each.child_frame_id.strip("/"), each.header.stamp, transform_row(each.transform)
+        row = placed(each.transform.translation, each.transform.rotation)
+        yield each.child_frame_id.strip("/"), each.header.stamp, row

@@ -60,12 +60,9 @@ class Report:
             found = figures(flight)
             data.append(report_page.flight_data(flight, found, points))
             entry = {
-                **{"recording": log.name, "vehicle": flight.vehicle, "flight": flight.number},
+                **{"recording": log.name, "vehicle": flight.vehicle.name, "flight": flight.number},
                 "phases": data[-1]["phases"],
-                "events": [
-                    [round(e.time - flight.start, 3), e.kind.value, e.text, e.count]
-                    for e in flight.events
-                ],
+                "events": flight.event_rows(),
             }
             self._flights.append((entry, found))
         start = f"{datetime.fromtimestamp(log.start, UTC):%Y-%m-%d %H:%M:%S} UTC"
@@ -81,11 +78,7 @@ class Report:
 
     def write(self, folder: Path) -> None:
         """Write page and tables into a folder, which is created if it does not exist."""
-        names = (
-            [[f.name, f.unit, f.needs, f.note] for f in self._flights[0][1]]
-            if self._flights
-            else []
-        )
+        names = [[f.name, f.unit, f.needs, f.note] for _, row in self._flights[:1] for f in row]
         folder.mkdir(parents=True, exist_ok=True)
         (folder / PAGE).write_text(report_page.page(self.recordings, names))
         keys = ("recording", "vehicle", "flight")
@@ -105,13 +98,7 @@ class Report:
             [[*key, *event] for key, entry, _ in rows for event in entry["events"]],
         )
         tables = [
-            entry
-            | {
-                "figures": {
-                    f.name: {"value": _number(f.value), "unit": f.unit, "normal": f.normal}
-                    for f in found
-                }
-            }
+            {**entry, "figures": {f.name: _figure(f) for f in found}}
             for entry, found in self._flights
         ]
         (folder / DATA).write_text(json.dumps(tables, indent=1, allow_nan=False))
@@ -239,6 +226,10 @@ def _why_there_is_no_flight(log):
 
 def _is_normal(figure):
     return None if math.isnan(figure.value) else figure.is_normal
+
+
+def _figure(figure):
+    return {"value": _number(figure.value), "unit": figure.unit, "normal": figure.normal}
 
 
 def _number(value):

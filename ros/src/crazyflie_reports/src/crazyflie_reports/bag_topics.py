@@ -32,13 +32,11 @@ class Role:
 
 def pose_row(pose: Any) -> Row:
     """Return `POSE_FIELDS` (m, rad) of a geometry_msgs/Pose."""
-    position, q = pose.position, pose.orientation
-    return (position.x, position.y, position.z, *rpy_from_quaternion(q.x, q.y, q.z, q.w))
+    return placed(pose.position, pose.orientation)
 
 
-def transform_row(transform: Any) -> Row:
-    """Return `POSE_FIELDS` (m, rad) of a geometry_msgs/Transform."""
-    p, q = transform.translation, transform.rotation
+def placed(p: Any, q: Any) -> Row:
+    """Return `POSE_FIELDS` (m, rad) of a position and a quaternion with x, y, z (and w)."""
     return (p.x, p.y, p.z, *rpy_from_quaternion(q.x, q.y, q.z, q.w))
 
 
@@ -77,6 +75,9 @@ _STATES: dict[str, Callable[[Any], Row]] = {
     "crazyflie_msgs/FullStateStamped": lambda numbers: (*numbers[:6], numbers[8]),
 }
 _CONTROLS: dict[str, Callable[[Any], Row]] = {"crazyflie_msgs/ControlStamped": tuple}
+_POSES: dict[str, Callable[[Any], Row]] = {
+    "geometry_msgs/PoseStamped": lambda message: pose_row(message.pose)
+}
 
 ROLES = (
     Role("state", "state", STATE_FIELDS, _STATES),
@@ -93,19 +94,9 @@ ROLES = (
     ),
     Role("final_control", "control/final", CONTROL_FIELDS, _CONTROLS),
     Role("cmd_vel", "cmd_vel", CONTROL_FIELDS, {"geometry_msgs/Twist": _of_cmd_vel}),
-    Role(
-        "pose",
-        "pose",
-        POSE_FIELDS,
-        {"geometry_msgs/PoseStamped": lambda message: pose_row(message.pose)},
-    ),
+    Role("pose", "pose", POSE_FIELDS, _POSES),
     # A virtual vehicle publishes it.
-    Role(
-        "true_pose",
-        "true_pose",
-        POSE_FIELDS,
-        {"geometry_msgs/PoseStamped": lambda message: pose_row(message.pose)},
-    ),
+    Role("true_pose", "true_pose", POSE_FIELDS, _POSES),
     Role("battery", "battery", ("voltage",), {"std_msgs/Float32": lambda m: (m.data,)}),
     Role("toggle", "in_flight", (), {"std_msgs/Empty": lambda message: ()}),
 )
@@ -130,6 +121,10 @@ FLOATS = {
     "crazyflie_msgs/FullStateStamped": 12,
 }
 
+_STATUS: dict[str, Callable[[Any], Row]] = {
+    "crazyflie_interfaces/Status": lambda message: (message.battery_voltage,)
+}
+
 #: Roles of ROS 2 only: those of crazyswarm2.
 _ROS2_ROLES = (
     Role(
@@ -142,12 +137,7 @@ _ROS2_ROLES = (
         },
     ),
     Role("cmd_vel", "cmd_vel_legacy", CONTROL_FIELDS, {"geometry_msgs/Twist": _of_cmd_vel}),
-    Role(
-        "battery",
-        "status",
-        ("voltage",),
-        {"crazyflie_interfaces/Status": lambda message: (message.battery_voltage,)},
-    ),
+    Role("battery", "status", ("voltage",), _STATUS),
 )
 _ROS2_EVENT_TYPES = {
     "rcl_interfaces/Log": r"rosout",

@@ -68,14 +68,20 @@ class Series:
         """Rows, shape (n, len(fields)); more than `times` if some came since that was taken."""
         return np.asarray(self._rows, dtype=float).reshape(-1, len(self.fields))
 
+    @property
+    def rows(self) -> NDArray[np.float64]:
+        """Times (s) and rows, shape (n, 1 + len(fields))."""
+        times = self.times
+        return np.column_stack([times, self.values[: len(times)]])
+
     def column(self, name: str) -> NDArray[np.float64]:
         """Return one column, shape (n,)."""
         return self.values[:, self.fields.index(name)]
 
     def between(self, start: float, end: float) -> NDArray[np.float64]:
         """Return the rows with start <= time <= end (s), shape (m, len(fields))."""
-        times = self.times
-        return self.values[: len(times)][(times >= start) & (times <= end)]
+        rows = self.rows
+        return rows[(rows[:, 0] >= start) & (rows[:, 0] <= end), 1:]
 
     @property
     def last_time(self) -> float:
@@ -166,20 +172,18 @@ class FlightRecord:
     def touchdown_speed(self) -> float:
         """Return the downward speed at which the vehicle met the ground (m/s).
 
-        The fastest of the last tenth of a second above `GROUND_TOLERANCE`. ValueError: the vehicle
-        did not come down, or no velocity is known there.
+        The fastest of the last tenth of a second above `GROUND_TOLERANCE`; NaN when the vehicle did
+        not come down, or no velocity is known there.
         """
         times, heights = self.state.times, self.state.column("z")
         descending = np.flatnonzero((times >= self.events["land"]) & (heights > GROUND_TOLERANCE))
         if not descending.size or descending[-1] == len(times) - 1:
-            raise ValueError("the vehicle did not reach the ground")
+            return float("nan")
         contact = times[descending[-1] + 1]
         window = (times >= contact - 0.1) & (times <= contact)
         speeds = -self.state.column("z_dot")[window]
         speeds = speeds[np.isfinite(speeds)]
-        if not speeds.size:
-            raise ValueError("no velocity is known at the touchdown")
-        return float(max(0.0, speeds.max()))
+        return float(max(0.0, speeds.max())) if speeds.size else float("nan")
 
     def save_csv(self, path: Path) -> None:
         """Write state and control, one row for every state, times from the call of /takeoff."""
@@ -221,16 +225,12 @@ class FlightReport:
         The hover error is that of the last ``window`` s of the hover.
         """
         mean, largest = record.hover_error(point, window)
-        try:
-            touchdown = record.touchdown_speed()
-        except ValueError:
-            touchdown = float("nan")
         return cls(
             time_to_hover=record.time_to_hover(point, HOVER_TOLERANCE),
             overshoot=record.overshoot(point),
             hover_error_mean=mean,
             hover_error_max=largest,
-            touchdown_speed=touchdown,
+            touchdown_speed=record.touchdown_speed(),
             final_height=float(record.state.last[2]),
             final_thrust=float(record.final_control.last[3]),
         )

@@ -9,7 +9,7 @@ import numpy as np
 import rospkg
 from numpy.typing import NDArray
 
-from crazyflie_reports.bag_flights import Flight
+from crazyflie_reports.bag_flights import MARGIN, Flight
 from crazyflie_reports.figures import Figure
 from crazyflie_reports.flight_record import gaps
 
@@ -46,17 +46,15 @@ def decimated(times: Array, values: Array, points: int) -> tuple[Array, Array]:
 
 def flight_data(flight: Flight, found: list[Figure], points: int) -> dict[str, Any]:
     """Return the page's data of a flight with its figures; times are from its start, s."""
-    events = flight.events[:MAX_EVENTS]
+    events = flight.event_rows()
     return {
-        "vehicle": flight.vehicle,
+        "vehicle": flight.vehicle.name,
         "number": flight.number,
         "start": round(flight.start, 3),
         "duration": round(flight.end - flight.start, 3),
         "phases": [[p.name, *_rounded([p.start, p.end], flight.start)] for p in flight.phases],
-        "events": [
-            [round(e.time - flight.start, 3), e.kind.value, e.text, e.count] for e in events
-        ],
-        "more_events": len(flight.events) - len(events),
+        "events": events[:MAX_EVENTS],
+        "more_events": max(0, len(events) - MAX_EVENTS),
         "figures": [
             [float(f"{f.value:.4g}") if math.isfinite(f.value) else None, f.is_normal, f.normal]
             for f in found
@@ -106,7 +104,7 @@ def _plots(flight, points):
         return _curve(name, times[known], turns, start, points)
 
     xyz = ("x", "y", "z")
-    measured = flight.attitude
+    measured = flight.during(flight.vehicle.attitude, MARGIN)
     attitude = [
         angles(name, measured[:, 0], measured[:, column])
         for name, column in (("roll", 4), ("pitch", 5), ("yaw", 6))
@@ -117,7 +115,8 @@ def _plots(flight, points):
     attitude.append(angles("yaw reference", reference.times, reference.column("yaw")))
     times, distances = record.tracking_errors()
     error = _curve("distance", times, distances, start, points)
-    battery = _curve("voltage", flight.battery[:, 0], flight.battery[:, 1], start, points)
+    volts = flight.during(flight.vehicle.battery, MARGIN)
+    battery = _curve("voltage", volts[:, 0], volts[:, 1], start, points)
     plots = [
         ("position", "m", curves(state, xyz) + curves(reference, xyz, 1.0, " reference")),
         ("distance from the reference", "m", [error]),
@@ -158,7 +157,7 @@ def _path(flight, points):
     period = max(FRAME_PERIOD, (times[-1] - times[0]) / points)
     moments = times[0] + period * np.arange((times[-1] - times[0]) // period + 1)
     columns = [np.interp(moments, times, state.values[:, k]) for k in range(3)]
-    attitude = flight.attitude
+    attitude = flight.during(flight.vehicle.attitude, MARGIN)
     if len(attitude):
         angles = np.unwrap(attitude[:, 4:7], axis=0)
         columns += [np.interp(moments, attitude[:, 0], angles[:, k]) for k in range(3)]

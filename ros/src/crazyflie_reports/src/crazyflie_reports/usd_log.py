@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from crazyflie_model.angles import quaternion_from_zyx, rpy_from_quaternion
 from crazyflie_model.units import thrust_from_pwm
@@ -105,8 +105,6 @@ class UsdConnection(Connection):
     #: vehicle, role: Name of the vehicle, that of the file; role of the values.
     vehicle: str
     role: Role
-
-    encoding: ClassVar[str] = "usd"
 
     def entry(self) -> Topic:
         """Return the reader for rows of `UsdLogFile.messages`, which need no decoding."""

@@ -88,7 +88,7 @@ def lay_over(usd: BagLog, logs: list[BagLog]) -> bool:
     name = f"{vehicle.name} {usd.name}"
     for topic, source in usd.sources.items():
         source.spool.offset = place.offset
-        log.sources[f"{name}/{topic}"] = Source(topic, name, source.role, source.spool)
+        log.sources[f"{name}/{topic}"] = Source(name, source.role, source.spool)
     if states := log.events.flight_states.get(vehicle.namespace):
         log.events.flight_states[name] = list(states)
     log.remarks += [

@@ -99,19 +99,11 @@ def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else IMAGES
     port, master = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_STREAM)
     environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{master}"}
+    launch = ["roslaunch", "-p", str(master)]
     commands = (
-        [
-            "roslaunch",
-            "-p",
-            str(master),
-            "crazyflie_examples",
-            "sw_swarm.launch",
-            "n:=3",
-            "rviz:=false",
-        ],
-        ["roslaunch", "-p", str(master), "--wait", "crazyflie_dashboard", "dashboard.launch"],
+        [*launch, "crazyflie_examples", "sw_swarm.launch", "n:=3", "rviz:=false"],
+        [*launch, "--wait", "crazyflie_dashboard", "dashboard.launch", f"port:={port}"],
     )
-    commands[1].append(f"port:={port}")
     started = [subprocess.Popen(command, env=environment) for command in commands]
     try:
         draw(port, folder)

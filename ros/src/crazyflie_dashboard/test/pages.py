@@ -16,7 +16,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 from crazyflie_dashboard.access import Access
-from crazyflie_dashboard.page import open_page
+from crazyflie_dashboard.page import Page
 from crazyflie_utils.testing.programs import free_port
 
 LONGEST_WAIT = 60.0
@@ -183,7 +183,7 @@ class Server:
         self.dashboard = dashboard or FakeDashboard()
         access = Access(host, self.port, token)
         self.url = access.url
-        self.page = open_page(self.dashboard, access, host, self.port)
+        self.page = Page(self.dashboard, access)
 
     def actions(self):
         """Return the commands that have come: actions and vehicles."""

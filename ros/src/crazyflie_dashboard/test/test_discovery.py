@@ -1,7 +1,10 @@
 """Vehicles are found by topics and services."""
 
-from crazyflie_dashboard.discovery import Graph, Request, vehicles
+from std_srvs.srv import Empty
+
+from crazyflie_dashboard.discovery import Graph, vehicles
 from crazyflie_dashboard.snapshot import Action
+from crazyflie_driver import srv
 
 STATE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 CONTROL = "crazyflie_msgs/ControlStamped"
@@ -23,7 +26,7 @@ def test_the_software_example_is_a_vehicle_without_a_namespace():
     (vehicle,) = vehicles(graph)
     assert vehicle.name == "/"
     assert vehicle.topics["state"] == ("/state", STATE)
-    assert vehicle.services[Action.TAKEOFF][0].request == Request.EMPTY
+    assert vehicle.services[Action.TAKEOFF][0].kind is Empty
     # A node for moves is started when one is asked for.
     (go_to,) = vehicle.services[Action.GO_TO]
     assert go_to.needs_commander
@@ -43,7 +46,7 @@ def test_a_fleet_is_in_natural_order_and_flown_by_its_high_level_services():
     assert names(graph) == ["cf1", "cf9", "cf10"]
     found = vehicles(graph)[0].services
     assert [each.name for each in found[Action.TAKEOFF]] == ["/cf1/high_level/takeoff"]
-    assert found[Action.TAKEOFF][0].request == Request.TAKEOFF
+    assert found[Action.TAKEOFF][0].kind is srv.Takeoff
     assert found[Action.GO_TO][0].name == "/cf1/high_level/go_to"
 
 

@@ -13,7 +13,7 @@ from geometry_msgs.msg import Point
 from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest
 
 from crazyflie_dashboard.answers import any_of, failed, gathered, settle
-from crazyflie_dashboard.discovery import FoundVehicle, Graph, Request, Service
+from crazyflie_dashboard.discovery import FoundVehicle, Graph, Service
 from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.moves import Move, expect_apart, formation, in_frame
@@ -48,15 +48,6 @@ _STAYS = "not all of them can go"
 _YAW, _FIXED = "reference/yaw", "frames/fixed"
 
 _YAW_REFERENCE = "crazyflie_msgs/PositionVelocityYawStateStamped"
-
-_TYPES = {
-    Request.EMPTY: Empty,
-    Request.SET_BOOL: SetBool,
-    Request.TAKEOFF: srv.Takeoff,
-    Request.LAND: srv.Land,
-    Request.GO_TO: srv.GoTo,
-    Request.UPDATE_PARAMS: srv.UpdateParams,
-}
 
 
 @dataclass(frozen=True)
@@ -135,7 +126,7 @@ class Actions:
         ]
         if len(own) < 2:
             return {}
-        answer = self._call(command, Service("/all/land", Request.EMPTY), EmptyRequest())
+        answer = self._call(command, Service("/all/land", Empty), EmptyRequest())
         return dict.fromkeys(own, answer)
 
     def _command(self, command, target, name, graph):
@@ -162,9 +153,7 @@ class Actions:
             go_to = _services(target, Action.GO_TO)
             if any(each.needs_commander for each in go_to):
                 self._start_commander(target.vehicle, graph)
-        answers = [
-            self._call(command, service, _request(command, service, target)) for service in services
-        ]
+        answers = [self._call(command, s, _request(command, s, target)) for s in services]
         return answers[0] if len(answers) == 1 else any_of(answers)
 
     def _call(self, command: Command, service: Service, request: Any) -> "Future[Any]":
@@ -179,14 +168,14 @@ class Actions:
         # A call that does not reach its node is withdrawn: a frozen node must not carry it out
         # later.
         answer = self._handle.call_service(
-            service.name, _TYPES[service.request], request, limit, MAX_COMMAND_AGE - age
+            service.name, service.kind, request, limit, MAX_COMMAND_AGE - age
         )
         answer.add_done_callback(lambda done: settle(done, outcome))
         return outcome
 
     def _light(self, driver, command):
         """Switch on all lights of a vehicle for `_LIGHT_TIME`, by its firmware."""
-        service = Service(f"{driver}/update_params", Request.UPDATE_PARAMS)
+        service = Service(f"{driver}/update_params", srv.UpdateParams)
         request = srv.UpdateParamsRequest([_LIGHTS])
         outcome: Future[Any] = Future()
 
@@ -199,12 +188,8 @@ class Actions:
 
         def off():
             timer.stop()
-            turn(
-                0,
-                lambda: self._handle.call_service(
-                    service.name, srv.UpdateParams, request, _TIMEOUT
-                ),
-            )
+            arguments = service.name, service.kind, request, _TIMEOUT
+            turn(0, lambda: self._handle.call_service(*arguments))
 
         turn(_ALL_LIGHTS, on)
         timer = self._handle.timer(_LIGHT_TIME, off, steady=True)
@@ -398,14 +383,14 @@ def _expect_inside(name: str, goal: Triple, fence: Box | None) -> None:
 
 
 def _request(command: Command, service: Service, target: Target | None) -> Any:
-    if service.request == Request.EMPTY:
+    if service.kind is Empty:
         return EmptyRequest()
-    if service.request == Request.SET_BOOL:
+    if service.kind is SetBool:
         return SetBoolRequest(command.action == Action.ARM)
-    if service.request == Request.TAKEOFF:
+    if service.kind is srv.Takeoff:
         duration = max(_MIN_DURATION, command.height / _CLIMB_SPEED)
         return srv.TakeoffRequest(0, command.height, genpy.Duration.from_sec(duration))
-    if service.request == Request.GO_TO:
+    if service.kind is srv.GoTo:
         return _hold_request()
     assert target is not None
     position = target.now.position

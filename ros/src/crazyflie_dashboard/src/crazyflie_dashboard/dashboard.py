@@ -156,11 +156,8 @@ class Dashboard:
         """Return nodes with live parameters, and vehicles with firmware parameters."""
         return self._parameters.owners()
 
-    def parameters(self, owner: str | None = None) -> "Future[tuple[ParameterInfo, ...]]":
-        """Return the live parameters of a node or of a vehicle's firmware; of all nodes.
-
-        For many vehicles those of one owner are much quicker.
-        """
+    def parameters(self, owner: str) -> "Future[tuple[ParameterInfo, ...]]":
+        """Return the live parameters of a node or of a vehicle's firmware."""
         return self._do(self._parameters.of, owner)
 
     def set_parameter(

@@ -61,19 +61,14 @@ class DashboardNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         folders = [path for path in self._parameters.folders.split(":") if path]
-        dashboard = Dashboard(
-            handle,
-            Master(handle.name),
-            new_lane(handle),
-            folders or example_folders(),
-        )
+        folders = folders or example_folders()
+        dashboard = Dashboard(handle, Master(handle.name), new_lane(handle), folders)
         self._open.callback(dashboard.close)
         # NiceGUI takes a second to import, which programs that only read the parameters'
         # declaration do not need.
-        from crazyflie_dashboard.page import open_page
+        from crazyflie_dashboard.page import Page
 
-        page = open_page(dashboard, self._access, self._parameters.host, self._parameters.port)
-        self._open.callback(page.close)
+        self._open.callback(Page(dashboard, self._access).close)
         # Printed and not logged: only those who see this terminal may have the token.
         print(f"the dashboard is at {self._access.url}", flush=True)
 

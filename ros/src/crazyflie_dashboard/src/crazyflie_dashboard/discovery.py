@@ -4,9 +4,12 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from enum import Enum
+from typing import Any
+
+from std_srvs.srv import Empty, SetBool
 
 from crazyflie_dashboard.snapshot import Action
+from crazyflie_driver import srv
 from crazyflie_reports.bag_topics import ROLES
 
 #: Topics in addition to the roles of recordings: names below the vehicle's namespace, and types.
@@ -21,26 +24,15 @@ _STATUS = {
 _NO_VEHICLES = {"all", "high_level"}
 
 
-class Request(Enum):
-    """Ways to call a service; the value is its type."""
-
-    EMPTY = "std_srvs/Empty"
-    SET_BOOL = "std_srvs/SetBool"
-    TAKEOFF = "crazyflie_driver/Takeoff"
-    LAND = "crazyflie_driver/Land"
-    GO_TO = "crazyflie_driver/GoTo"
-    UPDATE_PARAMS = "crazyflie_driver/UpdateParams"
-
-
 @dataclass(frozen=True)
 class Service:
-    """A service that carries out an action.
+    """A service of a type (class), which carries out an action.
 
     With ``needs_commander`` the vehicle has no `HighLevelNode` for it yet, which must be started.
     """
 
     name: str
-    request: Request
+    kind: Any
     needs_commander: bool = False
 
 
@@ -132,7 +124,7 @@ def _vehicle(top, driver, topics, services, has_driver):
         if there and action not in found:
             found[action] = there
     if Action.GO_TO not in found and {f"{top}/takeoff", f"{top}/land"} <= services.keys():
-        go_to = Service(f"{top}/high_level/go_to", Request.GO_TO, needs_commander=True)
+        go_to = Service(f"{top}/high_level/go_to", srv.GoTo, needs_commander=True)
         found[Action.GO_TO] = (go_to,)
     return FoundVehicle(top, driver, merged, found, has_driver)
 
@@ -142,25 +134,23 @@ def _candidates(
 ) -> Iterator[tuple[Action, Iterable[Service]]]:
     """Yield groups of services that carry out an action, the best first; all of one are called."""
     commander = f"{top}/high_level"
-    flights = [commander]
+    flights: list[tuple[str, Any, Any]] = [(commander, srv.Takeoff, srv.Land)]
     node = services.get(f"{driver}/upload_trajectory")
-    if node is not None and services.get(f"{driver}/takeoff") == node:
-        flights.append(driver)
-    for place in flights:
-        yield Action.TAKEOFF, [Service(f"{place}/takeoff", Request.TAKEOFF)]
-        yield Action.LAND, [Service(f"{place}/land", Request.LAND)]
+    is_flown_by_driver = node is not None and services.get(f"{driver}/takeoff") == node
+    if is_flown_by_driver:
+        flights.append((driver, srv.Takeoff, srv.Land))
+    if not is_flown_by_driver or driver != top:
+        flights.append((top, Empty, Empty))
+    for place, takeoff, land in flights:
+        yield Action.TAKEOFF, [Service(f"{place}/takeoff", takeoff)]
+        yield Action.LAND, [Service(f"{place}/land", land)]
         for action in (Action.GO_TO, Action.HOLD):
-            yield action, [Service(f"{place}/go_to", Request.GO_TO)]
-    if driver not in flights or driver != top:
-        yield Action.TAKEOFF, [Service(f"{top}/takeoff", Request.EMPTY)]
-        yield Action.LAND, [Service(f"{top}/land", Request.EMPTY)]
-        for action in (Action.GO_TO, Action.HOLD):
-            yield action, [Service(f"{top}/go_to", Request.GO_TO)]
+            yield action, [Service(f"{place}/go_to", srv.GoTo)]
     stops = dict.fromkeys((f"{top}/emergency", f"{driver}/emergency"))
-    yield Action.EMERGENCY, [Service(name, Request.EMPTY) for name in stops]
-    yield Action.RESET, [Service(f"{top}/emergency_reset", Request.EMPTY)]
-    yield Action.REBOOT, [Service(f"{driver}/reboot", Request.EMPTY)]
-    yield Action.RECOVER, [Service(f"{driver}/recover", Request.EMPTY)]
-    yield Action.IDENTIFY, [Service(f"{driver}/update_params", Request.UPDATE_PARAMS)]
-    yield Action.ARM, [Service(f"{driver}/arm", Request.SET_BOOL)]
-    yield Action.DISARM, [Service(f"{driver}/arm", Request.SET_BOOL)]
+    yield Action.EMERGENCY, [Service(name, Empty) for name in stops]
+    yield Action.RESET, [Service(f"{top}/emergency_reset", Empty)]
+    yield Action.REBOOT, [Service(f"{driver}/reboot", Empty)]
+    yield Action.RECOVER, [Service(f"{driver}/recover", Empty)]
+    yield Action.IDENTIFY, [Service(f"{driver}/update_params", srv.UpdateParams)]
+    yield Action.ARM, [Service(f"{driver}/arm", SetBool)]
+    yield Action.DISARM, [Service(f"{driver}/arm", SetBool)]

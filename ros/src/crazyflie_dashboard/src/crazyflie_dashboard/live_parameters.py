@@ -45,17 +45,16 @@ class LiveParameters:
         nodes = [name.removesuffix(_SERVICE) for name in services if name.endswith(_SERVICE)]
         return (*self._firmware(), *sorted(nodes))
 
-    def of(self, owner: str | None) -> "Future[tuple[ParameterInfo, ...]]":
-        """Return the parameters of a node or of a vehicle's firmware; of all nodes."""
+    def of(self, owner: str) -> "Future[tuple[ParameterInfo, ...]]":
+        """Return the parameters of a node or of a vehicle's firmware."""
         owners = self.owners()
-        if owner is not None and owner not in owners:
+        if owner not in owners:
             raise RefusalError(
                 f"{owner} has no live parameters; expected one of {', '.join(owners)}"
             )
         if owner in self._firmware():
             return self._workers.submit(self._read_firmware, owner)
-        nodes = [owner] if owner else [each for each in owners if each not in self._firmware()]
-        return self._of_nodes(nodes)
+        return self._of_node(owner)
 
     def set(self, parameter: ParameterInfo, text: str) -> "Future[ParameterInfo]":
         """Set a parameter to the typed value; the result has the value that came back."""
@@ -120,40 +119,25 @@ class LiveParameters:
             lambda done: self._workers.submit(read, done).add_done_callback(finish)
         )
 
-    def _of_nodes(self, nodes):
+    def _of_node(self, node):
         outcome: Future[tuple[ParameterInfo, ...]] = Future()
         handle = self._handle.child()
-        descriptions: dict[str, Any] = {}
-        configs: dict[str, Any] = {}
+        received: dict[str, Any] = {}
 
         def finish():
             if outcome.done():
                 return
             handle.close()
-            both = [node for node in nodes if node in descriptions and node in configs]
-            outcome.set_result(
-                tuple(
-                    p for node in both for p in described(node, descriptions[node], configs[node])
-                )
-            )
+            found = described(node, **received) if len(received) == 2 else ()
+            outcome.set_result(tuple(found))
 
-        def note(known, node, message):
-            known[node] = message
-            if len(descriptions) == len(configs) == len(nodes):
+        def note(name, message):
+            received[name] = message
+            if len(received) == 2:
                 finish()
 
-        for node in nodes:
-            handle.subscribe(
-                f"{node}/parameter_descriptions",
-                ConfigDescription,
-                partial(note, descriptions, node),
-            )
-            handle.subscribe(
-                f"{node}/parameter_updates",
-                Config,
-                partial(note, configs, node),
-            )
+        note_description, note_config = (partial(note, each) for each in ("description", "config"))
+        handle.subscribe(f"{node}/parameter_descriptions", ConfigDescription, note_description)
+        handle.subscribe(f"{node}/parameter_updates", Config, note_config)
         handle.timer(_TIMEOUT, finish, steady=True)
-        if not nodes:
-            finish()
         return outcome

@@ -57,12 +57,8 @@ class Diagnostics:
             (each for each in fresh if each.level != DiagnosticStatus.OK),
             key=lambda each: (-each.level, each.name),
         )
-        return tuple(
-            Sentence(
-                "warn" if each.level == DiagnosticStatus.WARN else "error", each.name, each.message
-            )
-            for each in wrong
-        )
+        words = {DiagnosticStatus.WARN: "warn"}
+        return tuple(Sentence(words.get(s.level, "error"), s.name, s.message) for s in wrong)
 
     def kind(self, vehicle: FoundVehicle) -> Kind:
         """Return the kind of a vehicle, by the address that its driver has for it."""
@@ -80,24 +76,15 @@ def examine() -> tuple[Sentence, ...]:
     """Run the doctor, with low priority; return its findings, errors first. It takes 10 s."""
     found = roslib.packages.find_node("crazyflie_doctor", "doctor")
     if not found:
-        return (
-            Sentence(
-                "error",
-                "doctor",
-                "the doctor is not installed",
-                "build the workspace (./run build)",
-            ),
-        )
+        text, remedy = "the doctor is not installed", "build the workspace (./run build)"
+        return (Sentence("error", "doctor", text, remedy),)
     try:
         done = subprocess.run(
             ["nice", "-n", "19", found[0]], capture_output=True, text=True, timeout=_DOCTOR_TIMEOUT
         )
     except subprocess.TimeoutExpired:
-        return (
-            Sentence(
-                "error", "doctor", f"it did not end within {_DOCTOR_TIMEOUT:g} s", "try again"
-            ),
-        )
+        text = f"it did not end within {_DOCTOR_TIMEOUT:g} s"
+        return (Sentence("error", "doctor", text, "try again"),)
     return sentences(done.stdout)
 
 

@@ -168,10 +168,8 @@ class Scene:
     frames: tuple[Frame, ...] = ()
     #: Planned trajectories, by the vehicle's name or by topic. Changes rarely.
     paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)
-    sentences: tuple[
-        Sentence, ...
-    ] = ()  #: Findings of the doctor and of /diagnostics, errors first.
+    sentences: tuple[Sentence, ...] = ()  #: Of the doctor and of /diagnostics, errors first.
     log: tuple[LogLine, ...] = ()  #: The newest ones, oldest first.
     images: tuple[str, ...] = ()  #: Topics of cameras.
-    missions: tuple[str, ...] = ()  #: Running missions, as `missions.Run.text`.
+    missions: tuple[str, ...] = ()  #: Running missions, as `Missions.running`.
     recording: str = ""  #: State of a recording that was begun here.

@@ -1,33 +1,34 @@
-"""A part of the page that a component of this folder draws from one list."""
+"""Parts of the page that a component of this folder draws from one value."""
 
 from typing import Any
 
 from nicegui.element import Element
 
 
-class ListView(Element):
-    """Shows a list; it is sent when it has changed."""
+class ValueView(Element):
+    """Shows a value; it is sent when it has changed."""
 
     prop: str  #: Name of the component's property.
+    empty: Any = ()  #: Its value at first.
 
     def __init__(self) -> None:
         super().__init__()
-        self._props[self.prop] = []
+        self._props[self.prop] = self.empty
 
-    def show(self, items: list[Any]) -> None:
-        """Show these items."""
-        if self._props[self.prop] != items:
-            self._props[self.prop] = items
+    def show(self, value: Any) -> None:
+        """Show this value."""
+        if self._props[self.prop] != value:
+            self._props[self.prop] = value
             self.update()
 
 
-class Cards(ListView, component="cards.js"):  # type: ignore[call-arg]
+class Cards(ValueView, component="cards.js"):  # type: ignore[call-arg]
     """A card for each vehicle."""
 
     prop = "vehicles"
 
 
-class Lines(ListView, component="lines.js"):  # type: ignore[call-arg]
+class Lines(ValueView, component="lines.js"):  # type: ignore[call-arg]
     """Lines: key, style, source, text, and remedy."""
 
     prop = "lines"
@@ -37,15 +38,7 @@ class Lines(ListView, component="lines.js"):  # type: ignore[call-arg]
         self._props["nothing"] = nothing
 
 
-class Camera(Element, component="camera.js"):  # type: ignore[call-arg]
-    """The newest picture of a camera, which the browser fetches by itself."""
+class Camera(ValueView, component="camera.js"):  # type: ignore[call-arg]
+    """The picture at an address of this server, which the browser fetches; none at an empty one."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._props["address"] = ""
-
-    def show(self, address: str) -> None:
-        """Show the picture at an address of this server; nothing if the address is empty."""
-        if self._props["address"] != address:
-            self._props["address"] = address
-            self.update()
+    prop, empty = "address", ""

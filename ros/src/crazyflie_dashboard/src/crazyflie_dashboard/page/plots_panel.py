@@ -149,6 +149,7 @@ def chart(series: Iterable[Series], can_be_measured: bool) -> dict[str, Any]:
     groups = [list(group) for _, group in groupby(series, key=_plot)]
     count = len(groups)
     tops = [TOP + k * (HEIGHT + GAP) for k in range(count)]
+    zoom = {"type": "inside", "xAxisIndex": list(range(count))}
     return {
         "height": TOP + count * (HEIGHT + GAP) + 10,
         "animation": False,
@@ -157,11 +158,12 @@ def chart(series: Iterable[Series], can_be_measured: bool) -> dict[str, Any]:
         "tooltip": {"trigger": "axis", "confine": True, "appendToBody": False},
         "axisPointer": {"link": [{"xAxisIndex": "all"}]},
         "grid": [{"left": 44, "right": 10, "top": top, "height": HEIGHT} for top in tops],
-        "xAxis": [_time_axis(k, is_last=k == count - 1) for k in range(count)],
-        "yAxis": [_value_axis(k) for k in range(count)],
-        "dataZoom": [{"type": "inside", "xAxisIndex": list(range(count))}]
-        if can_be_measured
-        else [],
+        "xAxis": [
+            _axis(k, {"show": k == count - 1, "formatter": "{value} s"}, min=-SPAN, max=0)
+            for k in range(count)
+        ],
+        "yAxis": [_axis(k, {"fontSize": 10}, scale=True, splitNumber=3) for k in range(count)],
+        "dataZoom": [zoom] if can_be_measured else [],
         "series": [
             _line(each, k, COLORS[i % len(COLORS)])
             for k, group in enumerate(groups)
@@ -186,25 +188,13 @@ def _title(group: list[Series], top: int) -> dict[str, Any]:
     return {"text": text, "top": top - 20, "left": 40, "textStyle": style}
 
 
-def _time_axis(plot: int, is_last: bool) -> dict[str, Any]:
+def _axis(plot: int, label: dict[str, Any], **options: Any) -> dict[str, Any]:
     return {
         "type": "value",
         "gridIndex": plot,
-        "min": -SPAN,
-        "max": 0,
-        "axisLabel": {**DIM, "show": is_last, "formatter": "{value} s"},
+        "axisLabel": {**DIM, **label},
         "splitLine": SPLIT_LINE,
-    }
-
-
-def _value_axis(plot: int) -> dict[str, Any]:
-    return {
-        "type": "value",
-        "gridIndex": plot,
-        "scale": True,
-        "splitNumber": 3,
-        "axisLabel": {**DIM, "fontSize": 10},
-        "splitLine": SPLIT_LINE,
+        **options,
     }
 
 

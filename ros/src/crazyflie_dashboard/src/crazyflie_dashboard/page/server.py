@@ -62,7 +62,7 @@ async def _report(dashboard: Dashboard, request: Request) -> Response:
 
 
 class Page:
-    """The server of the page; one in a process, since NiceGUI has one application in a process.
+    """The server of the page until `close`; one in a process, as NiceGUI's application.
 
     Raises
     ------
@@ -70,9 +70,9 @@ class Page:
         The address cannot be listened on.
     """
 
-    def __init__(self, dashboard: Dashboard, access: Access, host: str, port: int):
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        self._listener = socket.create_server((host, port), family=family)
+    def __init__(self, dashboard: Dashboard, access: Access):
+        family = socket.AF_INET6 if ":" in access.host else socket.AF_INET
+        self._listener = socket.create_server((access.host, access.port), family=family)
         application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         Client.shared_head_html = HEAD
         application.post("/emergency")(partial(_emergency, dashboard))
@@ -112,14 +112,3 @@ class Page:
         self._server.should_exit = True
         self._thread.join(CLOSING_TIME)
         self._listener.close()
-
-
-def open_page(dashboard: Dashboard, access: Access, host: str, port: int) -> Page:
-    """Serve the page at an address until `Page.close`.
-
-    Raises
-    ------
-    OSError
-        The address cannot be listened on.
-    """
-    return Page(dashboard, access, host, port)

@@ -172,15 +172,15 @@ def _line_of_log(name, line, level):
     """Yield the event of a line of a log, if any."""
     own_name = re.match(r"(/\S+): ", line)
     node = own_name[1] if own_name else name
-    kind = None
     if "refused" in line:
         kind = Kind.REFUSAL
     elif "rejected" in line:
         kind = Kind.REJECTED
     elif level >= _WARN:
         kind = Kind.ERROR if level >= _ERROR else Kind.WARNING
-    if kind is not None:
-        yield _parent(node), kind, line if own_name else f"{node}: {line}"
+    else:
+        return
+    yield _parent(node), kind, line if own_name else f"{node}: {line}"
 
 
 def _constant(message_type, value, names):

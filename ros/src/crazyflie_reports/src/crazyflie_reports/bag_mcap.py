@@ -6,6 +6,7 @@ The output is a ROS 2 bag, written by PyPI's rosbags, with the types of this wor
 import heapq
 import math
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ ARM, ROTOR = 0.046, 0.023  #: Half of the diagonal of a Crazyflie, radius of a p
 PATH_POINTS = 2000  #: Points of a path's marker.
 
 _STATE, _CONTROL = "crazyflie_msgs/PositionVelocityYawStateStamped", "crazyflie_msgs/ControlStamped"
+_STATUS, _BATTERY = "crazyflie_msgs/FlightStatus", "std_msgs/Float32"
 _LINE_STRIP, _LINE_LIST, _SPHERE, _CYLINDER, _TEXT = 4, 5, 2, 3, 9  # Types of a Marker.
 _WARN, _ERROR = 30, 40  # Levels of a Log.
 _ERRORS = (Kind.ERROR, Kind.EMERGENCY)
@@ -68,43 +70,42 @@ def _of_vehicle(vehicle: Vehicle, log: BagLog) -> Iterator[Timed]:
     if not len(poses):
         poses = np.hstack([vehicle.state[:, :4], flat, yaw])
     states = log.events.flight_states.get(vehicle.namespace, [])
+
+    def series(topic, datatype, rows, made):
+        return ((row[0], topic, datatype, made(row)) for row in rows)
+
     yield from _model(name, top, poses)
     yield from heapq.merge(
-        ((row[0], "/tf", "tf2_msgs/TFMessage", _transform(name, row)) for row in poses),
+        series("/tf", "tf2_msgs/TFMessage", poses, partial(_transform, name)),
         (
             (row[0], f"{top}/state", _STATE, _numbers(_STATE, row, stamp))
             for row, (_, stamp) in zip(vehicle.state, vehicle.stamps, strict=True)
         ),
-        (
-            (row[0], f"{top}/ref", _STATE, _numbers(_STATE, row, row[0]))
-            for row in vehicle.reference
-        ),
+        series(f"{top}/ref", _STATE, vehicle.reference, partial(_numbers, _STATE)),
         _references(name, top, vehicle.reference),
-        (
-            (row[0], f"{top}/control/final", _CONTROL, _numbers(_CONTROL, row, row[0]))
-            for row in vehicle.control
-        ),
-        (
-            (row[0], f"{top}/battery", "std_msgs/Float32", message("std_msgs/Float32", data=row[1]))
-            for row in vehicle.battery
-        ),
-        (
-            (
-                *(time, f"{top}/in_flight_flight_status", "crazyflie_msgs/FlightStatus"),
-                message("crazyflie_msgs/FlightStatus", header=_header(time), state=state),
-            )
-            for time, state in sorted(states)
-        ),
+        series(f"{top}/control/final", _CONTROL, vehicle.control, partial(_numbers, _CONTROL)),
+        series(f"{top}/battery", _BATTERY, vehicle.battery, _voltage),
+        series(f"{top}/in_flight_flight_status", _STATUS, sorted(states), _status),
         key=lambda each: each[0],
     )
 
 
-def _numbers(datatype, row, stamp):
-    """Return a message of a header with a stamp (s) and a message of numbers."""
+def _voltage(row):
+    return message(_BATTERY, data=row[1])
+
+
+def _status(row):
+    return message(_STATUS, header=_header(row[0]), state=row[1])
+
+
+def _numbers(datatype, row, stamp=None):
+    """Return a message of a header, with a stamp or the row's time (s), and one of numbers."""
     known(datatype)
     _, (field, kind) = types().fielddefs[ros2_name(datatype)][1]
     inner = types().types[kind[1]](*(float(each) for each in row[1:]))
-    return message(datatype, **{"header": _header(stamp), field: inner})
+    return message(
+        datatype, **{"header": _header(row[0] if stamp is None else stamp), field: inner}
+    )
 
 
 def _transform(name, row):
@@ -162,28 +163,16 @@ def _model(name: str, top: str, poses: np.ndarray) -> Iterator[Timed]:
     dark, light, blue = (0.1, 0.13, 0.19), (0.6, 0.64, 0.7), (0.0, 0.45, 0.7)
     arms = [_vector("Point", point) for end in ends for point in ((0.0, 0.0, 0.0), end)]
     own = {"frame": name, "frame_locked": True}
-    yield _markers(
-        time,
-        f"{top}/model",
-        [
-            _marker(time, name, _LINE_LIST, (0.006, 0.0, 0.0), dark, points=arms, **own),
-            *(
-                # The front propellers are dark.
-                _marker(
-                    *(time, name, _CYLINDER, (2 * ROTOR, 2 * ROTOR, 0.004)),
-                    *(dark if place[0] > 0.0 else light,),
-                    place=place,
-                    **own,
-                )
-                for place in ends
-            ),
-            _marker(
-                *(time, name, _TEXT, (0.0, 0.0, 0.05), dark), place=(0, 0, 0.08), text=name, **own
-            ),
-        ],
-    )
+    marker = partial(_marker, time, name)
+    parts = [marker(_LINE_LIST, (0.006, 0.0, 0.0), dark, points=arms, **own)]
+    for place in ends:
+        # The front propellers are dark.
+        color = dark if place[0] > 0.0 else light
+        parts.append(marker(_CYLINDER, (2 * ROTOR, 2 * ROTOR, 0.004), color, place=place, **own))
+    parts.append(marker(_TEXT, (0.0, 0.0, 0.05), dark, place=(0, 0, 0.08), text=name, **own))
+    yield _markers(time, f"{top}/model", parts)
     path = [_vector("Point", row[1:4]) for row in poses[:: 1 + len(poses) // PATH_POINTS]]
-    line = _marker(time, name, _LINE_STRIP, (0.005, 0.0, 0.0), blue, points=path)
+    line = marker(_LINE_STRIP, (0.005, 0.0, 0.0), blue, points=path)
     yield _markers(time, f"{top}/path", [line])
 
 

@@ -34,13 +34,11 @@ Values = Mapping[str, float]
 
 def _attitude(v: Values) -> Row | None:
     """Return roll, pitch and yaw, rad, of the first variables that have them."""
-    q = [f"stateEstimate.q{each}" for each in "xyzw"]
-    if all(each in v for each in q):
-        return rpy_from_quaternion(*(v[each] for each in q))
+    if quaternion := _numbers(v, *(f"stateEstimate.q{each}" for each in "xyzw")):
+        return rpy_from_quaternion(*quaternion)
     for group in ("stateEstimate", "stabilizer"):
-        names = [f"{group}.{each}" for each in ("roll", "pitch", "yaw")]
-        if all(each in v for each in names):
-            roll, pitch, yaw = (math.radians(v[each]) for each in names)
+        if angles := _numbers(v, *(f"{group}.{each}" for each in ("roll", "pitch", "yaw"))):
+            roll, pitch, yaw = map(math.radians, angles)
             # The firmware's are those of Rz(yaw) Ry(pitch) Rx(roll), with the pitch inverted.
             return rpy_from_quaternion(*quaternion_from_zyx(roll, -pitch, yaw))
     return None

@@ -199,12 +199,9 @@ class Actions:
 
     def _go_to(self, command, targets, graph, fixed):
         """Send vehicles so that their centre comes to the goal: all of them, or none."""
-        refusals = {}
-        for name in command.vehicles:
-            if text := self._why_it_stays(name, targets.get(name), graph):
-                refusals[name] = text
-        if refusals:
-            return gathered({name: failed(refusals.get(name, _STAYS)) for name in command.vehicles})
+        reasons = {n: self._why_it_stays(targets.get(n), graph) for n in command.vehicles}
+        if any(reasons.values()):
+            return gathered({name: failed(text or _STAYS) for name, text in reasons.items()})
         chosen = {name: targets[name] for name in command.vehicles}
         moving = {name: move for name, move in self._moves.items() if name in targets}
         ready = self._workers.submit(
@@ -218,9 +215,7 @@ class Actions:
                 outcome.set_exception(error)
                 return
             moves, requests = ready.result()
-            answers = {}
-            for name, (service, request) in requests.items():
-                answers[name] = self._call(command, service, request)
+            answers = {name: self._call(command, *each) for name, each in requests.items()}
             self._moves = {**moving, **moves}
             gathered(answers).add_done_callback(lambda done: end(done.result()))
 
@@ -238,7 +233,7 @@ class Actions:
         ready.add_done_callback(lambda _: self._handle.submit(call))
         return outcome
 
-    def _why_it_stays(self, name, target, graph):
+    def _why_it_stays(self, target, graph):
         services = () if target is None else _services(target, Action.GO_TO)
         if not services:
             return _why_no_service(Action.GO_TO, target)
@@ -276,16 +271,9 @@ class Actions:
             yaw = yaw if command.yaw is None else command.yaw
             goal, yaw = self._in_own_frame(name, goals[name], yaw, own.strip("/"), fixed)
             _expect_inside(name, goal, target.fence)
-            requests[name] = (
-                services[name],
-                srv.GoToRequest(
-                    groupMask=0,
-                    relative=False,
-                    goal=Point(*goal),
-                    yaw=yaw if has_yaw else 0.0,
-                    duration=genpy.Duration.from_sec(duration),
-                ),
-            )
+            request = srv.GoToRequest(goal=Point(*goal), yaw=yaw if has_yaw else 0.0)
+            request.duration = genpy.Duration.from_sec(duration)
+            requests[name] = services[name], request
         buffers = {name: float(known[key]) for name, key in wanted.items() if key in known}
         expect_apart(moves, places, moving, buffers, now)
         return moves, requests

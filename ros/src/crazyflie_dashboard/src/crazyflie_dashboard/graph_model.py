@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import replace
+from functools import partial
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Log
@@ -181,16 +182,13 @@ class GraphModel:
             name = vehicle.name
             self._seen[name] = now
             model = self.models.get(name)
-            if model is not None and model.vehicle == vehicle:
-                continue
             if model is not None and model.vehicle.topics == vehicle.topics:
                 model.vehicle = vehicle
                 continue
             if model is not None:
                 model.close()
-            self.models[name] = VehicleModel(
-                self._parent.child(), vehicle, self._clock, self._row_taker(name)
-            )
+            take = partial(self._take_row, name)
+            self.models[name] = VehicleModel(self._parent.child(), vehicle, self._clock, take)
         for name in [n for n in self.models if now - self._seen[n] > _FORGET_AFTER]:
             self.models.pop(name).close()
         self.models = {v.name: self.models[v.name] for v in found} | self.models
@@ -198,13 +196,9 @@ class GraphModel:
             model.kind = self._diagnostics.kind(model.vehicle)
         self.watch(set(self.plots))
 
-    def _row_taker(self, name):
-        def take(role, row):
-            plots = self.plots.get(name)
-            if plots is not None:
-                plots.take(role, row)
-
-        return take
+    def _take_row(self, name, role, row):
+        if name in self.plots:
+            self.plots[name].take(role, row)
 
     def _on_static(self, message):
         for transform in message.transforms:
@@ -240,7 +234,7 @@ class GraphModel:
             frames=tuple(others),
             paths={**self._surroundings.paths(frames, fixed), **self.paths},
             sentences=self._own_sentences() + self._diagnostics.sentences() + self.sentences,
-            log=tuple(self._log) if self._lines != _last(self.scene.log) else self.scene.log,
+            log=tuple(self._log),
             images=tuple(sorted(t for t, kind in self.graph.topics.items() if kind in IMAGES)),
             missions=self.missions(),
             recording=self.recording(),
@@ -271,7 +265,3 @@ class GraphModel:
             text = f"poses of {listed(sorted(late))} come {delay:.1f} s after their stamps"
             found.append(Sentence("error", "dashboard", text, _CLOCKS))
         return tuple(found)
-
-
-def _last(log):
-    return log[-1].number if log else 0

@@ -23,6 +23,10 @@ _NUMBERS = {"bool", "byte", "char", "time", "duration", "float32", "float64"} | 
 
 _UNITS = ["m", "m/s", "deg", "m/s^2", "V"]  #: Order of the plots by unit; others come last.
 
+#: Names and units of the first numbers of a state.
+_STATE = [(f"position {axis}", "m") for axis in "xyz"]
+_STATE += [(f"velocity {axis}", "m/s") for axis in "xyz"]
+
 #: Largest number of series of one vehicle: a log topic may have any number of values.
 _MAX_SERIES = 100
 
@@ -66,12 +70,7 @@ class VehiclePlots:
             self._reference = row
             self._add("reference position z", "m", row[2])
         elif role == "state":
-            for name, unit, value in zip(
-                [f"{what} {axis}" for what in ("position", "velocity") for axis in "xyz"],
-                ("m", "m", "m", "m/s", "m/s", "m/s"),
-                row,
-                strict=False,
-            ):
+            for (name, unit), value in zip(_STATE, row, strict=False):
                 self._add(name, unit, value)
             if self._reference is not None:
                 self._add("error", "m", math.dist(row[:3], self._reference[:3]))

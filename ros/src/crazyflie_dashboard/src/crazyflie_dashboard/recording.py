@@ -22,8 +22,9 @@ class Recording:
 
     Parameters
     ----------
-    folder : Path, optional Folder for the recordings, each in a folder with the date; by default
-    that of other recordings. programs : callable, optional
+    folder : Path, optional
+        Folder for the recordings, each in a folder with the date; by default that of others.
+    programs : callable, optional
         ``programs(name)`` returns the path of a program of crazyflie_reports.
     """
 

@@ -130,7 +130,7 @@ class Frame:
 class Sentence:
     """A problem and its remedy.
 
-    ``level`` is "ok", "warn" or "error"; ``source`` is "doctor" or the name of a diagnostic.
+    ``level`` is "warn" or "error"; ``source`` is "doctor" or the name of a diagnostic.
     """
 
     level: str

@@ -7,12 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
-import rospkg
 
 from crazyflie_reports.flight_operator import ready_operator
 
 FLOOD = (sys.executable, "-m", "crazyflie_utils.testing.hostile_publisher")
-FREEZE = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "bench" / "hostile.py"
+FREEZE = Path(__file__).with_name("frozen_listener.py")
 HOVER = "{state: {z: 1.0}}"
 ATTACKS = {
     "junk": (
@@ -24,7 +23,7 @@ ATTACKS = {
     ),
     "reference": (*FLOOD, "/ref", "crazyflie_msgs/PositionVelocityStateStamped", "10000", HOVER),
     "transforms": (*FLOOD, "/tf", "tf2_msgs/TFMessage", "2500", "80"),
-    "frozen": (sys.executable, str(FREEZE), "freeze"),
+    "frozen": (sys.executable, str(FREEZE)),
 }
 DURATION = 1.5
 ENOUGH = 0.95

@@ -7,16 +7,18 @@ import html
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_doctor.finding import ERROR, lines
-from crazyflie_doctor.vehicle import VehicleFacts, checks
+from crazyflie_doctor.vehicle import checks
+from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
 from crazyflie_model.units import HOVER_PWM
 
 Array = NDArray[np.float64]
+Rig = Any  #: A `first_flight_program.LiveRig`, or one with the same methods.
 
 HEIGHT = 0.3  #: Height of all hovers (m).
 STEP = 0.3  #: Length of the steps along each axis (m).
@@ -41,6 +43,14 @@ MAX_SATURATION = 0.02  #: Largest fraction of samples with a saturated motor.
 MAX_LOSS_WAY = 0.3  #: Largest distance that the vehicle moves without poses (m).
 MAX_TOUCHDOWN = 0.8  #: m/s.
 
+#: Number of a motor -> its place and its direction, seen from above.
+MOTORS = {
+    1: ("front right", "counter-clockwise"),
+    2: ("back right", "clockwise"),
+    3: ("back left", "counter-clockwise"),
+    4: ("front left", "clockwise"),
+}
+
 
 class Sample(NamedTuple):
     """A sample of a flight; motors, battery and gyroscope are those of the vehicle's log."""
@@ -53,48 +63,6 @@ class Sample(NamedTuple):
     gyro: float  # Yaw rate, rad/s.
     voltage: float  # V.
     motors: tuple[float, float, float, float]  # PWM.
-
-
-class Rig(Protocol):
-    """Moves a vehicle, real or virtual, and records it; all methods block."""
-
-    samples: list[Sample]
-
-    def examine(self) -> VehicleFacts:
-        """Return the facts of the doctor."""
-
-    def run(self, duration: float) -> None:
-        """Wait for a duration (s)."""
-
-    def spin(self, motor: int, pwm: int) -> None:
-        """Turn one motor, 1 to 4, for a second."""
-
-    def carry(self, x: float, y: float, z: float, yaw: float) -> None:
-        """Ask a person to carry the vehicle, m and degrees from its start, in its directions."""
-
-    def driver_takeoff(self, height: float) -> None:
-        """Take off by the vehicle's own high-level commander, to a height (m)."""
-
-    def driver_turn(self, yaw: float) -> None:
-        """Turn by an angle (degrees) in that flight."""
-
-    def driver_land(self) -> None:
-        """End that flight."""
-
-    def take_off(self) -> None:
-        """Take off by the takeoff server and hover by the LQR at `HEIGHT`."""
-
-    def refer(self, x: float, y: float, z: float) -> None:
-        """Give the LQR a reference, m, fixed frame."""
-
-    def land(self) -> None:
-        """End the flight by the LQR."""
-
-    def hide_poses(self, duration: float) -> None:
-        """Withhold poses for a duration (s)."""
-
-    def emergency(self) -> None:
-        """Stop the motors for good."""
 
 
 class Stop(Exception):  # noqa: N818
@@ -128,9 +96,9 @@ def _columns(samples: Sequence[Sample]) -> tuple[Array, Array]:
 
 
 def _since(rig: Rig, duration: float) -> list[Sample]:
-    rig_begin = len(rig.samples)
+    begin = len(rig.samples)
     rig.run(duration)
-    return rig.samples[rig_begin:]
+    return rig.samples[begin:]
 
 
 # The steps.
@@ -145,9 +113,7 @@ def _doctor(rig, _):
 
 
 def _motors(rig, ask):
-    directions = {1: "counter-clockwise", 2: "clockwise", 3: "counter-clockwise", 4: "clockwise"}
-    places = {1: "front right", 2: "back right", 3: "back left", 4: "front left"}
-    for motor, direction in directions.items():
+    for motor, (place, direction) in MOTORS.items():
         begin = len(rig.samples)
         rig.spin(motor, LOWEST_PWM)
         turned = {
@@ -157,8 +123,8 @@ def _motors(rig, ask):
             raise Stop(
                 f"motor {motor} was commanded, and the vehicle's log shows {turned or 'none'}"
             )
-        if not ask(f"Did motor {motor}, {places[motor]}, turn {direction}, seen from above?"):
-            raise Stop(f"motor {motor} does not turn {direction} at its place, {places[motor]}")
+        if not ask(f"Did motor {motor}, {place}, turn {direction}, seen from above?"):
+            raise Stop(f"motor {motor} does not turn {direction} at its place, {place}")
     return "all four turn as they should"
 
 
@@ -170,7 +136,8 @@ def _hand(rig, _):
     for goal in np.eye(3) * CARRY:
         rig.carry(*goal, 0.0)
         moved, _ = _rest(rig)
-        ways.append(_in_heading(moved - place, yaw))
+        x, y, z = moved - place
+        ways.append((*rotate_by_yaw(x, y, -yaw), z))
         rig.carry(0.0, 0.0, 0.0, 0.0)
     begin = len(rig.samples)
     rig.carry(0.0, 0.0, 0.0, TURN)
@@ -178,7 +145,7 @@ def _hand(rig, _):
     turn = rig.samples[begin:]
     rig.carry(0.0, 0.0, 0.0, 0.0)
     _check_axes(np.array(ways).T / CARRY)
-    angle = math.degrees((turned - yaw + math.pi) % (2.0 * math.pi) - math.pi)
+    angle = math.degrees(wrap_to_pi(turned - yaw))
     if abs(angle - TURN) > MAX_TURN_ERROR:
         raise Stop(f"a turn by {TURN:g} degrees to the left is {angle:.0f} degrees in the poses")
     delay = pose_delay(turn)
@@ -196,11 +163,6 @@ def _rest(rig):
     samples = _since(rig, 0.5)
     _, places = _columns(samples)
     return places.mean(axis=0), samples[-1].yaw
-
-
-def _in_heading(way, yaw):
-    x, y, z = way
-    return [math.cos(yaw) * x + math.sin(yaw) * y, math.cos(yaw) * y - math.sin(yaw) * x, z]
 
 
 def _check_axes(measured: Array) -> None:
@@ -310,7 +272,7 @@ def _yaw(rig, _):
     before = rig.samples[-1]
     rig.driver_turn(TURN)
     rig.run(3.0)
-    angle = math.degrees((rig.samples[-1].yaw - before.yaw + math.pi) % (2 * math.pi) - math.pi)
+    angle = math.degrees(wrap_to_pi(rig.samples[-1].yaw - before.yaw))
     if abs(angle - TURN) > MAX_TURN_ERROR:
         raise Stop(f"the vehicle has turned by {angle:.0f} degrees, expected {TURN:g}")
     rig.driver_turn(-TURN)

@@ -68,7 +68,10 @@ class FirstFlightParameters(Parameters):
 
 
 class LiveRig:
-    """Moves a vehicle by the driver, or by hw_hover.launch, and records it from ROS."""
+    """Moves a vehicle by the driver, or by hw_hover.launch, and records it from ROS.
+
+    All methods block.
+    """
 
     def __init__(self, uri: str, options: FirstFlightParameters, folder: Path):
         self.samples: list[Sample] = []
@@ -101,26 +104,21 @@ class LiveRig:
 
     def _on_tf(self, message):
         for each in message.transforms:
-            if each.child_frame_id == self._frame:
+            if each.child_frame_id == self._frame and not self._hides:
                 self._on_pose(each)
 
     def _on_pose(self, pose):
-        if self._hides:
-            return
         place, q = pose.transform.translation, pose.transform.rotation
         yaw = zyx_from_quaternion((q.x, q.y, q.z, q.w))[2]
         m1, m2, m3, m4, gyro, voltage = self._log
-        stamp = self._handle.time()
+        now, motors = self._handle.time(), (m1, m2, m3, m4)
         self.samples.append(
-            Sample(
-                stamp, place.x, place.y, place.z, yaw, math.radians(gyro), voltage, (m1, m2, m3, m4)
-            )
+            Sample(now, place.x, place.y, place.z, yaw, math.radians(gyro), voltage, motors)
         )
-        header, transform = pose.header, pose.transform
-        self._tf.publish(TFMessage([TransformStamped(header, _RELAYED, transform)]))
+        self._tf.publish(TFMessage([TransformStamped(pose.header, _RELAYED, pose.transform)]))
         if self._options.positioning == MOCAP:
-            external = PoseStamped(header=header)
-            external.pose.position, external.pose.orientation = Point(*_xyz(place)), q
+            external = PoseStamped(header=pose.header)
+            external.pose.position, external.pose.orientation = Point(place.x, place.y, place.z), q
             self._external.publish(external)
 
     # The rig.
@@ -282,10 +280,6 @@ class LiveRig:
             self._handle.call_service(full, service, request, _LIMIT).result()
         except ServiceError as error:
             raise Stop(f"{full}: {error}") from None
-
-
-def _xyz(vector):
-    return vector.x, vector.y, vector.z
 
 
 def _package() -> Path:

@@ -13,6 +13,7 @@ import rosgraph
 from crazyflie_demo import figure8
 from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
 from crazyflie_reports import bag_log, bag_report
+from crazyflie_reports.bag_flights import Flight
 from crazyflie_reports.flight_operator import FlightError, FlightOperator
 from crazyflie_reports.flight_record import FlightReport
 from crazyflie_utils.main import begin
@@ -26,9 +27,8 @@ EIGHT_DURATION = 6.0
 #: Scale of `crazyflie_demo.figure8`: the whole figure would need, in this time, the full tilt of 15
 #: degrees that a control may have.
 EIGHT_SCALE = 0.8
-REFERENCE_PERIOD = (
-    0.01  #: Period of the controller, so that its reference moves as its state does (s).
-)
+#: Period of the controller, so that its reference moves as its state does (s).
+REFERENCE_PERIOD = 0.01
 
 SETTLING = 0.5  #: Time from the end of the figure eight to the landing (s).
 
@@ -101,7 +101,6 @@ def fly(folder: Path, launch_arguments: list[str]) -> int:
         *LAUNCH_FILE, *ARGUMENTS, f"record_folder:={recordings}", *seen, *launch_arguments
     ]  # fmt: skip
     print(f"launching {' '.join(arguments)}  (its output: {log})", flush=True)
-    before = set(recordings.glob("*/"))
     with roslaunch(arguments, log):
         print(f"watch it with  export ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}", flush=True)
         try:
@@ -111,7 +110,7 @@ def fly(folder: Path, launch_arguments: list[str]) -> int:
             print(f"the flight failed: {error}; see {log}", file=sys.stderr)
             print(*complaints(log), sep="\n", file=sys.stderr)
             return 1
-    return report(new_recording(recordings, before), folder, log)
+    return report(recordings, folder, log)
 
 
 def wait_for_recording(topic: str) -> None:
@@ -124,20 +123,21 @@ def wait_for_recording(topic: str) -> None:
         time.sleep(0.05)
 
 
-def new_recording(recordings: Path, before: set[Path]) -> Path:
-    """Return the folder of a recording that was not there before."""
-    (recording,) = set(recordings.glob("*/")) - before
-    return recording
-
-
-def report(recording: Path, folder: Path, log: Path) -> int:
-    """Print the table of a flight, write page and data; return the exit status."""
+def report_recording(recordings: Path, folder: Path) -> tuple[bag_report.Report, list[Flight]]:
+    """Write the report of the newest recording into a folder; return it, and the flights in it."""
+    recording = max(recordings.glob("*/"), key=lambda path: path.stat().st_mtime)
     page = bag_report.Report()
     with tempfile.TemporaryDirectory(dir=folder) as series:
         (recorded,) = bag_log.read(recording, Path(series))
         page.add(recorded)
-        (flight,) = bag_report.flights_of(recorded)
+        flights = list(bag_report.flights_of(recorded))
     page.write(folder)
+    return page, flights
+
+
+def report(recordings: Path, folder: Path, log: Path) -> int:
+    """Print the table of a flight, write page and data; return the exit status."""
+    _, (flight,) = report_recording(recordings, folder)
     flight.record.save_csv(folder / "sw_hover.csv")
     hover = FlightReport.of(flight.record, HOVER, HOVER_WINDOW)
     print(hover.table())

@@ -8,15 +8,14 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from crazyflie_dev.demo import new_recording, wait_for_recording
-from crazyflie_reports import bag_log, bag_report
+from crazyflie_dev.demo import report_recording, wait_for_recording
 from crazyflie_reports.bag_flights import Flight
+from crazyflie_reports.bag_report import PAGE
 from crazyflie_reports.flight_operator import FlightError
 from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
 
@@ -43,7 +42,6 @@ def fly(script: list[str], n: int, folder: Path, launch_arguments: list[str]) ->
         *("record:=true", f"record_folder:={recordings}"),
         *launch_arguments,
     ]
-    before = set(recordings.glob("*/"))
     print(f"launching {' '.join(arguments)}  (its output: {log})", flush=True)
     begin = time.monotonic()
     with roslaunch(arguments, log):
@@ -58,21 +56,11 @@ def fly(script: list[str], n: int, folder: Path, launch_arguments: list[str]) ->
     print(f"flown in {time.monotonic() - begin:.0f} s; writing the report", flush=True)
     if status:
         print(*complaints(log), sep="\n", file=sys.stderr)
-    report(new_recording(recordings, before), folder)
-    return status
-
-
-def report(recording: Path, folder: Path) -> None:
-    """Write report and picture of a recording into a folder."""
-    page = bag_report.Report()
-    with tempfile.TemporaryDirectory(dir=folder) as series:
-        (recorded,) = bag_log.read(recording, Path(series))
-        page.add(recorded)
-        picture = draw_from_above(list(bag_report.flights_of(recorded)))
-    page.write(folder)
-    picture.savefig(folder / PICTURE, dpi=150)
+    page, flights = report_recording(recordings, folder)
+    draw_from_above(flights).savefig(folder / PICTURE, dpi=150)
     print(page.table())
-    print(f"report: {folder / bag_report.PAGE}\npicture: {folder / PICTURE}")
+    print(f"report: {folder / PAGE}\npicture: {folder / PICTURE}")
+    return status
 
 
 def draw_from_above(flights: list[Flight]) -> Figure:

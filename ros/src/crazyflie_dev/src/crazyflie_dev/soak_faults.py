@@ -56,10 +56,8 @@ _HEIGHT = 1.0  #: Height of references of other programs (m).
 _UP = (0.0, 0.0, _HEIGHT)
 #: Height of a reference that climbs from `_HEIGHT` at 2 m/s, the limit, for 0.5 s (m).
 _MOVED = _HEIGHT + 1.0
-_STREAM_RADIUS, _STREAM_SPEED = (
-    0.5,
-    0.6,
-)  #: Radius and speed of the circle that a mission streams (m, m/s).
+#: Radius and speed of the circle that a mission streams (m, m/s).
+_STREAM_RADIUS, _STREAM_SPEED = 0.5, 0.6
 
 Steps = Generator[None, None, None]
 

@@ -1,18 +1,17 @@
 """An X display without a screen, and what is drawn on it."""
 
 import contextlib
-import os
 import select
 import subprocess
-import time
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import ImageGrab
 
-_START_LIMIT = 30.0
-_END_LIMIT = 30.0
+from crazyflie_utils.testing.programs import running
+
+_START_LIMIT = 30.0  #: Longest time until Xvfb is ready (s).
 
 
 class DisplayError(Exception):
@@ -36,41 +35,19 @@ def virtual_display(width: int, height: int) -> Iterator[str]:
 
     `DisplayError`: Xvfb is not installed or does not start.
     """
-    number, writable = os.pipe()
-    command = ["Xvfb", "-displayfd", str(writable), "-screen", "0", f"{width}x{height}x24"]
+    command = ["Xvfb", "-displayfd", "1", "-screen", "0", f"{width}x{height}x24"]
     command += ["-nocursor", "-nolisten", "tcp"]
-    try:
-        server = subprocess.Popen(command, pass_fds=[writable], start_new_session=True)
-    except FileNotFoundError:
-        os.close(number)
-        raise DisplayError("Xvfb is not installed (Debian package xvfb)") from None
-    finally:
-        os.close(writable)
-    try:
-        yield f":{_read_line(number)}"
-    finally:
-        os.close(number)
-        _end(server)
-
-
-def _read_line(descriptor):
-    text = b""
-    deadline = time.monotonic() + _START_LIMIT
-    while not text.endswith(b"\n"):
-        wait = max(0.0, deadline - time.monotonic())
-        if not select.select([descriptor], [], [], wait)[0]:
+    with contextlib.ExitStack() as stack:
+        try:
+            server = stack.enter_context(running(*command, stdout=subprocess.PIPE, text=True))
+        except FileNotFoundError:
+            raise DisplayError("Xvfb is not installed (Debian package xvfb)") from None
+        assert server.stdout is not None
+        # Xvfb writes the number of its display when it is ready.
+        output = stack.enter_context(server.stdout)
+        if not select.select([output], [], [], _START_LIMIT)[0]:
             raise DisplayError(f"Xvfb has not started within {_START_LIMIT:g} s")
-        part = os.read(descriptor, 16)
-        if not part:
+        number = output.readline().strip()
+        if not number:
             raise DisplayError("Xvfb ended at once; what it printed says why")
-        text += part
-    return text.decode().strip()
-
-
-def _end(server):
-    server.terminate()
-    try:
-        server.wait(_END_LIMIT)
-    except subprocess.TimeoutExpired:
-        server.kill()
-        server.wait()
+        yield f":{number}"

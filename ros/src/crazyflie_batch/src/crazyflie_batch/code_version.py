@@ -1,11 +1,11 @@
 """The version of the simulated code, so that results of two versions are not mixed."""
 
-import ast
 import hashlib
-import importlib.util
-from collections.abc import Iterator
 from functools import lru_cache
+from importlib import import_module
+from modulefinder import ModuleFinder
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,36 +37,15 @@ def code_version(module: str = "crazyflie_batch.monte_carlo") -> str:
 
 def sources(module: str) -> dict[str, bytes]:
     """Return the source of a module, and of all that it imports of `FLOWN_PACKAGES`, by name."""
-    found: dict[str, bytes] = {}
-    waiting = [module]
-    while waiting:
-        name = waiting.pop()
-        path = _path(name)
-        if name not in found and path is not None:
-            found[name] = path.read_bytes()
-            waiting += _imported(found[name])
-    return found
-
-
-def _path(name: str) -> Path | None:
-    """Return the file of a module; None for other packages and other objects."""
-    if name.partition(".")[0] not in FLOWN_PACKAGES:
-        return None
-    try:
-        spec = importlib.util.find_spec(name)
-    except ModuleNotFoundError:
-        return None
-    # A package in a workspace that is not installed has another __init__.py.
-    if spec is None or spec.origin is None or spec.submodule_search_locations is not None:
-        return None
-    return Path(spec.origin)
-
-
-def _imported(source: bytes) -> Iterator[str]:
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module is not None:
-            yield node.module
-            # An imported name may be a module.
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+    # Other packages are not found in these folders.
+    folders = [str(Path(import_module(each).__path__[-1]).parent) for each in FLOWN_PACKAGES]
+    finder = ModuleFinder(folders)
+    finder.import_hook(module)
+    modules: dict[str, Any] = finder.modules
+    # Built-in modules have no file. A package in a workspace that is not installed has another
+    # __init__.py.
+    return {
+        name: Path(each.__file__).read_bytes()
+        for name, each in modules.items()
+        if each.__file__ and not each.__path__
+    }

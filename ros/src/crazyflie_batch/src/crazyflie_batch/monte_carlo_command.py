@@ -81,8 +81,7 @@ def _parser():
         "--scheduler",
         metavar="ADDRESS",
         help="scheduler of dask.distributed, such as tcp://10.0.0.1:8786; its workers run in a "
-        "sourced "
-        "workspace (default: the processors of this machine)",
+        "sourced workspace (default: the processors of this machine)",
     )
     return parser
 

@@ -14,7 +14,7 @@ from crazyflie_batch.simulation import time_errors
 from crazyflie_lqr.gain_file import GainFileError, load_matrix
 from crazyflie_model.limits import CRASH_TILT
 from crazyflie_state_estimator import kalman
-from crazyflie_utils import ParameterError, Parameters, parameter
+from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import Declaration
 from crazyflie_utils.parameters.types import DURATION, METRES, TEXT, Integer, Number, Text
 from crazyflie_utils.parameters.types import FINITE as ANY
@@ -227,6 +227,3 @@ def _number(entry: Entry, declaration: Declaration) -> float:
         return declaration.type(entry.value)
     except ValueError:
         raise entry.error(f"is {shown(entry.value)}; expected {declaration.type}") from None
-
-
-__all__ = ["FlightParameters", "ParameterError", "RunParameters", "Settings", "read_settings"]

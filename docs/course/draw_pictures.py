@@ -7,16 +7,15 @@ It needs a workspace that is built and sourced, and packages of docs/course/solu
 """
 
 import argparse
+import contextlib
 import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import rosgraph
-import rospy
 from matplotlib.figure import Figure
 from PIL import Image
 from plots import (
@@ -27,8 +26,8 @@ from plots import (
     draw_main_loop,
     draw_sweep,
 )
-from std_srvs.srv import Empty
 
+from crazyflie_dev.bench_flights import call, wait_for_service
 from crazyflie_dev.render_rviz import background_of, crop_to_scene
 from crazyflie_dev.virtual_display import screenshot, virtual_display
 from crazyflie_reports.flight_operator import FlightOperator
@@ -41,6 +40,7 @@ COURSE = Path(__file__).resolve().parent
 QUICK = "sim_time:=true real_time_factor:=2 composed:=true simulator_dt:=0.01".split()
 SCREEN = (1400, 900)
 COLOURS = 64
+POLE_VIEW = COURSE / "launch" / "pole.rviz"
 LIMIT = 300.0
 """The longest that a part of a flight may take, s: RViz draws without a graphics card."""
 
@@ -52,17 +52,6 @@ def operate() -> FlightOperator:
     operator = FlightOperator(begin("draw_pictures"), limit=LIMIT)
     operator.wait_until_ready()
     return operator
-
-
-def wait_for_service(name: str, limit: float = 60.0) -> None:
-    """Wait until a service is offered, s at most."""
-    end = time.monotonic() + limit
-    while time.monotonic() < end:
-        services = rosgraph.Master("/draw_pictures_wait").getSystemState()[2]
-        if name in [service for service, _ in services]:
-            return
-        time.sleep(0.5)
-    raise TimeoutError(f"there is no {name} after {limit:g} s")
 
 
 def draw_figure_eight(path: Path, log: Path) -> None:
@@ -152,48 +141,45 @@ def gains_folder() -> Path:
     return COURSE.parents[1] / "ros" / "src" / "crazyflie_lqr" / "config"
 
 
-def draw_scene(path: Path, log: Path, arguments: list[str], config: Path, fly: Callable) -> None:
-    """Draw what RViz shows after ``fly`` has done what it does."""
+@contextlib.contextmanager
+def rviz(log: Path, package: str, file: str, *arguments: str, config: Path) -> Iterator[str]:
+    """Launch a file with RViz on a virtual display; yield the display's name."""
     with virtual_display(*SCREEN) as display:
         os.environ.update(DISPLAY=display, LIBGL_ALWAYS_SOFTWARE="1")
-        with roslaunch([*arguments, f"config:={config}", "rviz:=true", *QUICK], log):
-            operator = fly()
-            scene = crop_to_scene(screenshot(display), background_of(config))
-            operator.land()
-    image = Image.fromarray(scene)
+        with roslaunch([package, file, *arguments, f"config:={config}", "rviz:=true"], log):
+            yield display
+
+
+def save_scene(display: str, config: Path, path: Path) -> None:
+    """Write what RViz shows of the scene into a picture."""
+    image = Image.fromarray(crop_to_scene(screenshot(display), background_of(config)))
     image.thumbnail((900, 700))
     image.quantize(COLOURS).save(path, optimize=True)
 
 
-def draw_pole(path: Path, log: Path) -> None:
-    """Draw the circle around the pole."""
-
-    def fly():
+@contextlib.contextmanager
+def around_the_pole(log: Path) -> Iterator[str]:
+    """Fly around the pole; yield the display when the circle is on it, and then land."""
+    with rviz(log, "crazyflie_teleop", "circle.launch", *QUICK, config=POLE_VIEW) as display:
         operator = operate()
         with running("rosrun", "pole", "pole_node"):
             operator.hover(25.0)
             time.sleep(5.0)
-            return operator
+            yield display
+        operator.land()
 
-    arguments = ["crazyflie_teleop", "circle.launch"]
-    draw_scene(path, log, arguments, COURSE / "launch" / "pole.rviz", fly)
+
+def draw_pole(path: Path, log: Path) -> None:
+    """Draw the circle around the pole."""
+    with around_the_pole(log) as display:
+        save_scene(display, POLE_VIEW, path)
 
 
 def draw_rviz_panel(path: Path, log: Path) -> None:
     """Draw the whole window of RViz, with the panel of the displays."""
-    with virtual_display(*SCREEN) as display:
-        os.environ.update(DISPLAY=display, LIBGL_ALWAYS_SOFTWARE="1")
-        config = COURSE / "launch" / "pole.rviz"
-        with roslaunch(
-            ["crazyflie_teleop", "circle.launch", f"config:={config}", "rviz:=true", *QUICK], log
-        ):
-            operator = operate()
-            with running("rosrun", "pole", "pole_node"):
-                operator.hover(25.0)
-                time.sleep(5.0)
-                window = screenshot(display)
-            operator.land()
-    Image.fromarray(window).resize((1050, 675)).quantize(128).save(path, optimize=True)
+    with around_the_pole(log) as display:
+        window = Image.fromarray(screenshot(display))
+    window.resize((1050, 675)).quantize(128).save(path, optimize=True)
 
 
 def draw_swarm(path: Path, log: Path) -> None:
@@ -201,19 +187,13 @@ def draw_swarm(path: Path, log: Path) -> None:
     fleet_view = COURSE.parents[1] / "ros/src/crazyflie_fleet/config/fleet.rviz"
     near = log.with_name("near.rviz")
     near.write_text(fleet_view.read_text().replace("Distance: 7", "Distance: 2.3"))
-    arguments = ["crazyflie_examples", "sw_swarm.launch", "n:=9", "spacing:=0.5", *QUICK[:2]]
-    with virtual_display(*SCREEN) as display:
-        os.environ.update(DISPLAY=display, LIBGL_ALWAYS_SOFTWARE="1")
-        with roslaunch([*arguments, "rviz:=true", f"config:={near}"], log):
-            wait_for_service("/all/takeoff")
-            rospy.init_node("draw_swarm")
-            rospy.ServiceProxy("/all/takeoff", Empty)()
-            time.sleep(10.0)
-            scene = crop_to_scene(screenshot(display), background_of(near))
-            rospy.ServiceProxy("/all/land", Empty)()
-    image = Image.fromarray(scene)
-    image.thumbnail((900, 700))
-    image.quantize(COLOURS).save(COURSE.parent / "images" / path.name, optimize=True)
+    launch = ["crazyflie_examples", "sw_swarm.launch", "n:=9", "spacing:=0.5", *QUICK[:2]]
+    with rviz(log, *launch, config=near) as display:
+        wait_for_service("/all/takeoff")
+        call("/all/takeoff")
+        time.sleep(10.0)
+        save_scene(display, near, COURSE.parent / "images" / path.name)
+        call("/all/land")
 
 
 PICTURES = {

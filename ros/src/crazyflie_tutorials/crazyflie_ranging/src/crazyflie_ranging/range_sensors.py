@@ -135,17 +135,10 @@ class Ranger:
     def __init__(self, sensors: Sequence[RangeSensor], random: np.random.Generator):
         self._sensors = sensors
         self._random = random
-        rays: list[NDArray[np.float64]] = []
-        self._slices: list[slice] = []
-        begin = 0
-        for each in sensors:
-            turn = Rotation.from_quat(each.attitude)
-            rays.append(turn.apply(cone(each.spread_angle, each.rays)))
-            self._slices.append(slice(begin, begin + each.rays))
-            begin += each.rays
-        self._origins = np.repeat(
-            [each.position for each in sensors], [each.rays for each in sensors], axis=0
-        )
+        counts = [each.rays for each in sensors]
+        self._ends = np.cumsum(counts)[:-1]
+        self._origins = np.repeat([each.position for each in sensors], counts, axis=0)
+        rays = [Rotation.from_quat(s.attitude).apply(cone(s.spread_angle, s.rays)) for s in sensors]
         self._rays = np.concatenate(rays)
 
     def measure(self, world: World, position: Triple, attitude: Quaternion) -> list[float]:
@@ -157,7 +150,7 @@ class Ranger:
         turn = Rotation.from_quat(attitude)
         distances, _ = world.cast(position + turn.apply(self._origins), turn.apply(self._rays))
         readings = []
-        for sensor, own in zip(self._sensors, self._slices, strict=True):
+        for sensor, own in zip(self._sensors, np.split(distances, self._ends), strict=True):
             noise = sensor.noise * self._random.standard_normal()
-            readings.append(sensor.reading(float(distances[own].min()) + noise))
+            readings.append(sensor.reading(float(own.min()) + noise))
         return readings

@@ -7,7 +7,6 @@ from functools import partial
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from sensor_msgs.msg import Range
 from typing_extensions import override
 
@@ -15,7 +14,9 @@ from crazyflie_driver.msg import GenericLogData
 from crazyflie_ranging.range_sensors import SENSOR_FILE, ULTRASONIC, Ranger, RangeSensor
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TEXT, TIME_STEP, TOPIC, Integer, ListOf
+from crazyflie_utils.tf.poses import StampedPose
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
+from crazyflie_utils.vectors import stamped
 from crazyflie_world.world import World
 from crazyflie_world.world_file import WORLD_FILE
 
@@ -45,25 +46,20 @@ class RangePublisher:
         """Publish the readings (m) of some sensors, by their number, and the sensors' frames."""
         for index, reading in readings.items():
             sensor = self._sensors[index]
-            message = Range(
+            message = stamped(
+                Range,
+                stamp,
+                sensor.frame_id,
                 radiation_type=Range.ULTRASOUND if sensor.type == ULTRASONIC else Range.INFRARED,
                 field_of_view=sensor.spread_angle,
                 min_range=sensor.min_range,
                 max_range=sensor.max_range,
                 range=reading,
             )
-            message.header.stamp = stamp
-            message.header.frame_id = sensor.frame_id
             self._publishers[index].publish(message)
-        self._broadcast([self._transform(self._sensors[index], stamp) for index in readings])
-
-    def _transform(self, sensor, stamp):
-        transform = TransformStamped(child_frame_id=sensor.frame_id)
-        transform.header.stamp = stamp
-        transform.header.frame_id = self._frame
-        transform.transform.translation = Vector3(*sensor.position)
-        transform.transform.rotation = Quaternion(*sensor.attitude)
-        return transform
+        sensors, now = [self._sensors[index] for index in readings], stamp.to_nsec()
+        poses = [StampedPose(self._frame, s.frame_id, now, s.position, s.attitude) for s in sensors]
+        self._broadcast([pose.message() for pose in poses])
 
 
 _MILLIMETRE = 0.001
@@ -95,8 +91,8 @@ class DeckRangerNode(Node):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(DeckRangerParameters)
-        places = {name: place for place, name in enumerate(self._parameters.variables)}
-        self._places = [places[sensor.log_variable] for sensor in self._parameters.sensors]
+        place = self._parameters.variables.index
+        self._places = [place(sensor.log_variable) for sensor in self._parameters.sensors]
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -106,13 +102,11 @@ class DeckRangerNode(Node):
     def _on_log(self, message):
         parameters = self._parameters
         topic = self._handle.resolve(parameters.log_topic)
+        fault = "" if all(map(math.isfinite, message.values)) else "its values are not finite"
         if len(message.values) != len(parameters.variables):
-            text = f"it has {len(message.values)} values; expected {len(parameters.variables)}"
-            self._handle.warn(f"ignoring a message on {topic}: {text}", throttle=5.0)
-            return
-        if not all(map(math.isfinite, message.values)):
-            text = "its values are not finite"
-            self._handle.warn(f"ignoring a message on {topic}: {text}", throttle=5.0)
+            fault = f"it has {len(message.values)} values; expected {len(parameters.variables)}"
+        if fault:
+            self._handle.warn(f"ignoring a message on {topic}: {fault}", throttle=5.0)
             return
         readings = {}
         for number, (sensor, place) in enumerate(
@@ -145,7 +139,7 @@ class SimulatedRangerNode(Node):
     """Measure distances to the objects of a world from the vehicle's pose on /tf."""
 
     def __init__(self) -> None:
-        self._stamps: dict[int, genpy.Time] = {}
+        self._stamps: dict[int, int] = {}
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -165,7 +159,7 @@ class SimulatedRangerNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = RangePublisher(handle, self._parameters)
-        self._lookup = handle.listen_to_transforms()
+        self._lookup = handle.listen_to_poses()
         for period, (ranger, numbers) in self._groups.items():
             handle.timer(period, partial(self._on_timer, ranger, numbers))
 
@@ -178,31 +172,21 @@ class SimulatedRangerNode(Node):
         world = self._parameters.world
         try:
             robot = self._pose(self._parameters.robot_frame)
-            centres = {each.name: _position(self._pose(each.name)) for each in world.moving}
+            centres = {each.name: self._pose(each.name).position for each in world.moving}
         except TransformError as error:
             self._handle.warn(f"no ranges: {error}", throttle=5.0)
             return
         # A missing pose is logged once.
-        if self._stamps.get(numbers[0]) == robot.header.stamp:
+        if self._stamps.get(numbers[0]) == robot.stamp:
             return
-        self._stamps[numbers[0]] = robot.header.stamp
-        rotation = robot.transform.rotation
-        readings = ranger.measure(
-            world.placed(centres),
-            _position(robot),
-            (rotation.x, rotation.y, rotation.z, rotation.w),
-        )
-        self._publisher.publish(dict(zip(numbers, readings, strict=True)), robot.header.stamp)
+        self._stamps[numbers[0]] = robot.stamp
+        readings = ranger.measure(world.placed(centres), robot.position, robot.rotation)
+        self._publisher.publish(dict(zip(numbers, readings, strict=True)), robot.time)
 
-    def _pose(self, frame: str) -> TransformStamped:
+    def _pose(self, frame: str) -> StampedPose:
         pose = self._lookup(self._parameters.world.frame, frame)
-        age = (self._handle.stamp() - pose.header.stamp).to_sec()
+        age = (self._handle.stamp() - pose.time).to_sec()
         # A pose far ahead of now is one from before the clock was set back.
         if not -MAX_FUTURE_STAMP_SIMULATED <= age <= self._parameters.silence:
             raise TransformError(f"the pose of {frame} is {age:.1f} s old")
         return pose
-
-
-def _position(pose):
-    translation = pose.transform.translation
-    return translation.x, translation.y, translation.z

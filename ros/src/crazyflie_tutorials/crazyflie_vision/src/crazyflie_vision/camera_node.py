@@ -1,10 +1,8 @@
 """ROS interface of the simulated camera."""
 
 from collections import deque
-from collections.abc import Iterator
 
 import numpy as np
-from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
@@ -19,10 +17,10 @@ from crazyflie_utils import (
     parameter,
 )
 from crazyflie_utils.parameters.types import FRAME, TOPIC, File
+from crazyflie_utils.tf.poses import StampedPose
 from crazyflie_vision.camera import CameraParameters, Pinhole, PixelNoise, Pose, load, optical_pose
 from crazyflie_vision.images import camera_info, to_message
 from crazyflie_vision.renderer import Renderer
-from crazyflie_world.shapes import Shape
 from crazyflie_world.world import World
 from crazyflie_world.world_file import WORLD_FILE
 
@@ -65,7 +63,10 @@ class CameraNode(Node):
         self._parameters = handle.load(CameraNodeParameters)
         camera = self._parameters.camera
         self._pinhole = Pinhole.with_fov(camera.width, camera.height, camera.fov)
-        self._mount = optical_pose(camera.mount)
+        self._mount = mount = optical_pose(camera.mount)
+        frames = self._parameters.vehicle_frame, self._parameters.camera_frame
+        rotation = Rotation.from_matrix(mount.rotation).as_quat()
+        self._frame = StampedPose(*frames, 0, tuple(mount.position), tuple(rotation))
         try:
             self._renderer = Renderer(self._pinhole, self._parameters.world)
         except OSError as error:
@@ -78,7 +79,7 @@ class CameraNode(Node):
         self._images = handle.publisher(parameters.image_topic, Image)
         self._infos = handle.publisher(parameters.info_topic, CameraInfo)
         self._broadcast = handle.broadcast_transforms()
-        self._lookup = handle.listen_to_transforms()
+        self._lookup = handle.listen_to_poses()
         handle.timer(1.0 / parameters.camera.rate, self._expose)
         if parameters.camera.latency > 0.0:
             # From then on, images are delivered at the rate of exposures, later by the latency.
@@ -89,18 +90,18 @@ class CameraNode(Node):
         self._handle.timer(1.0 / self._parameters.camera.rate, self._deliver)
 
     def _expose(self):
+        world = self._parameters.world
         try:
-            vehicle = _pose(
-                self._lookup(self._parameters.world.frame, self._parameters.vehicle_frame)
-            )
-            moving = tuple(self._moving())
+            vehicle = self._lookup(world.frame, self._parameters.vehicle_frame)
+            moving = [e.moved_to(self._lookup(world.frame, e.name).position) for e in world.moving]
         except TransformError as error:
             self._handle.warn(f"no image: {error}", throttle=5.0)
             return
-        image = self._noise.add(self._renderer.render(vehicle @ self._mount, moving))
+        pose = Pose(Rotation.from_quat(vehicle.rotation).as_matrix(), np.array(vehicle.position))
+        image = self._noise.add(self._renderer.render(pose @ self._mount, moving))
         now = self._handle.time()
         header = Header(stamp=self._handle.stamp(now), frame_id=self._parameters.camera_frame)
-        self._announce(header.stamp)
+        self._broadcast([self._frame._replace(stamp=header.stamp.to_nsec()).message()])
         self._exposed.append((now, to_message(image, header), camera_info(self._pinhole, header)))
         if self._parameters.camera.latency == 0.0:
             self._deliver()
@@ -111,25 +112,3 @@ class CameraNode(Node):
             _, image, info = self._exposed.popleft()
             self._infos.publish(info)
             self._images.publish(image)
-
-    def _moving(self) -> Iterator[Shape]:
-        world = self._parameters.world
-        for each in world.moving:
-            yield each.moved_to(tuple(_pose(self._lookup(world.frame, each.name)).position))
-
-    def _announce(self, stamp):
-        transform = TransformStamped(child_frame_id=self._parameters.camera_frame)
-        transform.header.stamp = stamp
-        transform.header.frame_id = self._parameters.vehicle_frame
-        rotation = Rotation.from_matrix(self._mount.rotation).as_quat()
-        transform.transform = Transform(Vector3(*self._mount.position), Quaternion(*rotation))
-        self._broadcast([transform])
-
-
-def _pose(transform: TransformStamped) -> Pose:
-    rotation, translation = transform.transform.rotation, transform.transform.translation
-    quaternion = [rotation.x, rotation.y, rotation.z, rotation.w]
-    return Pose(
-        Rotation.from_quat(quaternion).as_matrix(),
-        np.array([translation.x, translation.y, translation.z]),
-    )

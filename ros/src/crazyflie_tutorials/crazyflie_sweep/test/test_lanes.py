@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_sweep.lanes import Arc, LanePath, Line, lane_offsets, reversed_path, sweep
+from crazyflie_sweep.lanes import Arc, LanePath, Line, lane_offsets, sweep
 from crazyflie_sweep.sweep_parameters import Area
 from crazyflie_sweep.sweeper import Coverage
 
@@ -47,7 +47,7 @@ def test_length_is_that_of_lanes_and_half_circles():
 @given(WIDTH, WIDTH, st.floats(0.2, 2.0), st.booleans())
 def test_the_path_is_smooth_and_directions_are_its_derivatives(length, width, lane_width, reverse):
     path = sweep(Area(x_min=0.0, x_max=length, y_min=0.0, y_max=width), lane_width, 1.0)
-    path = reversed_path(path) if reverse else path
+    path = path.reversed() if reverse else path
     step = 1e-4
     for k in range(200):
         s = (path.length - step) * k / 199
@@ -67,7 +67,7 @@ def test_a_reversed_path_ends_where_the_path_begins():
     path = sweep(AREA, 0.5, 1.0)
     for s in (0.0, 1.0, 3.2, path.length):
         position, direction = path.at(s)
-        again, opposite = reversed_path(path).at(path.length - s)
+        again, opposite = path.reversed().at(path.length - s)
         assert again == pytest.approx(position)
         assert opposite == pytest.approx([-d for d in direction])
 

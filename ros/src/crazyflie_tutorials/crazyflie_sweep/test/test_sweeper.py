@@ -94,7 +94,7 @@ def test_goes_through_the_oscillators_velocities_on_a_lane():
     sweeper = make(speed__max=2.0, speed__acceleration=5.0)
     seen = {}
     while not sweeper.is_done:
-        if sweeper.is_on_lane and sweeper.reference[1] == -0.75:
+        if sweeper.lane is not None and sweeper.reference[1] == -0.75:
             seen[round(sweeper.reference[0], 1)] = sweeper.speed
         sweeper.advance(DT, oscillator_velocity(sweeper.service_position(sweeper.reference[0])))
     # Lanes of 3 m stand for 7: everything is 3/7 as large.
@@ -113,7 +113,7 @@ def test_service_position_scales_the_lane_to_the_interval():
 
 def test_without_a_velocity_it_brakes_and_stays():
     sweeper = make()
-    while not (sweeper.is_on_lane and sweeper.speed > 0.5):
+    while not (sweeper.lane is not None and sweeper.speed > 0.5):
         sweeper.advance(DT, 2.0)
     before = sweeper.reference
     for _ in range(200):
@@ -146,7 +146,7 @@ def test_a_second_pass_leads_back_and_the_last_one_ends():
 
 def test_a_vehicle_that_is_there_needs_no_approach():
     sweeper = make((-1.5, -0.75, 1.0))
-    assert sweeper.is_on_lane
+    assert sweeper.lane is not None
     assert sweeper.reference[:3] == (-1.5, -0.75, 1.0)
 
 

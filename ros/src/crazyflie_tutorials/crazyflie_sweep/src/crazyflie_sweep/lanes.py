@@ -3,10 +3,8 @@
 import bisect
 import itertools
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-
-from typing_extensions import override
+from dataclasses import dataclass
 
 from crazyflie_sweep.sweep_parameters import Area
 
@@ -15,68 +13,72 @@ Point = tuple[float, float, float]  #: x, y, z in m.
 _SLACK = 1e-9
 
 
-class Segment(ABC):
-    """A piece of a path, of a ``length`` in m."""
-
-    length: float
-
-    @abstractmethod
-    def at(self, s: float) -> tuple[Point, Point]:
-        """Return position (m) and direction (unit vector) after ``s`` metres of it."""
-
-
-class Line(Segment):
+@dataclass(frozen=True)
+class Line:
     """A straight piece between two different points.
 
     A lane sweeps the area; other pieces only connect lanes.
     """
 
-    def __init__(self, begin: Point, end: Point, is_lane: bool = True):
-        self.begin = begin
-        self.end = end
-        self.is_lane = is_lane
-        self.length = math.dist(begin, end)
-        ux, uy, uz = ((e - b) / self.length for b, e in zip(begin, end, strict=True))
-        self._direction = (ux, uy, uz)
+    begin: Point
+    end: Point
+    is_lane: bool = True
 
-    @override
+    @property
+    def length(self) -> float:
+        """Length (m)."""
+        return math.dist(self.begin, self.end)
+
     def at(self, s: float) -> tuple[Point, Point]:
-        return self._point(s), self._direction
+        """Return position (m) and direction (unit vector) after ``s`` metres of it."""
+        ux, uy, uz = ((e - b) / self.length for b, e in zip(self.begin, self.end, strict=True))
+        x, y, z = self.begin
+        return (x + s * ux, y + s * uy, z + s * uz), (ux, uy, uz)
+
+    def reversed(self) -> "Line":
+        """Return the line from its end to its begin."""
+        return Line(self.end, self.begin, self.is_lane)
 
     def distance(self, point: Point) -> float:
         """Return the distance of a point from the line between its ends, m."""
-        offset = (p - b for p, b in zip(point, self.begin, strict=True))
-        along = sum(o * u for o, u in zip(offset, self._direction, strict=True))
-        return math.dist(point, self._point(min(max(along, 0.0), self.length)))
-
-    def _point(self, s):
-        x, y, z = self.begin
-        ux, uy, uz = self._direction
-        return x + s * ux, y + s * uy, z + s * uz
+        begin, direction = self.at(0.0)
+        along = sum((p - b) * u for p, b, u in zip(point, begin, direction, strict=True))
+        return math.dist(point, self.at(min(max(along, 0.0), self.length))[0])
 
 
-class Arc(Segment):
+@dataclass(frozen=True)
+class Arc:
     """A circular piece, horizontal, of a radius in m.
 
     ``begin`` is the angle of its first point as seen from the centre, ``turn`` that to its last
     one, rad; positive is counter-clockwise.
     """
 
-    def __init__(self, centre: Point, radius: float, begin: float, turn: float):
-        self.centre = centre
-        self.radius = radius
-        self.begin = begin
-        self.turn = turn
-        self.length = radius * abs(turn)
+    centre: Point
+    radius: float
+    begin: float
+    turn: float
 
-    @override
+    @property
+    def length(self) -> float:
+        """Length (m)."""
+        return self.radius * abs(self.turn)
+
     def at(self, s: float) -> tuple[Point, Point]:
+        """Return position (m) and direction (unit vector) after ``s`` metres of it."""
         angle = self.begin + self.turn * s / self.length
         cosine, sine = math.cos(angle), math.sin(angle)
         sign = math.copysign(1.0, self.turn)
         x, y, z = self.centre
         position = (x + self.radius * cosine, y + self.radius * sine, z)
         return position, (-sign * sine, sign * cosine, 0.0)
+
+    def reversed(self) -> "Arc":
+        """Return the arc from its last point to its first."""
+        return Arc(self.centre, self.radius, self.begin + self.turn, -self.turn)
+
+
+Segment = Line | Arc
 
 
 class LanePath:
@@ -100,6 +102,10 @@ class LanePath:
         number = self._number(s)
         segment = self.segments[number]
         return segment.at(min(max(s - self._begins[number], 0.0), segment.length))
+
+    def reversed(self) -> "LanePath":
+        """Return the reversed path."""
+        return LanePath([segment.reversed() for segment in self.segments[::-1]])
 
     def _number(self, s):
         return min(max(bisect.bisect_right(self._begins, s) - 1, 0), len(self.segments) - 1)
@@ -132,14 +138,3 @@ def sweep(area: Area, lane_width: float, height: float) -> LanePath:
             turn = math.pi if is_forward else -math.pi
             segments.append(Arc((end, y + radius, height), radius, -math.pi / 2.0, turn))
     return LanePath(segments)
-
-
-def reversed_path(path: LanePath) -> LanePath:
-    """Return the reversed path."""
-    return LanePath([_reversed(segment) for segment in reversed(path.segments)])
-
-
-def _reversed(segment):
-    if isinstance(segment, Line):
-        return Line(segment.end, segment.begin, segment.is_lane)
-    return Arc(segment.centre, segment.radius, segment.begin + segment.turn, -segment.turn)

@@ -29,6 +29,7 @@ from crazyflie_tutorial_msgs.srv import (
 )
 from crazyflie_utils import Node, NodeHandle, Parameters, flight_status, parameter
 from crazyflie_utils.parameters.types import SERVICE, Integer
+from crazyflie_utils.vectors import stamped
 
 COVERED_COLOUR = ColorRGBA(0.15, 0.65, 0.35, 0.75)
 UNCOVERED_COLOUR = ColorRGBA(0.75, 0.78, 0.82, 0.6)
@@ -227,8 +228,7 @@ class SweepNode(Node):
             self._finish(f"the flight was ended: {status.reason or 'the vehicle is being landed'}")
 
     def _on_state(self, message):
-        state = message.state
-        self._position = (state.x, state.y, state.z)
+        self._position = (message.state.x, message.state.y, message.state.z)
         self._position_time = self._handle.time()
         if self._sweeper is not None and self._is_sweeping():
             self._markers_are_old |= self._sweeper.measure(self._position)
@@ -273,10 +273,9 @@ class SweepNode(Node):
         return velocity
 
     def _publish_reference(self, sweeper):
-        message = PositionVelocityStateStamped(state=PositionVelocityState(*sweeper.reference))
-        message.header.stamp = self._handle.stamp()
-        message.header.frame_id = self._parameters.fixed_frame
-        self._reference.publish(message)
+        state, frame = PositionVelocityState(*sweeper.reference), self._parameters.fixed_frame
+        stamp = self._handle.stamp()
+        self._reference.publish(stamped(PositionVelocityStateStamped, stamp, frame, state=state))
 
     # The velocity service.
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from crazyflie_sweep.lanes import LanePath, Line, Point, reversed_path, sweep
+from crazyflie_sweep.lanes import LanePath, Line, Point, sweep
 from crazyflie_sweep.sweep_parameters import Area, SweepPlan
 from crazyflie_sweep.velocities import OSCILLATOR_BEGIN, OSCILLATOR_END, OSCILLATOR_LENGTH
 
@@ -83,12 +83,8 @@ class Sweeper:
         return self.coverage.share >= self._plan.coverage.goal
 
     @property
-    def is_on_lane(self) -> bool:
-        """Whether the reference is on a lane, where a service sets its speed."""
-        return self._lane is not None
-
-    @property
-    def _lane(self):
+    def lane(self) -> Line | None:
+        """The lane on which the reference is, where a service sets its speed; None elsewhere."""
         segment = self._path.segment_at(self._s)
         return segment if isinstance(segment, Line) and segment.is_lane else None
 
@@ -106,7 +102,7 @@ class Sweeper:
         limits = self._plan.speed
         if velocity is None:
             target = 0.0
-        elif self.is_on_lane:
+        elif self.lane is not None:
             target = min(max(velocity * self._scale, limits.min), limits.max)
         else:
             target = limits.turn
@@ -126,8 +122,7 @@ class Sweeper:
             self.is_done = True
             return
         self._passes += 1
-        self.lanes = reversed_path(self.lanes)
-        self._path = self.lanes
+        self._path = self.lanes = self.lanes.reversed()
         self._s = 0.0
 
     @property
@@ -138,8 +133,8 @@ class Sweeper:
 
     def measure(self, position: Point) -> bool:
         """Process a position of the vehicle; return whether it has covered new cells."""
-        if self._lane is not None:
-            self.max_lane_distance = max(self.max_lane_distance, self._lane.distance(position))
+        if (lane := self.lane) is not None:
+            self.max_lane_distance = max(self.max_lane_distance, lane.distance(position))
         return self.coverage.add(position)
 
     def _with_approach(self, start):

@@ -8,12 +8,12 @@ A symbol represents one number of each of several vehicles, its lanes.
 A formula must not branch on a value; it chooses with ``where`` and ``clip``.
 """
 
-from collections.abc import Callable, Sequence
-from functools import partialmethod
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
 DOUBLE = ir.DoubleType()
 
@@ -33,9 +33,16 @@ _FUNCTIONS = {
 
 #: Intrinsics of LLVM: one instruction on most processors.
 _INTRINSICS = {np.sqrt: "llvm.sqrt", np.floor: "llvm.floor", np.absolute: "llvm.fabs"}
-#: Operators that numpy passes as functions when one of its own numbers is on the left.
+#: Instructions of operators, which numpy's mixin makes functions.
 _OPERATORS = {np.add: "fadd", np.subtract: "fsub", np.multiply: "fmul", np.divide: "fdiv"}
-
+_COMPARISONS = {
+    np.less: "<",
+    np.less_equal: "<=",
+    np.greater: ">",
+    np.greater_equal: ">=",
+    np.equal: "==",
+}
+_LOGIC = {np.bitwise_and: "and_", np.bitwise_or: "or_", np.invert: "not_"}
 
 _MUST_NOT_BRANCH = "a formula of a batch must not branch; it chooses with where() or clip()"
 
@@ -62,16 +69,16 @@ class Emitter:
         """Return the symbol of a vector."""
         return Symbol(self, value)
 
-    def arithmetic(self, instruction: str, left: Any, right: Any) -> "Symbol":
-        """Return the result of an LLVM instruction of two symbols or floats."""
-        emit = getattr(self.builder, instruction)
-        return self.symbol(emit(self.value(left), self.value(right)))
-
-    def call(self, function: Any, arguments: Sequence[Any]) -> "Symbol":
+    def call(self, function: Any, arguments: Sequence[Any]) -> "Symbol | Condition":
         """Return a function, one of numpy's, of symbols or floats."""
-        if function in _OPERATORS:
-            return self.arithmetic(_OPERATORS[function], *arguments)
         values = [self.value(argument) for argument in arguments]
+        if function in _OPERATORS:
+            return self.symbol(getattr(self.builder, _OPERATORS[function])(*values))
+        if function in _COMPARISONS:
+            sign = _COMPARISONS[function]
+            return Condition(self, self.builder.fcmp_ordered(sign, *values))
+        if function is np.negative:
+            return self.symbol(self.builder.fsub(self.value(-0.0), *values))
         if function in _INTRINSICS:
             name = f"{_INTRINSICS[function]}.v{self.lanes}f64"
             return self.symbol(self.builder.call(self._declare(name, self.type, 1), values))
@@ -101,23 +108,12 @@ class Emitter:
         return ir.Function(module, ir.FunctionType(type_, [type_] * count), name)
 
 
-class Condition:
+class Condition(NDArrayOperatorsMixin):
     """A condition that is true for some of the lanes."""
 
     def __init__(self, emitter: Emitter, value: ir.Value):
         self.value = value
         self._emitter = emitter
-
-    def __and__(self, other: "Condition | bool") -> "Condition":
-        return Condition(self._emitter, self._emitter.builder.and_(self.value, self._of(other)))
-
-    def __or__(self, other: "Condition | bool") -> "Condition":
-        return Condition(self._emitter, self._emitter.builder.or_(self.value, self._of(other)))
-
-    __rand__, __ror__ = __and__, __or__
-
-    def __invert__(self) -> "Condition":
-        return Condition(self._emitter, self._emitter.builder.not_(self.value))
 
     def _of(self, other):
         # A condition without symbols is a bool.
@@ -128,6 +124,13 @@ class Condition:
     def __bool__(self) -> bool:
         raise TypeError(_MUST_NOT_BRANCH)
 
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
+        """Support ``&``, ``|`` and ``~``."""
+        if method != "__call__" or kwargs or ufunc not in _LOGIC:
+            return NotImplemented
+        emit = getattr(self._emitter.builder, _LOGIC[ufunc])
+        return Condition(self._emitter, emit(*map(self._of, inputs)))
+
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
         """Support ``numpy.where``."""
         if function is not np.where:
@@ -137,32 +140,12 @@ class Condition:
         return self._emitter.symbol(self._emitter.builder.select(self.value, *values))
 
 
-def _arithmetic(instruction: str) -> tuple[Callable[..., "Symbol"], Callable[..., "Symbol"]]:
-    """Return the methods of an operator with the symbol on its left, and on its right."""
-
-    def with_symbol_left(self: "Symbol", other: Any) -> "Symbol":
-        return self._emitter.arithmetic(instruction, self, other)
-
-    def with_symbol_right(self: "Symbol", other: Any) -> "Symbol":
-        return self._emitter.arithmetic(instruction, other, self)
-
-    return with_symbol_left, with_symbol_right
-
-
-class Symbol:
+class Symbol(NDArrayOperatorsMixin):
     """A number whose value is known when the program runs; see the module."""
 
     def __init__(self, emitter: Emitter, value: ir.Value):
         self.value = value
         self._emitter = emitter
-
-    __add__, __radd__ = _arithmetic("fadd")
-    __sub__, __rsub__ = _arithmetic("fsub")
-    __mul__, __rmul__ = _arithmetic("fmul")
-    __truediv__, __rtruediv__ = _arithmetic("fdiv")
-
-    def __neg__(self) -> "Symbol":
-        return self._emitter.arithmetic("fsub", -0.0, self)
 
     def __pow__(self, exponent: Any) -> "Symbol":
         try:
@@ -180,22 +163,11 @@ class Symbol:
     def __bool__(self) -> bool:
         raise TypeError(_MUST_NOT_BRANCH)
 
-    def _compare(self, sign: str, other: Any) -> Condition:
-        values = self.value, self._emitter.value(other)
-        return Condition(self._emitter, self._emitter.builder.fcmp_ordered(sign, *values))
-
-    __lt__ = partialmethod(_compare, "<")
-    __le__ = partialmethod(_compare, "<=")
-    __gt__ = partialmethod(_compare, ">")
-    __ge__ = partialmethod(_compare, ">=")
-    __eq__ = partialmethod(_compare, "==")
-    __hash__ = None  # type: ignore[assignment]
-
-    def __array_ufunc__(self, function: Any, method: str, *args: Any, **kwargs: Any) -> Any:
-        """Support ``numpy.sin`` and other functions."""
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
+        """Support operators, ``numpy.sin`` and other functions."""
         if method != "__call__" or kwargs:
             return NotImplemented
-        return self._emitter.call(function, args)
+        return self._emitter.call(ufunc, inputs)
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
         """Support ``numpy.clip``."""

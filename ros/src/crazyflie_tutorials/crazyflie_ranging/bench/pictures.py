@@ -14,7 +14,7 @@ import rospkg
 from geometry_msgs.msg import Twist, Vector3
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Polygon, Wedge
+from matplotlib.patches import Circle, Rectangle, Wedge
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_ranging.range_sensors import DIRECTIONS
@@ -54,7 +54,7 @@ class Flight:
         while not answer.done():
             self.process.advance(0.1)
         self._begin = self.process.clock.time()
-        self._lookup = self.process.handle("/pictures").listen_to_transforms()
+        self._lookup = self.process.handle("/pictures").listen_to_poses()
 
     def watch(self) -> Moment:
         """Advance by `STEP`; return the moment after it."""
@@ -71,8 +71,7 @@ class Flight:
         )
 
     def _place(self, frame):
-        place = self._lookup("world", frame).transform.translation
-        return place.x, place.y, place.z
+        return self._lookup("world", frame).position
 
 
 def draw_room(axes: Axes, moment: Moment) -> None:
@@ -80,7 +79,11 @@ def draw_room(axes: Axes, moment: Moment) -> None:
     for each in moment.world.objects:
         colour = OBJECT if each.path is not None else "#c9c5bb"
         if isinstance(each, Box):
-            axes.add_patch(Polygon(corners(each), fc=colour, ec=GREY, lw=0.6))
+            (x, y, _), (width, depth, _) = each.centre, each.extent
+            corner, turn = (x - width / 2.0, y - depth / 2.0), math.degrees(each.yaw)
+            box = Rectangle(corner, width, depth, angle=turn, rotation_point="center")
+            box.set(fc=colour, ec=GREY, lw=0.6)
+            axes.add_patch(box)
         else:
             axes.add_patch(Circle(each.centre[:2], each.size[0] / 2.0, fc=colour, ec=GREY, lw=0.6))
     for side, reading in moment.ranges.items():
@@ -93,22 +96,9 @@ def draw_room(axes: Axes, moment: Moment) -> None:
             axes.add_patch(cone)
     axes.add_patch(Circle((moment.x, moment.y), 0.07, fc=VEHICLE))
     width, depth = moment.world.floor.size
-    axes.set_xlim(-width / 2.0 - 0.15, width / 2.0 + 0.15)
-    axes.set_ylim(-depth / 2.0 - 0.15, depth / 2.0 + 0.15)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x, m")
-    axes.set_ylabel("y, m")
+    x, y = width / 2.0 + 0.15, depth / 2.0 + 0.15
+    axes.set(xlim=(-x, x), ylim=(-y, y), aspect="equal", xlabel="x, m", ylabel="y, m")
     axes.set_title(f"{moment.time:.0f} s after the takeoff, from above", loc="left", fontsize=10)
-
-
-def corners(box: Box) -> list[tuple[float, float]]:
-    """Return the corners of a box as seen from above, m."""
-    c, s = math.cos(box.yaw), math.sin(box.yaw)
-    halves = [(box.size[0] / 2.0 * a, box.size[1] / 2.0 * b) for a, b in _SIGNS]
-    return [(box.centre[0] + c * x - s * y, box.centre[1] + s * x + c * y) for x, y in halves]
-
-
-_SIGNS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 
 def panes() -> tuple[Figure, Axes, Axes, Axes]:
@@ -151,8 +141,7 @@ def follow_object(path: Path) -> None:
     ):
         bottom.fill_between(time, 0.0, 0.9, is_sent, color=colour, alpha=0.6, lw=0, label=name)
     bottom.legend(loc="lower left", fontsize=8, title="command, else 0", title_fontsize=8)
-    bottom.set_ylim(0.0, 0.9)
-    bottom.set_ylabel("sensor in front, m")
+    bottom.set(ylim=(0.0, 0.9), ylabel="sensor in front, m")
     figure.savefig(path, dpi=110)
 
 
@@ -168,16 +157,14 @@ def obstacle_stop(path: Path) -> None:
     time = [each.time for each in moments]
     top.axhline(0.5, color=GREY, ls="--", lw=1.0, label="asked for")
     top.plot(time, [each.command for each in moments], color=VEHICLE, label="passed on")
-    top.set_ylabel("velocity ahead, m/s")
-    top.set_ylim(-0.02, 0.6)
+    top.set(ylim=(-0.02, 0.6), ylabel="velocity ahead, m/s")
     top.legend(loc="upper right", fontsize=8)
     bottom.plot(time, [each.ranges["front"] for each in moments], color=VEHICLE)
     bottom.axhline(0.5, color=GREY, ls="--", lw=0.8)
     bottom.text(
         time[-1], 0.45, "distance that is kept", fontsize=8, color=GREY, ha="right", va="top"
     )
-    bottom.set_ylim(0.0, None)
-    bottom.set_ylabel("sensor in front, m")
+    bottom.set(ylim=(0.0, None), ylabel="sensor in front, m")
     figure.savefig(path, dpi=110)
 
 

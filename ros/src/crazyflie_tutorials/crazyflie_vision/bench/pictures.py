@@ -36,7 +36,7 @@ class Flight:
         while not answer.done():
             self.advance(STEP)
         self.begin = self._process.clock.time()
-        self._lookup = self._process.handle("/pictures").listen_to_transforms()
+        self._lookup = self._process.handle("/pictures").listen_to_poses()
 
     def advance(self, duration: float) -> None:
         """Advance by a duration (s); old images are dropped."""
@@ -52,8 +52,7 @@ class Flight:
 
     def place(self, frame: str) -> NDArray[np.float64]:
         """Return the position of a frame in the world, m."""
-        place = self._lookup("world", frame).transform.translation
-        return np.array([place.x, place.y, place.z])
+        return np.array(self._lookup("world", frame).position)
 
     def targets(self) -> NDArray[np.float64]:
         """Return the targets since the takeoff: rows of time (s), x, y (pixels)."""
@@ -73,9 +72,7 @@ def draw_flight(times, vehicle, ball, targets) -> Figure:
     above.plot(*vehicle[:, :2].T, color=VEHICLE, label="vehicle")
     for k in range(0, len(times), round(4.0 / STEP)):
         above.plot(*np.array([vehicle[k, :2], ball[k, :2]]).T, color=GREY, lw=0.6, zorder=0)
-    above.set_aspect("equal")
-    above.set_xlabel("x, m")
-    above.set_ylabel("y, m")
+    above.set(xlabel="x, m", ylabel="y, m", aspect="equal")
     above.set_title("from above, every 4 s", loc="left", fontsize=10)
     above.legend(frameon=False, loc="upper right")
     pixels, metres = right.subplots(2, 1, sharex=True)
@@ -85,8 +82,7 @@ def draw_flight(times, vehicle, ball, targets) -> Figure:
     pixels.legend(frameon=False, ncols=2, fontsize=8)
     metres.plot(times, np.linalg.norm(vehicle - ball, axis=1), color=VEHICLE)
     metres.axhline(1.0, color=GREY, lw=0.8, ls=":")
-    metres.set_ylabel("distance, m")
-    metres.set_xlabel("time since the takeoff, s")
+    metres.set(xlabel="time since the takeoff, s", ylabel="distance, m")
     for axes in (above, pixels, metres):
         axes.spines[["top", "right"]].set_visible(False)
     return figure

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 OK, WARN, ERROR = "ok", "warn", "error"
 
@@ -15,6 +16,10 @@ class Finding:
     remedy: str
 
 
+#: Findings that should be looked at, and those that keep a vehicle from flying correctly.
+warn, error = partial(Finding, WARN), partial(Finding, ERROR)
+
+
 @dataclass(frozen=True)
 class Check:
     """A check of one thing."""
@@ -22,16 +27,6 @@ class Check:
     name: str
     fine: str  #: Text for a check without findings.
     findings: Iterable[Finding]  #: Often a generator, which runs the check when it is iterated.
-
-
-def warn(text: str, remedy: str) -> Finding:
-    """Return a finding that should be looked at."""
-    return Finding(WARN, text, remedy)
-
-
-def error(text: str, remedy: str) -> Finding:
-    """Return a finding that keeps a vehicle from flying correctly."""
-    return Finding(ERROR, text, remedy)
 
 
 def lines(check: Check) -> Iterator[tuple[str, str]]:

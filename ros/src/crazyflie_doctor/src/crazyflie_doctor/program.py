@@ -41,8 +41,7 @@ def doctor(arguments: list[str] | None = None) -> int:
         "doctor",
         "Check this computer and the running graph; print a line for each finding and what to do "
         "about it. The command publishes nothing, and connects only to a vehicle that is given. "
-        "Exit "
-        "status: 0 without errors, 1 with errors, 2 wrong usage.",
+        "Exit status: 0 without errors, 1 with errors, 2 wrong usage.",
     )
     watchdog = threading.Timer(options.timeout, _give_up, [options.timeout])
     watchdog.daemon = True

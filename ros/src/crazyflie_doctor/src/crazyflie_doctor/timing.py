@@ -25,9 +25,9 @@ FUTURE = 0.5
 
 #: Clocks that differ by more than this, s, are different clocks: simulated and real time.
 OTHER_CLOCK = 1e6
-USED_MARGIN = (
-    2.0 / 3.0
-)  #: Usable fraction of the delay margin; the rest is for the vehicle and for jitter.
+
+#: Usable fraction of the delay margin; the rest is for the vehicle and for jitter.
+USED_MARGIN = 2.0 / 3.0
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,8 @@ ALL_MOTORS = 0b1111  #: Bit mask in health.motorPass.
 
 _PERIOD_MS = 100
 _SELF_TEST_LIMIT = 10.0  #: s.
-_VERSION_PORT, _VERSION_CHANNEL, _FIRMWARE = 13, 1, 1
+#: Port, channel and first byte of the question for the firmware's version, and of its answer.
+_VERSION = (13, 1, b"\x01")
 _VARIANCES = ("kalman.varPX", "kalman.varPY", "kalman.varPZ")
 _HEALTH = ("health.motorPass", "health.batteryPass", "health.motorTestCount")
 
@@ -148,12 +149,7 @@ class _Watch:
     came: threading.Event = field(default_factory=threading.Event)
 
     def on_packet(self, port: int, channel: int, data: bytes) -> None:
-        is_version = (port, channel, data[:1]) == (
-            _VERSION_PORT,
-            _VERSION_CHANNEL,
-            bytes([_FIRMWARE]),
-        )
-        if is_version:
+        if (port, channel, data[:1]) == _VERSION:
             self.firmware = data[1:].split(b"\0")[0].decode(errors="replace")
 
     def on_health(self, _: int, values: tuple[float, ...]) -> None:
@@ -176,38 +172,26 @@ def examine(uri: str, duration: float = 10.0, motors: bool = False) -> VehicleFa
 
 def _watch(vehicle: Crazyflie, watch: _Watch, duration: float, motors: bool) -> VehicleFacts:
     known = vehicle.log.variables()
-    vehicle.add_log_block(
-        LogBlock(
-            "battery", _PERIOD_MS, ("pm.vbat",), lambda _, values: watch.voltages.append(values[0])
-        )
-    )
-    if all(name in known for name in _VARIANCES):
-        vehicle.add_log_block(
-            LogBlock(
-                "variances", _PERIOD_MS, _VARIANCES, lambda _, v: watch.variances.append(tuple(v))
-            )
-        )
-    if all(name in known for name in _HEALTH):
-        vehicle.add_log_block(LogBlock("health", _PERIOD_MS, _HEALTH, watch.on_health))
-    vehicle.send_packet(_VERSION_PORT, _VERSION_CHANNEL, bytes([_FIRMWARE]))
+    for name, variables, on_values in (
+        ("battery", ("pm.vbat",), lambda _, values: watch.voltages.append(values[0])),
+        ("variances", _VARIANCES, lambda _, values: watch.variances.append(tuple(values))),
+        ("health", _HEALTH, watch.on_health),
+    ):
+        if all(each in known for each in variables):
+            vehicle.add_log_block(LogBlock(name, _PERIOD_MS, variables, on_values))
+    vehicle.send_packet(*_VERSION)
     end = time.monotonic() + duration
     while time.monotonic() < end:
         # Raises the reason when the link is lost.
         vehicle.link()
         time.sleep(_PERIOD_MS / 1000.0)
-    values = vehicle.parameters.values()
+    decks = [name.partition(".") for name, value in vehicle.parameters.values().items() if value]
     deviations = [tuple(map(_root, sample)) for sample in watch.variances]
     facts = VehicleFacts(
         voltage=sum(watch.voltages) / len(watch.voltages) if watch.voltages else math.nan,
         quality=vehicle.quality(),
         latency=vehicle.latency(),
-        decks=tuple(
-            sorted(
-                name.removeprefix("deck.")
-                for name, value in values.items()
-                if name.startswith("deck.") and value
-            )
-        ),
+        decks=tuple(sorted(name for prefix, _, name in decks if prefix == "deck")),
         firmware=watch.firmware,
         deviations=deviations[-1] if deviations else (),
         changes=tuple(max(axis) - min(axis) for axis in zip(*deviations, strict=True)),

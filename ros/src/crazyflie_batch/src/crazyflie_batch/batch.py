@@ -76,7 +76,10 @@ def fly(batch: Batch, record: bool, threads: int) -> Flights:
     is_random = batch.parameters["noise"].any() or batch.parameters["dropout"].any()
 
     def fly_group(group):
-        noise = _noise_samples(batch, groups[group]) if is_random else no_noise
+        noise = no_noise
+        if is_random:
+            samples = [batch.noise_samples(vehicle) for vehicle in groups[group].tolist()]
+            noise = np.ascontiguousarray(np.stack(samples, axis=-1))
         rows = records[group] if record else np.empty((1, *memory.shape[1:]))
         program(plan).fly(memory[group], parameters[group], noise, rows, slots)
 
@@ -89,11 +92,6 @@ def fly(batch: Batch, record: bool, threads: int) -> Flights:
 def _groups(n, lanes):
     """Return the vehicles of each group; the last one is filled up with the last vehicle."""
     return np.minimum(np.arange(math.ceil(n / lanes) * lanes), n - 1).reshape(-1, lanes)
-
-
-def _noise_samples(batch, vehicles):
-    samples = [batch.noise_samples(vehicle) for vehicle in vehicles.tolist()]
-    return np.ascontiguousarray(np.stack(samples, axis=-1))
 
 
 def _grouped(rows, groups, n):

@@ -40,7 +40,7 @@ class Results:
         text = json.dumps(present, indent=1, sort_keys=True)
         noted = folder / "settings.json"
         if noted.exists():
-            _check(folder, json.loads(text), _parsed(noted.read_bytes()))
+            _check(folder, json.loads(text), noted.read_bytes())
         noted.write_text(text, encoding="utf-8")
 
     def missing(self) -> list[int]:
@@ -76,21 +76,17 @@ class Results:
         return self._chunks / f"{first:08d}.npy"
 
 
-def _parsed(text):
+def _check(folder, present, text):
     try:
         noted = json.loads(text)
     except ValueError:
-        return {}
-    return noted if isinstance(noted, dict) else {}
-
-
-def _check(folder, present, noted):
-    if noted == present:
-        return
-    advice = "expected another --out, or --restart"
-    if {**noted, "code": present["code"]} == present:
-        raise OtherFlightsError(f"{folder} has flights of another version of the code; {advice}")
-    raise OtherFlightsError(f"{folder} has flights of other settings; {advice}")
+        noted = None
+    if noted != present:
+        is_same = isinstance(noted, dict) and {**noted, "code": present["code"]} == present
+        other = "another version of the code" if is_same else "other settings"
+        raise OtherFlightsError(
+            f"{folder} has flights of {other}; expected another --out, or --restart"
+        )
 
 
 def run(

@@ -90,22 +90,20 @@ def test_bad_files_are_named(tmp_path, name, content, expected):
     assert expected in str(error.value)
 
 
-class Unplugged(FrameSource):
-    """A camera that gives two images, and then is gone."""
+def unplugged(*_):
+    """Return a camera that gives two images, and then is gone."""
+    images = [picture(50), picture(100)]
 
-    is_live = True
-
-    def __init__(self):
-        self.images = [picture(50), picture(100)]
-
-    def read(self):
-        if self.images:
-            return self.images.pop(0)
+    def read():
+        if images:
+            return images.pop(0)
         raise OSError("camera 0 gives no more images; was it unplugged?")
+
+    return FrameSource(read, is_live=True)
 
 
 def test_a_camera_that_is_unplugged_ends_the_node(monkeypatch):
-    monkeypatch.setattr("crazyflie_vision.webcam_node.open_source", lambda *_: Unplugged())
+    monkeypatch.setattr("crazyflie_vision.webcam_node.open_source", unplugged)
     is_over = threading.Event()
     monkeypatch.setattr(FakeProcess, "end", lambda _, status: codes.append(status) or is_over.set())
     codes = []

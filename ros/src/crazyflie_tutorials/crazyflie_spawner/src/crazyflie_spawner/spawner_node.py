@@ -106,7 +106,6 @@ class SpawnedVehicle:
     process: VehicleProcess
     ticks_left: int  #: Number of timer periods until it must be ready.
     spawning: "Future[SpawnVehicleResponse]"  #: Reply of the spawn service.
-    is_ready: bool = False  #: Whether its takeoff service is offered.
     #: Replies of the remove service.
     removing: "list[Future[RemoveVehicleResponse]]" = field(default_factory=list)
 
@@ -185,14 +184,13 @@ class SpawnerNode(Node):
             status = vehicle.process.status
             if status is not None:
                 self._forget(name, status)
-            elif not vehicle.is_ready and not vehicle.removing:
+            elif not vehicle.spawning.done() and not vehicle.removing:
                 services = self._handle.service_nodes() if services is None else services
                 self._check_ready(name, vehicle, services)
 
     def _check_ready(self, name, vehicle, services):
         vehicle.ticks_left -= 1
         if self._takeoff(name) in services:
-            vehicle.is_ready = True
             vehicle.spawning.set_result(SpawnVehicleResponse(name))
             self._handle.info(f"{name} is ready")
         elif vehicle.ticks_left <= 0:

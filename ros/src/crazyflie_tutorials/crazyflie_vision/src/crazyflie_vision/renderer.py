@@ -50,12 +50,7 @@ class Face:
     @property
     def shade(self) -> float:
         """Fraction of the colour's brightness."""
-        return brightness(float(self.normal @ LIGHT))
-
-
-def brightness(cosine: float) -> float:
-    """Return the brightness of a surface from the cosine between its normal and the light."""
-    return AMBIENT + (1.0 - AMBIENT) * max(cosine, 0.0)
+        return AMBIENT + (1.0 - AMBIENT) * max(float(self.normal @ LIGHT), 0.0)
 
 
 def bgr(colour: Colour) -> NDArray[np.float64]:

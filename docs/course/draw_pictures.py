@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -104,29 +105,18 @@ def draw_steps(path: Path, log: Path) -> None:
     """Draw the position after a step, in a process for each gain file."""
     figure = Figure(figsize=(6, 4), layout="constrained")
     position, tilt = figure.subplots(2, 1, sharex=True)
-    for name in ("K_quadrotor.txt", "K_calm.txt"):
-        data = log.with_name(f"{name}.npz")
-        if os.fork() == 0:
-            calm = COURSE / "solutions" / "8" / "my_pd" / "config" / "K.txt"
-            record = step(calm if name == "K_calm.txt" else gains_folder() / name, log)
-            end = record.events["land"]
-            start = record.reference.times[record.reference.column("x") == 0.5][0]
-            after, sent = (
-                (times >= start) & (times <= end)
-                for times in (record.state.times, record.final_control.times)
-            )
-            np.savez(
-                data,
-                t=record.state.times[after] - start,
-                x=record.state.column("x")[after],
-                tc=record.final_control.times[sent] - start,
-                pitch=record.final_control.column("pitch")[sent],
-            )
-            os._exit(0)
-        os.wait()
-        saved = np.load(data)
-        position.plot(saved["t"], saved["x"], label=name)
-        tilt.plot(saved["tc"], np.degrees(saved["pitch"]))
+    gains = COURSE.parents[1] / "ros" / "src" / "crazyflie_lqr" / "config" / "K_quadrotor.txt"
+    calm = COURSE / "solutions" / "8" / "my_pd" / "config" / "K.txt"
+    for name, file in (("K_quadrotor.txt", gains), ("K_calm.txt", calm)):
+        with ProcessPoolExecutor(1) as executor:
+            record = executor.submit(step, file, log).result()
+        start = record.reference.times[record.reference.column("x") == 0.5][0]
+        for axes, series, column, scale in (
+            (position, record.state, "x", 1.0),
+            (tilt, record.final_control, "pitch", np.degrees(1.0)),
+        ):
+            shown = (series.times >= start) & (series.times <= record.events["land"])
+            axes.plot(series.times[shown] - start, scale * series.column(column)[shown], label=name)
     position.axhline(0.5, color="gray", linestyle="--")
     position.set_ylabel("x (m)")
     position.legend(loc="lower right")
@@ -134,11 +124,6 @@ def draw_steps(path: Path, log: Path) -> None:
     for axes in (position, tilt):
         axes.grid(alpha=0.3)
     figure.savefig(path, dpi=90)
-
-
-def gains_folder() -> Path:
-    """Return the folder of the workspace's gain files."""
-    return COURSE.parents[1] / "ros" / "src" / "crazyflie_lqr" / "config"
 
 
 @contextlib.contextmanager

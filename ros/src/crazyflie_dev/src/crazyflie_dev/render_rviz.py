@@ -7,6 +7,8 @@ import sys
 import tempfile
 import time
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -72,44 +74,30 @@ def material_of(model: Path, name: str) -> list[float]:
     return [float(part) for part in colour.attrib["rgba"].split()[:3]]
 
 
-class RvizScene:
-    """RViz's picture of the flight on a display, and its expected content.
+show_progress = partial(print, flush=True)
 
-    ``description`` is the folder of crazyflie_description, which has the colours.
+
+def wait_for_picture(
+    display: str, background: ArrayLike, colours: Mapping[str, ArrayLike]
+) -> NDArray[np.uint8]:
+    """Return RViz's picture on a display when colours, by the name of what has them, are on it.
+
+    It has the shape (height, width, 3). `DisplayError`: something is missing.
     """
-
-    def __init__(self, display: str, description: Path):
-        self._display = display
-        self._background = background_of(description / "launch" / "crazyflie.rviz")
-        self._vehicle = material_of(description / "urdf" / "crazyflie2.urdf", "front")
-
-    def wait_for_vehicle(self) -> None:
-        """Wait until the vehicle is drawn."""
-        self._wait({"vehicle": self._vehicle})
-
-    def wait_for_everything(self) -> NDArray[np.uint8]:
-        """Return the picture when vehicle, path and reference are on it, shape (h, w, 3)."""
-        markers = {"path": PATH_COLOUR, "reference": REFERENCE_COLOUR}
-        colours = {name: (colour.r, colour.g, colour.b) for name, colour in markers.items()}
-        return self._wait({"vehicle": self._vehicle, **colours})
-
-    def _wait(self, colours):
-        deadline = time.monotonic() + _DRAW_LIMIT
-        while True:
-            screen = screenshot(self._display)
-            picture = crop_to_scene(screen, self._background)
-            missing = [
-                name for name, c in colours.items() if pixels_of(picture, c) < _FEWEST_PIXELS
-            ]
-            if picture.size < _SMALLEST_SHARE * screen.size:
-                missing.insert(0, "window")
-            if not missing:
-                return picture
-            if time.monotonic() > deadline:
-                raise DisplayError(
-                    f"RViz has drawn no {' and no '.join(missing)} within {_DRAW_LIMIT:g} s"
-                )
-            time.sleep(0.5)
+    deadline = time.monotonic() + _DRAW_LIMIT
+    while True:
+        screen = screenshot(display)
+        picture = crop_to_scene(screen, background)
+        missing = [name for name, c in colours.items() if pixels_of(picture, c) < _FEWEST_PIXELS]
+        if picture.size < _SMALLEST_SHARE * screen.size:
+            missing.insert(0, "window")
+        if not missing:
+            return picture
+        if time.monotonic() > deadline:
+            raise DisplayError(
+                f"RViz has drawn no {' and no '.join(missing)} within {_DRAW_LIMIT:g} s"
+            )
+        time.sleep(0.5)
 
 
 def render(output: Path, log: Path, launch_arguments: list[str]) -> None:
@@ -118,16 +106,21 @@ def render(output: Path, log: Path, launch_arguments: list[str]) -> None:
     `DisplayError`: RViz has not drawn what it should; `FlightError`: the vehicle does not hover.
     """
     description = Path(rospkg.RosPack().get_path("crazyflie_description"))
+    background = background_of(description / "launch" / "crazyflie.rviz")
+    vehicle: dict[str, ArrayLike] = {
+        "vehicle": material_of(description / "urdf" / "crazyflie2.urdf", "front")
+    }
+    markers = {"path": PATH_COLOUR, "reference": REFERENCE_COLOUR}
+    colours = {name: (colour.r, colour.g, colour.b) for name, colour in markers.items()}
     with virtual_display(*SCREEN) as display:
         os.environ.update(DISPLAY=display, LIBGL_ALWAYS_SOFTWARE="1")
-        scene = RvizScene(display, description)
         arguments = ["crazyflie_examples", "sw_hover.launch", "rviz:=true", *launch_arguments]
         show_progress(f"launching {' '.join(arguments)} on display {display}")
         with roslaunch(arguments, log):
             operator = FlightOperator(begin("render_rviz"))
             operator.wait_until_ready()
             show_progress("waiting for RViz to draw the vehicle")
-            scene.wait_for_vehicle()
+            wait_for_picture(display, background, vehicle)
             show_progress("taking off")
             operator.takeoff()
             operator.hover(1.0)
@@ -135,15 +128,10 @@ def render(output: Path, log: Path, launch_arguments: list[str]) -> None:
             if error > HOVER_TOLERANCE:
                 raise FlightError(f"it hovers {error:.3f} m from where it should")
             show_progress("waiting for RViz to draw vehicle, path and reference")
-            picture = scene.wait_for_everything()
+            picture = wait_for_picture(display, background, vehicle | colours)
     output.parent.mkdir(parents=True, exist_ok=True)
     image.imsave(output, np.ascontiguousarray(picture))
     show_progress(f"{output}: {picture.shape[1]} x {picture.shape[0]} pixels")
-
-
-def show_progress(text: str) -> None:
-    """Print what is being done."""
-    print(text, flush=True)
 
 
 def main() -> int:

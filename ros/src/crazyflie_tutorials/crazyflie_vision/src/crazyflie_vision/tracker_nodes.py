@@ -98,18 +98,11 @@ class FaceDetectorNode(TrackerNode):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         super().load_parameters(handle)
-        each = self._parameters
         try:
-            self._detector = FaceDetector(each.cascade, each.smallest, each.neighbours)
+            self._detector = FaceDetector(self._parameters.cascade)
         except OSError as error:
             raise ParameterError(f"parameter {handle.resolve('~cascade')}: {error}") from None
 
     @override
     def find(self, image: NDArray[Any]) -> Target | None:
-        return self._detector.find(image)
-
-    @override
-    def _reconfigure(self, parameters):
-        super()._reconfigure(parameters)
-        self._detector.smallest = parameters.smallest
-        self._detector.neighbours = parameters.neighbours
+        return self._detector.find(image, self._parameters.smallest, self._parameters.neighbours)

@@ -34,17 +34,16 @@ def draw(image: NDArray[Any], target: Target | None) -> NDArray[Any]:
     height, width = image.shape[:2]
     middle = ((width - 1) // 2, (height - 1) // 2)
     cv2.drawMarker(drawn, middle, (255, 255, 255), cv2.MARKER_CROSS, 14, 1)
-    if target is None:
-        cv2.putText(drawn, "nothing", (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, _INK, 1, cv2.LINE_AA)
-        return drawn
-    x, y, radius = (
-        round(value * 2**_SUBPIXEL_BITS) for value in (target.x, target.y, target.radius)
-    )
-    cv2.circle(drawn, (x, y), radius, _INK, 2, cv2.LINE_AA, _SUBPIXEL_BITS)
-    centre = (round(target.x), round(target.y))
-    cv2.drawMarker(drawn, centre, _INK, cv2.MARKER_CROSS, 8, 1)
-    cv2.arrowedLine(drawn, middle, centre, (0, 255, 255), 1, cv2.LINE_AA, tipLength=0.1)
-    text = f"x {target.x:.0f}  y {target.y:.0f}  radius {target.radius:.1f}"
+    text = "nothing"
+    if target is not None:
+        x, y, radius = (
+            round(value * 2**_SUBPIXEL_BITS) for value in (target.x, target.y, target.radius)
+        )
+        cv2.circle(drawn, (x, y), radius, _INK, 2, cv2.LINE_AA, _SUBPIXEL_BITS)
+        centre = (round(target.x), round(target.y))
+        cv2.drawMarker(drawn, centre, _INK, cv2.MARKER_CROSS, 8, 1)
+        cv2.arrowedLine(drawn, middle, centre, (0, 255, 255), 1, cv2.LINE_AA, tipLength=0.1)
+        text = f"x {target.x:.0f}  y {target.y:.0f}  radius {target.radius:.1f}"
     cv2.putText(drawn, text, (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, _INK, 1, cv2.LINE_AA)
     return drawn
 
@@ -114,13 +113,10 @@ CASCADE = "/usr/share/opencv4/haarcascades/haarcascade_frontalface_default.xml"
 class FaceDetector:
     """Finds the largest face in an image, by a cascade: a file with features and their weights.
 
-    ``smallest`` is the width of the smallest face, pixels; the time that it takes is about 1 /
-    smallest^2. ``neighbours`` is the number of overlapping finds that make a face; more of them
-    miss more faces, and find fewer false ones. OSError: the file does not exist, or is not a
-    cascade.
+    OSError: the file does not exist, or is not a cascade.
     """
 
-    def __init__(self, cascade: str = CASCADE, smallest: int = 24, neighbours: int = 4):
+    def __init__(self, cascade: str = CASCADE):
         self._cascade = cv2.CascadeClassifier()
         try:
             is_loaded = self._cascade.load(cascade)
@@ -128,15 +124,16 @@ class FaceDetector:
             is_loaded = False
         if not is_loaded:
             raise OSError(f"{cascade} is not a cascade; those of Debian are in opencv-data")
-        self.smallest = smallest
-        self.neighbours = neighbours
 
-    def find(self, image: NDArray[Any]) -> Target | None:
-        """Return the largest face in a coloured image, its radius half its width; None without."""
+    def find(self, image: NDArray[Any], smallest: int = 24, neighbours: int = 4) -> Target | None:
+        """Return the largest face in a coloured image, its radius half its width; None without.
+
+        ``smallest`` is the width of the smallest face, pixels; the time that it takes is about 1 /
+        smallest^2. ``neighbours`` is the number of overlapping finds that make a face; more of them
+        miss more faces, and find fewer false ones.
+        """
         grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-        faces = self._cascade.detectMultiScale(
-            grey, 1.1, self.neighbours, minSize=(self.smallest, self.smallest)
-        )
+        faces = self._cascade.detectMultiScale(grey, 1.1, neighbours, minSize=(smallest, smallest))
         if len(faces) == 0:
             return None
         x, y, width, height = (float(value) for value in max(faces, key=lambda face: face[2]))

@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
+from unittest.mock import patch
 
 from crazyflie_dev import bench_flights
 
@@ -76,9 +77,8 @@ def measure(
             for _ in range(rounds):
                 for environment, measured in ((reference, there), (own, here)):
                     if environment is not None:
-                        os.environ.clear()
-                        os.environ.update(environment)
-                        measured.append(getattr(bench_flights, function)(*arguments))
+                        with patch.dict(os.environ, environment, clear=True):
+                            measured.append(getattr(bench_flights, function)(*arguments))
         except bench_flights.NotMeasuredError as error:
             outcome = {"reason": str(error)}
         # After any error, the other figures can still be measured.

@@ -5,7 +5,6 @@ import datetime
 import keyword
 import os
 import re
-import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -122,23 +121,18 @@ def create(package: Package, folder: Path) -> Path:
     target = folder / package.name
     if target.exists() or target.is_symlink():
         raise GeneratorError(f"{target} exists already; expected the name of a new package")
-    unfinished = None
     try:
         # In the same folder, so that it appears at its place at once and complete.
-        unfinished = Path(tempfile.mkdtemp(prefix=f".{package.name}-", dir=folder))
-        for place, text in package.files():
-            file = unfinished / place
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(text)
-            if place.parts[0] == "exec":
-                file.chmod(0o755)
-        unfinished.chmod(0o755)
-        os.rename(unfinished, target)
+        with tempfile.TemporaryDirectory(prefix=f".{package.name}-", dir=folder) as unfinished:
+            for place, text in package.files():
+                file = Path(unfinished, package.name, place)
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_text(text)
+                if place.parts[0] == "exec":
+                    file.chmod(0o755)
+            os.rename(Path(unfinished, package.name), target)
     except OSError as error:
         raise GeneratorError(f"{target} cannot be written: {error}") from None
-    finally:
-        if unfinished is not None:
-            shutil.rmtree(unfinished, ignore_errors=True)
     return target
 
 

@@ -112,7 +112,7 @@ class LanePath:
 
 
 def lane_offsets(width: float, lane_width: float) -> list[float]:
-    """Return the distances of lanes from one side of a strip, m.
+    """Return the distances of lanes, or of the middles of cells, from one side of a strip, m.
 
     They are equally spaced, at most ``lane_width`` apart, and as few as possible.
     """

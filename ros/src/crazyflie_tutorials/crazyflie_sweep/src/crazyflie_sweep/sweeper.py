@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from crazyflie_sweep.lanes import LanePath, Line, Point, sweep
+from crazyflie_sweep.lanes import LanePath, Line, Point, lane_offsets, sweep
 from crazyflie_sweep.sweep_parameters import Area, SweepPlan
 from crazyflie_sweep.velocities import OSCILLATOR_BEGIN, OSCILLATOR_END, OSCILLATOR_LENGTH
 
@@ -17,11 +17,13 @@ class Coverage:
     """
 
     def __init__(self, area: Area, cell: float, swath: float):
-        xs, width = _middles(area.x_min, area.x_max, cell)
-        ys, height = _middles(area.y_min, area.y_max, cell)
-        self.cell_size = (width, height)  #: Width of the cells along x and y, m.
+        width, height = area.x_max - area.x_min, area.y_max - area.y_min
+        xs, ys = lane_offsets(width, cell), lane_offsets(height, cell)
+        #: Width of the cells along x and y, m.
+        self.cell_size = (width / len(xs), height / len(ys))
         self._radius = swath / 2.0
-        self._x, self._y = np.meshgrid(xs, ys, indexing="ij")
+        x, y = np.meshgrid(xs, ys, indexing="ij")
+        self._x, self._y = area.x_min + x, area.y_min + y
         self._is_covered = np.zeros(self._x.shape, dtype=bool)
 
     def add(self, position: Point) -> bool:
@@ -44,12 +46,6 @@ class Coverage:
         """Return the middles of the cells that are (not) covered, m, shape (n, 2)."""
         chosen = self._is_covered == covered
         return np.column_stack((self._x[chosen], self._y[chosen]))
-
-
-def _middles(least, most, cell):
-    count = max(1, math.ceil((most - least) / cell - 1e-9))
-    width = (most - least) / count
-    return least + width * (np.arange(count) + 0.5), width
 
 
 _NEAR = 0.01  #: Distance from the first lane at which a vehicle has arrived (m).

@@ -63,7 +63,7 @@ class WebcamNode(Node):
             # The thread waits for images, which a callback must not do.
             threading.Thread(target=self._watch, daemon=True).start()
         else:
-            handle.timer(1.0 / parameters.rate, self._on_timer)
+            handle.timer(1.0 / parameters.rate, self._read)
 
     @override
     def shutdown(self) -> None:
@@ -71,21 +71,17 @@ class WebcamNode(Node):
         self._is_over.set()
 
     def _watch(self):
-        while not self._is_over.is_set():
-            try:
-                image = self._source.read()
-            except OSError as error:
-                self._handle.submit(self._end, str(error))
-                return
-            self._handle.submit(self._publish, image)
+        while not self._is_over.is_set() and self._read():
+            pass
 
-    def _on_timer(self):
+    def _read(self):
+        """Read an image and have it published; return whether there was one."""
         try:
-            image = self._source.read()
+            self._handle.submit(self._publish, self._source.read())
         except OSError as error:
-            self._end(str(error))
-            return
-        self._publish(image)
+            self._handle.submit(self._end, str(error))
+            return False
+        return True
 
     def _publish(self, image):
         size = (self._pinhole.width, self._pinhole.height)

@@ -10,7 +10,7 @@ from llvmlite import binding, ir
 
 from crazyflie_batch import flight
 from crazyflie_batch.flight import Components, Plan
-from crazyflie_batch.symbols import DOUBLE, Emitter
+from crazyflie_batch.symbols import DOUBLE, Emitter, Symbol
 
 _INTEGER = ir.IntType(64)
 _BYTES = 8  #: Size of a number.
@@ -130,12 +130,12 @@ class _Writer:
                 offset = builder.add(slot, self._integer(part * self._lanes + lane))
                 number = builder.load(builder.gep(numbers, [offset]))
                 pose[part] = builder.insert_element(pose[part], number, index)
-        return [self._emitter.symbol(value) for value in pose]
+        return [Symbol(self._emitter, value) for value in pose]
 
     def _load(self, pointer: ir.Value, dims: Mapping[str, int]) -> Components:
         rows = range(sum(dims.values()))
         load = self._builder.load
-        symbols = [self._emitter.symbol(self._aligned(load, pointer, row)) for row in rows]
+        symbols = [Symbol(self._emitter, self._aligned(load, pointer, row)) for row in rows]
         return flight.components(symbols, dims)
 
     def _aligned(self, action, pointer, index, *value):
@@ -159,7 +159,7 @@ class _Writer:
         for lane in range(self._lanes):
             index = ir.Constant(ir.IntType(32), lane)
             vector = builder.insert_element(vector, number, index)
-        return self._emitter.symbol(vector)
+        return Symbol(self._emitter, vector)
 
     def _times(self, integer, factor):
         return self._builder.mul(integer, self._integer(factor))

@@ -65,23 +65,19 @@ class Emitter:
             return number.value
         return ir.Constant(self.type, [float(number)] * self.lanes)
 
-    def symbol(self, value: ir.Value) -> "Symbol":
-        """Return the symbol of a vector."""
-        return Symbol(self, value)
-
     def call(self, function: Any, arguments: Sequence[Any]) -> "Symbol | Condition":
         """Return a function, one of numpy's, of symbols or floats."""
         values = [self.value(argument) for argument in arguments]
         if function in _OPERATORS:
-            return self.symbol(getattr(self.builder, _OPERATORS[function])(*values))
+            return Symbol(self, getattr(self.builder, _OPERATORS[function])(*values))
         if function in _COMPARISONS:
             sign = _COMPARISONS[function]
             return Condition(self, self.builder.fcmp_ordered(sign, *values))
         if function is np.negative:
-            return self.symbol(self.builder.fsub(self.value(-0.0), *values))
+            return Symbol(self, self.builder.fsub(self.value(-0.0), *values))
         if function in _INTRINSICS:
             name = f"{_INTRINSICS[function]}.v{self.lanes}f64"
-            return self.symbol(self.builder.call(self._declare(name, self.type, 1), values))
+            return Symbol(self, self.builder.call(self._declare(name, self.type, 1), values))
         if function not in _FUNCTIONS:
             raise TypeError(f"{function} is not supported in a batch")
         name = _FUNCTIONS[function]
@@ -89,8 +85,8 @@ class Emitter:
             parameters = "v" * len(values)
             name = f"_ZGV{_VECTOR_LETTERS[self.lanes]}N{self.lanes}{parameters}_{name}"
             callee = self._declare(name, self.type, len(values))
-            return self.symbol(self.builder.call(callee, values))
-        return self.symbol(self._lane_by_lane(self._declare(name, DOUBLE, len(values)), values))
+            return Symbol(self, self.builder.call(callee, values))
+        return Symbol(self, self._lane_by_lane(self._declare(name, DOUBLE, len(values)), values))
 
     def _lane_by_lane(self, function, values):
         result = ir.Constant(self.type, ir.Undefined)
@@ -137,7 +133,7 @@ class Condition(NDArrayOperatorsMixin):
             return NotImplemented
         _, value, other = args
         values = [self._emitter.value(number) for number in (value, other)]
-        return self._emitter.symbol(self._emitter.builder.select(self.value, *values))
+        return Symbol(self._emitter, self._emitter.builder.select(self.value, *values))
 
 
 class Symbol(NDArrayOperatorsMixin):

@@ -44,11 +44,9 @@ LIMIT = 30.0  #: Timeout of a part of the flight (s); a takeoff takes 6 s.
 def eight(moment: float) -> PositionVelocityYawState:
     """Return the reference of the figure eight, which turns once, at a time (s) since its begin."""
     rate = figure8.DURATION / EIGHT_DURATION
-    x, y, turn = (
-        figure8.sine(EIGHT_SCALE * figure8.WIDTH, 1, rate * moment),
-        figure8.sine(EIGHT_SCALE * figure8.HEIGHT, 2, rate * moment),
-        figure8.phase(rate * moment),
-    )
+    x = figure8.sine(EIGHT_SCALE * figure8.WIDTH, 1, rate * moment)
+    y = figure8.sine(EIGHT_SCALE * figure8.HEIGHT, 2, rate * moment)
+    turn = figure8.phase(rate * moment)
     return PositionVelocityYawState(
         x=x[0], y=y[0], z=HOVER[2], x_dot=rate * x[1], y_dot=rate * y[1], yaw=turn[0]
     )

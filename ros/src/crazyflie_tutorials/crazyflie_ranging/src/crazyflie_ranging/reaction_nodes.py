@@ -1,7 +1,7 @@
 """ROS interfaces of the reactions to ranges: following an object, and a filter of cmd_vel."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 from geometry_msgs.msg import Twist, Vector3
@@ -16,22 +16,23 @@ from crazyflie_utils.vectors import is_finite
 
 
 class LatestRanges:
-    """The latest readings of range sensors; ``topics`` has their topics by name."""
+    """The latest readings of range sensors, which are valid for ``age`` (s)."""
 
-    def __init__(self, handle: NodeHandle, topics: dict[str, str]):
+    def __init__(self, handle: NodeHandle, topics: Sequence[str], age: float):
         self._handle = handle
-        self._readings: dict[str, tuple[float, float]] = {}
-        for name, topic in topics.items():
-            handle.subscribe(topic, Range, partial(self._take, name))
+        self._age = age
+        self._readings = [(math.nan, -math.inf)] * len(topics)
+        for number, topic in enumerate(topics):
+            handle.subscribe(topic, Range, partial(self._take, number))
 
-    def _take(self, name, message):
+    def _take(self, number, message):
         if not math.isnan(message.range):
-            self._readings[name] = (message.range, self._handle.time())
+            self._readings[number] = (message.range, self._handle.time())
 
-    def reading(self, name: str, age: float) -> float | None:
-        """Return a sensor's reading of the last ``age`` seconds, m; None if it was silent."""
-        reading, time = self._readings.get(name, (math.nan, -math.inf))
-        return reading if self._handle.time() - time <= age else None
+    def readings(self) -> list[float | None]:
+        """Return the readings in the order of the topics, m; None for a silent sensor."""
+        now = self._handle.time()
+        return [reading if now - time <= self._age else None for reading, time in self._readings]
 
 
 class SilenceParameters(Parameters):
@@ -74,14 +75,8 @@ class FollowObjectNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._publisher = handle.publisher(parameters.cmd_vel_topic, Twist)
-        self._ranges = LatestRanges(
-            handle,
-            {
-                "front": parameters.front_topic,
-                "left": parameters.left_topic,
-                "right": parameters.right_topic,
-            },
-        )
+        topics = (parameters.front_topic, parameters.left_topic, parameters.right_topic)
+        self._ranges = LatestRanges(handle, topics, parameters.reading_age)
         handle.timer(parameters.time_step, self._on_timer)
 
     @override
@@ -93,10 +88,7 @@ class FollowObjectNode(Node):
         self._parameters = parameters
 
     def _on_timer(self):
-        age = self._parameters.reading_age
-        front, left, right = (
-            self._ranges.reading(name, age) for name in ("front", "left", "right")
-        )
+        front, left, right = self._ranges.readings()
         if front is None:
             topic = self._handle.resolve(self._parameters.front_topic)
             self._handle.warn(f"standing still: no message on {topic}", throttle=5.0)
@@ -146,9 +138,8 @@ class ObstacleStopNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._publisher = handle.publisher(parameters.out_topic, Twist)
-        self._ranges = LatestRanges(
-            handle, {each: f"{parameters.ranges_topic}/{each}" for each in parameters.directions}
-        )
+        topics = [f"{parameters.ranges_topic}/{each}" for each in parameters.directions]
+        self._ranges = LatestRanges(handle, topics, parameters.reading_age)
         handle.subscribe(parameters.in_topic, Twist, self._on_cmd_vel)
         handle.timer(parameters.time_step, self._on_timer)
 
@@ -181,8 +172,8 @@ class ObstacleStopNode(Node):
             self._publish(self._command)
 
     def _publish(self, command):
-        age = self._parameters.reading_age
-        clearances = {each: self._ranges.reading(each, age) for each in self._parameters.directions}
+        directions = self._parameters.directions
+        clearances = dict(zip(directions, self._ranges.readings(), strict=True))
         silent = [each for each, clearance in clearances.items() if clearance is None]
         if silent:
             topic = self._handle.resolve(self._parameters.ranges_topic)

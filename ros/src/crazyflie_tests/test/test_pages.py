@@ -12,6 +12,7 @@ COMMANDS = {"./run", "apt", "catkin_make", "git", "pip", "python3", "source", "s
 ROS_COMMAND = re.compile(r"ros(launch|run|service|topic|param|node|msg|bag|test|pack|core)")
 CODE_SPAN = re.compile(r"`([^`]+)`")
 RUN = re.compile("run$|run: until /[a-z0-9_/]+$|run: until it prints .+$")
+IMPORT = re.compile(r"^[+ ]*(from crazyflie_[a-z_.]+ import [A-Za-z_, ]+)$", re.M)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
@@ -117,6 +118,15 @@ def test_code_stands_so_in_its_file(path):
             assert block.language in ("sh", "text", "diff"), (
                 f"{where}: say from which file the code is"
             )
+
+
+EXAMPLES = sorted((TOP / "docs").glob("**/*.py"))
+
+
+@named([*PAGES, *PACKAGE_PAGES, *EXAMPLES])
+def test_names_that_readers_import_exist(path):
+    for statement in IMPORT.findall(path.read_text()):
+        exec(statement, {})
 
 
 @named([*PAGES, *PACKAGE_PAGES])

@@ -13,7 +13,7 @@ from safety_helpers import HIGH_LEVEL, LAND, LOCKED, TAKEOFF, is_, stream_positi
 from std_msgs.msg import Empty
 from std_srvs.srv import EmptyRequest, SetBoolRequest
 
-from crazyflie_driver import all_vehicles
+from crazyflie_driver import server_node
 from crazyflie_driver.msg import TrajectoryPolynomialPiece
 from crazyflie_driver.srv import (
     GoToRequest,
@@ -90,7 +90,7 @@ def test_a_vehicle_that_misses_the_landing_is_landed_by_itself(swarm):
 
 def test_a_takeoff_that_was_too_late_is_not_sent_after_its_refusal(swarm, monkeypatch):
     server, vehicles = swarm
-    monkeypatch.setattr(all_vehicles, "LIMIT", 2.0)
+    monkeypatch.setattr(server_node, "ANSWER_LIMIT", 2.0)
     driven, free = server.node._vehicles[vehicles[0].uri], threading.Event()
     check = driven.commands.check
 

@@ -10,7 +10,7 @@ from crazyflie_link.address import Address
 from crazyflie_link.broadcast import is_broadcast
 from crazyflie_link.cflib_internals import packet
 from crazyflie_link.errors import RefusedError, ValueRangeError
-from crazyflie_link.link_monitor import LinkHealth, LinkMonitor
+from crazyflie_link.link import LinkHealth, LinkMonitor
 from crazyflie_link.localization import Localization, PackedPoses, pack
 from crazyflie_link.log import Uptime
 from crazyflie_link.subsystem import (

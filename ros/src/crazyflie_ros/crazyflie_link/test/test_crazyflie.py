@@ -7,8 +7,7 @@ from cflib.crazyflie import Crazyflie as CflibCrazyflie
 
 from crazyflie_link.cflib_internals import packet, table_cache
 from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.link import Link
-from crazyflie_link.link_monitor import LinkHealth
+from crazyflie_link.link import Link, LinkHealth
 
 URI = "radio://0/25/2M/E7E7E7E701"
 LOG = 5, 2

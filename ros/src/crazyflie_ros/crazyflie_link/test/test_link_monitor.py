@@ -4,7 +4,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from crazyflie_link.link_monitor import LOST_AFTER, LinkHealth, LinkMonitor
+from crazyflie_link.link import LOST_AFTER, LinkHealth, LinkMonitor
 from crazyflie_link.log import Uptime
 
 

@@ -19,8 +19,7 @@ from crazyflie_link.cflib_internals import packet
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.discovery import MODES, reboot
 from crazyflie_link.errors import AddressError, LinkLostError, NoAnswerError, NoDongleError
-from crazyflie_link.link import Link, LinkTimeouts
-from crazyflie_link.link_monitor import LinkHealth, LinkMonitor
+from crazyflie_link.link import Link, LinkHealth, LinkMonitor, LinkTimeouts
 
 # cflib warns of one of its own attributes when a mock takes stock of them.
 pytestmark = pytest.mark.filterwarnings("ignore:link_quality_updated:DeprecationWarning")

@@ -14,8 +14,7 @@ from crazyflie_link.errors import (
     NoDongleError,
     SetupError,
 )
-from crazyflie_link.link import Link
-from crazyflie_link.link_monitor import LinkHealth
+from crazyflie_link.link import Link, LinkHealth
 from crazyflie_link.supervisor import EmergencyStop
 
 

@@ -1,9 +1,6 @@
 """ROS interface between VRPN or Vicon and a vehicle's estimator."""
 
-from collections.abc import Callable
-from typing import Any
-
-from geometry_msgs.msg import Point, PointStamped, PoseStamped, TransformStamped
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, TransformStamped
 from typing_extensions import override
 
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
@@ -17,13 +14,10 @@ class ExternalParameters(Parameters):
 
 
 class _ExternalNode(Node):
-    """Pass a measurement on to ``output``, with stamp and frame; drop it if not finite."""
+    """Pass a measurement on, with stamp and frame; drop it if not finite."""
 
-    input_type: type
-    finite: str
-    output: str
-    output_type: type
-    _convert: Callable[[Any], Any]
+    input_type: type = TransformStamped
+    output_type: type = PointStamped
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -31,51 +25,35 @@ class _ExternalNode(Node):
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        self._publisher = handle.publisher(self.output, self.output_type)
-        handle.subscribe(
-            self._parameters.topic, self.input_type, self._on_measurement, finite=self.finite
-        )
+        output = "external_pose" if self.output_type is PoseStamped else "external_position"
+        finite = "pose" if self.input_type is PoseStamped else "transform"
+        self._publisher = handle.publisher(output, self.output_type)
+        topic = self._parameters.topic
+        handle.subscribe(topic, self.input_type, self._on_measurement, finite=finite)
 
     def _on_measurement(self, message):
-        self._publisher.publish(self._convert(message))
+        if self.input_type is PoseStamped:
+            place, attitude = message.pose.position, message.pose.orientation
+        else:
+            place, attitude = message.transform.translation, message.transform.rotation
+        point = Point(place.x, place.y, place.z)
+        if self.output_type is PoseStamped:
+            self._publisher.publish(PoseStamped(message.header, Pose(point, attitude)))
+        else:
+            self._publisher.publish(PointStamped(message.header, point))
 
 
 class ExternalPoseViconNode(_ExternalNode):
     """Vicon's transform of a vehicle, as an external pose for its estimator."""
 
-    input_type, finite = TransformStamped, "transform"
-    output, output_type = "external_pose", PoseStamped
-
-    @staticmethod
-    def _convert(message: TransformStamped) -> PoseStamped:
-        pose = PoseStamped(header=message.header)
-        pose.pose.position = _point(message)
-        pose.pose.orientation = message.transform.rotation
-        return pose
+    output_type = PoseStamped
 
 
 class ExternalPositionViconNode(_ExternalNode):
     """Vicon's transform of a vehicle, as an external position for its estimator."""
 
-    input_type, finite = TransformStamped, "transform"
-    output, output_type = "external_position", PointStamped
-
-    @staticmethod
-    def _convert(message: TransformStamped) -> PointStamped:
-        return PointStamped(message.header, _point(message))
-
 
 class ExternalPositionVrpnNode(_ExternalNode):
     """A vehicle's pose from VRPN, as an external position for its estimator."""
 
-    input_type, finite = PoseStamped, "pose"
-    output, output_type = "external_position", PointStamped
-
-    @staticmethod
-    def _convert(message: PoseStamped) -> PointStamped:
-        return PointStamped(message.header, message.pose.position)
-
-
-def _point(message):
-    t = message.transform.translation
-    return Point(t.x, t.y, t.z)
+    input_type = PoseStamped

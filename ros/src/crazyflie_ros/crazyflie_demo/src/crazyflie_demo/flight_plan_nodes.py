@@ -8,23 +8,8 @@ from geometry_msgs.msg import Point
 from typing_extensions import override
 
 from crazyflie_demo.trajectory_file import load, summary
+from crazyflie_driver import srv
 from crazyflie_driver.msg import TrajectoryPolynomialPiece
-from crazyflie_driver.srv import (
-    GoTo,
-    GoToRequest,
-    Land,
-    LandRequest,
-    StartTrajectory,
-    StartTrajectoryRequest,
-    Stop,
-    StopRequest,
-    Takeoff,
-    TakeoffRequest,
-    UpdateParams,
-    UpdateParamsRequest,
-    UploadTrajectory,
-    UploadTrajectoryRequest,
-)
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.server import ParameterWriter
@@ -96,19 +81,19 @@ class FlightPlanNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         height, duration = self._parameters.height, self._parameters.duration
-        enable = UpdateParamsRequest([_HIGH_LEVEL])
-        takeoff = TakeoffRequest(height=height, duration=seconds(duration))
+        enable = srv.UpdateParamsRequest([_HIGH_LEVEL])
+        takeoff = srv.TakeoffRequest(height=height, duration=seconds(duration))
         self._steps = deque(
             [
                 # Answered when the driver has connected and read all parameters of the vehicle,
                 # which overwrites earlier values.
-                Step("update_params", UpdateParams, UpdateParamsRequest()),
-                Step("update_params", UpdateParams, enable, parameter=(_HIGH_LEVEL, 1)),
+                Step("update_params", srv.UpdateParams, srv.UpdateParamsRequest()),
+                Step("update_params", srv.UpdateParams, enable, parameter=(_HIGH_LEVEL, 1)),
                 *self.preparations(),
-                Step("takeoff", Takeoff, takeoff, duration),
+                Step("takeoff", srv.Takeoff, takeoff, duration),
                 *self.manoeuvres(),
-                Step("land", Land, self._landing(), self._parameters.landing_duration),
-                Step("stop", Stop, StopRequest()),
+                Step("land", srv.Land, self._landing(), self._parameters.landing_duration),
+                Step("stop", srv.Stop, srv.StopRequest()),
             ]
         )
         self._writer = ParameterWriter(self._write, lambda text: handle.submit(self._end, text))
@@ -119,10 +104,10 @@ class FlightPlanNode(Node):
         if self._is_flying:
             self._is_flying = False
             self._handle.warn("landing")
-            self._handle.call_service("land", Land, self._landing(), _LIMIT)
+            self._handle.call_service("land", srv.Land, self._landing(), _LIMIT)
 
     def _landing(self):
-        return LandRequest(height=0.0, duration=seconds(self._parameters.landing_duration))
+        return srv.LandRequest(height=0.0, duration=seconds(self._parameters.landing_duration))
 
     def _next(self):
         step = self._steps[0]
@@ -206,8 +191,10 @@ class HighLevelFlightNode(FlightPlanNode):
 
     def _go(self, x):
         duration = self._parameters.duration
-        request = GoToRequest(relative=True, goal=Point(x, 0.0, 0.0), duration=seconds(duration))
-        return Step("go_to", GoTo, request, duration)
+        request = srv.GoToRequest(
+            relative=True, goal=Point(x, 0.0, 0.0), duration=seconds(duration)
+        )
+        return Step("go_to", srv.GoTo, request, duration)
 
 
 class TrajectoryFlightParameters(FlightPlanParameters):
@@ -245,13 +232,19 @@ class TrajectoryFlightNode(FlightPlanNode):
             TrajectoryPolynomialPiece(*piece.axes, seconds(piece.duration))
             for piece in self._parameters.pieces
         ]
-        return [Step("upload_trajectory", UploadTrajectory, UploadTrajectoryRequest(pieces=pieces))]
+        return [
+            Step(
+                "upload_trajectory",
+                srv.UploadTrajectory,
+                srv.UploadTrajectoryRequest(pieces=pieces),
+            )
+        ]
 
     @override
     def manoeuvres(self) -> list[Step]:
         parameters = self._parameters
-        request = StartTrajectoryRequest(
+        request = srv.StartTrajectoryRequest(
             timescale=parameters.timescale, reversed=parameters.reversed, relative=True
         )
         duration = summary(parameters.pieces).duration * parameters.timescale
-        return [Step("start_trajectory", StartTrajectory, request, duration)]
+        return [Step("start_trajectory", srv.StartTrajectory, request, duration)]

@@ -4,8 +4,7 @@ from concurrent.futures import Future
 
 from typing_extensions import override
 
-from crazyflie_driver.parameters import POSITIONING_PARAMETER, CrazyflieAddParameters
-from crazyflie_driver.server_node import ADD
+from crazyflie_driver.parameters import ADD, POSITIONING_PARAMETER, CrazyflieAddParameters
 from crazyflie_driver.srv import AddCrazyflie
 from crazyflie_utils import Node, NodeHandle
 

@@ -3,6 +3,7 @@
 import enum
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from crazyflie_driver import srv
@@ -12,48 +13,35 @@ from crazyflie_link.high_level import ALL_GROUPS, HighLevel
 #: Commands that differ from the others, which move a vehicle in the air.
 TAKEOFF, LAND, STOP = "takeoff", "land", "stop"
 
-#: High-level command -> type of its service.
-SERVICE_TYPES = {
-    "takeoff": srv.Takeoff,
-    "land": srv.Land,
-    "stop": srv.Stop,
-    "go_to": srv.GoTo,
-    "start_trajectory": srv.StartTrajectory,
-    "go_to_linear": srv.GoTo,
-    "spiral": srv.Spiral,
+
+def _go_to(high_level, r, duration, linear=False):
+    goal = (r.goal.x, r.goal.y, r.goal.z)
+    high_level.go_to(goal, r.yaw, duration, r.relative, r.groupMask, linear)
+
+
+def _spiral(high_level, r, duration):
+    radii = (r.initialRadius, r.finalRadius)
+    high_level.spiral(r.angle, radii, r.ascent, duration, r.sideways, r.clockwise, r.groupMask)
+
+
+#: High-level command -> type of its service, and function that sends a request with a duration (s).
+_COMMANDS: dict[str, tuple[Any, Callable[[HighLevel, Any, float], None]]] = {
+    "takeoff": (srv.Takeoff, lambda h, r, duration: h.take_off(r.height, duration, r.groupMask)),
+    "land": (srv.Land, lambda h, r, duration: h.land(r.height, duration, r.groupMask)),
+    "stop": (srv.Stop, lambda h, r, _: h.stop(r.groupMask)),
+    "go_to": (srv.GoTo, _go_to),
+    "start_trajectory": (
+        srv.StartTrajectory,
+        lambda h, r, _: h.start_trajectory(
+            r.trajectoryId, r.timescale, r.relative, r.reversed, r.groupMask
+        ),
+    ),
+    "go_to_linear": (srv.GoTo, partial(_go_to, linear=True)),
+    "spiral": (srv.Spiral, _spiral),
 }
 
-#: High-level command -> function that sends a request of it.
-_SENDERS: dict[str, Callable[[HighLevel, Any], None]] = {
-    "takeoff": lambda high_level, r: high_level.take_off(
-        r.height, r.duration.to_sec(), r.groupMask
-    ),
-    "land": lambda high_level, r: high_level.land(r.height, r.duration.to_sec(), r.groupMask),
-    "stop": lambda high_level, r: high_level.stop(r.groupMask),
-    "go_to": lambda high_level, r: high_level.go_to(
-        (r.goal.x, r.goal.y, r.goal.z), r.yaw, r.duration.to_sec(), r.relative, r.groupMask
-    ),
-    "start_trajectory": lambda high_level, r: high_level.start_trajectory(
-        r.trajectoryId, r.timescale, r.relative, r.reversed, r.groupMask
-    ),
-    "go_to_linear": lambda high_level, r: high_level.go_to(
-        (r.goal.x, r.goal.y, r.goal.z),
-        r.yaw,
-        r.duration.to_sec(),
-        r.relative,
-        r.groupMask,
-        linear=True,
-    ),
-    "spiral": lambda high_level, r: high_level.spiral(
-        r.angle,
-        (r.initialRadius, r.finalRadius),
-        r.ascent,
-        r.duration.to_sec(),
-        r.sideways,
-        r.clockwise,
-        r.groupMask,
-    ),
-}
+#: High-level command -> type of its service.
+SERVICE_TYPES = {name: service_type for name, (service_type, _) in _COMMANDS.items()}
 
 
 @dataclass(frozen=True)
@@ -85,10 +73,10 @@ class Command:
 def requested(name: str, request: Any) -> Command:
     """Return the command that a service with this name is asked for."""
     duration = request.duration.to_sec() if hasattr(request, "duration") else 0.0
-    sender = _SENDERS[name]
+    _, send = _COMMANDS[name]
     return Command(
         name,
-        lambda high_level: sender(high_level, request),
+        lambda high_level: send(high_level, request, duration),
         duration,
         request.groupMask,
         request.height if name == LAND else None,

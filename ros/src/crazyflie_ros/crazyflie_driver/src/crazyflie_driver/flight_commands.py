@@ -53,15 +53,8 @@ class Reason(enum.Enum):
     #: The caller of the command was told that it failed.
     NO_ANSWER = "a command that was refused as not answered is carried out", 7.0
 
-    @property
-    def words(self) -> str:
-        """The reason, for messages."""
-        return self.value[0]
-
-    @property
-    def limit(self) -> float:
-        """The longest duration of the landing, s."""
-        return self.value[1]
+    def __init__(self, words: str, limit: float):
+        self.words, self.limit = words, limit
 
 
 @dataclass(eq=False)

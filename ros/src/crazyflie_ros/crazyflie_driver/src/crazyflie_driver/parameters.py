@@ -31,37 +31,7 @@ _SECONDS = Number("s", minimum=0.0)
 _SHARE = Number("", minimum=0.0, maximum=1.0)
 
 
-class SafetyParameters(Parameters):
-    """Reactions of the driver to faults."""
-
-    emergency_watchdog: bool = parameter(
-        BOOLEAN,
-        "feed the firmware's emergency-stop watchdog from the first high-level command on: 1 s "
-        "after PC or link have died the vehicle falls, and is locked until it is restarted; so "
-        "it is after it has been removed",
-        False,
-    )
-    battery_low: float = parameter(
-        _VOLTS, "below it the diagnostics warn and takeoff is refused", 3.2, "battery/low"
-    )
-    battery_critical: float = parameter(
-        _VOLTS,
-        "below it a flight is landed, on high-level commands or on setpoints other than cmd_vel",
-        3.0,
-        "battery/critical",
-    )
-    battery_critical_time: float = parameter(
-        _SECONDS, "after so long, since the voltage sinks under load", 5.0, "battery/critical_time"
-    )
-    landing_duration: float = parameter(
-        Number("s", minimum=MIN_DURATION, maximum=30.0),
-        "of landings that the driver itself begins, at least; longer where 0.5 m/s need more",
-        3.0,
-        "landing/duration",
-    )
-    landing_limit: float = parameter(
-        _SECONDS, "how long the removal of a vehicle waits for one", 10.0, "landing/limit"
-    )
+ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"  #: Services of the server.
 
 
 class LinkLimits(Parameters):
@@ -94,9 +64,37 @@ class BroadcastParameters(Parameters):
     )
 
 
-class CrazyflieServerParameters(SafetyParameters):
+class CrazyflieServerParameters(Parameters):
     """Parameters of `CrazyflieServerNode`."""
 
+    emergency_watchdog: bool = parameter(
+        BOOLEAN,
+        "feed the firmware's emergency-stop watchdog from the first high-level command on: 1 s "
+        "after PC or link have died the vehicle falls, and is locked until it is restarted; so "
+        "it is after it has been removed",
+        False,
+    )
+    battery_low: float = parameter(
+        _VOLTS, "below it the diagnostics warn and takeoff is refused", 3.2, "battery/low"
+    )
+    battery_critical: float = parameter(
+        _VOLTS,
+        "below it a flight is landed, on high-level commands or on setpoints other than cmd_vel",
+        3.0,
+        "battery/critical",
+    )
+    battery_critical_time: float = parameter(
+        _SECONDS, "after so long, since the voltage sinks under load", 5.0, "battery/critical_time"
+    )
+    landing_duration: float = parameter(
+        Number("s", minimum=MIN_DURATION, maximum=30.0),
+        "of landings that the driver itself begins, at least; longer where 0.5 m/s need more",
+        3.0,
+        "landing/duration",
+    )
+    landing_limit: float = parameter(
+        _SECONDS, "how long the removal of a vehicle waits for one", 10.0, "landing/limit"
+    )
     fixed_frame: str = parameter(
         FRAME, "frame of the pose that vehicles estimate", "world", "frames/fixed"
     )

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from crazyflie_utils import ServiceError
 from mocap_optitrack.frame_times import ClockOffset, FrameOrder
@@ -24,6 +25,8 @@ MAX_DEVIATIONS = {LIGHTHOUSE: 0.05, LOCO: 0.15, FLOW: 0.1}
 
 #: Reading of the Flow deck's ranging sensor without an object in its range (mm).
 OUT_OF_REACH = 32000
+
+_POSITION = ("kalman.varX", "kalman.varY", "kalman.varZ")
 
 Values = Mapping[str, float]
 
@@ -53,12 +56,8 @@ def _lighthouse(values: Values) -> str:
     return _position(LIGHTHOUSE, values)
 
 
-def _loco(values: Values) -> str:
-    return _position(LOCO, values)
-
-
-def _position(system, values):
-    deviation = _deviation(values, "kalman.varX", "kalman.varY", "kalman.varZ")
+def _position(system: str, values: Values) -> str:
+    deviation = _deviation(values, *_POSITION)
     return _excess(system, "position", deviation, "m", "does it see enough of its system?")
 
 
@@ -86,7 +85,6 @@ class System:
     problem: Callable[[Values], str]  # Returns the fault of the state; empty without a fault.
 
 
-_POSITION = ("kalman.varX", "kalman.varY", "kalman.varZ")
 SYSTEMS = {
     FLOW: System(
         "Flow deck",
@@ -100,7 +98,12 @@ SYSTEMS = {
         ("lighthouse.bsReceive", "lighthouse.bsGeoVal", "lighthouse.bsCalVal", *_POSITION),
         _lighthouse,
     ),
-    LOCO: System("Loco Positioning deck", ("deck.bcDWM1000", "deck.bcLoco"), _POSITION, _loco),
+    LOCO: System(
+        "Loco Positioning deck",
+        ("deck.bcDWM1000", "deck.bcLoco"),
+        _POSITION,
+        partial(_position, LOCO),
+    ),
 }
 
 

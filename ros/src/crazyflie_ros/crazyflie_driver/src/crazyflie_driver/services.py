@@ -75,6 +75,7 @@ class VehicleServices:
 
     def advertise(self) -> None:
         """Offer all services that the vehicle has, below `ASIDE` what is another node's; blocks."""
+        crazyflie = self._vehicle.crazyflie
         services: dict[str, tuple[type, Callable[[Any], Any]]] = {
             "emergency": (Empty, self._on_emergency),
             "arm": (SetBool, self._on_arm),
@@ -90,15 +91,18 @@ class VehicleServices:
         for name, service_type in SERVICE_TYPES.items():
             services[name] = service_type, partial(self._on_command, name, service_type)
         jobs: dict[str, tuple[type, Callable[[Any], Any]]] = {
-            "update_params": (srv.UpdateParams, self._update_params),
-            "set_group_mask": (srv.SetGroupMask, self._set_group_mask),
+            "update_params": (srv.UpdateParams, lambda r: self._mirror.write(r.params)),
+            "set_group_mask": (
+                srv.SetGroupMask,
+                lambda r: crazyflie.high_level.set_group_mask(r.groupMask),
+            ),
             "set_led_color": (srv.SetLedColor, self._set_led_color),
-            "store_params": (srv.UpdateParams, self._store),
-            "clear_params": (srv.UpdateParams, self._clear),
+            "store_params": (srv.UpdateParams, partial(_for_each, crazyflie.parameters.store)),
+            "clear_params": (srv.UpdateParams, partial(_for_each, crazyflie.parameters.clear)),
             "param_state": (srv.ParamState, self._state),
             "write_lighthouse": (srv.WriteLighthouse, self._write_lighthouse),
         }
-        if self._vehicle.crazyflie.address.is_radio:
+        if crazyflie.address.is_radio:
             jobs["reboot"] = Empty, self._reboot
         for name, (service_type, work) in jobs.items():
             services[name] = service_type, partial(self._on_job, name, service_type, work)
@@ -225,14 +229,6 @@ class VehicleServices:
             self._mirror.set(f"ring.solid{name}", round(255 * value))
         self._mirror.set("ring.effect", _SOLID_COLOR)
 
-    def _store(self, request):
-        for name in map(parsed_name, request.params):
-            self._vehicle.crazyflie.parameters.store(name)
-
-    def _clear(self, request):
-        for name in map(parsed_name, request.params):
-            self._vehicle.crazyflie.parameters.clear(name)
-
     def _state(self, request):
         state = self._vehicle.crazyflie.parameters.stored(parsed_name(request.param))
         stored = math.nan if state.stored_value is None else state.stored_value
@@ -249,12 +245,6 @@ class VehicleServices:
         self._vehicle.crazyflie.lighthouse.write_file(
             request.file, self._vehicle.crazyflie.parameters
         )
-
-    def _update_params(self, request):
-        self._mirror.write(request.params)
-
-    def _set_group_mask(self, request):
-        self._vehicle.crazyflie.high_level.set_group_mask(request.groupMask)
 
     def _reboot(self, _):
         try:
@@ -273,6 +263,11 @@ class VehicleServices:
                 f"fall; its state is: {state.words()}"
             )
         self._vehicle.crazyflie.reboot()
+
+
+def _for_each(act, request):
+    for name in map(parsed_name, request.params):
+        act(name)
 
 
 class _Controllers(ParameterType):

@@ -25,8 +25,6 @@ from crazyflie_msgs.msg import VehicleStatus
 #: Least number of packets in a second for a meaningful fraction of received ones.
 _FEW_PACKETS = 10
 
-_DEFAULTS = LinkLimits.from_mapping({})
-
 LINK_NAMES = {
     VehicleStatus.DISCONNECTED: "disconnected",
     VehicleStatus.CONNECTING: "connecting",
@@ -38,7 +36,7 @@ _EMERGENCY = "emergency stop: remove, restart and add the vehicle"
 _BLOCKED = "setpoints are ignored since the link was lost: pause them, or call a service"
 
 
-def findings(status: VehicleStatus, limits: LinkLimits = _DEFAULTS) -> list[tuple[int, str]]:
+def findings(status: VehicleStatus, limits: LinkLimits) -> list[tuple[int, str]]:
     """Return (level, text) of all faults, worst first."""
     found = []
     error, warn = DiagnosticStatus.ERROR, DiagnosticStatus.WARN
@@ -107,7 +105,7 @@ def words(status: VehicleStatus) -> str:
 
 
 def diagnostics(
-    status: VehicleStatus, name: str, hardware_id: str, limits: LinkLimits = _DEFAULTS
+    status: VehicleStatus, name: str, hardware_id: str, limits: LinkLimits
 ) -> DiagnosticStatus:
     """Return a status as diagnostic_msgs/DiagnosticStatus."""
     found = findings(status, limits)

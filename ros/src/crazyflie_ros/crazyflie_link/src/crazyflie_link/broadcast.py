@@ -120,23 +120,3 @@ class SharedCommand:
             if self._awaited == 0 and now < self._end:
                 # Later than that, each vehicle has received its own command, and would obey twice.
                 self._broadcaster.send([command], end=self._end)
-
-
-class CommandRecorder:
-    """Replaces cflib's Crazyflie: the attribute `sent` has the packet."""
-
-    def __init__(self, link: Link):
-        self.platform = link.cflib.platform
-        self.sent: CRTPPacket | None = None
-
-    def send_packet(self, command: CRTPPacket) -> None:
-        """Keep a packet."""
-        self.sent = command
-
-
-def recorded(link: Link, send: Callable[..., None], sender: type) -> CRTPPacket:
-    """Return the packet that ``send(sender)`` would send over a link."""
-    recorder = CommandRecorder(link)
-    send(sender(recorder))
-    assert recorder.sent is not None
-    return recorder.sent

@@ -22,8 +22,7 @@ from crazyflie_link.errors import (
 )
 from crazyflie_link.high_level import HighLevel
 from crazyflie_link.lighthouse import Lighthouse
-from crazyflie_link.link import LOG_DATA, Link, LinkTimeouts, OnPacket
-from crazyflie_link.link_monitor import LinkHealth
+from crazyflie_link.link import LOG_DATA, Link, LinkHealth, LinkTimeouts, OnPacket
 from crazyflie_link.localization import Localization
 from crazyflie_link.log import Log, LogBlock
 from crazyflie_link.parameters import FirmwareParameters
@@ -123,7 +122,8 @@ class Crazyflie:
         self._reconnect, self._cache, self._limits = reconnect, cache, limits
         self._on_state, self._on_packet = on_state, on_packet
         self._console = Console(on_console) if on_console is not None else None
-        self._emergency = EmergencyStop(self._any_link)
+        # The link may be silent or still being opened.
+        self._emergency = EmergencyStop(lambda: self._link or self._opening)
         link = self.link
         #: setpoints, high_level, trajectories, localization, lighthouse, parameters, log,
         #: supervisor: Parts of the firmware; see their classes.
@@ -242,10 +242,6 @@ class Crazyflie:
 
     # The life of the link: opened by `connect`, then followed in a thread of its own.
 
-    def _any_link(self):
-        # The link may be silent or still being opened.
-        return self._link or self._opening
-
     def _set_state(self, state, text):
         self.state = state
         self._reason = text
@@ -260,15 +256,11 @@ class Crazyflie:
         if link is not None:
             link.close(reason)
 
-    def _make_link(self):
+    def _open(self):
         folder = table_cache() if self._cache is None else self._cache
-        link = Link(self.address, self._limits, folder, self._on_received)
+        self._opening = link = Link(self.address, self._limits, folder, self._on_received)
         link.cflib.packet_sent.add_callback(self._on_sent)
         link.cflib.link_statistics.uplink_rssi_updated.add_callback(self._on_rssi)
-        return link
-
-    def _open(self):
-        self._opening = link = self._make_link()
         try:
             # `close` closes the link that it finds here; if it was called before, it found none.
             self._end_if_closed(link)

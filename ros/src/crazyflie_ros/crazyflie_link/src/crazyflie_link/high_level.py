@@ -6,12 +6,13 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import Self
 
 from cflib.crazyflie.high_level_commander import HighLevelCommander
-from cflib.crtp.crtpstack import CRTPPort
+from cflib.crtp.crtpstack import CRTPPacket, CRTPPort
 
-from crazyflie_link.broadcast import SharedCommand, recorded
+from crazyflie_link.broadcast import SharedCommand
 from crazyflie_link.errors import AlreadyLandingError, NoReplyError, RefusedError, ValueRangeError
 from crazyflie_link.link import Link
 from crazyflie_link.subsystem import Subsystem, check_byte, check_duration, check_finite
@@ -21,9 +22,7 @@ from crazyflie_model.supervisor import SupervisorState
 
 ALL_GROUPS = 0  #: Group mask of commands to all vehicles.
 
-# First versions of the protocol with the present forms of two commands.
-_GO_TO_2_PROTOCOL = 8
-_START_2_PROTOCOL = 10
+_GO_TO_2_PROTOCOL = 8  #: First version of the protocol with linear go-to and spiral.
 
 REPORT_LAG = 0.1  #: Time after which the supervisor, at 25 Hz, reports a takeoff, s.
 
@@ -92,20 +91,14 @@ class HighLevel(Subsystem):
     def set_group_mask(self, group_mask: int) -> None:
         """Set the groups (bits) that the vehicle belongs to."""
         check_byte("group mask", group_mask)
-        self._command(
-            "the group mask",
-            HighLevelCommander.COMMAND_SET_GROUP_MASK,
-            lambda c: c.set_group_mask(group_mask),
-        )
+        self._command("the group mask", lambda c: c.set_group_mask(group_mask))
         self._knowledge.groups = group_mask
 
     def take_off(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
         """Climb to a height (m) in a duration (s), keeping position and heading."""
         _check("takeoff", duration, group_mask, height)
         self._command(
-            "the takeoff command",
-            HighLevelCommander.COMMAND_TAKEOFF_2,
-            lambda c: c.takeoff(height, duration, group_mask, yaw=None),
+            "the takeoff command", lambda c: c.takeoff(height, duration, group_mask, yaw=None)
         )
 
     def land(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
@@ -117,7 +110,6 @@ class HighLevel(Subsystem):
         _check("landing", duration, group_mask, height)
         self._command(
             "the land command",
-            HighLevelCommander.COMMAND_LAND_2,
             lambda c: c.land(height, duration, group_mask, yaw=None),
             # After the touchdown a repetition would start the motors.
             resend=duration > REPLY_LIMIT,
@@ -136,21 +128,12 @@ class HighLevel(Subsystem):
             commander.land(height, duration, ALL_GROUPS, yaw=None)
 
         # After the touchdown a repetition would start the motors.
-        self._command(
-            "the land command",
-            HighLevelCommander.COMMAND_LAND_2,
-            send,
-            resend=duration > REPLY_LIMIT,
-        )
+        self._command("the land command", send, resend=duration > REPLY_LIMIT)
 
     def stop(self, group_mask: int = ALL_GROUPS) -> None:
         """Stop the motors, wherever the vehicle is."""
         check_byte("group mask", group_mask)
-        self._command(
-            "the stop command",
-            HighLevelCommander.COMMAND_STOP,
-            lambda c: c.stop(group_mask),
-        )
+        self._command("the stop command", lambda c: c.stop(group_mask))
 
     def go_to(
         self,
@@ -167,12 +150,10 @@ class HighLevel(Subsystem):
         """
         x, y, z = position
         _check("go-to", duration, group_mask, x, y, z, yaw)
-        is_new = self._current_link().protocol >= _GO_TO_2_PROTOCOL
-        if linear and not is_new:
+        if linear and self._current_link().protocol < _GO_TO_2_PROTOCOL:
             raise RefusedError("the go-to command: this firmware has no linear one; update it")
         self._command(
             "the go-to command",
-            HighLevelCommander.COMMAND_GO_TO_2 if is_new else HighLevelCommander.COMMAND_GO_TO,
             lambda c: c.go_to(
                 x, y, z, yaw, duration, relative=relative, linear=linear, group_mask=group_mask
             ),
@@ -200,7 +181,6 @@ class HighLevel(Subsystem):
             raise RefusedError("the spiral command: this firmware has none; update it")
         self._command(
             "the spiral command",
-            HighLevelCommander.COMMAND_SPIRAL,
             lambda c: c.spiral(
                 angle, *radii, ascent, duration, is_sideways, is_clockwise, group_mask
             ),
@@ -223,7 +203,6 @@ class HighLevel(Subsystem):
         check_byte("trajectory number", trajectory_id)
         check_duration("time scale", time_scale)
         check_byte("group mask", group_mask)
-        is_new = self._current_link().protocol >= _START_2_PROTOCOL
         defined = self._knowledge.defined
         if trajectory_id not in defined:
             known = ", ".join(map(str, sorted(defined))) or "none"
@@ -239,9 +218,6 @@ class HighLevel(Subsystem):
             )
         self._command(
             "the start of the trajectory",
-            HighLevelCommander.COMMAND_START_TRAJECTORY_2
-            if is_new
-            else HighLevelCommander.COMMAND_START_TRAJECTORY,
             lambda c: c.start_trajectory(
                 trajectory_id,
                 time_scale,
@@ -263,7 +239,6 @@ class HighLevel(Subsystem):
             kind = HighLevelCommander.TRAJECTORY_TYPE_POLY4D_COMPRESSED
         self._command(
             "the definition of the trajectory",
-            HighLevelCommander.COMMAND_DEFINE_TRAJECTORY,
             lambda c: c.define_trajectory(trajectory_id, place.start, pieces, kind),
         )
         self._knowledge.overwritten.pop(trajectory_id, None)
@@ -276,19 +251,21 @@ class HighLevel(Subsystem):
             if written.start < place.stop and place.start < written.stop:
                 known.overwritten[other] = trajectory_id
 
-    def _command(self, what, number, send, resend=True):
+    def _command(self, what, send, resend=True):
         link = self._current_link()
         if self._is_dry:
             return
-        sent = 0
+        packets = _packets(link, send)
+        number, sent = packets[-1].data[0], 0
 
         def transmit():
             nonlocal sent
             sent += 1
             if self._shared is not None and sent == 1:
-                self._shared.ready(recorded(link, send, HighLevelCommander))
+                self._shared.ready(packets[-1])
             else:
-                send(link.cflib.high_level_commander)
+                for each in packets:
+                    link.cflib.send_packet(each)
 
         request = Request(CRTPPort.SETPOINT_HL, 0, bytes([number]), what, resend)
         if self._shared is None or resend:
@@ -303,6 +280,14 @@ class HighLevel(Subsystem):
             is_landing = code == _BUSY and number == HighLevelCommander.COMMAND_LAND_2
             error = AlreadyLandingError if is_landing else RefusedError
             raise error(f"{what}: the vehicle refuses it ({os.strerror(code)}, {code})")
+
+
+def _packets(link: Link, send: Callable[[HighLevelCommander], None]) -> list[CRTPPacket]:
+    # Returns the packets that ``send(commander)`` has cflib send; the last one is the command.
+    packets: list[CRTPPacket] = []
+    recorder = SimpleNamespace(platform=link.cflib.platform, send_packet=packets.append)
+    send(HighLevelCommander(recorder))
+    return packets
 
 
 def request_after_broadcast(link: Link, transmit: Send, request: Request) -> bytes:

@@ -59,18 +59,13 @@ class Trajectories(Subsystem):
         link = self._current_link()
         memory = find_memory(link, MemoryElement.TYPE_TRAJ, "trajectories")
         begin = piece_offset * PIECE_SIZE
-        end = begin + len(pieces) * PIECE_SIZE
-        if end > memory.size:
+        if begin + len(pieces) * PIECE_SIZE > memory.size:
             raise ValueRangeError(
                 f"trajectory {trajectory_id}: {len(pieces)} pieces from piece {piece_offset} on "
                 f"do not fit: the vehicle has room for {memory.size // PIECE_SIZE}"
             )
         data = b"".join(map(_packed, pieces))
-        place = range(begin, end)
-        self._high_level.begin_upload(trajectory_id, place)
-        write_memory(link, memory.id, begin, data, "the trajectory", check)
-        check()
-        self._high_level.define_trajectory(trajectory_id, place, len(pieces))
+        self._write(link, memory.id, trajectory_id, begin, data, len(pieces), check)
 
     def upload_compressed(
         self,
@@ -99,13 +94,15 @@ class Trajectories(Subsystem):
                 f"trajectory {trajectory_id}: {len(data)} bytes from byte {offset} on do not fit; "
                 f"the vehicle has {memory.size}"
             )
-        place = range(offset, offset + len(data))
+        count = min(len(segments), 255)
+        self._write(link, memory.id, trajectory_id, offset, data, count, check, is_compressed=True)
+
+    def _write(self, link, memory, trajectory_id, begin, data, count, check, is_compressed=False):
+        place = range(begin, begin + len(data))
         self._high_level.begin_upload(trajectory_id, place)
-        write_memory(link, memory.id, offset, data, "the trajectory", check)
+        write_memory(link, memory, begin, data, "the trajectory", check)
         check()
-        self._high_level.define_trajectory(
-            trajectory_id, place, min(len(segments), 255), is_compressed=True
-        )
+        self._high_level.define_trajectory(trajectory_id, place, count, is_compressed)
 
 
 def _packed(piece: PolynomialPiece) -> bytes:

@@ -94,9 +94,14 @@ def test_a_connection_that_is_lost_and_comes_back_moves_nothing_and_has_no_contr
     browser.press("Take off")
     browser.has("hovering", browser.card("cf1"))
     before = browser.text(".control").split()[1]
-    # Clicks without a connection are sent when the connection is back.
-    land = browser.button("Land")
-    driver.execute_script("window.socket.io.engine.close(); arguments[0].click()", land)
+    # Clicks without a connection are sent when the connection is back; those while it is being
+    # closed, which takes until all before them is sent, are lost.
+    script = """
+        const land = arguments[0];
+        window.socket.once("disconnect", () => land.click());
+        window.socket.io.engine.close();
+    """
+    driver.execute_script(script, browser.button("Land"))
     browser.has("this page can only watch: no page has control")
     browser.has("no page has control", ".control")
     assert browser.text(".control").split()[1] != before

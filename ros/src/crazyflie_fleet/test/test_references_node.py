@@ -270,6 +270,25 @@ def test_a_way_after_a_hold_begins_at_rest(flight):
     assert abs(flight.followed("cf1")[-1].state.y_dot) < 0.05
 
 
+def test_a_move_that_was_held_goes_on_at_rest_from_the_place_where_it_was_held(flight):
+    flight.go_to(goal=(0.0, 0.9, 1.0), seconds=4.0)
+    flight.process.advance(2.6)
+    assert flight.followed("cf1")[-1].state.y_dot > 0.3
+    flight.see("cf1", 0.8)
+    flight.process.advance(0.06)
+    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    before = len(flight.followed("cf1"))
+    flight.see("cf2", 3.0)
+    flight.process.advance(3.0)
+    assert flight.process.published("/fleet/waiting")[-1].data == ""
+    # References that went on where they had stopped, at their speed, would pull it with a jerk.
+    references = [each.state for each in flight.followed("cf1")[before:]]
+    assert (references[0].y, references[0].y_dot) == (0.8, 0.0)
+    assert min(each.y for each in references) == 0.8
+    assert max(each.y_dot for each in references) < 0.2
+    assert references[-1].y == pytest.approx(0.9)
+
+
 def test_a_way_back_is_open_also_for_a_vehicle_that_has_not_come_to_rest(flight):
     flight.go_to(goal=(0.0, 0.9, 1.0), seconds=4.0)
     flight.process.advance(2.6)

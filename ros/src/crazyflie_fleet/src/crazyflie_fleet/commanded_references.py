@@ -87,6 +87,7 @@ class CommandedReferences:
         self._state: Goal[float] | None = None
         self._state_time = 0.0
         self._vehicle = vehicle
+        self._held_at: Triple | None = None  # Place from which a move that is held is to go on.
         self._plan = PlanMarker(handle, parameters.plan_topic, parameters.fixed_frame)
         if vehicle is None:
             reference_type = parameters.reference_type
@@ -218,7 +219,13 @@ class CommandedReferences:
         last = self._setpoint_time
         if last is not None and not 0.0 <= now - last < SETPOINT_TIMEOUT:
             self.end_setpoints()
-        if self._is_move and (self._is_held() or self._measured() is None):
+        place = None if self._vehicle is None else self._vehicle.held_at
+        if self._is_move and place is not None and place is not self._held_at:
+            # In the middle of the move, its speed would pull the vehicle towards the other one.
+            self._held_at = place
+            self.follower.restart_move(now, place)
+            self.publish()
+        elif self._is_move and (place is not None or self._measured() is None):
             self.follower.delay(self._parameters.time_step)
         elif self._is_moving:
             # The last one, at rest, is published, too.

@@ -10,7 +10,7 @@ from crazyflie_model.planner import (
     move,
     shortest_duration,
 )
-from crazyflie_model.polynomials import Goal
+from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_model.trajectory import Pieces, Trajectory
 from crazyflie_utils.refusal import RefusalError
 
@@ -74,6 +74,15 @@ class CommandFollower:
     def delay(self, duration: float) -> None:
         """Continue a move, which has been interrupted for a duration (s)."""
         self._begin += duration
+
+    def restart_move(self, time: float, position: Triple) -> None:
+        """Begin the rest of a move at ``time`` (s) at rest at a position (m)."""
+        assert self.trajectory is not None
+        end = self.trajectory.evaluate(self.trajectory.duration)
+        start = at_rest(position, self.trajectory.evaluate(time - self._begin).yaw)
+        left = self._begin + self.trajectory.duration - time
+        duration = max(left, shortest_duration(math.dist(position, end.position), 0.0))
+        self._fly(time, Trajectory(move(start, end.position, end.yaw, duration)))
 
     def is_moving(self, time: float) -> bool:
         """Return whether a move or a trajectory has not ended."""

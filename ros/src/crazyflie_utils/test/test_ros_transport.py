@@ -175,3 +175,16 @@ def test_callbacks_subscribe_without_waiting_for_the_master(monkeypatch):
     answers.set()
     wait_until(lambda: len(done) == 3, "the master's answers", 20.0)
     assert done == ["subscribed to /a", "unsubscribed", "subscribed to /b"]
+
+
+@pytest.mark.parametrize("limits_rate", [True, False])
+def test_messages_wait_in_real_time_only(monkeypatch, limits_rate):
+    """Simulated time may pass so quickly that a socket is full before a node looks something up."""
+    callbacks = []
+    monkeypatch.setattr(
+        "rospy.Subscriber", lambda name, kind, callback, **_: callbacks.append(callback)
+    )
+    transport = RosTransport(limits_rate)
+    transport.subscribe("/a", String, print, lambda: True)
+    transport.subscribe("/b", String, print)
+    assert [callback.may_wait() for callback in callbacks] == [limits_rate, False]

@@ -85,7 +85,8 @@ class _RosSubscriber(ExternalSubscriber):
 class RosTransport(Transport):
     """rospy, for a process that has called ``rospy.init_node``.
 
-    If ``limits_rate``, it decodes floods in part; not in simulated time, which may pass quickly.
+    If ``limits_rate``, it decodes floods in part, and messages may wait in their sockets; not in
+    simulated time, which may pass so quickly that the sockets would be full of old messages.
     ``refused`` has the numbers of peers' errors, by kind.
     """
 
@@ -176,7 +177,9 @@ class RosTransport(Transport):
             patches.own_subscription(
                 topic, message_type, is_handed_over, self._refuse, self._limits_rate
             )
-            callback = OwnCallback(deliver, is_handed_over, may_wait)
+            callback = OwnCallback(
+                deliver, is_handed_over, lambda: self._limits_rate and may_wait()
+            )
             name = self._rospy_name(topic)
             return rospy.Subscriber(name, message_type, callback, tcp_nodelay=True)
 

@@ -2,10 +2,18 @@
 
 import numpy as np
 import pytest
+import rospy
 from scripted import EXAMPLES, fly, run
 
 NEAR = 0.15
 """m; the vehicles estimate their positions."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def vehicles():
+    """Wait for both vehicles: a script has those that are there when it starts."""
+    for name in ("cf1", "cf2"):
+        rospy.wait_for_service(f"/{name}/upload_trajectory", 30.0)
 
 
 def test_groups():

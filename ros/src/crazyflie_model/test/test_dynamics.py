@@ -219,3 +219,27 @@ def test_a_derived_model_flies_by_its_own_rates():
     for count in range(1000):
         x = Drag().step(count, x, [0.0, 0.0, 0.0, GRAVITY])
     assert x[3] == pytest.approx(2.0 * math.exp(-0.5), rel=1e-6)
+
+
+class Ceiling(NearHover):
+    """A model of which only the contact is its own."""
+
+    def apply_ground_contact(self, x):
+        return [*x[:2], min(x[2], 1.0), *x[3:]]
+
+
+class Sinking(Coupled7D):
+    """A model with steps of its own."""
+
+    def step(self, count, x, u):
+        return [*x[:2], x[2] - 1e-3 * count, *x[3:]]
+
+
+@pytest.mark.parametrize("model", [NearHover, Coupled7D, Drag, Ceiling, Sinking])
+@pytest.mark.parametrize("z", [0.005, 0.999])
+def test_many_steps_are_those_of_one_after_another(model, z):
+    u, x = [0.1, -0.05, 0.7, GRAVITY - 2.0 + 3.0 * z], [0.0, 0.0, z, 1.0, -0.5, -0.1, 0.3]
+    single = x
+    for count in range(5, 205):
+        single = model().step(count, single, u)
+    assert model().steps(200, 5, x, u) == single

@@ -166,6 +166,21 @@ def test_period_of_zero_is_due_every_time(queue):
     assert len(ticks) == 3
 
 
+def test_what_a_timer_submits_is_done_before_it_is_repeated():
+    executor = started()
+    queue = TimerQueue(executor)
+    done = []
+
+    def tick():
+        done.append("tick")
+        executor.submit(done.append, "submitted")
+
+    queue.add(0.0, tick, now=0.0)
+    queue.add(1.0, lambda: done.append("second"), now=0.0)
+    queue.run_due(1.0, times=2)
+    assert done == ["tick", "submitted", "tick", "submitted", "second"]
+
+
 @pytest.mark.parametrize("period", [-1.0, math.nan, math.inf])
 def test_other_periods_are_refused(queue, period):
     with pytest.raises(ValueError, match=f"period of a timer is {period}"):

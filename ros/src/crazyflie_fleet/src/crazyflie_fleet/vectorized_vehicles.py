@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from crazyflie_model.dynamics import STEP, SevenDimensional, watchdog_control
+from crazyflie_model.dynamics import LEVEL_STEPS, STEP, SevenDimensional, watchdog_control
 
 _NEVER = np.iinfo(np.int64).max
 
@@ -74,10 +74,17 @@ class VectorizedVehicles:
             self._start, self._steps = time, 0
             self._since[self._since != _NEVER] = 0
             self._next = {vehicle: (0, u) for vehicle, (_, u) in self._next.items()}
-        for _ in range(steps):
+        end = self._steps + steps
+        while self._steps < end:
             self._take_commands()
-            self._step()
+            self._move(min(self._constant_steps(), end - self._steps))
         self._take_commands()
+
+    def _constant_steps(self):
+        """Return a number of steps in which all controls are certainly constant."""
+        first = [step for step, _ in self._next.values()]
+        next_change = min([int(self._since.min()) + LEVEL_STEPS, *first])
+        return max(next_change - self._steps, 1)
 
     def _take_commands(self):
         due = {vehicle: u for vehicle, (step, u) in self._next.items() if step <= self._steps}
@@ -88,14 +95,14 @@ class VectorizedVehicles:
         self._since[numbers] = self._steps
         self._next = {key: each for key, each in self._next.items() if key not in due}
 
-    def _step(self):
-        moved = self._dynamics.step(self._steps, self._x, self._effective_control())
+    def _move(self, steps):
+        moved = self._dynamics.steps(steps, self._steps, self._x, self._effective_control())
         obeys = self._since != _NEVER
         # A vehicle stays put until its first control.
         self._x = (
             moved if obeys.all() else [*map(lambda a, b: np.where(obeys, a, b), moved, self._x)]
         )
-        self._steps += 1
+        self._steps += steps
 
     def _effective_control(self):
         # `_NEVER` gives an age far below zero: that of a valid control.

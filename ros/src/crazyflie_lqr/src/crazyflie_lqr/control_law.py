@@ -7,7 +7,7 @@ described in `linear_feedback`. Nothing is changed in place.
 
 import math
 from collections.abc import Sequence
-from operator import mul
+from operator import add, mul, sub
 
 from crazyflie_model.angles import wrap_to_pi
 from crazyflie_model.elementwise import Number, Vector, clip, functions, where
@@ -38,9 +38,10 @@ def heading_error(
     It is ``x - x_ref``, with the horizontal position and velocity turned by ``-yaw``, which is at
     ``yaw_index`` of the state, and the yaw error wrapped to [-pi, pi].
     """
-    e = [a - b for a, b in zip(x, x_ref, strict=True)]
+    e = list(map(sub, x, x_ref))
     yaw = x[yaw_index]
-    c, s = functions(yaw).cos(yaw), functions(yaw).sin(yaw)
+    f = functions(yaw)
+    c, s = f.cos(yaw), f.sin(yaw)
     e[0], e[1] = c * e[0] + s * e[1], c * e[1] - s * e[0]
     e[3], e[4] = c * e[3] + s * e[4], c * e[4] - s * e[3]
     e[yaw_index] = wrap_to_pi(e[yaw_index])
@@ -51,7 +52,7 @@ def linear_control(
     K: Sequence[Sequence[Number]], u_ref: Sequence[Number], error: Sequence[Number]
 ) -> Vector[Number]:
     """Return u_ref + K e; K is a sequence of rows."""
-    return [reference + sum(map(mul, row, error)) for reference, row in zip(u_ref, K, strict=True)]
+    return list(map(add, u_ref, (sum(map(mul, row, error)) for row in K)))
 
 
 def integrate(

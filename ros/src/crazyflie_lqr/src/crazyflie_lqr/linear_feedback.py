@@ -318,7 +318,7 @@ class IntegralStateFeedback(LinearFeedback):
 
     def _integrate(self, error, dt, linear):
         # An error that overflowed must not stay in the integral.
-        if dt == 0.0 or not all(map(math.isfinite, error)):
+        if dt == 0.0 or not math.isfinite(sum(error)):
             return
         # The climb has an integral of its own for the height.
         for axis in range(3 if self._climb is None else 2):

@@ -232,22 +232,22 @@ class LinearFeedbackNode(Node):
             self._controller.take_off()
 
     def _on_state(self, message):
-        if self._is_old(message.header.stamp):
+        now, time = self._handle.time(), message.header.stamp.to_sec()
+        if self._is_old(time, now):
             return
         x = to_tuple(message.state)
-        x_ref = self._reference.value(self._handle.time(), x)
+        x_ref = self._reference.value(now, x)
         if x_ref is None and self._flight_state == FlightStatus.FLYING:
             # The node was restarted in flight; the reference may have been published once, long
             # ago.
             self._reference.update(at_rest(x, self.yaw_index))
-            x_ref = self._reference.value(self._handle.time(), x)
+            x_ref = self._reference.value(now, x)
         if x_ref is None:
             return
         if self._flight_state == FlightStatus.UNKNOWN:
             self._guess_flight(x, x_ref)
-        time = message.header.stamp.to_sec()
         u = self._law(x, x_ref, time)
-        if not all(map(math.isfinite, u)):
+        if not math.isfinite(sum(u)):
             self._handle.warn(
                 f"the control {u} is not finite and is not sent", throttle=1.0, key="not finite"
             )
@@ -255,9 +255,8 @@ class LinearFeedbackNode(Node):
         control = from_vector(Control, u)
         self._publisher.publish(stamped(ControlStamped, message.header.stamp, control=control))
 
-    def _is_old(self, stamp):
-        time = self._handle.time()
-        age = self._age.update(stamp.to_sec(), self._handle.nanoseconds(time) * 1e-9, time)
+    def _is_old(self, stamp, now):
+        age = self._age.update(stamp, self._handle.nanoseconds(now) * 1e-9, now)
         if age <= self._parameters.max_age:
             self._clocks_agree = True
             return False

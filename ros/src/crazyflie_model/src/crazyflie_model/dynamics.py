@@ -48,7 +48,8 @@ STEP = 0.001  #: Integration step of every model (s).
 #: which tables have 0.3 to 0.6.
 GROUND_FRICTION = 0.5
 
-_LEVEL_STEPS, _OFF_STEPS = round(LEVEL_AGE / STEP), round(OFF_AGE / STEP)
+LEVEL_STEPS = round(LEVEL_AGE / STEP)  #: `LEVEL_AGE` in steps.
+_OFF_STEPS = round(OFF_AGE / STEP)
 
 
 def watchdog_control(u: Vector[Any], age: Any) -> Vector[Any]:
@@ -56,10 +57,10 @@ def watchdog_control(u: Vector[Any], age: Any) -> Vector[Any]:
 
     From `LEVEL_AGE` on it is level and keeps its thrust, from `OFF_AGE` on its motors are off.
     """
-    if nowhere(age >= _LEVEL_STEPS):
+    if nowhere(age >= LEVEL_STEPS):
         return [*u]
     *attitude, thrust = u
-    level = [where(age < _LEVEL_STEPS, each, 0.0) for each in attitude]
+    level = [where(age < LEVEL_STEPS, each, 0.0) for each in attitude]
     return [*level, where(age < _OFF_STEPS, thrust, 0.0)]
 
 
@@ -96,6 +97,12 @@ class Dynamics(ABC):
         """Return the state one `STEP` later; ``count`` steps have been done since the start."""
         return self.apply_ground_contact(rk4_step(self.rates, count * STEP, x, u, STEP))
 
+    def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
+        """Return the state ``n`` `STEP` later, the same as ``n`` times `step`."""
+        for each in range(count, count + n):
+            x = self.step(each, x, u)
+        return x
+
     def derivative(self, t: float, x: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
         """Return the time derivative, shape as x, ``t`` s after the start.
 
@@ -122,10 +129,10 @@ class SevenDimensional(Dynamics):
         contact). At rest the latter is that of weight minus lift in a step, so that the speed
         decreases at `GROUND_FRICTION` (g - thrust), m/s^2, and not if thrust carries the vehicle.
         """
-        px, py, z, vx, vy, vz, yaw = x
-        below = z <= 0.0
+        below = x[2] <= 0.0
         if nowhere(below):
             return x
+        px, py, z, vx, vy, vz, yaw = x
         stopped = below & (vz < 0.0)
         speed = functions(vx).hypot(vx, vy)
         loss = where(stopped, -GROUND_FRICTION * vz, 0.0)
@@ -173,20 +180,34 @@ class NearHover(SevenDimensional):
 
     def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.step`: exact, as acceleration and yaw rate are constant, and quick."""
+        return self._move(1, count, x, u)
+
+    def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
+        """See `Dynamics.steps`."""
+        # A derived model may have other rates and steps.
+        move = self._move if type(self) is NearHover else super().steps
+        return move(n, count, x, u)
+
+    def _move(self, n, count, x, u):
         px, py, pz, _, _, _, yaw = x
-        vx, vy, vz, ax, ay, az, yaw_dot = self.rates(count * STEP, x, u)
-        half = STEP / 2.0
-        return self.apply_ground_contact(
-            [
-                px + STEP * (vx + half * ax),
-                py + STEP * (vy + half * ay),
-                pz + STEP * (vz + half * az),
-                vx + STEP * ax,
-                vy + STEP * ay,
-                vz + STEP * az,
-                yaw + STEP * yaw_dot,
-            ]
-        )
+        vx, vy, vz, *acceleration, yaw_dot = self.rates(count * STEP, x, u)
+        dvx, dvy, dvz = (STEP * each for each in acceleration)
+        half_dvx, half_dvy, half_dvz = (STEP / 2.0 * each for each in acceleration)
+        dyaw = STEP * yaw_dot
+        for _ in range(n):
+            x = self.apply_ground_contact(
+                [
+                    px + STEP * (vx + half_dvx),
+                    py + STEP * (vy + half_dvy),
+                    pz + STEP * (vz + half_dvz),
+                    vx + dvx,
+                    vy + dvy,
+                    vz + dvz,
+                    yaw + dyaw,
+                ]
+            )
+            px, py, pz, vx, vy, vz, yaw = x
+        return x
 
 
 class Coupled7D(SevenDimensional):
@@ -205,23 +226,37 @@ class Coupled7D(SevenDimensional):
         if type(self).rates is not Coupled7D.rates:
             # A model that is derived from this one has other rates.
             return super().step(count, x, u)
-        px, py, pz, vx, vy, vz, yaw = x
+        return self._move(1, x, u)
+
+    def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
+        """See `Dynamics.steps`."""
+        if type(self) is not Coupled7D:
+            return super().steps(n, count, x, u)
+        return self._move(n, x, u)
+
+    def _move(self, n, x, u):
         yaw_dot, half = u[2], STEP / 2.0
-        ax, ay, az = coupled_acceleration(u, yaw + half * yaw_dot)
+        forward, left, az = _heading_acceleration(u)
         mean = 1.0 - (STEP * yaw_dot) ** 2 / 24.0
-        ax, ay = mean * ax, mean * ay
         turn = STEP**3 / 12.0 * yaw_dot
-        return self.apply_ground_contact(
-            [
-                px + STEP * (vx + half * ax) + turn * ay,
-                py + STEP * (vy + half * ay) - turn * ax,
-                pz + STEP * (vz + half * az),
-                vx + STEP * ax,
-                vy + STEP * ay,
-                vz + STEP * az,
-                yaw + STEP * yaw_dot,
-            ]
-        )
+        half_dyaw, dyaw = half * yaw_dot, STEP * yaw_dot
+        half_dvz, dvz = half * az, STEP * az
+        for _ in range(n):
+            px, py, pz, vx, vy, vz, yaw = x
+            ax, ay = _turned(forward, left, yaw + half_dyaw)
+            ax, ay = mean * ax, mean * ay
+            x = self.apply_ground_contact(
+                [
+                    px + STEP * (vx + half * ax) + turn * ay,
+                    py + STEP * (vy + half * ay) - turn * ax,
+                    pz + STEP * (vz + half_dvz),
+                    vx + STEP * ax,
+                    vy + STEP * ay,
+                    vz + dvz,
+                    yaw + dyaw,
+                ]
+            )
+        return x
 
 
 def coupled_acceleration(u: Sequence[Number], yaw: Number) -> Vector[Number]:
@@ -231,10 +266,20 @@ def coupled_acceleration(u: Sequence[Number], yaw: Number) -> Vector[Number]:
     (sin(pitch) cos(yaw) + sin(roll) sin(yaw)), y_ddot = T (-sin(roll) cos(yaw) + sin(pitch)
     sin(yaw)), z_ddot = T cos(roll) cos(pitch) - g. The yaw rate has no effect.
     """
+    acceleration: Vector[Number] = _heading_acceleration(u)
+    return _turned(acceleration[0], acceleration[1], yaw) + acceleration[2:]
+
+
+def _heading_acceleration(u: Sequence[Number]) -> Vector[Number]:
+    """Return the acceleration forward, left and up, m/s^2."""
     roll, pitch, _, thrust = u
-    trigonometry = functions(roll)
-    forward = thrust * trigonometry.sin(pitch)
-    right = thrust * trigonometry.sin(roll)
-    lift = thrust * trigonometry.cos(roll) * trigonometry.cos(pitch)
-    c, s = functions(yaw).cos(yaw), functions(yaw).sin(yaw)
-    return [forward * c + right * s, forward * s - right * c, lift - GRAVITY]
+    f = functions(roll)
+    lift = thrust * f.cos(roll) * f.cos(pitch)
+    return [thrust * f.sin(pitch), -thrust * f.sin(roll), lift - GRAVITY]
+
+
+def _turned(forward: Number, left: Number, yaw: Number) -> Vector[Number]:
+    """Return a horizontal vector of the heading frame in the fixed frame."""
+    f = functions(yaw)
+    c, s = f.cos(yaw), f.sin(yaw)
+    return [forward * c - left * s, forward * s + left * c]

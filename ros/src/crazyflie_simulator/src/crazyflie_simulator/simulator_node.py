@@ -132,6 +132,7 @@ class SimulatorNode(Node):
 
     def __init__(self) -> None:
         self._ticks = 0
+        self._broadcast_ticks: int | None = None
         self._is_idle = False
         self._measured_at: float | None = None
         self._crash_is_known = False
@@ -211,8 +212,10 @@ class SimulatorNode(Node):
     def _catch_up(self, now):
         """Advance to the clock, which is at ``now`` (s); broadcast all poses with consumers."""
         if self._parameters.publishes_clock:
-            self._advance_to(self._tick_time(self._ticks))
-            self._broadcast_pose()
+            if self._ticks != self._broadcast_ticks:
+                self._broadcast_ticks = self._ticks
+                self._advance_to(self._tick_time(self._ticks))
+                self._broadcast_pose()
         elif not self._handle.uses_sim_time:
             self._broadcast_missed(now)
             self._set_pace()
@@ -267,7 +270,8 @@ class SimulatorNode(Node):
         else:
             self._ticks += 1
             self._catch_up(self._handle.time())
-        self._set_clock(*map(self._tick_time, range(before + 1, self._ticks + 1)))
+        passed = map(self._tick_time, range(before + 1, self._ticks))
+        self._set_clock(self._tick_time(self._ticks), passed)
 
     def _ticks_to_next_event(self):
         parameters = self._parameters

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_model.angles import Quaternion, Triple
-from crazyflie_model.dynamics import STEP, Dynamics, watchdog_control
+from crazyflie_model.dynamics import LEVEL_STEPS, STEP, Dynamics, watchdog_control
 from crazyflie_model.elementwise import Vector
 
 _OFF: Vector[float] = [0.0, 0.0, 0.0, 0.0]
@@ -37,7 +37,8 @@ class SimulatedVehicle:
         delay: float = 0.0,
     ):
         self.has_crashed = False
-        self._least_upright = math.cos(max_tilt) if math.isfinite(max_tilt) else -math.inf
+        self._can_crash = math.isfinite(max_tilt)
+        self._least_upright = math.cos(max_tilt) if self._can_crash else 0.0
         self._dynamics = dynamics
         self._x = dynamics.initial_state(_floats(position))
         self._u: Vector[float] = _OFF
@@ -95,16 +96,26 @@ class SimulatedVehicle:
         elif self._control_step is None and not self._pending:
             self._steps += max(steps, 0)
         else:
-            for _ in range(steps):
+            end = self._steps + steps
+            while self._steps < end:
                 while self._pending and self._pending[0][0] <= self._steps:
                     self._control_step, self._u = self._pending.popleft()
+                count = min(self._constant_steps(), end - self._steps)
                 if self._control_step is not None:
-                    self._x = self._dynamics.step(self._steps, self._x, self._effective_control())
-                self._steps += 1
+                    self._x = self._dynamics.steps(
+                        count, self._steps, self._x, self._effective_control()
+                    )
+                self._steps += count
                 self._notice_crash()
 
+    def _constant_steps(self):
+        """Return a number of steps in which the effective control is certainly constant."""
+        if self._control_step is None or self._pending or self._can_crash:
+            return 1
+        return max(self._control_step + LEVEL_STEPS - self._steps, 1)
+
     def _notice_crash(self):
-        if self._least_upright == -math.inf:
+        if not self._can_crash:
             return
         _, (x, y, _, _) = self.pose
         # The cosine of the tilt, from the quaternion.

@@ -26,6 +26,7 @@ control. A vehicle in gusts departs from p(t), too, but does not stay at one pla
 import math
 from collections import deque
 from collections.abc import Sequence
+from operator import mul
 from typing import NamedTuple
 
 from crazyflie_model.dynamics import coupled_acceleration
@@ -198,13 +199,12 @@ class ResponseMonitor:
 
     def _update_noise(self, times, positions, mean):
         """Average the variance of the poses about a straight line through those of a block."""
-        spread = sum(t * t for t in times)
+        spread = sum(map(mul, times, times))
         squares = 0.0
         for axis, middle in enumerate(mean):
             offsets = [each[axis] - middle for each in positions]
-            slope = sum(t * x for t, x in zip(times, offsets, strict=True)) / spread
-            squares += sum((x - slope * t) ** 2 for t, x in zip(times, offsets, strict=True))
-        variance = squares / (3.0 * (len(times) - 2))
+            squares += sum(map(mul, offsets, offsets)) - sum(map(mul, times, offsets)) ** 2 / spread
+        variance = max(squares, 0.0) / (3.0 * (len(times) - 2))
         variance = self._noise**2 + (variance - self._noise**2) / NOISE_AVERAGING
         self._noise = max(math.sqrt(variance), MIN_NOISE)
 

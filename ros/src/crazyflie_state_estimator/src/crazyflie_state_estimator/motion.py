@@ -3,6 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from operator import sub
 from typing import NamedTuple
 
 from typing_extensions import override
@@ -58,7 +59,7 @@ class FiniteDifference(RateFilter):
         self._elapsed += dt
         if self._elapsed >= self._least_step:
             elapsed = self._elapsed
-            self._rate = [(a - b) / elapsed for a, b in zip(value, self._value, strict=True)]
+            self._rate = [change / elapsed for change in map(sub, value, self._value)]
             self._value, self._elapsed = value, 0.0
         return value, self._rate
 
@@ -139,7 +140,7 @@ class MotionEstimator:
         the attitude roll, pitch, yaw in rad; ``acceleration`` was commanded since the last pose, if
         it is known, m/s^2.
         """
-        if not (_is_finite(position) and _is_finite(attitude)):
+        if not math.isfinite(sum(position) + sum(attitude)):
             return None
         if self._stamp is None or stamp < self._stamp:
             self._start(stamp, position, attitude)
@@ -148,7 +149,7 @@ class MotionEstimator:
             return None
         motion = self._step((stamp - self._stamp) * 1e-9, position, attitude, acceleration)
         self._stamp = stamp
-        if not all(map(_is_finite, motion)):
+        if not math.isfinite(sum(map(sum, motion))):
             self.reset()
             return None
         return motion
@@ -169,7 +170,3 @@ class MotionEstimator:
         self._angles = attitude
         self._position_filter.start(position)
         self._angle_filter.start(attitude)
-
-
-def _is_finite(numbers):
-    return all(map(math.isfinite, numbers))

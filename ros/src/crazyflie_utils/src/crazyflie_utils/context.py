@@ -1,7 +1,7 @@
 """The objects that the nodes of one process share."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 
 from rosgraph_msgs.msg import Clock
@@ -101,18 +101,18 @@ class ProcessContext:
         return self._simulated.next_deadline()
 
     def clock_publisher(self) -> Callable[..., None]:
-        """Return ``set_clock(*moments)``, which moves simulated time to moments (s).
+        """Return ``set_clock(moment, passed=())``, which moves simulated time to a moment (s).
 
-        Other processes receive all of them at once. In this process time moves to the last one,
-        after the present callback; then the due timers run.
+        Other processes receive the moments ``passed`` meanwhile, too, all at once. In this process
+        time moves after the present callback; then the due timers run.
         """
         publisher = self._clock_publisher = self.topics.publisher("/clock", Clock, latch=False)
 
-        def set_clock(*moments: float) -> None:
-            stamp = self.clock.stamp(moments[-1])
+        def set_clock(moment: float, passed: Iterable[float] = ()) -> None:
+            stamp = self.clock.stamp(moment)
             self.transport.clock_was_set(stamp)
-            passed = moments[:-1] if publisher.is_heard_outside() else ()
-            publisher.publish(Clock(stamp), [Clock(self.clock.stamp(each)) for each in passed])
+            heard = passed if publisher.is_heard_outside() else ()
+            publisher.publish(Clock(stamp), [Clock(self.clock.stamp(each)) for each in heard])
 
         return set_clock
 

@@ -164,24 +164,21 @@ class Executor:
 
         From outside, each begins after all that the one before has submitted.
         """
-        items = [(work, ()) for work in works]
         if self._started and self._runner != threading.get_ident():
-            self._drain(items)
+            self._drain(works)
         else:
-            self._queue.extend(items)
+            self._queue.extend((work, ()) for work in works)
 
-    def _drain(self, items=()):
+    def _drain(self, works=()):
         if not self._started:
             return
         with self._running:
             self._runner = threading.get_ident()
             queue = self._queue
             try:
-                while queue:
-                    work, arguments = queue.popleft()
-                    work(*arguments)
-                for item in items:
-                    queue.append(item)
+                for each in (None, *works):
+                    if each is not None:
+                        each()
                     while queue:
                         work, arguments = queue.popleft()
                         work(*arguments)
@@ -208,7 +205,7 @@ class Timer:
         self.deadline = math.nan
         self.number = 0
         self.stopped = False
-        self._period = period
+        self.period = period
         self._work = work
         self.restart(now)
 
@@ -220,22 +217,22 @@ class Timer:
         """Set the next deadline one period after ``now`` (s)."""
         self._start = now
         self._count = 1
-        self.deadline = now + self._period
+        self.deadline = now + self.period
 
     def skip_to(self, now: float) -> None:
         """Set the next deadline to the first moment of its phase after ``now`` (s)."""
-        if self._period == 0.0:
+        if self.period == 0.0:
             self.deadline = now
             return
         # Multiples of the period do not add up rounding errors as sums do.
-        deadline = self._start + (self._count + 1) * self._period
+        deadline = self._start + (self._count + 1) * self.period
         if now + _TOLERANCE < deadline:
             self._count += 1
             self.deadline = deadline
             return
-        passed = math.floor((now - self._start + _TOLERANCE) / self._period)
+        passed = math.floor((now - self._start + _TOLERANCE) / self.period)
         self._count = max(self._count, passed) + 1
-        self.deadline = self._start + self._count * self._period
+        self.deadline = self._start + self._count * self.period
 
     def fire(self) -> None:
         """Call the callback, unless the timer was stopped."""
@@ -326,15 +323,15 @@ class TimerQueue:
         with self._lock:
             return self._heap[0][0] if self._heap else math.inf
 
-    def run_due(self, now: float) -> None:
+    def run_due(self, now: float, times: int = 1) -> None:
         """Submit every timer that is due at ``now`` (s), in order, each once.
 
-        A timer that is late by more than a period skips the missed ticks and
-        keeps its phase.
+        Those with a period of zero are submitted ``times`` times. A timer that is late by more than
+        a period skips the missed ticks and keeps its phase.
         """
         self._is_running = True
         due = self._take_due(now)
-        works = [timer.fire for timer in due]
+        works = [timer.fire for timer in due for _ in range(1 if timer.period > 0.0 else times)]
         if len(due) > 1:
             works = [*filter(None, (self._before, *works, self._after))]
         if works:
@@ -362,13 +359,14 @@ class TimerQueue:
     def _take_due(self, now):
         due: list[Timer] = []
         with self._lock:
-            while self._heap and self._heap[0][0] <= now + _TOLERANCE:
-                timer = heapq.heappop(self._heap)[2]
+            heap, limit = self._heap, now + _TOLERANCE
+            while heap and heap[0][0] <= limit:
+                timer = heapq.heappop(heap)[2]
                 if not timer.stopped:
                     due.append(timer)
             # Deadlines of one moment differ by rounding only, which varies. The order is that of
             # registration, so that periods are even.
-            if due and due[-1].deadline - due[0].deadline < _TOLERANCE:
+            if len(due) > 1 and due[-1].deadline - due[0].deadline < _TOLERANCE:
                 due.sort(key=_number)
             for timer in due:
                 timer.skip_to(now)
@@ -447,4 +445,5 @@ class SteadyTimers:
             wait = self._queue.next_deadline() - self._clock.time()
             if wait > 0.0:
                 self._news.acquire(timeout=min(wait, 1.0))
-            self._queue.run_due(self._clock.time())
+            # To find a timer that is due takes as long as a short callback.
+            self._queue.run_due(self._clock.time(), times=10)

@@ -180,9 +180,10 @@ class Publisher:
 
         The messages ``before`` it are sent to other processes only, all at once.
         """
-        if not isinstance(message, self._topic.message_type):
+        topic = self._topic
+        if not isinstance(message, topic.message_type):
             raise TypeError(
-                f"topic {self.topic} carries {self._topic.message_type._type}, "
+                f"topic {topic.name} carries {topic.message_type._type}, "
                 f"not {type(message).__name__}"
             )
         if self._is_closed:
@@ -191,7 +192,7 @@ class Publisher:
             self.latched = message
         if self._latch or self._external.has_subscribers():
             self._external.publish(*before, message)
-        for receiver in self._topic.receivers:
+        for receiver in topic.receivers:
             receiver(message)
 
     def close(self) -> None:

@@ -39,11 +39,12 @@ _QUEUE_SIZE = 100
 class _RosPublisher(ExternalPublisher):
     def __init__(self, publisher: rospy.Publisher, on_close: Callable[[], None]):
         self._publisher = publisher
+        self._own = publisher.impl
         self._on_close = on_close
 
     def has_subscribers(self) -> bool:
-        implementation = self._publisher.impl
-        return implementation is not None and bool(implementation.connections)
+        # None after the end of the publication.
+        return bool(self._own.connections)
 
     def publish(self, *messages: genpy.Message) -> None:
         publish(self._publisher, messages)
@@ -61,18 +62,21 @@ class _RosSubscriber(ExternalSubscriber):
     ):
         self._register, self._run = register, run
         self._subscriber: rospy.Subscriber | None = None
+        self._own: OwnSubscription | None = None
         run(self._begin)
 
     def _begin(self):
         self._subscriber = self._register()
+        own = getattr(self._subscriber, "impl", None)
+        self._own = own if isinstance(own, OwnSubscription) else None
 
     def has_publishers(self) -> bool:
         return self._subscriber is not None and self._subscriber.get_num_connections() > 0
 
     def collect(self) -> None:
-        own = self._subscriber and self._subscriber.impl
-        if isinstance(own, OwnSubscription):
-            own.collect()
+        # Most topics have no publisher in another process.
+        if self._own is not None and self._own.connections:
+            self._own.collect()
 
     def close(self) -> None:
         self._run(self._end)

@@ -237,9 +237,18 @@ class Sinking(Coupled7D):
 
 @pytest.mark.parametrize("model", [NearHover, Coupled7D, Drag, Ceiling, Sinking])
 @pytest.mark.parametrize("z", [0.005, 0.999])
-def test_many_steps_are_those_of_one_after_another(model, z):
-    u, x = [0.1, -0.05, 0.7, GRAVITY - 2.0 + 3.0 * z], [0.0, 0.0, z, 1.0, -0.5, -0.1, 0.3]
+@pytest.mark.parametrize("yaw_dot", [0.0, 0.7])
+def test_many_steps_are_those_of_one_after_another(model, z, yaw_dot):
+    u, x = [0.1, -0.05, yaw_dot, GRAVITY - 2.0 + 3.0 * z], [0.0, 0.0, z, 1.0, -0.5, -0.1, 0.3]
     single = x
     for count in range(5, 205):
         single = model().step(count, single, u)
     assert model().steps(200, 5, x, u) == single
+
+
+def test_vehicles_that_do_not_turn_fly_as_those_next_to_one_that_does():
+    u = [[0.1, 0.1], [-0.05, -0.05], [0.0, 0.7], [9.5, 9.5]]
+    x = [np.array([value, value]) for value in (0.0, 0.0, 0.3, 1.0, -0.5, -0.1, 0.3)]
+    both = Coupled7D().steps(300, 0, x, [np.array(each) for each in u])
+    alone = Coupled7D().steps(300, 0, [each[:1] for each in x], [np.array(each[:1]) for each in u])
+    np.testing.assert_array_equal([each[0] for each in both], np.ravel(alone))

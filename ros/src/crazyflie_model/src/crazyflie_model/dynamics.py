@@ -155,6 +155,28 @@ class SevenDimensional(Dynamics):
         """See `Dynamics.pose`: roll and pitch are those of the control, yaw is the state's."""
         return (x[0], x[1], x[2]), quaternion_from_rpy(u[0], u[1], x[6])
 
+    def _accelerate(self, n, x, rates):
+        """Return the state after ``n`` steps of constant acceleration and yaw rate: exact."""
+        px, py, pz, _, _, _, yaw = x
+        vx, vy, vz, *acceleration, yaw_dot = rates
+        dvx, dvy, dvz = (STEP * each for each in acceleration)
+        half_dvx, half_dvy, half_dvz = (STEP / 2.0 * each for each in acceleration)
+        dyaw = STEP * yaw_dot
+        for _ in range(n):
+            x = self.apply_ground_contact(
+                [
+                    px + STEP * (vx + half_dvx),
+                    py + STEP * (vy + half_dvy),
+                    pz + STEP * (vz + half_dvz),
+                    vx + dvx,
+                    vy + dvy,
+                    vz + dvz,
+                    yaw + dyaw,
+                ]
+            )
+            px, py, pz, vx, vy, vz, yaw = x
+        return x
+
 
 class NearHover(SevenDimensional):
     """Small angles about hover, independent yaw: tilt does not reduce lift."""
@@ -180,34 +202,14 @@ class NearHover(SevenDimensional):
 
     def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.step`: exact, as acceleration and yaw rate are constant, and quick."""
-        return self._move(1, count, x, u)
+        return self._accelerate(1, x, self.rates(count * STEP, x, u))
 
     def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.steps`."""
         # A derived model may have other rates and steps.
-        move = self._move if type(self) is NearHover else super().steps
-        return move(n, count, x, u)
-
-    def _move(self, n, count, x, u):
-        px, py, pz, _, _, _, yaw = x
-        vx, vy, vz, *acceleration, yaw_dot = self.rates(count * STEP, x, u)
-        dvx, dvy, dvz = (STEP * each for each in acceleration)
-        half_dvx, half_dvy, half_dvz = (STEP / 2.0 * each for each in acceleration)
-        dyaw = STEP * yaw_dot
-        for _ in range(n):
-            x = self.apply_ground_contact(
-                [
-                    px + STEP * (vx + half_dvx),
-                    py + STEP * (vy + half_dvy),
-                    pz + STEP * (vz + half_dvz),
-                    vx + dvx,
-                    vy + dvy,
-                    vz + dvz,
-                    yaw + dyaw,
-                ]
-            )
-            px, py, pz, vx, vy, vz, yaw = x
-        return x
+        if type(self) is not NearHover:
+            return super().steps(n, count, x, u)
+        return self._accelerate(n, x, self.rates(count * STEP, x, u))
 
 
 class Coupled7D(SevenDimensional):
@@ -232,6 +234,8 @@ class Coupled7D(SevenDimensional):
         """See `Dynamics.steps`."""
         if type(self) is not Coupled7D:
             return super().steps(n, count, x, u)
+        if nowhere(u[2] != 0.0):
+            return self._accelerate(n, x, self.rates(count * STEP, x, u))
         return self._move(n, x, u)
 
     def _move(self, n, x, u):

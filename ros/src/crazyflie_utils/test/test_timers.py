@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from crazyflie_utils.testing.programs import wait_until
 from crazyflie_utils.timers import Executor, SteadyClock, SteadyTimers, TimerQueue
 
 LIMIT = 60.0
@@ -179,6 +180,27 @@ def test_what_a_timer_submits_is_done_before_it_is_repeated():
     queue.add(1.0, lambda: done.append("second"), now=0.0)
     queue.run_due(1.0, times=2)
     assert done == ["tick", "submitted", "tick", "submitted", "second"]
+
+
+def test_a_thread_does_not_wait_for_all_repetitions_of_a_timer():
+    executor = started()
+    queue = TimerQueue(executor)
+    has_returned = threading.Event()
+    ticks = []
+
+    def submit():
+        executor.submit(lambda: None)
+        has_returned.set()
+
+    def tick():
+        if not ticks:
+            threading.Thread(target=submit, daemon=True).start()
+            wait_until(lambda: executor._running._waiting, "the thread to wait")
+        ticks.append(not ticks or has_returned.wait(LIMIT))
+
+    queue.add(0.0, tick, now=0.0)
+    queue.run_due(0.0, times=2)
+    assert ticks == [True, True]
 
 
 @pytest.mark.parametrize("period", [-1.0, math.nan, math.inf])

@@ -125,6 +125,12 @@ class _FairLock:
             else:
                 self._held = False
 
+    def give_way(self) -> None:
+        """Let the threads that wait for the lock have it first."""
+        if self._waiting:
+            self.__exit__()
+            self.__enter__()
+
 
 class Executor:
     """Run submitted work one piece at a time, first come, first served.
@@ -178,6 +184,8 @@ class Executor:
             try:
                 for each in (None, *works):
                     if each is not None:
+                        self._running.give_way()
+                        self._runner = threading.get_ident()
                         each()
                     while queue:
                         work, arguments = queue.popleft()

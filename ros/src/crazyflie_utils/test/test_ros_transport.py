@@ -152,6 +152,8 @@ def test_callbacks_subscribe_without_waiting_for_the_master(monkeypatch):
     answers, done = threading.Event(), []
 
     class Subscriber:
+        impl = None
+
         def __init__(self, name, *_, **__):
             answers.wait(20.0)
             done.append(f"subscribed to {name}")
@@ -181,9 +183,14 @@ def test_callbacks_subscribe_without_waiting_for_the_master(monkeypatch):
 def test_messages_wait_in_real_time_only(monkeypatch, limits_rate):
     """Simulated time may pass so quickly that a socket is full before a node looks something up."""
     callbacks = []
-    monkeypatch.setattr(
-        "rospy.Subscriber", lambda name, kind, callback, **_: callbacks.append(callback)
-    )
+
+    class Subscriber:
+        impl = None
+
+        def __init__(self, _name, _kind, callback, **_):
+            callbacks.append(callback)
+
+    monkeypatch.setattr("rospy.Subscriber", Subscriber)
     transport = RosTransport(limits_rate)
     transport.subscribe("/a", String, print, lambda: True)
     transport.subscribe("/b", String, print)

@@ -7,7 +7,7 @@ described in `linear_feedback`. Nothing is changed in place.
 
 import math
 from collections.abc import Sequence
-from operator import add, mul, sub
+from operator import mul
 
 from crazyflie_model.angles import wrap_to_pi
 from crazyflie_model.elementwise import Number, Vector, clip, functions, where
@@ -38,7 +38,7 @@ def heading_error(
     It is ``x - x_ref``, with the horizontal position and velocity turned by ``-yaw``, which is at
     ``yaw_index`` of the state, and the yaw error wrapped to [-pi, pi].
     """
-    e = list(map(sub, x, x_ref))
+    e = [a - b for a, b in zip(x, x_ref, strict=True)]
     yaw = x[yaw_index]
     f = functions(yaw)
     c, s = f.cos(yaw), f.sin(yaw)
@@ -52,7 +52,7 @@ def linear_control(
     K: Sequence[Sequence[Number]], u_ref: Sequence[Number], error: Sequence[Number]
 ) -> Vector[Number]:
     """Return u_ref + K e; K is a sequence of rows."""
-    return list(map(add, u_ref, (sum(map(mul, row, error)) for row in K)))
+    return [reference + sum(map(mul, row, error)) for reference, row in zip(u_ref, K, strict=True)]
 
 
 def integrate(

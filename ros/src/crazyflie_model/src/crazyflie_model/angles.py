@@ -23,8 +23,8 @@ _SMALLEST_COSINE = 1e-6  #: Least cosine of a pitch at which roll and yaw are di
 def wrap_to_pi(angle: Number) -> Number:
     """Return the angle in [-pi, pi] that points the same way as a finite one, rad."""
     turned = angle + math.pi
-    if type(turned) is float:
-        return turned % math.tau - math.pi
+    if isinstance(turned, float):
+        return turned % (2.0 * math.pi) - math.pi
     # The remainder, by functions that other types with numpy's protocols support, too.
     return turned - 2.0 * math.pi * np.floor(turned / (2.0 * math.pi)) - math.pi
 

@@ -234,6 +234,7 @@ class Coupled7D(SevenDimensional):
         """See `Dynamics.steps`."""
         if type(self) is not Coupled7D:
             return super().steps(n, count, x, u)
+        # Without a yaw rate the acceleration does not turn: the same result, without trigonometry.
         if nowhere(u[2] != 0.0):
             return self._accelerate(n, x, self.rates(count * STEP, x, u))
         return self._move(n, x, u)

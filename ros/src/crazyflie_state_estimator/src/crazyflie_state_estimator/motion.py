@@ -3,7 +3,6 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from operator import sub
 from typing import NamedTuple
 
 from typing_extensions import override
@@ -59,7 +58,7 @@ class FiniteDifference(RateFilter):
         self._elapsed += dt
         if self._elapsed >= self._least_step:
             elapsed = self._elapsed
-            self._rate = [change / elapsed for change in map(sub, value, self._value)]
+            self._rate = [(a - b) / elapsed for a, b in zip(value, self._value, strict=True)]
             self._value, self._elapsed = value, 0.0
         return value, self._rate
 

@@ -180,18 +180,21 @@ class Executor:
             return
         with self._running:
             self._runner = threading.get_ident()
-            queue = self._queue
             try:
-                for each in (None, *works):
-                    if each is not None:
-                        self._running.give_way()
-                        self._runner = threading.get_ident()
-                        each()
-                    while queue:
-                        work, arguments = queue.popleft()
-                        work(*arguments)
+                self._run_queued()
+                for work in works:
+                    self._running.give_way()
+                    self._runner = threading.get_ident()
+                    work()
+                    self._run_queued()
             finally:
                 self._runner = None
+
+    def _run_queued(self):
+        queue = self._queue
+        while queue:
+            work, arguments = queue.popleft()
+            work(*arguments)
 
 
 #: Time by which a timer may be early (s): more than the rounding error of the seconds since 1970 as

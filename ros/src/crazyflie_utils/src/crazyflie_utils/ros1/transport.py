@@ -39,12 +39,11 @@ _QUEUE_SIZE = 100
 class _RosPublisher(ExternalPublisher):
     def __init__(self, publisher: rospy.Publisher, on_close: Callable[[], None]):
         self._publisher = publisher
-        self._own = publisher.impl
+        self._implementation = publisher.impl
         self._on_close = on_close
 
     def has_subscribers(self) -> bool:
-        # None after the end of the publication.
-        return bool(self._own.connections)
+        return self._implementation is not None and bool(self._implementation.connections)
 
     def publish(self, *messages: genpy.Message) -> None:
         publish(self._publisher, messages)
@@ -52,6 +51,7 @@ class _RosPublisher(ExternalPublisher):
     def close(self) -> None:
         self._on_close()
         self._publisher.unregister()
+        self._implementation = None
 
 
 class _RosSubscriber(ExternalSubscriber):
@@ -67,7 +67,7 @@ class _RosSubscriber(ExternalSubscriber):
 
     def _begin(self):
         self._subscriber = self._register()
-        own = getattr(self._subscriber, "impl", None)
+        own = self._subscriber.impl
         self._own = own if isinstance(own, OwnSubscription) else None
 
     def has_publishers(self) -> bool:
@@ -82,6 +82,7 @@ class _RosSubscriber(ExternalSubscriber):
         self._run(self._end)
 
     def _end(self):
+        self._own = None
         if self._subscriber is not None:
             self._subscriber.unregister()
 

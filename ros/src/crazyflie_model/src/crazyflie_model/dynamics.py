@@ -97,8 +97,15 @@ class Dynamics(ABC):
         """Return the state one `STEP` later; ``count`` steps have been done since the start."""
         return self.apply_ground_contact(rk4_step(self.rates, count * STEP, x, u, STEP))
 
+    def has_exact_steps(self, u: Vector[Number]) -> bool:
+        """Return whether a formula gives the state after many steps with the control ``u``."""
+        return False
+
     def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
-        """Return the state ``n`` `STEP` later, the same as ``n`` times `step`."""
+        """Return the state ``n`` `STEP` later: the same as ``n`` times `step`.
+
+        With `has_exact_steps` the rounding errors are different.
+        """
         for each in range(count, count + n):
             x = self.step(each, x, u)
         return x
@@ -155,27 +162,41 @@ class SevenDimensional(Dynamics):
         """See `Dynamics.pose`: roll and pitch are those of the control, yaw is the state's."""
         return (x[0], x[1], x[2]), quaternion_from_rpy(u[0], u[1], x[6])
 
+    def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
+        """See `Dynamics.steps`."""
+        if self.has_exact_steps(u):
+            return self._accelerate(n, x, self.rates(count * STEP, x, u))
+        return super().steps(n, count, x, u)
+
     def _accelerate(self, n, x, rates):
         """Return the state after ``n`` steps of constant acceleration and yaw rate: exact."""
-        px, py, pz, _, _, _, yaw = x
-        vx, vy, vz, *acceleration, yaw_dot = rates
-        dvx, dvy, dvz = (STEP * each for each in acceleration)
-        half_dvx, half_dvy, half_dvz = (STEP / 2.0 * each for each in acceleration)
-        dyaw = STEP * yaw_dot
+        duration = n * STEP
+        end = _accelerated(duration, x, rates)
+        if n == 1:
+            return self.apply_ground_contact(end)
+        z, vz, end_vz = x[2], x[5], end[5]
+        # The vertical speed is never beyond those of the start and of the end.
+        may_touch = (z <= 0.0) | (z + duration * vz <= 0.0) | (z + duration * end_vz <= 0.0)
+        if nowhere(may_touch):
+            return end
         for _ in range(n):
-            x = self.apply_ground_contact(
-                [
-                    px + STEP * (vx + half_dvx),
-                    py + STEP * (vy + half_dvy),
-                    pz + STEP * (vz + half_dvz),
-                    vx + dvx,
-                    vy + dvy,
-                    vz + dvz,
-                    yaw + dyaw,
-                ]
-            )
-            px, py, pz, vx, vy, vz, yaw = x
+            x = self.apply_ground_contact(_accelerated(STEP, x, [*x[3:6], *rates[3:]]))
         return x
+
+
+def _accelerated(duration: float, x: Vector[Number], rates: Vector[Number]) -> Vector[Number]:
+    px, py, pz, _, _, _, yaw = x
+    vx, vy, vz, ax, ay, az, yaw_dot = rates
+    half = duration / 2.0
+    return [
+        px + duration * (vx + half * ax),
+        py + duration * (vy + half * ay),
+        pz + duration * (vz + half * az),
+        vx + duration * ax,
+        vy + duration * ay,
+        vz + duration * az,
+        yaw + duration * yaw_dot,
+    ]
 
 
 class NearHover(SevenDimensional):
@@ -204,12 +225,10 @@ class NearHover(SevenDimensional):
         """See `Dynamics.step`: exact, as acceleration and yaw rate are constant, and quick."""
         return self._accelerate(1, x, self.rates(count * STEP, x, u))
 
-    def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
-        """See `Dynamics.steps`."""
+    def has_exact_steps(self, u: Vector[Number]) -> bool:
+        """See `Dynamics.has_exact_steps`."""
         # A derived model may have other rates and steps.
-        if type(self) is not NearHover:
-            return super().steps(n, count, x, u)
-        return self._accelerate(n, x, self.rates(count * STEP, x, u))
+        return type(self) is NearHover
 
 
 class Coupled7D(SevenDimensional):
@@ -230,13 +249,14 @@ class Coupled7D(SevenDimensional):
             return super().step(count, x, u)
         return self._move(1, x, u)
 
+    def has_exact_steps(self, u: Vector[Number]) -> bool:
+        """See `Dynamics.has_exact_steps`: without a yaw rate the acceleration does not turn."""
+        return type(self) is Coupled7D and nowhere(u[2] != 0.0)
+
     def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.steps`."""
-        if type(self) is not Coupled7D:
+        if type(self) is not Coupled7D or self.has_exact_steps(u):
             return super().steps(n, count, x, u)
-        # Without a yaw rate the acceleration does not turn: the same result, without trigonometry.
-        if nowhere(u[2] != 0.0):
-            return self._accelerate(n, x, self.rates(count * STEP, x, u))
         return self._move(n, x, u)
 
     def _move(self, n, x, u):

@@ -10,10 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_model.angles import Quaternion, Triple
-from crazyflie_model.dynamics import LEVEL_STEPS, STEP, Dynamics, watchdog_control
+from crazyflie_model.dynamics import STEP, Dynamics, watchdog_control
 from crazyflie_model.elementwise import Vector
 
 _OFF: Vector[float] = [0.0, 0.0, 0.0, 0.0]
+
+#: Most steps that are taken at once, from a control on: a divisor of the ages, in steps, at which
+#: `watchdog_control` changes it.
+_STEPS_TOGETHER = 10
 
 
 class SimulatedVehicle:
@@ -44,6 +48,8 @@ class SimulatedVehicle:
         self._u: Vector[float] = _OFF
         self._start = time
         self._steps = 0
+        # The step, and its state, from which the next ones are calculated.
+        self._origin, self._x_origin = 0, self._x
         self._control_step: int | None = None
         self._delay_steps = round(delay / STEP)
         # Delayed controls, with the steps from which they act.
@@ -62,21 +68,20 @@ class SimulatedVehicle:
     @property
     def pose(self) -> tuple[Triple, Quaternion]:
         """Position (x, y, z) in m and quaternion (x, y, z, w) in the fixed frame."""
-        return self._dynamics.pose(self._x, self._effective_control())
+        return self._dynamics.pose(self._x, self._effective_control(self._steps))
 
     def command(self, u: Sequence[float]) -> None:
         """Set the control, u_dim components, from the present step and the delay on."""
         if self._delay_steps:
             self._pending.append((self._steps + self._delay_steps, _floats(u)))
             return
-        self._u = _floats(u)
-        self._control_step = self._steps
+        self._set_control(_floats(u), self._steps)
 
     def recover(self) -> None:
         """Enable the motors of a crashed vehicle from the next control on."""
         self.has_crashed = False
         if self._control_step is not None:
-            self._u = _OFF
+            self._set_control(_OFF, self._control_step)
 
     def skip(self, duration: float) -> None:
         """Advance the time by ``duration`` (s) without motion."""
@@ -92,27 +97,38 @@ class SimulatedVehicle:
         if steps < -1:
             self._start, self._steps = time, 0
             self._pending.clear()
-            self._control_step = None if self._control_step is None else 0
+            self._set_control(self._u, None if self._control_step is None else 0)
         elif self._control_step is None and not self._pending:
             self._steps += max(steps, 0)
         else:
             end = self._steps + steps
             while self._steps < end:
                 while self._pending and self._pending[0][0] <= self._steps:
-                    self._control_step, self._u = self._pending.popleft()
-                count = min(self._constant_steps(), end - self._steps)
-                if self._control_step is not None:
-                    self._x = self._dynamics.steps(
-                        count, self._steps, self._x, self._effective_control()
-                    )
-                self._steps += count
+                    step, u = self._pending.popleft()
+                    self._set_control(u, step)
+                self._advance(end)
                 self._notice_crash()
 
-    def _constant_steps(self):
-        """Return a number of steps in which the effective control is certainly constant."""
-        if self._control_step is None or self._pending or self._can_crash:
-            return 1
-        return max(self._control_step + LEVEL_STEPS - self._steps, 1)
+    def _set_control(self, u, step):
+        self._u, self._control_step = u, step
+        self._origin, self._x_origin = self._steps, self._x
+
+    def _advance(self, end):
+        """Advance with constant control up to the step ``end`` at most."""
+        change = self._pending[0][0] if self._pending else math.inf
+        if self._control_step is None:
+            self._steps = min(end, change)
+            return
+        origin = self._origin
+        u = self._effective_control(origin)
+        together = 1 if self._can_crash else _STEPS_TOGETHER
+        passed = (origin - self._control_step) % together
+        next_origin = min(origin + together - passed, change)
+        self._steps = min(end, next_origin)
+        self._x = self._dynamics.steps(self._steps - origin, origin, self._x_origin, u)
+        # Rounding errors of a formula must not depend on the times of `advance_to`.
+        if self._steps == next_origin or not self._dynamics.has_exact_steps(u):
+            self._origin, self._x_origin = self._steps, self._x
 
     def _notice_crash(self):
         if not self._can_crash:
@@ -122,12 +138,12 @@ class SimulatedVehicle:
         if 1.0 - 2.0 * (x * x + y * y) < self._least_upright:
             self.has_crashed = True
 
-    def _effective_control(self):
+    def _effective_control(self, step):
         if self.has_crashed:
             return _OFF
         if self._control_step is None:
             return self._u
-        return watchdog_control(self._u, self._steps - self._control_step)
+        return watchdog_control(self._u, step - self._control_step)
 
 
 def _floats(vector: Sequence[float]) -> Vector[float]:

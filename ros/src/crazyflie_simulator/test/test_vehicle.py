@@ -46,11 +46,12 @@ def test_ground_stops_the_fall_but_not_the_climb(make_dynamics):
 
 
 @MODELS
-@given(moments=st.lists(st.floats(0.0, 2.2), max_size=30))
-def test_how_often_it_is_asked_does_not_matter(make_dynamics, moments):
+@pytest.mark.parametrize("delay", [0.0, 0.123])
+@given(moments=st.lists(st.floats(0.0, 2.2), max_size=30), yaw_dot=st.sampled_from([0.0, 0.2]))
+def test_how_often_it_is_asked_does_not_matter(make_dynamics, delay, moments, yaw_dot):
     def fly(moments):
-        vehicle = SimulatedVehicle(make_dynamics(), [0.0, 0.0, 1.0], time=0.0)
-        vehicle.command([0.05, -0.1, 0.2, 10.0])
+        vehicle = SimulatedVehicle(make_dynamics(), [0.0, 0.0, 1.0], time=0.0, delay=delay)
+        vehicle.command([0.05, -0.1, yaw_dot, 10.0])
         for moment in moments:
             vehicle.advance_to(moment)
         return vehicle.state

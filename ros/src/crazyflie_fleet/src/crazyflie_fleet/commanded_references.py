@@ -13,6 +13,7 @@ from crazyflie_fleet.follower import CommandFollower, Velocity
 from crazyflie_fleet.high_level_services import HighLevelParameters, reference_message
 from crazyflie_fleet.references_node import TrackedVehicle
 from crazyflie_model.angles import Triple
+from crazyflie_model.limits import LEVEL_AGE
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_model.trajectory import Trajectory
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
@@ -25,7 +26,6 @@ _WIDTH = 0.01  #: Width of the line (m).
 _POINTS = 20  #: Number of points of a piece of a trajectory.
 _MAX_POINTS = 200  #: Largest number of points of a trajectory.
 
-SETPOINT_TIMEOUT = 0.5  #: Time without a setpoint after which a stream has ended (s).
 _HOLD_DURATION = 0.5  #: Duration of the move to the goal of the last setpoint (s).
 
 
@@ -217,7 +217,7 @@ class CommandedReferences:
     def _on_timer(self):
         now = self._handle.time()
         last = self._setpoint_time
-        if last is not None and not 0.0 <= now - last < SETPOINT_TIMEOUT:
+        if last is not None and not 0.0 <= now - last < LEVEL_AGE:
             self.end_setpoints()
         place = None if self._vehicle is None else self._vehicle.held_at
         if self._is_move and place is not None and place is not self._held_at:

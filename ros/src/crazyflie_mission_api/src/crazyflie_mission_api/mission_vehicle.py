@@ -8,9 +8,6 @@ from crazyflie_mission_api.limits import Bounds
 from crazyflie_model.angles import Triple, rotate_by_yaw
 from crazyflie_model.trajectory import Pieces
 
-#: Age of a setpoint at which the firmware levels out, s (commander.h, WDT_TIMEOUT_STABILIZE).
-SETPOINT_TIMEOUT = 0.5
-
 
 class FullStateSetpoint(NamedTuple):
     """Position (m), velocity (m/s), acceleration (m/s^2), yaw (rad), body rates (rad/s)."""

@@ -8,7 +8,6 @@ from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import FirmwareNumber
 from crazyflie_fleet.separation import LOOK_AHEAD
 from crazyflie_mission_api.mission_vehicle import (
-    SETPOINT_TIMEOUT,
     AttitudeSetpoint,
     MotorsOffSetpoint,
     Move,
@@ -19,6 +18,7 @@ from crazyflie_mission_api.mission_vehicle import (
 from crazyflie_mission_api.ros_vehicle import RosVehicle, TimedPose, velocity_between
 from crazyflie_model.angles import Triple, rpy_from_quaternion
 from crazyflie_model.collision_avoidance import AvoidanceSettings
+from crazyflie_model.limits import LEVEL_AGE
 from crazyflie_msgs.msg import FlightStatus, VehicleStatus
 from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.ros_connection import ScriptConnection
@@ -227,7 +227,7 @@ class ScriptVehicle:
         if self._streamed is None:
             return None
         setpoint, time = self._streamed
-        if self._connection.fleet.time() - time > SETPOINT_TIMEOUT:
+        if self._connection.fleet.time() - time > LEVEL_AGE:
             return None
         return led_to(setpoint, place, self.vehicle.heading(), LOOK_AHEAD)
 

@@ -12,7 +12,6 @@ from typing_extensions import override
 
 from crazyflie_mission_api.dry_run import IdealVehicle
 from crazyflie_mission_api.mission_vehicle import (
-    SETPOINT_TIMEOUT,
     AttitudeSetpoint,
     FullStateSetpoint,
     HoverSetpoint,
@@ -24,6 +23,7 @@ from crazyflie_mission_api.mission_vehicle import (
 )
 from crazyflie_model.angles import Triple, rotate_by_yaw
 from crazyflie_model.collision_avoidance import AvoidanceSettings, CollisionAvoidance
+from crazyflie_model.limits import LEVEL_AGE
 from crazyflie_model.polynomials import Goal
 from crazyflie_model.units import GRAVITY
 from crazyflie_py.fleet import FleetVehicle
@@ -208,9 +208,9 @@ class SimulatedVehicle(IdealVehicle):
         if now > self._expiry:
             self._setpoint = None
         if self._setpoint is not None:
-            if math.isinf(self._expiry) and now > self._sent + SETPOINT_TIMEOUT + dt:
+            if math.isinf(self._expiry) and now > self._sent + LEVEL_AGE + dt:
                 self._warn(
-                    f"{self.name}: no setpoint for {SETPOINT_TIMEOUT:g} s; a real vehicle levels "
+                    f"{self.name}: no setpoint for {LEVEL_AGE:g} s; a real vehicle levels "
                     "out and stops its motors 2 s after the last one"
                 )
             return self._at_setpoint(self._setpoint, dt)

@@ -239,11 +239,14 @@ class Sinking(Coupled7D):
 @pytest.mark.parametrize("z", [0.005, 0.999])
 @pytest.mark.parametrize("yaw_dot", [0.0, 0.7])
 def test_many_steps_are_those_of_one_after_another(model, z, yaw_dot):
-    u, x = [0.1, -0.05, yaw_dot, GRAVITY - 2.0 + 3.0 * z], [0.0, 0.0, z, 1.0, -0.5, -0.1, 0.3]
-    single = x
-    for count in range(5, 205):
-        single = model().step(count, single, u)
-    assert model().steps(200, 5, x, u) == pytest.approx(single, rel=1e-12, abs=1e-12)
+    u, start = [0.1, -0.05, yaw_dot, GRAVITY - 2.0 + 3.0 * z], [0.0, 0.0, z, 1.0, -0.5, -0.1, 0.3]
+    for together in (200, 40):
+        x = single = start
+        for begin in range(5, 205, together):
+            x = model().steps(together, begin, x, u)
+            for count in range(begin, begin + together):
+                single = model().step(count, single, u)
+        assert x == pytest.approx(single, rel=1e-12, abs=1e-12)
 
 
 def test_vehicles_that_do_not_turn_fly_as_those_next_to_one_that_does():

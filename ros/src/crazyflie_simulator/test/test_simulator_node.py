@@ -247,12 +247,12 @@ def test_a_clock_that_jumps_forward_is_not_simulated_step_by_step(monkeypatch):
     process = launch()
     command(process, 9.81)
     process.advance(0.1)
-    steps = []
-    step = NearHover.step
-    monkeypatch.setattr(NearHover, "step", lambda *a: steps.append(1) or step(*a))
+    taken = []
+    steps = NearHover.steps
+    monkeypatch.setattr(NearHover, "steps", lambda *a: taken.append(a[1]) or steps(*a))
     process.clock.set(process.clock.time() + 3600.0)
     process.advance(0.02)
-    assert len(steps) <= 1030
+    assert 900 < sum(taken) <= 1030
     (warning,) = process.logged("warn")
     assert "the vehicle skips that" in warning
     stamps = [transform.header.stamp for transform in transforms(process)]

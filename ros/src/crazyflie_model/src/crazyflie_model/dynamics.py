@@ -48,6 +48,9 @@ STEP = 0.001  #: Integration step of every model (s).
 #: which tables have 0.3 to 0.6.
 GROUND_FRICTION = 0.5
 
+#: Largest turn of a vehicle in one formula (rad).
+_MAX_TURN = 0.06
+
 LEVEL_STEPS = round(LEVEL_AGE / STEP)  #: `LEVEL_AGE` in steps.
 _OFF_STEPS = round(OFF_AGE / STEP)
 
@@ -97,8 +100,9 @@ class Dynamics(ABC):
         """Return the state one `STEP` later; ``count`` steps have been done since the start."""
         return self.apply_ground_contact(rk4_step(self.rates, count * STEP, x, u, STEP))
 
-    def has_exact_steps(self, u: Vector[Number]) -> bool:
-        """Return whether a formula gives the state after many steps with the control ``u``."""
+    @property
+    def has_exact_steps(self) -> bool:
+        """Whether a formula gives the state after many steps."""
         return False
 
     def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
@@ -162,31 +166,42 @@ class SevenDimensional(Dynamics):
         """See `Dynamics.pose`: roll and pitch are those of the control, yaw is the state's."""
         return (x[0], x[1], x[2]), quaternion_from_rpy(u[0], u[1], x[6])
 
+    def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
+        """See `Dynamics.step`."""
+        if not self.has_exact_steps:
+            return super().step(count, x, u)
+        return self.apply_ground_contact(self._flight(x, u)(STEP, x))
+
     def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.steps`."""
-        if self.has_exact_steps(u):
-            return self._accelerate(n, x, self.rates(count * STEP, x, u))
-        return super().steps(n, count, x, u)
-
-    def _accelerate(self, n, x, rates):
-        """Return the state after ``n`` steps of constant acceleration and yaw rate: exact."""
+        if not self.has_exact_steps:
+            return super().steps(n, count, x, u)
+        flown = self._flight(x, u)
         duration = n * STEP
-        end = _accelerated(duration, x, rates)
-        if n == 1:
-            return self.apply_ground_contact(end)
-        z, vz, end_vz = x[2], x[5], end[5]
+        end = flown(duration, x)
+        z, vz, end_vz, turn = x[2], x[5], end[5], duration * u[2]
         # The vertical speed is never beyond those of the start and of the end.
         may_touch = (z <= 0.0) | (z + duration * vz <= 0.0) | (z + duration * end_vz <= 0.0)
-        if nowhere(may_touch):
+        if nowhere(may_touch | (turn * turn > _MAX_TURN**2)):
             return end
         for _ in range(n):
-            x = self.apply_ground_contact(_accelerated(STEP, x, [*x[3:6], *rates[3:]]))
+            x = self.apply_ground_contact(flown(STEP, x))
         return x
 
+    def _flight(self, x, u):
+        """Return ``flown(duration, x)``: the state after a duration (s) in the air.
 
-def _accelerated(duration: float, x: Vector[Number], rates: Vector[Number]) -> Vector[Number]:
-    px, py, pz, _, _, _, yaw = x
-    vx, vy, vz, ax, ay, az, yaw_dot = rates
+        Only models with `has_exact_steps` have it. They turn by at most `_MAX_TURN` meanwhile.
+        """
+        raise NotImplementedError
+
+
+def _accelerate(
+    duration: float, x: Vector[Number], a: Vector[Number], dyaw: Number
+) -> Vector[Number]:
+    """Return the state after a duration (s) of constant acceleration, and a turn by ``dyaw``."""
+    px, py, pz, vx, vy, vz, yaw = x
+    ax, ay, az = a
     half = duration / 2.0
     return [
         px + duration * (vx + half * ax),
@@ -195,7 +210,7 @@ def _accelerated(duration: float, x: Vector[Number], rates: Vector[Number]) -> V
         vx + duration * ax,
         vy + duration * ay,
         vz + duration * az,
-        yaw + duration * yaw_dot,
+        yaw + dyaw,
     ]
 
 
@@ -221,14 +236,14 @@ class NearHover(SevenDimensional):
             yaw_dot,
         ]
 
-    def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
-        """See `Dynamics.step`: exact, as acceleration and yaw rate are constant, and quick."""
-        return self._accelerate(1, x, self.rates(count * STEP, x, u))
-
-    def has_exact_steps(self, u: Vector[Number]) -> bool:
-        """See `Dynamics.has_exact_steps`."""
-        # A derived model may have other rates and steps.
+    @property
+    def has_exact_steps(self) -> bool:
+        """Whether the model is not a derived one, which may have other rates."""
         return type(self) is NearHover
+
+    def _flight(self, x, u):
+        *_, ax, ay, az, yaw_dot = self.rates(0.0, x, u)
+        return lambda duration, x: _accelerate(duration, x, [ax, ay, az], duration * yaw_dot)
 
 
 class Coupled7D(SevenDimensional):
@@ -238,50 +253,32 @@ class Coupled7D(SevenDimensional):
         """See `Dynamics.rates` and `coupled_acceleration`; the yaw rate is commanded."""
         return x[3:6] + coupled_acceleration(u, x[6]) + [u[2]]
 
-    def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
-        """See `Dynamics.step`: as exact as needed, and quick.
+    @property
+    def has_exact_steps(self) -> bool:
+        """Whether the model is not a derived one, which may have other rates."""
+        return type(self) is Coupled7D
 
-        The acceleration turns with the heading; terms of its integrals of third order in the yaw
-        rate are neglected: at 3.5 rad/s they are 1e-9 of the integrals.
-        """
-        if type(self).rates is not Coupled7D.rates:
-            # A model that is derived from this one has other rates.
-            return super().step(count, x, u)
-        return self._move(1, x, u)
-
-    def has_exact_steps(self, u: Vector[Number]) -> bool:
-        """See `Dynamics.has_exact_steps`: without a yaw rate the acceleration does not turn."""
-        return type(self) is Coupled7D and nowhere(u[2] != 0.0)
-
-    def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
-        """See `Dynamics.steps`."""
-        if type(self) is not Coupled7D or self.has_exact_steps(u):
-            return super().steps(n, count, x, u)
-        return self._move(n, x, u)
-
-    def _move(self, n, x, u):
-        yaw_dot, half = u[2], STEP / 2.0
+    def _flight(self, x, u):
+        yaw_dot = u[2]
+        if nowhere((yaw_dot < 0.0) | (yaw_dot > 0.0)):
+            acceleration = coupled_acceleration(u, x[6])
+            return lambda duration, x: _accelerate(duration, x, acceleration, 0.0)
         forward, left, az = _heading_acceleration(u)
-        mean = 1.0 - (STEP * yaw_dot) ** 2 / 24.0
-        turn = STEP**3 / 12.0 * yaw_dot
-        half_dyaw, dyaw = half * yaw_dot, STEP * yaw_dot
-        half_dvz, dvz = half * az, STEP * az
-        for _ in range(n):
-            px, py, pz, vx, vy, vz, yaw = x
-            ax, ay = _turned(forward, left, yaw + half_dyaw)
-            ax, ay = mean * ax, mean * ay
-            x = self.apply_ground_contact(
-                [
-                    px + STEP * (vx + half * ax) + turn * ay,
-                    py + STEP * (vy + half * ay) - turn * ax,
-                    pz + STEP * (vz + half_dvz),
-                    vx + STEP * ax,
-                    vy + STEP * ay,
-                    vz + dvz,
-                    yaw + dyaw,
-                ]
-            )
-        return x
+
+        def flown(duration, x):
+            # The acceleration turns with the heading. Of its integrals, terms of sixth order in
+            # the turn are neglected: at `_MAX_TURN` they are 2e-13 of the integrals.
+            half_turn = duration / 2.0 * yaw_dot
+            square = half_turn * half_turn
+            mean = 1.0 - square / 6.0 * (1.0 - square / 20.0)
+            ax, ay = _turned(mean * forward, mean * left, x[6] + half_turn)
+            end = _accelerate(duration, x, [ax, ay, az], 2.0 * half_turn)
+            lag = duration * duration * half_turn / 6.0 * (1.0 + square / 15.0)
+            end[0] = end[0] + lag * ay
+            end[1] = end[1] - lag * ax
+            return end
+
+        return flown
 
 
 def coupled_acceleration(u: Sequence[Number], yaw: Number) -> Vector[Number]:

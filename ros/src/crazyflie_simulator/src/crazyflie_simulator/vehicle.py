@@ -127,7 +127,7 @@ class SimulatedVehicle:
         self._steps = min(end, next_origin)
         self._x = self._dynamics.steps(self._steps - origin, origin, self._x_origin, u)
         # Rounding errors of a formula must not depend on the times of `advance_to`.
-        if self._steps == next_origin or not self._dynamics.has_exact_steps(u):
+        if self._steps == next_origin or not self._dynamics.has_exact_steps:
             self._origin, self._x_origin = self._steps, self._x
 
     def _notice_crash(self):

@@ -17,5 +17,5 @@ def test_answers_a_state():
     state.header.stamp = rospy.Time(12, 345)
     control = exchange({"/ref": reference, "/state": state}, "/control/lqr", ControlStamped)
     assert control.header.stamp == state.header.stamp
-    assert control.control.yaw_dot == pytest.approx(10.0)
-    assert control.control.pitch == pytest.approx(-0.1, rel=0.05)
+    assert control.control.yaw_dot == pytest.approx(0.8)
+    assert control.control.pitch == pytest.approx(-0.025, rel=0.05)

@@ -1,6 +1,7 @@
 """Flights of the examples by a program."""
 
 import contextlib
+import math
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -13,6 +14,7 @@ from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_msgs.msg import (
     ControlStamped,
+    FlightStatus,
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
@@ -44,6 +46,9 @@ class FlightOperator:
         self.record = record = FlightRecord()  #: Record of the flight so far.
         self._received = threading.Condition()  # Notified after every message.
         self._is_finished = False
+        # Present state of the flight, and when each state last began (s).
+        self._flight_state = FlightStatus.UNKNOWN
+        self._began: dict[int, float] = {}
         for topic, message_type, series in (
             ("state", PositionVelocityYawStateStamped, record.state),
             ("ref", PositionVelocityStateStamped, record.reference),
@@ -52,6 +57,7 @@ class FlightOperator:
         ):
             handle.subscribe(topic, message_type, partial(self._on_message, series))
         handle.subscribe("in_flight", EmptyMessage, self._on_toggle)
+        handle.subscribe("in_flight_flight_status", FlightStatus, self._on_status)
         self._reference = handle.publisher("ref", PositionVelocityStateStamped)
         if start:
             process.start()
@@ -79,7 +85,7 @@ class FlightOperator:
 
     def takeoff(self) -> None:
         """Call takeoff and wait for its answer."""
-        self._call("takeoff", "flying")
+        self._call("takeoff", "flying", FlightStatus.FLYING)
 
     def hover(self, duration: float) -> None:
         """Wait for ``duration`` seconds of flight."""
@@ -96,8 +102,11 @@ class FlightOperator:
 
     def land(self) -> None:
         """Call land and wait for its answer, and for the end of the motion."""
-        self._call("land", "landed")
-        self.hover(0.5)
+        self._call("land", "landed", FlightStatus.ON_GROUND)
+        record = self.record
+        end = record.events["landed"] + 0.5
+        self._wait_for(lambda: record.state.last_time >= end, "states stopped coming")
+        self._wait_for(lambda: record.final_control.last_time >= end, "controls stopped coming")
 
     def fly(self, hover: float) -> FlightRecord:
         """Take off, hover for some seconds and land; return the record, which is finished."""
@@ -107,7 +116,7 @@ class FlightOperator:
         self.land()
         return self.finish()
 
-    def _call(self, service, answered):
+    def _call(self, service, answered, flight_state):
         record = self.record
         called_at = record.state.last_time
         future = self._handle.call_service(service, Empty, EmptyRequest(), self._limit)
@@ -117,6 +126,15 @@ class FlightOperator:
             raise FlightError(str(error)) from None
         record.events[service] = called_at
         record.events[answered] = record.state.last_time
+        if not self._began:
+            return
+        # Messages may be later than the answer, by seconds where simulated time is fast.
+        self._wait_for(
+            lambda: self._began.get(flight_state, -math.inf) >= called_at,
+            f"the server has answered {service}, and was not {answered}",
+        )
+        end = record.events[answered] = self._began[flight_state]
+        self._wait_for(lambda: record.state.last_time >= end, "states stopped coming")
 
     def _on_message(self, series, message):
         content = message.control if isinstance(message, ControlStamped) else message.state
@@ -124,6 +142,13 @@ class FlightOperator:
 
     def _on_toggle(self, _):
         self._note(self.record.toggles.append, self._handle.stamp().to_sec())
+
+    def _on_status(self, status):
+        with self._received:
+            if status.state != self._flight_state:
+                self._flight_state = status.state
+                self._began[status.state] = status.header.stamp.to_sec()
+                self._received.notify_all()
 
     def _note(self, append, *values):
         with self._received:

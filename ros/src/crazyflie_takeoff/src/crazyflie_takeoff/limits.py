@@ -197,7 +197,7 @@ class RunGaps:
 
     def __init__(self) -> None:
         self.longest = 0.0  #: Longest gap of the last seconds (s).
-        self._time = math.nan
+        self.time = math.nan  #: Time of the last run (s).
         self._lost = 0.0
 
     @property
@@ -211,15 +211,19 @@ class RunGaps:
         """Whether `apply` changes no control that is in its ranges."""
         return self.longest * _MAX_EXCESS < MAX_SPEED_CHANGE
 
-    def run(self, time: float) -> None:
-        """Record that the filter runs at ``time`` (s)."""
-        gap = time - self._time
-        self._time = time
-        if gap > 0.0:
-            remembered = self.longest * math.exp(-gap / GAP_MEMORY)
-            gap = min(gap, LONGEST_GAP)
+    def run(self, time: float, longest: float = math.inf) -> None:
+        """Record that the filter runs at ``time`` (s).
+
+        If it has run before, since the last call, ``longest`` is the longest gap meanwhile (s).
+        """
+        elapsed = time - self.time
+        self.time = time
+        if elapsed > 0.0:
+            remembered = self.longest * math.exp(-elapsed / GAP_MEMORY)
+            elapsed = min(elapsed, LONGEST_GAP)
+            gap = min(elapsed, longest)
             self.longest = max(remembered, gap)
-            share = 1.0 - math.exp(-gap / STARVATION_MEMORY)
+            share = 1.0 - math.exp(-elapsed / STARVATION_MEMORY)
             self._lost += share * (float(gap > BUSY_GAP) - self._lost)
 
     def apply(

@@ -50,9 +50,10 @@ class Relay:
         self._command = self._allowed_command = self._passed = MOTORS_OFF
         self._takeoff = MOTORS_OFF
         # Summary of the controls that have passed unchanged since the last `flush`: the last one,
-        # the time for which they have flown (s), and the integral of their vertical thrust (m/s).
+        # the time for which they have flown (s), the integral of their vertical thrust (m/s), and
+        # the longest gap before one of them (s).
         self._unchanged: Any = None
-        self._duration = self._impulse = 0.0
+        self._duration = self._impulse = self._gap = 0.0
 
     @property
     def hover(self) -> float:
@@ -133,6 +134,7 @@ class Relay:
         ):
             return False
         step, self._time = time - self._time, time
+        self._gap = max(self._gap, min(step, time - self.gaps.time))
         self._duration += step
         self._impulse += step * thrust * math.cos(roll) * math.cos(pitch)
         self._unchanged = control
@@ -146,9 +148,9 @@ class Relay:
         self._command = self._allowed_command = self._passed = setpoint
         if self._duration > 0.0:
             self._learn(self._duration, self._impulse / self._duration)
-        self.gaps.run(self._time)
+        self.gaps.run(self._time, self._gap)
         self.commanded_callers.renew(self._time)
-        self._unchanged, self._duration, self._impulse = None, 0.0, 0.0
+        self._unchanged, self._duration, self._impulse, self._gap = None, 0.0, 0.0, 0.0
 
     def takeoff(
         self, control: Control, setpoint: SafeSetpoint, lands: bool

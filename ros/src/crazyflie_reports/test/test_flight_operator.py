@@ -39,7 +39,9 @@ class LateVehicle:
     def call_service(self, *_):
         answer = Future()
         answer.set_result(None)
-        threading.Timer(0.05, lambda: [act(*arguments) for act, *arguments in self.messages]).start()
+        threading.Timer(
+            0.05, lambda: [act(*arguments) for act, *arguments in self.messages]
+        ).start()
         return answer
 
     def show(self, time, thrust):

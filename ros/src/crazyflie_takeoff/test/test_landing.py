@@ -209,6 +209,17 @@ def test_a_server_that_is_to_leave_aborts_a_takeoff():
     assert network.vehicle.z == 0.0
 
 
+def test_a_server_that_is_to_leave_does_not_take_off():
+    """Its process may wait for the landing of another vehicle, and ends after that."""
+    network = HoverNetwork(SERVER)
+    network.advance(1.0)
+    network.process("server").prepare_shutdown({"/server": network.server})
+    network.advance(1.0)
+    with pytest.raises(ServiceError, match="/takeoff refused: /server is to end"):
+        network.call("/takeoff")
+    assert states(network) == ["on_ground"]
+
+
 def test_on_the_ground_there_is_nothing_to_land():
     network = HoverNetwork(SERVER)
     network.advance(1.0)

@@ -97,6 +97,14 @@ def test_lands_before_its_process_ends():
     assert process.published("/flights")[-1].data == "/crazyflie/controller on ground"
 
 
+def test_does_not_take_off_when_its_process_is_to_end():
+    process = launch()
+    show(process)
+    process.prepare_shutdown({})
+    with pytest.raises(ServiceError, match="takeoff refused: /crazyflie/controller is to end"):
+        call(process, "takeoff")
+
+
 def test_steers_to_the_goal():
     process = launch()
     process.publish("/crazyflie/goal", goal(0.1, 0.2, 0.1, quaternion_from_rpy(0.0, 0.0, 0.3)))

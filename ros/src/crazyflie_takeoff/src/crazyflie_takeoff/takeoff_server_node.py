@@ -129,6 +129,9 @@ class StatusPublisher:
 
     def takeoff_refusal(self) -> str:
         """Return why the vehicle must not take off from the ground; empty if it may."""
+        # Another vehicle of the process may be landing, and the process end with that flight.
+        if self._handle.is_ending:
+            return f"{self._handle.name} is to end"
         return self._checks.refusal(self._handle.time(), self._flight.filter)
 
     def log_recovery(self, height: float | None) -> None:

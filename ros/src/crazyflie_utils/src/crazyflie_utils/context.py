@@ -52,6 +52,8 @@ class ProcessContext:
         self._inhibitors: list[ShutdownInhibitor] = []
         #: Exit status with which the process is to end; None while it is not to end.
         self.exit_status: int | None = None
+        #: Whether the process ends as soon as its flights have ended: none may begin.
+        self.is_ending = False
         self.is_refused = False  #: Whether another process flies the vehicle of this one's nodes.
         if isinstance(self.clock, SimulatedClock):
             self.clock.on_change(self._run_simulated)

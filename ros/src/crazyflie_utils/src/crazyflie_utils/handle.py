@@ -347,6 +347,11 @@ class NodeHandle:
         guarded = self.guard(callback)
         self._process.transforms.on_pose(frame, period, lambda: self._submit(guarded))
 
+    @property
+    def is_ending(self) -> bool:
+        """Whether the process ends as soon as its flights have ended: none may begin."""
+        return self._process.is_ending
+
     def inhibit_shutdown(self) -> Callable[[bool], None]:
         """Return ``publish(in_flight)``, which publishes whether this node has a flight.
 

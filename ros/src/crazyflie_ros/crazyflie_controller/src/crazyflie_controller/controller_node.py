@@ -82,10 +82,15 @@ class ControllerNode(Node):
         self._controller.reconfigure(parameters.pids)
 
     def _on_takeoff(self, _):
-        return self._begin("takeoff", self._flight.take_off)
+        return self._begin("takeoff", self._take_off)
 
     def _on_land(self, _):
         return self._begin("land", self._flight.land)
+
+    def _take_off(self):
+        if self._handle.is_ending:
+            raise RefusalError(f"{self._handle.name} is to end")
+        self._flight.take_off()
 
     def _begin(self, service, manoeuvre):
         try:

@@ -134,7 +134,8 @@ class Relay:
         ):
             return False
         step, self._time = time - self._time, time
-        self._gap = max(self._gap, min(step, time - self.gaps.time))
+        if step > self._gap:
+            self._gap = max(self._gap, min(step, time - self.gaps.time))
         self._duration += step
         self._impulse += step * thrust * math.cos(roll) * math.cos(pitch)
         self._unchanged = control

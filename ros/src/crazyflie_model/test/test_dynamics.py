@@ -246,7 +246,9 @@ def test_many_steps_are_those_of_one_after_another(model, z, yaw_dot):
             x = model().steps(together, begin, x, u)
             for count in range(begin, begin + together):
                 single = model().step(count, single, u)
-        assert x == pytest.approx(single, rel=1e-12, abs=1e-12)
+        # A formula has other rounding errors.
+        is_exact = model().has_exact_steps
+        assert x == (pytest.approx(single, rel=1e-12, abs=1e-12) if is_exact else single)
 
 
 def test_vehicles_that_do_not_turn_fly_as_those_next_to_one_that_does():

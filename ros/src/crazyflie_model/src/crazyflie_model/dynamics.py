@@ -266,8 +266,10 @@ class Coupled7D(SevenDimensional):
         forward, left, az = _heading_acceleration(u)
 
         def flown(duration, x):
-            # The acceleration turns with the heading. Of its integrals, terms of sixth order in
-            # the turn are neglected: at `_MAX_TURN` they are 2e-13 of the integrals.
+            # The acceleration turns with the heading. Its integral is its mean, sin(h) / h of it in
+            # the direction half-way, with h half the turn; that of the velocity is beside that of
+            # this mean by a lag, (1 / h - cot(h)) duration^2 / 2. Of both series, terms of sixth
+            # order are neglected: at `_MAX_TURN` they are 2e-13 of the integrals.
             half_turn = duration / 2.0 * yaw_dot
             square = half_turn * half_turn
             mean = 1.0 - square / 6.0 * (1.0 - square / 20.0)

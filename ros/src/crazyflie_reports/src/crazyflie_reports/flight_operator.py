@@ -84,7 +84,7 @@ class FlightOperator:
         self._wait_for(lambda: len(self.record.final_control), "no control was published")
 
     def takeoff(self) -> None:
-        """Call takeoff and wait for its answer."""
+        """Call takeoff, and wait for its answer and for the states of that time."""
         self._call("takeoff", "flying", FlightStatus.FLYING)
 
     def hover(self, duration: float) -> None:

@@ -1,6 +1,9 @@
 """The reference that is followed while its source fails."""
 
+import math
+
 import numpy as np
+import pytest
 
 from crazyflie_lqr.reference import GuardedReference
 
@@ -128,6 +131,29 @@ def test_who_repeats_one_that_is_far_away_does_not_lead_the_vehicle_there():
     assert followed(reference, 0.0, np.zeros(7)) == [0.0] * 7
     reference.update(far)
     np.testing.assert_allclose(reference.value(0.0, np.zeros(7))[:3], [3.0, 0.0, 0.06], atol=0.01)
+
+
+@pytest.mark.parametrize("shares", [(0.3, 0.3), (1.0, 0.1), (1.1, 1.1)])
+def test_near_ones_in_between_do_not_lead_the_vehicle_to_one_far_away(shares):
+    """The vehicle flies these shares of the way to the far and to the near ones."""
+    reference = GuardedReference(6, max_jump=3.0)
+    far, near = [50.0, -50.0, 1.0, 0.0, 0.0, 0.0, 0.0], [-1.0, 0.5, 1.2, 0.0, 0.0, 0.0, 0.0]
+    vehicle = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    for step in range(200):
+        reference.update(far if step % 2 else near)
+        goal = np.array(reference.value(0.0, vehicle))
+        assert math.dist(goal[:3], vehicle[:3]) <= 3.0 + 1e-9
+        assert math.dist(goal[:3], near[:3]) <= 3.0 + 1e-9
+        vehicle += shares[0 if step % 2 else 1] * (goal - vehicle)
+
+
+def test_a_vehicle_carried_away_from_the_last_near_one_flies_towards_one_far_away():
+    reference = GuardedReference(6, max_jump=3.0)
+    reference.update([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    assert followed(reference, 0.0, np.zeros(7))[:3] == [0.0, 0.0, 1.0]
+    reference.update([0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    vehicle = [0.0, 20.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    np.testing.assert_allclose(followed(reference, 0.0, vehicle)[:3], [0.0, 23.0, 0.0])
 
 
 def test_another_one_that_is_far_away_is_another_direction():

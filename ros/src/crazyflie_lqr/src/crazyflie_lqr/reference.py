@@ -74,8 +74,10 @@ class GuardedReference:
     where it is, until a valid one comes. A reference that is older than the present one is ignored.
     One that is further from the vehicle than ``max_jump`` (m) is replaced by a position at rest at
     this distance in the same direction, which stays while references come from about the same
-    place. A velocity is limited to ``max_speed`` (m/s). ``report(text)`` is called in both cases.
-    A reference with a velocity becomes a position at rest when no other has followed for
+    place, and which is no further than ``max_jump`` from the last reference that was not replaced
+    either: near references of one source do not lead the vehicle step by step to the distant one
+    of another. A velocity is limited to ``max_speed`` (m/s). ``report(text)`` is called in both
+    cases. A reference with a velocity becomes a position at rest when no other has followed for
     `VELOCITY_LIMIT`, and at once when the positions of the references do not move with their
     velocities (see `VelocityCheck`). ``yaw_index`` is the index of the yaw in the state.
     """
@@ -94,6 +96,7 @@ class GuardedReference:
         self._last_valid: LastValid[Components] = LastValid()
         self._hold_point: Components | None = None
         self._near: Components | None = None
+        self._accepted: Components | None = None
         self._far: Components | None = None
         self._rest: Components | None = None
         self._velocity_check = VelocityCheck()
@@ -189,6 +192,7 @@ class GuardedReference:
         distance = math.dist(x_ref[:3], x[:3])
         if distance <= self.max_jump:
             self._near = self._far = None
+            self._accepted = x_ref
             return x_ref
         self._report(
             f"the reference is {distance:.1f} m away; flying {self.max_jump:g} m in its direction"
@@ -198,14 +202,23 @@ class GuardedReference:
         if self._near is None or not is_repeated:
             self._far = x_ref
             self._near = at_rest(x_ref, self._yaw_index)
-            # A weighted mean, which does not overflow for far references or short distances.
-            share = self.max_jump / distance
-            self._near[:3] = [
-                (1.0 - share) * here + share * there
-                for here, there in zip(x[:3], x_ref[:3], strict=True)
-            ]
+            goal, last = x_ref[:3], self._accepted
+            # A vehicle that is far from there has been carried since.
+            if last is not None and math.dist(last[:3], x[:3]) <= 2.0 * self.max_jump:
+                goal = _towards(goal, last[:3], self.max_jump)
+            self._near[:3] = _towards(goal, x[:3], self.max_jump)
         self._last_valid.update(self._near)
         return self._near
+
+
+def _towards(goal, start, longest):
+    """Return a point in the direction of a goal, at most ``longest`` (m) from the start."""
+    distance = math.dist(goal, start)
+    if distance <= longest:
+        return goal
+    # A weighted mean, which does not overflow for far references or short distances.
+    share = longest / distance
+    return [(1.0 - share) * a + share * b for a, b in zip(start, goal, strict=True)]
 
 
 #: Difference above which two clocks are unrelated (s): one of them is simulated, or is that of a

@@ -8,13 +8,15 @@ from numpy.typing import NDArray
 
 from crazyflie_batch import FiniteDifferences, Kalman, simulation
 from crazyflie_batch.batch import Batch
-from crazyflie_lqr import control_law
+from crazyflie_lqr import linear_feedback
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_model.angles import rpy_from_quaternion
-from crazyflie_simulator.disturbances import MotionCapture
-from crazyflie_simulator.vehicle import SimulatedVehicle
-from crazyflie_state_estimator.kalman import ConstantAccelerationFilter
-from crazyflie_state_estimator.motion import FiniteDifference, MotionEstimator
+from crazyflie_simulator.vehicle import MotionCapture, SimulatedVehicle
+from crazyflie_state_estimator.motion import (
+    ConstantAccelerationFilter,
+    FiniteDifference,
+    MotionEstimator,
+)
 
 _YAW = 6
 _FILTERS: dict[Any, Any] = {FiniteDifferences: FiniteDifference, Kalman: ConstantAccelerationFilter}
@@ -42,7 +44,7 @@ def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.f
     filter_ = _FILTERS[plan.estimator](*own["estimator"])
     estimator = MotionEstimator(filter_, FiniteDifference())
     controller = IntegralStateFeedback(
-        np.reshape(own["K"], (control_law.U_DIM, control_law.X_DIM)),
+        np.reshape(own["K"], (linear_feedback.U_DIM, linear_feedback.X_DIM)),
         np.array(own["u_ref"]),
         _YAW,
         own["integrator_k"],
@@ -55,7 +57,7 @@ def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.f
     )
     goal = np.array(own["goal"])
     states, controls = [vehicle.state], []
-    control: NDArray[np.float64] = np.zeros(control_law.U_DIM)
+    control: NDArray[np.float64] = np.zeros(linear_feedback.U_DIM)
     for tick in range(batch.ticks):
         moment = tick * period
         random.begin(tick)

@@ -9,7 +9,7 @@ from crazyflie_driver import srv
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.fake_process import FakeProcess
-from crazyflie_utils.tf.poses import PoseCodec, StampedPose
+from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
 
 STATE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 STATUS = "in_flight_flight_status"

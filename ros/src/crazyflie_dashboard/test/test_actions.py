@@ -16,7 +16,7 @@ from crazyflie_dashboard.snapshot import Action
 from crazyflie_driver import srv
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.tf.poses import PoseCodec, StampedPose
+from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
 
 LIMIT = 10.0  # s.
 

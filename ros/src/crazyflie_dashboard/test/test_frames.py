@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crazyflie_dashboard.frames import Frames
-from crazyflie_utils.tf.poses import PoseCodec, StampedPose
+from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 QUARTER = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))

@@ -17,7 +17,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.snapshot import Fence
 from crazyflie_msgs.msg import ControlStamped, FlightStatus, PositionVelocityYawStateStamped
-from crazyflie_utils.tf.poses import PoseCodec, StampedPose
+from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
 
 
 @pytest.fixture

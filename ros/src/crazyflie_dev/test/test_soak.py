@@ -14,7 +14,7 @@ from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
 from crazyflie_utils.testing import FakeGraph
-from crazyflie_utils.tf.poses import PoseCodec, StampedPose
+from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
 
 POSE_PERIOD = 0.01
 """Of the simulator, s; a soak from the command line has twice as many poses."""

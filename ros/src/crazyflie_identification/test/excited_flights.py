@@ -10,13 +10,11 @@ import numpy as np
 
 from crazyflie_identification import excitation
 from crazyflie_identification.fit import Recording
-from crazyflie_lqr.control_law import limited
-from crazyflie_lqr.linear_feedback import IntegralStateFeedback
+from crazyflie_lqr.linear_feedback import IntegralStateFeedback, limited
 from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
 from crazyflie_model.quadrotor import TYPES
-from crazyflie_simulator.disturbances import MotionCapture
-from crazyflie_simulator.vehicle import SimulatedVehicle
+from crazyflie_simulator.vehicle import MotionCapture, SimulatedVehicle
 from crazyflie_utils.parameters import model_file
 from crazyflie_virtual.crtp import Packet, Port
 from crazyflie_virtual.settings import VehicleSettings

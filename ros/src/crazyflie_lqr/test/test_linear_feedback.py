@@ -8,8 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from crazyflie_lqr.control_law import heading_error, integrate
-from crazyflie_lqr.linear_feedback import IntegralStateFeedback, LinearFeedback
+from crazyflie_lqr.linear_feedback import (
+    IntegralStateFeedback,
+    LinearFeedback,
+    heading_error,
+    integrate,
+)
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 
 U_REF = np.array([0.0, 0.0, 0.0, 9.81])

@@ -13,7 +13,7 @@ from crazyflie_msgs.msg import (
     VehicleStatus,
 )
 from crazyflie_utils import ServiceError
-from crazyflie_utils.tf.poses import StampedPose
+from crazyflie_utils.tf.frame_tree import StampedPose
 
 
 class ControllerVehicle:

@@ -12,12 +12,14 @@ from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import GRAVITY
-from crazyflie_simulator.disturbances import MotionCapture
-from crazyflie_simulator.vehicle import SimulatedVehicle
+from crazyflie_simulator.vehicle import MotionCapture, SimulatedVehicle
 from crazyflie_simulator.wind import Wind
 from crazyflie_state_estimator.control_response import ControlInput, FrozenPoseMonitor
-from crazyflie_state_estimator.kalman import ConstantAccelerationFilter
-from crazyflie_state_estimator.motion import FiniteDifference, MotionEstimator
+from crazyflie_state_estimator.motion import (
+    ConstantAccelerationFilter,
+    FiniteDifference,
+    MotionEstimator,
+)
 
 PERIOD = 0.01
 LIFT_OFF, CLIMB = 0.3, 1.0

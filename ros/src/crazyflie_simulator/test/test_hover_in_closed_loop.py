@@ -17,8 +17,7 @@ from crazyflie_lqr.models import near_hover
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import GRAVITY
-from crazyflie_simulator.disturbances import MotionCapture
-from crazyflie_simulator.vehicle import SimulatedVehicle
+from crazyflie_simulator.vehicle import MotionCapture, SimulatedVehicle
 from crazyflie_simulator.wind import Wind
 from crazyflie_state_estimator.motion import FiniteDifference, MotionEstimator
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from crazyflie_simulator.disturbances import MotionCapture
+from crazyflie_simulator.vehicle import MotionCapture
 
 POSE = ((1.0, 2.0, 3.0), (0.5, 0.5, 0.5, 0.5))
 

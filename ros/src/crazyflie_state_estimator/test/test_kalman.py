@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_are
 
-from crazyflie_state_estimator.kalman import (
+from crazyflie_state_estimator.motion import (
     ACCELERATION_WALK,
     ACCELERATION_WALK_WITH_CONTROL,
     MEMORY,

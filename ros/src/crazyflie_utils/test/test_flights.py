@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 from std_msgs.msg import String
 
-from crazyflie_utils import Node, shutdown
-from crazyflie_utils.flights import Flights
+from crazyflie_utils import Node, main
+from crazyflie_utils.context import Flights
 from crazyflie_utils.testing import FakeProcess
 
 PILOT = "/cf/pilot"
@@ -87,7 +87,7 @@ class Pilot(Node):
 
 def test_a_signal_that_comes_with_the_notice_ends_the_wait(process, monkeypatch):
     signals = []
-    waiting = shutdown.Shutdown(process, {PILOT: Pilot()}, signals)
+    waiting = main.Shutdown(process, {PILOT: Pilot()}, signals)
     process.handle(PILOT).inhibit_shutdown()(True)
     # Who reads the notice may send the signal before the process goes on.
     process.transport.log = lambda level, text: signals.append(signal.SIGINT)
@@ -96,6 +96,6 @@ def test_a_signal_that_comes_with_the_notice_ends_the_wait(process, monkeypatch)
         pytest.fail("the signal does not count")
 
     clock = SimpleNamespace(monotonic=time.monotonic, sleep=sleep)
-    monkeypatch.setattr(shutdown, "time", clock)
+    monkeypatch.setattr(main, "time", clock)
     waiting.wait_for_flights()
     assert signals == [signal.SIGINT]

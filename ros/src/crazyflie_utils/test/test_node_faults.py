@@ -15,7 +15,7 @@ def test_log_names_the_node(process, handle):
 
 def test_throttled_warnings(process, handle, monkeypatch):
     now = [50.0]
-    monkeypatch.setattr("crazyflie_utils.log.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("crazyflie_utils.context.time.monotonic", lambda: now[0])
     for _ in range(3):
         handle.warn("a", throttle=1.0)
         handle.warn("b", throttle=1.0)

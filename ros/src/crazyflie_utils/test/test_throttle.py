@@ -1,6 +1,6 @@
 """Limits against a flood of the log."""
 
-from crazyflie_utils.log import Throttle
+from crazyflie_utils.context import Throttle
 
 
 def test_a_key_passes_once_in_its_period():

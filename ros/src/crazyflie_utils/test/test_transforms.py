@@ -13,7 +13,7 @@ from transform_helpers import hear, transform, x_of
 
 from crazyflie_utils import TransformError
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_utils.tf.poses import StampedPose
+from crazyflie_utils.tf.frame_tree import StampedPose
 
 
 def test_latest_transform_with_its_own_stamp(process, lookup):

@@ -14,7 +14,7 @@ from typing_extensions import override
 
 from crazyflie_batch.per_vehicle import check_above
 from crazyflie_model.elementwise import Vector, where
-from crazyflie_state_estimator import kalman
+from crazyflie_state_estimator import motion
 
 
 @dataclass(frozen=True)
@@ -64,16 +64,16 @@ class FiniteDifferences(Estimator):
 
 @dataclass(frozen=True)
 class Kalman(Estimator):
-    """See `crazyflie_state_estimator.kalman.ConstantAccelerationFilter`; without the control.
+    """See `crazyflie_state_estimator.motion.ConstantAccelerationFilter`; without the control.
 
     Memory: position (3), velocity (3), acceleration (3), and the covariance that the axes share,
     upper half by rows (6). ValueError: one of the deviations is not positive.
     """
 
     #: Float or ndarray, shape (n,). Standard deviation of the poses' coordinates, m.
-    noise: ArrayLike = kalman.POSITION_NOISE
+    noise: ArrayLike = motion.POSITION_NOISE
     #: Float or ndarray, shape (n,); m/s^2/sqrt(s).
-    acceleration_walk: ArrayLike = kalman.ACCELERATION_WALK
+    acceleration_walk: ArrayLike = motion.ACCELERATION_WALK
     memory_dim = 15
 
     def __post_init__(self) -> None:
@@ -95,14 +95,14 @@ class Kalman(Estimator):
         restarted = _begin(position, speeds, noise)
         state, covariance = _predict(memory[:9], memory[9:], dt, walk * walk)
         state, covariance = _correct(state, covariance, position, noise * noise)
-        is_late = dt > kalman.MEMORY
+        is_late = dt > motion.MEMORY
         memory = [where(is_late, a, b) for a, b in zip(restarted, state + covariance, strict=True)]
         return memory, memory[:3], memory[3:6]
 
 
 def _first_variances():
     """Return the variances of rate and acceleration in a filter that has seen one sample."""
-    filter_ = kalman.ConstantAccelerationFilter(1.0, 1.0)
+    filter_ = motion.ConstantAccelerationFilter(1.0, 1.0)
     filter_.start([0.0])
     return np.diag(filter_.covariance)[1:].tolist()
 

@@ -15,7 +15,7 @@ from itertools import islice
 from typing import Any
 
 from crazyflie_batch.estimators import Estimator
-from crazyflie_lqr import control_law
+from crazyflie_lqr import linear_feedback
 from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Dynamics, watchdog_control
 from crazyflie_model.elementwise import Number, Vector, functions, where
@@ -39,7 +39,7 @@ def yaw_from_quaternion(quaternion: Sequence[Number]) -> Number:
 def turn(quaternion: Sequence[Number], rotation: Sequence[Number]) -> Vector[Number]:
     """Return the quaternion after a rotation vector (rad) in the body frame.
 
-    The error of an attitude in `crazyflie_simulator.disturbances`.
+    The error of an attitude in `crazyflie_simulator.vehicle`.
     """
     x, y, z, w = quaternion
     p, q, r = rotation
@@ -108,11 +108,11 @@ class Plan:
         return {
             "model": len(self.model_parameters),
             "estimator": len(fields(self.estimator)),
-            "K": control_law.X_DIM * control_law.U_DIM,
-            "u_ref": control_law.U_DIM,
+            "K": linear_feedback.X_DIM * linear_feedback.U_DIM,
+            "u_ref": linear_feedback.U_DIM,
             "integrator_k": 3,
             "integrator_limit": 3,
-            "goal": control_law.X_DIM,
+            "goal": linear_feedback.X_DIM,
             "noise": 2,
             "delay": 1,
             "dropout": 1,
@@ -127,7 +127,7 @@ class Plan:
         """Return the memory of a flight that begins at a state of the model."""
         return {
             "x": x,
-            "u": [0.0] * control_law.U_DIM,
+            "u": [0.0] * linear_feedback.U_DIM,
             "age": [0.0],
             "is_commanded": [0.0],
             "has_crashed": [0.0],
@@ -153,7 +153,7 @@ def measure(
 ) -> Vector[Any]:
     """Return the pose that motion capture sends off, `POSE_DIM` components.
 
-    See `crazyflie_simulator.disturbances.MotionCapture`.
+    See `crazyflie_simulator.vehicle.MotionCapture`.
     """
     position, attitude = plan.model(parameters).pose(memory["x"], effective_control(memory))
     position_noise, attitude_noise = parameters["noise"]
@@ -186,17 +186,19 @@ def run_controller(
 
     k = parameters["integrator_k"]
     dt = where(control_stamp >= 0.0, tick * plan.period - control_stamp * plan.period, 0.0)
-    dt = where(dt <= control_law.MAX_GAP, dt, 0.0)
-    error = control_law.heading_error(state, parameters["goal"])
-    rows = [parameters["K"][i : i + control_law.X_DIM] for i in range(0, 28, control_law.X_DIM)]
-    linear = control_law.linear_control(rows, parameters["u_ref"], error)
+    dt = where(dt <= linear_feedback.MAX_GAP, dt, 0.0)
+    error = linear_feedback.heading_error(state, parameters["goal"])
+    rows = [
+        parameters["K"][i : i + linear_feedback.X_DIM] for i in range(0, 28, linear_feedback.X_DIM)
+    ]
+    linear = linear_feedback.linear_control(rows, parameters["u_ref"], error)
     integral = [
-        control_law.integrate(axis, before, error[axis], dt, linear, k[axis], limit)
+        linear_feedback.integrate(axis, before, error[axis], dt, linear, k[axis], limit)
         for axis, (before, limit) in enumerate(
             zip(memory["integral"], parameters["integrator_limit"], strict=True)
         )
     ]
-    u = control_law.limited(control_law.with_integrals(linear, integral, k))
+    u = linear_feedback.limited(linear_feedback.with_integrals(linear, integral, k))
     first = _choose(has_arrived, {"estimator": begun, "stamp": [tick]}, memory)
     return _choose(
         is_second,

@@ -13,7 +13,7 @@ from scipy.special import ndtri
 from crazyflie_batch.simulation import time_errors
 from crazyflie_lqr.gain_file import GainFileError, load_matrix
 from crazyflie_model.limits import CRASH_TILT
-from crazyflie_state_estimator import kalman
+from crazyflie_state_estimator import motion
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import Declaration
 from crazyflie_utils.parameters.types import DURATION, METRES, TEXT, Integer, Number, Text
@@ -81,12 +81,12 @@ class RunParameters(Parameters):
     filter_noise: float = parameter(
         Number("m", above=0.0),
         "position noise that the Kalman filter expects",
-        kalman.POSITION_NOISE,
+        motion.POSITION_NOISE,
     )
     filter_walk: float = parameter(
         Number("m/s^2/sqrt(s)", above=0.0),
         "acceleration walk that the Kalman filter expects",
-        kalman.ACCELERATION_WALK,
+        motion.ACCELERATION_WALK,
     )
     K_file: str = parameter(
         TEXT, "gain file, 4 rows of 7 numbers: next to this file, or in crazyflie_lqr/config"

@@ -12,7 +12,7 @@ from crazyflie_batch.batch import Batch, Flights, fly
 from crazyflie_batch.estimators import Estimator, FiniteDifferences
 from crazyflie_batch.flight import Plan
 from crazyflie_batch.per_vehicle import check_above, check_range, columns, stacked_columns
-from crazyflie_lqr import control_law
+from crazyflie_lqr import linear_feedback
 from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Coupled7D, Dynamics, NearHover
 from crazyflie_model.limits import CRASH_TILT
@@ -92,7 +92,7 @@ class Controller:
 
 @dataclass(frozen=True)
 class Measurement:
-    """`crazyflie_simulator.disturbances.MotionCapture` for every vehicle.
+    """`crazyflie_simulator.vehicle.MotionCapture` for every vehicle.
 
     ValueError: an argument is out of its range.
     """
@@ -184,11 +184,11 @@ def simulate(
     parameters = {
         "model": stacked_columns(model.parameters, n),
         "estimator": stacked_columns(vars(estimator), n),
-        "K": columns("K", controller.K, (control_law.U_DIM, control_law.X_DIM), n),
-        "u_ref": columns("u_ref", controller.u_ref, (control_law.U_DIM,), n),
+        "K": columns("K", controller.K, (linear_feedback.U_DIM, linear_feedback.X_DIM), n),
+        "u_ref": columns("u_ref", controller.u_ref, (linear_feedback.U_DIM,), n),
         "integrator_k": columns("integrator_k", controller.integrator_k, (3,), n),
         "integrator_limit": columns("integrator_limit", controller.integrator_limit, (3,), n),
-        "goal": columns("goal", goal, (control_law.X_DIM,), n),
+        "goal": columns("goal", goal, (linear_feedback.X_DIM,), n),
         "noise": stacked_columns(noise, n),
         "delay": columns("latency", delay, (), n),
         "dropout": columns("dropout", measurement.dropout, (), n),

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from crazyflie_dashboard.snapshot import Rotation, Triple
 from crazyflie_utils import TransformError
-from crazyflie_utils.tf.frame_tree import FrameTree
-from crazyflie_utils.tf.poses import PoseCodec, StampedPose, entries
+from crazyflie_utils.tf.frame_tree import FrameTree, PoseCodec, StampedPose, entries
 
 _MAX_FRAMES = 1000
 _FORGET_AFTER = 30.0  #: Time without a pose after which a moving frame is not shown (s).

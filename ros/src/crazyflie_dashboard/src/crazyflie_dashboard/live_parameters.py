@@ -15,7 +15,7 @@ from crazyflie_dashboard.page_data import ParameterInfo
 from crazyflie_dashboard.parameters import described, of_firmware, parsed, values_of
 from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
 from crazyflie_utils import NodeHandle, ParameterError
-from crazyflie_utils.parameters.reconfigure import config_message
+from crazyflie_utils.parameters.server import config_message
 from crazyflie_utils.parameters.types import ParameterType
 from crazyflie_utils.refusal import RefusalError
 

@@ -26,7 +26,7 @@ from tf2_msgs.msg import TFMessage
 
 from crazyflie_msgs.msg import Control, ControlStamped, PositionVelocityStateStamped
 from crazyflie_utils.testing import FakeGraph
-from crazyflie_utils.tf.poses import RawTransforms
+from crazyflie_utils.tf.frame_tree import RawTransforms
 
 CONTROLLER, ESTIMATOR, SERVER, FILTER = (
     "/lqr_controller",

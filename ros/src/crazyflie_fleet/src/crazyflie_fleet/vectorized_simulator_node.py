@@ -18,9 +18,13 @@ from crazyflie_fleet.vehicle_nodes import (
     SAFE_REFERENCE,
     STATE,
 )
-from crazyflie_lqr.control_law import heading_error, limited, linear_control
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
-from crazyflie_lqr.linear_feedback import IntegralStateFeedback
+from crazyflie_lqr.linear_feedback import (
+    IntegralStateFeedback,
+    heading_error,
+    limited,
+    linear_control,
+)
 from crazyflie_lqr.reference import GuardedReference
 from crazyflie_model.angles import quaternion_from_rpy, wrap_to_pi
 from crazyflie_model.dynamics import Coupled7D, NearHover, SevenDimensional
@@ -35,7 +39,7 @@ from crazyflie_msgs.msg import (
 from crazyflie_simulator.simulator_node import MAX_CATCH_UP, RealTimeWatch
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, Number
-from crazyflie_utils.tf.poses import StampedPose
+from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import to_tuple
 

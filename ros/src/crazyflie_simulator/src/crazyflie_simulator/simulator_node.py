@@ -10,8 +10,7 @@ from typing_extensions import override
 
 from crazyflie_model.dynamics import Coupled7D, Dynamics, NearHover
 from crazyflie_msgs.msg import ControlStamped
-from crazyflie_simulator.disturbances import MotionCapture
-from crazyflie_simulator.vehicle import SimulatedVehicle
+from crazyflie_simulator.vehicle import MotionCapture, SimulatedVehicle
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, StampedPose, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import (

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 from crazyflie_model.dynamics import coupled_acceleration
 from crazyflie_model.limits import MAX_THRUST, MIN_THRUST
-from crazyflie_state_estimator.kalman import ConstantAccelerationFilter
+from crazyflie_state_estimator.motion import ConstantAccelerationFilter
 from crazyflie_utils.last_valid import HOLD_LIMIT
 
 

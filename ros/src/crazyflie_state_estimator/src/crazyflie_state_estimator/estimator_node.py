@@ -12,10 +12,15 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_state_estimator import kalman
 from crazyflie_state_estimator.control_response import ControlInput, FrozenPoseMonitor
 from crazyflie_state_estimator.motion import (
+    ACCELERATION_WALK,
+    ACCELERATION_WALK_WITH_CONTROL,
+    ANGLE_NOISE,
+    ANGULAR_ACCELERATION_WALK,
+    POSITION_NOISE,
     ClockStepMonitor,
+    ConstantAccelerationFilter,
     EstimatedMotion,
     FiniteDifference,
     MotionEstimator,
@@ -81,28 +86,28 @@ class KalmanParameters(Parameters):
     position_noise: float = parameter(
         Number("m", minimum=1e-6, maximum=100.0),
         "standard deviation of the poses' coordinates",
-        kalman.POSITION_NOISE,
+        POSITION_NOISE,
         "filter/position_noise",
         live=True,
     )
     acceleration_walk: float = parameter(
         _ACCELERATION_WALK,
         _ACCELERATION_WALK_HELP,
-        kalman.ACCELERATION_WALK,
+        ACCELERATION_WALK,
         "filter/acceleration_walk",
         live=True,
     )
     angle_noise: float = parameter(
         Number("rad", minimum=1e-6, maximum=10.0),
         "standard deviation of the poses' angles",
-        kalman.ANGLE_NOISE,
+        ANGLE_NOISE,
         "filter/angle_noise",
         live=True,
     )
     angular_acceleration_walk: float = parameter(
         Number("rad/s^2/sqrt(s)", minimum=1e-6, maximum=1e6),
         "as `filter/acceleration_walk`, of roll, pitch and yaw",
-        kalman.ANGULAR_ACCELERATION_WALK,
+        ANGULAR_ACCELERATION_WALK,
         "filter/angular_acceleration_walk",
         live=True,
     )
@@ -114,7 +119,7 @@ class KalmanWithControlParameters(KalmanParameters):
     acceleration_walk: float = parameter(
         _ACCELERATION_WALK,
         _ACCELERATION_WALK_HELP,
-        kalman.ACCELERATION_WALK_WITH_CONTROL,
+        ACCELERATION_WALK_WITH_CONTROL,
         "filter/acceleration_walk",
         live=True,
     )
@@ -165,10 +170,10 @@ class StateEstimatorNode(Node):
         parameters = handle.load(
             KalmanWithControlParameters if knows_control else KalmanParameters, self._reconfigure
         )
-        self._position_filter = kalman.ConstantAccelerationFilter(
+        self._position_filter = ConstantAccelerationFilter(
             parameters.position_noise, parameters.acceleration_walk
         )
-        self._angle_filter = kalman.ConstantAccelerationFilter(
+        self._angle_filter = ConstantAccelerationFilter(
             parameters.angle_noise, parameters.angular_acceleration_walk
         )
         return MotionEstimator(self._position_filter, self._angle_filter)

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from crazyflie_utils.parameters.declaration import parameter as parameter
     from crazyflie_utils.program import run_program as run_program
     from crazyflie_utils.refusal import ServiceError as ServiceError
+    from crazyflie_utils.tf.frame_tree import StampedPose as StampedPose
     from crazyflie_utils.tf.frame_tree import TransformError as TransformError
-    from crazyflie_utils.tf.poses import StampedPose as StampedPose
 
 _HOME = {
     "Node": "crazyflie_utils.node",
@@ -26,7 +26,7 @@ _HOME = {
     "ParameterError": "crazyflie_utils.parameters.declaration",
     "Parameters": "crazyflie_utils.parameters.declaration",
     "ServiceError": "crazyflie_utils.refusal",
-    "StampedPose": "crazyflie_utils.tf.poses",
+    "StampedPose": "crazyflie_utils.tf.frame_tree",
     "TransformError": "crazyflie_utils.tf.frame_tree",
     "parameter": "crazyflie_utils.parameters.declaration",
     "run": "crazyflie_utils.main",

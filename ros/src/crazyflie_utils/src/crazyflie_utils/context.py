@@ -1,13 +1,15 @@
-"""The objects that the nodes of one process share."""
+"""The objects that the nodes of one process share, their logs, and the flights it waits for."""
 
 import math
-from collections.abc import Callable, Iterable
+import time
+import traceback
+from collections.abc import Callable, Hashable, Iterable
 from functools import partial
+from typing import Any
 
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
 
-from crazyflie_utils.flights import ShutdownInhibitor
-from crazyflie_utils.log import NodeLog
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED, Transforms
 from crazyflie_utils.timers import (
     Executor,
@@ -18,6 +20,147 @@ from crazyflie_utils.timers import (
     TimerQueue,
 )
 from crazyflie_utils.topics import Publisher, Topics, Transport
+
+FLIGHTS_TOPIC = "/flights"  #: Topic of nodes that start and end flights, latched.
+
+_IN_FLIGHT, _TO_END, _ON_GROUND = "in flight", "in flight, to end", "on ground"
+
+
+class ShutdownInhibitor:
+    """Publishes the flights that a node starts and ends, which inhibit the end of processes."""
+
+    def __init__(self, topics: Topics, node: str):
+        self.node = node  #: Absolute name of the node.
+        self.in_flight = False  #: Last published value.
+        self._publisher = topics.publisher(FLIGHTS_TOPIC, String, latch=True)
+
+    def publish(self, in_flight: bool) -> None:
+        """Publish whether there is a flight."""
+        self.in_flight = in_flight
+        self._send(_IN_FLIGHT if in_flight else _ON_GROUND)
+
+    def publish_ending(self) -> None:
+        """Publish that the flight, if any, is ending because its process is to end."""
+        if self.in_flight:
+            self._send(_TO_END)
+
+    def close(self) -> None:
+        """End the publication."""
+        self.in_flight = False
+        self._publisher.close()
+
+    def _send(self, state):
+        self._publisher.publish(String(f"{self.node} {state}"))
+
+
+class Flights:
+    """The flights that concern nodes, by absolute name: in their namespaces, above and below."""
+
+    def __init__(self, topics: Topics, nodes: Iterable[str]):
+        self._namespaces = [_namespace(node) for node in nodes]
+        self._in_flight: dict[str, bool] = {}
+        self._to_end_since: dict[str, float] = {}
+        topics.subscribe(FLIGHTS_TOPIC, String, self._note)
+
+    @property
+    def in_flight(self) -> list[str]:
+        """Names of the nodes whose flights have not ended."""
+        return sorted(name for name, flies in self._in_flight.items() if flies)
+
+    def unattended(self, within: float) -> list[str]:
+        """Return those in flight that were not published as ending within ``within`` (s)."""
+        since = time.monotonic() - within
+        return [name for name in self.in_flight if self._to_end_since.get(name, since) <= since]
+
+    def _note(self, message: String) -> None:
+        name, _, state = message.data.partition(" ")
+        here = _namespace(name)
+        if any(here.startswith(each) or each.startswith(here) for each in self._namespaces):
+            self._in_flight[name] = state in (_IN_FLIGHT, _TO_END)
+            if state == _TO_END:
+                self._to_end_since[name] = time.monotonic()
+
+
+def _namespace(name):
+    return name.rpartition("/")[0] + "/"
+
+
+_MAX_KEYS = 64
+
+
+class Throttle:
+    """Passes each key once in a period; new keys do not pass while `_MAX_KEYS` are stored."""
+
+    def __init__(self) -> None:
+        self._allowed_from: dict[Hashable, float] = {}
+
+    def passes(self, key: Hashable, period: float, now: float) -> bool:
+        """Return whether ``key`` may pass at ``now`` (s); if so, not again for ``period`` (s)."""
+        if now < self._allowed_from.get(key, now):
+            return False
+        if key not in self._allowed_from and len(self._allowed_from) >= _MAX_KEYS:
+            self._allowed_from = {k: end for k, end in self._allowed_from.items() if now < end}
+            if len(self._allowed_from) >= _MAX_KEYS:
+                return False
+        self._allowed_from[key] = now + period
+        return True
+
+
+class NodeLog:
+    """Log of one node, whose absolute name begins each text."""
+
+    def __init__(self, transport: Transport, node: str):
+        self._transport = transport
+        self._node = node
+        self._throttle = Throttle()
+
+    def info(self, text: str) -> None:
+        """Log information for an operator."""
+        self._transport.log("info", f"{self._node}: {text}")
+
+    def warn(self, text: str, throttle: float = 0.0, key: Hashable = None) -> None:
+        """Log a warning; the same ``key`` (the text) at most once in ``throttle`` seconds.
+
+        The time is that of the machine's clock, also in simulated time. A varying text needs a key.
+        """
+        key = text if key is None else key
+        if throttle <= 0.0 or self._throttle.passes(key, throttle, time.monotonic()):
+            self._transport.log("warn", f"{self._node}: {text}")
+
+    def error(self, text: str) -> None:
+        """Log an error that makes the node fail."""
+        self._transport.log("error", f"{self._node}: {text}")
+
+
+class FaultHandler:
+    """Logs exceptions of a node's callbacks, and calls its `enter_safe_state`.
+
+    A new fault is logged with its traceback; repetitions are only counted.
+    """
+
+    def __init__(self, log: NodeLog):
+        self.enter_safe_state: Callable[[], None] | None = None  #: Called after each fault.
+        self._log = log
+        self._counts: dict[tuple[type, str, int | None], int] = {}
+
+    def report(self, callback: Callable[..., Any], error: Exception) -> None:
+        """Log that ``callback`` has raised ``error``, and put the node into its safe state."""
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        fault = (type(error), where.filename, where.lineno)
+        count = self._counts[fault] = self._counts.get(fault, 0) + 1
+        name = getattr(callback, "__qualname__", repr(callback))
+        if count == 1:
+            self._log.error(f"{name} failed\n{''.join(traceback.format_exception(error))}")
+        else:
+            self._log.warn(
+                f"{name} failed again: {error!r} ({count} times)", throttle=5.0, key=fault
+            )
+        if self.enter_safe_state is None:
+            return
+        try:
+            self.enter_safe_state()
+        except Exception as second:
+            self._log.error(f"enter_safe_state failed too: {second!r}")
 
 
 class ProcessContext:

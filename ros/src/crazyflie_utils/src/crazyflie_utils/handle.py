@@ -13,8 +13,7 @@ import rosgraph.names
 from std_srvs.srv import Trigger, TriggerResponse
 from typing_extensions import override
 
-from crazyflie_utils.context import ProcessContext
-from crazyflie_utils.log import FaultHandler, NodeLog
+from crazyflie_utils.context import FaultHandler, NodeLog, ProcessContext
 from crazyflie_utils.parameters.declaration import (
     REQUIRED,
     Declaration,
@@ -22,11 +21,10 @@ from crazyflie_utils.parameters.declaration import (
     Parameters,
     read_parameter,
 )
-from crazyflie_utils.parameters.reconfigure import Reconfiguration
-from crazyflie_utils.parameters.server import PrivateParameters
+from crazyflie_utils.parameters.server import PrivateParameters, Reconfiguration
 from crazyflie_utils.parameters.types import ParameterType
 from crazyflie_utils.refusal import RefusalError, ServiceError
-from crazyflie_utils.tf.poses import StampedPose
+from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_utils.timers import Timer, VaryingTimer
 from crazyflie_utils.topics import LatestMessage, Publisher, Subscriber
 from crazyflie_utils.vectors import is_finite, number_getter

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing_extensions import override
 
 from crazyflie_model.angles import Quaternion, Triple
-from crazyflie_simulator.disturbances import MotionCapture
+from crazyflie_simulator.vehicle import MotionCapture
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, TEXT, Integer, Number, Text
 from crazyflie_virtual import natnet

@@ -14,7 +14,7 @@ from crazyflie_driver.msg import GenericLogData
 from crazyflie_ranging.range_sensors import SENSOR_FILE, ULTRASONIC, Ranger, RangeSensor
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TEXT, TIME_STEP, TOPIC, Integer, ListOf
-from crazyflie_utils.tf.poses import StampedPose
+from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 from crazyflie_utils.vectors import stamped
 from crazyflie_world.world import World

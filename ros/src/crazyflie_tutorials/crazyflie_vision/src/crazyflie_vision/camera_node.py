@@ -17,7 +17,7 @@ from crazyflie_utils import (
     parameter,
 )
 from crazyflie_utils.parameters.types import FRAME, TOPIC, File
-from crazyflie_utils.tf.poses import StampedPose
+from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_vision.camera import CameraParameters, Pinhole, PixelNoise, Pose, load, optical_pose
 from crazyflie_vision.images import camera_info, to_message
 from crazyflie_vision.renderer import Renderer

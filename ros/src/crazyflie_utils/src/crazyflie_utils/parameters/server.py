@@ -1,9 +1,32 @@
-"""The parameter server: a node reads its own parameters in one request; a thread sets them."""
+"""Parameters of a running node: on the parameter server, and changes in flight.
 
+A node reads its own parameters in one request; a thread sets them. dynamic_reconfigure and
+rqt_reconfigure change them through the node handle, between two callbacks; the library's own server
+uses threads of rospy. Only the library's messages are imported: its other modules load two hundred
+modules (20 MiB) that find packages in the file system.
+"""
+
+import contextlib
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Any
+
+from dynamic_reconfigure.msg import (
+    BoolParameter,
+    Config,
+    ConfigDescription,
+    DoubleParameter,
+    Group,
+    IntParameter,
+    ParamDescription,
+    StrParameter,
+)
+from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
+
+from crazyflie_utils.parameters.declaration import REQUIRED, ParameterError, Parameters
+from crazyflie_utils.parameters.types import Boolean, Integer, Number, ParameterType, Text
+from crazyflie_utils.refusal import ServiceError
 
 
 class PrivateParameters:
@@ -78,3 +101,134 @@ class ParameterWriter:
                 done.set_exception(error)
             else:
                 done.set_result(None)
+
+
+class Reconfiguration:
+    """Offers the live parameters of a node, which ``get`` returns; see `NodeHandle.load`.
+
+    The handle is a `NodeHandle`, whose module imports this one.
+    """
+
+    def __init__(
+        self,
+        handle: Any,
+        parameters: Parameters,
+        get: Callable[[str], Any],
+        on_change: Callable[[Any], None],
+    ):
+        self._handle = handle
+        self._type = type(parameters)
+        self._on_change = on_change
+        # All are read now: at a change, in flight, no callback may wait for the master.
+        self._values = _read(self._type.declarations(), get)
+        self._live = {d.name: d for d in self._type.declarations() if d.live}
+        descriptions = handle.publisher("~parameter_descriptions", ConfigDescription, latch=True)
+        self._updates = handle.publisher("~parameter_updates", Config, latch=True)
+        descriptions.publish(_description(self._live.values(), self._config()))
+        self._updates.publish(config_message(self._config()))
+        handle.advertise_service("~set_parameters", Reconfigure, self._on_set_parameters)
+
+    def _on_set_parameters(self, request):
+        sent = request.config
+        wanted = {
+            parameter.name: parameter.value
+            for parameter in (*sent.bools, *sent.ints, *sent.strs, *sent.doubles)
+        }
+        try:
+            self._apply(wanted)
+        except ParameterError as error:
+            self._updates.publish(config_message(self._config()))
+            raise ServiceError(str(error)) from None
+        for name, value in wanted.items():
+            self._handle.set_param_later(f"~{name}", value)
+        self._updates.publish(config_message(self._config()))
+        return ReconfigureResponse(config_message(self._config()))
+
+    def _apply(self, wanted):
+        unknown = wanted.keys() - self._live.keys()
+        if unknown:
+            raise ParameterError(
+                f"{', '.join(sorted(unknown))} cannot be changed while {self._handle.name} runs; "
+                f"expected names among {', '.join(self._live)}"
+            )
+        before = self._values
+        self._values = {**before, **wanted}
+        try:
+            full_name = self._handle.resolve
+            self._on_change(
+                self._type.read(self._values.__getitem__, lambda name: full_name(f"~{name}"))
+            )
+        except Exception:
+            self._values = before
+            raise
+
+    def _config(self):
+        return {name: self._value(declaration) for name, declaration in self._live.items()}
+
+    def _value(self, declaration):
+        _, python_type, _, _ = _wire_format(declaration.type)
+        return python_type(self._values.get(declaration.name, declaration.default))
+
+
+def _read(declarations, get):
+    values = {}
+    for declaration in declarations:
+        with contextlib.suppress(KeyError):
+            values[declaration.name] = get(declaration.name)
+    return values
+
+
+def _wire_format(kind: ParameterType) -> tuple[str, type, Any, Any]:
+    """Return how a parameter is sent: its type's name there and in Python, and its limits."""
+    if isinstance(kind, Number):
+        return "double", float, max(kind.minimum, kind.above), kind.maximum
+    if isinstance(kind, Integer):
+        return "int", int, kind.minimum, kind.maximum
+    if isinstance(kind, Boolean):
+        return "bool", bool, False, True
+    return "str", str, "", ""
+
+
+def config_message(values: Mapping[str, bool | int | float | str]) -> Config:
+    """Return values, by the parameter's name, as dynamic_reconfigure sends them."""
+    message = Config()
+    for name, value in values.items():
+        # A bool is an int, too.
+        if isinstance(value, bool):
+            message.bools.append(BoolParameter(name, value))
+        elif isinstance(value, int):
+            message.ints.append(IntParameter(name, value))
+        elif isinstance(value, float):
+            message.doubles.append(DoubleParameter(name, value))
+        else:
+            message.strs.append(StrParameter(name, value))
+    return message
+
+
+def _description(live, config):
+    low, high, defaults = {}, {}, {}
+    group = Group(name="Default")
+    for declaration in live:
+        name = declaration.name
+        wire_type, python_type, low[name], high[name] = _wire_format(declaration.type)
+        has_default = declaration.default is not REQUIRED
+        defaults[name] = python_type(declaration.default) if has_default else config[name]
+        unit = f", {declaration.type.unit}" if declaration.type.unit else ""
+        edit_method = _choices(declaration.type)
+        group.parameters.append(
+            ParamDescription(name, wire_type, 0, declaration.help + unit, edit_method)
+        )
+    return ConfigDescription(
+        [group], config_message(high), config_message(low), config_message(defaults)
+    )
+
+
+def _choices(parameter_type):
+    # A Python literal in a string, as dynamic_reconfigure's own generator writes it.
+    if not isinstance(parameter_type, Text) or not parameter_type.choices:
+        return ""
+    choices = [
+        {"name": name, "type": "str", "value": name, "description": ""}
+        for name in parameter_type.choices
+    ]
+    return repr({"enum": choices, "enum_description": ""})

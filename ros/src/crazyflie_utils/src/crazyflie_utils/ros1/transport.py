@@ -16,7 +16,7 @@ import rosgraph
 import rospy
 from rosgraph_msgs.msg import Clock
 
-from crazyflie_utils.log import Throttle
+from crazyflie_utils.context import Throttle
 from crazyflie_utils.parameters.server import ParameterWriter
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.ros1 import patches

@@ -8,8 +8,7 @@ import genpy
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_utils.tf.frame_tree import FrameTree
-from crazyflie_utils.tf.poses import PoseCodec, RawTransforms, StampedPose
+from crazyflie_utils.tf.frame_tree import FrameTree, PoseCodec, RawTransforms, StampedPose
 from crazyflie_utils.topics import Subscriber, Topics
 
 #: Largest time of a stamp ahead of now (s). tf's static_transform_publisher stamps 0.1 s ahead.

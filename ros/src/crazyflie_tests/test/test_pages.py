@@ -207,6 +207,22 @@ def test_the_launch_file_of_the_software_example_has_its_table():
     assert "arguments of: ros/src/crazyflie_examples/launch/sw_hover.launch" in files
 
 
+MODULE_TABLES = [
+    (path, table)
+    for path in PACKAGE_PAGES
+    for table in Page(path).tables
+    if table.rows[0][0].startswith("module")
+]
+
+
+@pytest.mark.parametrize(("path", "table"), MODULE_TABLES, ids=lambda p: getattr(p, "name", ""))
+def test_modules_in_tables_exist(path, table):
+    exist = {each.stem for each in path.parent.glob("src/**/*")}
+    named = {name.strip("/") for row in table.rows[1:] for name in CODE_SPAN.findall(row[0])}
+    assert named - exist == set()
+    assert named
+
+
 @pytest.mark.parametrize("path", find_package_paths(str(TOP / "ros" / "src")))
 def test_every_package_is_named(path):
     page = Page(TOP / "docs" / "organisation.md")

@@ -92,6 +92,19 @@ def test_comes_down_whatever_it_weighs_and_however_it_moved(height, hover, speed
     assert max(flight.flown[lost:]) <= 1.25 * G + 1e-9
 
 
+@pytest.mark.parametrize("height", [1.0, 2.0])
+@pytest.mark.parametrize("share", [0.05, 0.09, 0.12, 0.16, 0.2])
+def test_a_vehicle_that_weighs_less_than_was_learned_is_brought_down_with_its_motors_on(
+    height, share
+):
+    flight = Flight(height).run(8.0)
+    # It drops a load, and the controller ends.
+    flight.hover *= 1.0 - share
+    flight.lose(pose=False).run_until_off(20.0)
+    assert flight.vehicle.z == 0.0
+    assert flight.vehicle.touchdown_speed < 0.5
+
+
 def test_it_holds_the_vehicle_with_the_thrust_that_was_learned():
     flight = Flight(hover=10.8).run(10.0).lose(pose=False).run(0.3)
     assert flight.filter.state is FilterState.HOLDING

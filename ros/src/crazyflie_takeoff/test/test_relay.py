@@ -117,6 +117,18 @@ def test_what_a_vehicle_accelerates_by_is_not_learned(relay):
     assert relay.hover - G == pytest.approx(thrust - 0.125 * (2.0 / 2.125) / 2.0)
 
 
+def test_what_happens_while_the_filter_does_not_run_is_not_learned(relay):
+    for tick in range(300):
+        relay.measure(at(1.0), 0.0, False, True)
+        command(relay, level(G), tick / 100, learns=True)
+    # It climbs, and then falls: its motors stop 2 s after the last control.
+    relay.measure(at(4.0)._replace(velocity=(0.0, 0.0, -5.0)), 0.0, False, True)
+    command(relay, level(16.0), 5.0, learns=True)
+    assert relay.hover == pytest.approx(G)
+    command(relay, level(G), 5.01, learns=True)
+    assert relay.hover == pytest.approx(G)
+
+
 def test_without_a_state_a_vehicle_neither_climbs_nor_falls(relay):
     relay.gaps.run(1.0)
     relay.gaps.run(1.25)

@@ -206,9 +206,12 @@ class Relay:
         return self._faded(self._takeoff, age) if is_late else None
 
     def _learn(self, step, lift):
+        motion = self.measured.fresh
+        speed = None if motion is None else motion.velocity[2]
         if 0.0 < step < LEARNING_STEP:
-            motion = self.measured.fresh
-            self._hover.update(step, lift, None if motion is None else motion.velocity[2])
+            self._hover.update(step, lift, speed)
+        elif step >= LEARNING_STEP:
+            self._hover.skip(speed)
 
     def _allowed(self, setpoint, lowest, lands, is_ramp=False):
         motion, hover = self.measured.fresh, self.hover

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.motion import TOUCHDOWN_SPEED, Motion
+from crazyflie_takeoff.motion import Motion
 
 #: Longest step between two ticks (s): if a clock was set, or the process was stopped for
 #: a while, a silence is not as long as it seems.
@@ -97,6 +97,14 @@ class HoverThrust:
         mean = speed if self._speed is None else self._speed + share * (speed - self._speed)
         self._speed, self._acceleration = mean, (speed - mean) / AVERAGING
 
+    def skip(self, speed: float | None) -> None:
+        """Skip a time in which it is not known which thrust has flown the vehicle.
+
+        ``speed`` is the z_dot measured after it, m/s, or None.
+        """
+        # What has changed the speed meanwhile is not in the mean of the thrust.
+        self._speed = None if speed is None else speed - AVERAGING * self._acceleration
+
 
 class SafeControl:
     """Hover at a position, and descent, without a controller.
@@ -158,11 +166,14 @@ class SafeControl:
     def _press(self, step, sinks):
         """Reduce the thrust further while the vehicle does not sink although it is to.
 
-        On the ground, that shows a touchdown. In the air, it corrects the thrust of hover.
+        On the ground, that shows a touchdown. In the air, it corrects a thrust of hover that is too
+        high; it stays while the vehicle sinks, but more slowly than it is to. A climb that is
+        braked as much as it may be needs no correction.
         """
-        stays = (
-            sinks and self._target < -0.5 * SINK_SPEED and abs(self._velocity[2]) < TOUCHDOWN_SPEED
-        )
+        lag = self._velocity[2] - self._target
+        if sinks and 0.0 < lag <= 0.5 * SINK_SPEED:
+            return
+        stays = sinks and self._target < -0.5 * SINK_SPEED and 0.0 < lag < SETTLING * MAX_BRAKING
         self._pressure += PRESS_RATE * step if stays else -PRESS_RATE * step
         self._pressure = min(max(self._pressure, 0.0), MAX_BRAKING)
 

@@ -14,7 +14,7 @@ assert not always, always
 """
 
 
-@pytest.mark.parametrize("module", ["crazyflie_link.crazyflie", "crazyflie_link.discovery"])
+@pytest.mark.parametrize("module", ["crazyflie_link.crazyflie", "crazyflie_link.cflib_internals"])
 def test_deprecation_warnings_stay_off(module):
     """In a process of its own: modules are imported once."""
     done = subprocess.run(

@@ -8,7 +8,7 @@ from cflib.crazyflie.mem import MemoryElement
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.errors import RefusedError, ValueRangeError
-from crazyflie_link.lighthouse import Lighthouse
+from crazyflie_link.localization import Lighthouse
 from crazyflie_link.testing import write_lighthouse_file
 
 CALIBRATIONS = 16  #: The page of the first calibration; those of the geometries begin at 0.

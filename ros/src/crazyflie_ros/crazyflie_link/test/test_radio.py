@@ -16,8 +16,7 @@ from crazyflie_link import link as module
 from crazyflie_link import scan
 from crazyflie_link.address import Address
 from crazyflie_link.cflib_internals import packet
-from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.discovery import MODES, reboot
+from crazyflie_link.crazyflie import MODES, Crazyflie
 from crazyflie_link.errors import AddressError, LinkLostError, NoAnswerError, NoDongleError
 from crazyflie_link.link import Link, LinkHealth, LinkMonitor, LinkTimeouts
 
@@ -169,8 +168,8 @@ def test_the_radios_figures():
 
 
 def test_restarting():
-    with patch("crazyflie_link.discovery.PowerSwitch", spec=PowerSwitch) as switch:
-        reboot(Address.parse(URI))
+    with patch("crazyflie_link.crazyflie.PowerSwitch", spec=PowerSwitch) as switch:
+        Crazyflie(URI).reboot()
         switch.assert_called_once_with(URI)
         switch.return_value.reboot_to_fw.assert_called_once_with()
         switch.return_value.close.assert_called_once_with()
@@ -178,16 +177,16 @@ def test_restarting():
 
 @pytest.mark.parametrize("mode", MODES)
 def test_switching_a_vehicle(mode):
-    with patch("crazyflie_link.discovery.PowerSwitch", spec=PowerSwitch) as switch:
+    with patch("crazyflie_link.crazyflie.PowerSwitch", spec=PowerSwitch) as switch:
         Crazyflie(URI).reboot(mode)
         getattr(switch.return_value, MODES[mode]).assert_called_once_with()
 
 
 def test_restarting_a_vehicle_that_is_off():
-    with patch("crazyflie_link.discovery.PowerSwitch", spec=PowerSwitch) as switch:
+    with patch("crazyflie_link.crazyflie.PowerSwitch", spec=PowerSwitch) as switch:
         switch.return_value.reboot_to_fw.side_effect = Exception("Failed to connect to Crazyflie")
         with pytest.raises(NoAnswerError, match="Failed to connect"):
-            reboot(Address.parse(URI))
+            Crazyflie(URI).reboot()
         switch.return_value.close.assert_called_once_with()
 
 

@@ -169,7 +169,7 @@ def test_the_radio_restarts_the_vehicle(monkeypatch, arguments, called):
         def __getattr__(self, name):
             return lambda: calls.append(name)
 
-    monkeypatch.setattr("crazyflie_link.discovery.PowerSwitch", Switch)
+    monkeypatch.setattr("crazyflie_link.crazyflie.PowerSwitch", Switch)
     uri = "radio://0/25/2M/E7E7E7E701"
     assert tools.reboot(["--uri", uri, *arguments]) == 0
     assert calls == [uri, called, "close"]
@@ -187,7 +187,7 @@ def searched(monkeypatch):
             return self.result
 
     searched = Searched()
-    monkeypatch.setattr("crazyflie_link.discovery.scan", searched)
+    monkeypatch.setattr("crazyflie_link.crazyflie.scan", searched)
     return searched
 
 

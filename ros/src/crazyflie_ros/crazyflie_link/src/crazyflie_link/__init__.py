@@ -17,7 +17,7 @@ _HOME = {
     "CrazyflieError": "crazyflie_link.errors",
     "LinkState": "crazyflie_link.crazyflie",
     "LogBlock": "crazyflie_link.log",
-    "scan": "crazyflie_link.discovery",
+    "scan": "crazyflie_link.crazyflie",
 }
 
 __all__ = ["Crazyflie", "CrazyflieError", "LinkState", "LogBlock", "scan"]

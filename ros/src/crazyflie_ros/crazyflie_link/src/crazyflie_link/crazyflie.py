@@ -1,34 +1,50 @@
-"""A vehicle, over a link that is set up again after a loss."""
+"""Search for vehicles; a vehicle, over a link that is set up again after a loss."""
 
 import codecs
+import contextlib
 import enum
+import io
 import threading
 import time
 from collections.abc import Callable
 
+import cflib.crtp
 from cflib.crtp.crtpstack import CRTPPort
+from cflib.crtp.radiodriver import DEFAULT_ADDR
+from cflib.utils.power_switch import PowerSwitch
 
 from crazyflie_link.address import Address
 from crazyflie_link.broadcast import is_broadcast
-from crazyflie_link.cflib_internals import CLOSE_LIMIT, table_cache
-from crazyflie_link.discovery import check_is_radio, reboot
+from crazyflie_link.cflib_internals import CLOSE_LIMIT, init_drivers, table_cache
 from crazyflie_link.errors import (
+    AddressError,
     CrazyflieError,
     LinkLostError,
     NoAnswerError,
     RefusedError,
     UnknownNameError,
     ValueRangeError,
+    explain,
 )
-from crazyflie_link.high_level import HighLevel
-from crazyflie_link.lighthouse import Lighthouse
+from crazyflie_link.high_level import HighLevel, Trajectories
 from crazyflie_link.link import LOG_DATA, Link, LinkHealth, LinkTimeouts, OnPacket
-from crazyflie_link.localization import Localization
+from crazyflie_link.localization import Lighthouse, Localization
 from crazyflie_link.log import Log, LogBlock
 from crazyflie_link.parameters import FirmwareParameters
 from crazyflie_link.setpoints import Setpoints
 from crazyflie_link.supervisor import EmergencyStop, Supervisor
-from crazyflie_link.trajectory import Trajectories
+
+DEFAULT_ADDRESS = f"{DEFAULT_ADDR:X}"  #: Radio address of new vehicles.
+
+#: Mode -> cflib's name of it: restart into the firmware or the boot loader, switch the main
+#: processor and the decks off or on again, switch everything off.
+MODES = {
+    "firmware": "reboot_to_fw",
+    "bootloader": "reboot_to_bootloader",
+    "sysoff": "stm_power_down",
+    "syson": "stm_power_up",
+    "alloff": "platform_power_down",
+}
 
 CHECK_PERIOD = 0.05  #: Period at which the link is checked, s.
 
@@ -45,6 +61,37 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 
 _JOIN_LIMIT = 0.3  #: Time limit of the thread that checks the link in `Crazyflie.close`, s.
 _CLOSED = "the link was closed"
+
+
+def scan(address: str = DEFAULT_ADDRESS) -> tuple[list[str], list[CrazyflieError]]:
+    """Search for vehicles on all interfaces; takes some seconds with a radio.
+
+    On UDP the ports 19850 to 19859 of 127.0.0.1, or of the environment variable SCAN_ADDRESS, are
+    tried; by radio an address of up to 10 hexadecimal digits, or else `AddressError` is raised.
+
+    Returns the addresses that were found, and an error for each interface that could not be
+    searched, such as a missing Crazyradio.
+    """
+    try:
+        number = int(address, 16)
+    except ValueError:
+        number = -1
+    if not 0 <= number < 1 << 40:
+        raise AddressError(f"{address!r} is no radio address: expected up to 10 hexadecimal digits")
+    init_drivers()
+    found: list[str] = []
+    problems: list[CrazyflieError] = []
+    for driver_class in cflib.crtp.CLASSES:
+        # The radio driver prints its errors, and finds nothing.
+        printed = io.StringIO()
+        try:
+            with contextlib.redirect_stdout(printed):
+                found += [uri for uri, *_ in driver_class().scan_interface(number)]
+        except Exception as error:
+            printed.write(str(error) or repr(error))
+        if printed.getvalue().strip():
+            problems.append(explain(driver_class.__name__, printed.getvalue()))
+    return found, problems
 
 
 class LinkState(enum.Enum):
@@ -217,13 +264,24 @@ class Crazyflie:
         return self.link().monitor.age(time.monotonic())
 
     def reboot(self, mode: str = "firmware") -> None:
-        """Restart the vehicle, or switch it off; see `crazyflie_link.discovery.reboot`. Blocks.
+        """Restart the vehicle or switch it off, as one of `MODES`; only by radio; blocks.
 
-        The link is lost by that; with ``reconnect`` a new one is set up.
+        The link is lost by that; with ``reconnect`` a new one is set up. Raises `CrazyflieError` if
+        it is not a radio link, or the vehicle has not acknowledged the command.
         """
-        check_is_radio(self.address)
+        uri = self.address.uri
+        if not self.address.is_radio:
+            raise RefusedError(
+                f"{uri}: only a radio link can restart a vehicle; switch it off and on instead"
+            )
         self._close_link("the vehicle is restarted")
-        reboot(self.address, mode)
+        init_drivers()
+        try:
+            with contextlib.closing(PowerSwitch(uri)) as switch:
+                getattr(switch, MODES[mode])()
+        except Exception as error:
+            # cflib raises bare exceptions.
+            raise explain(uri, str(error)) from None
 
     def close(self) -> None:
         """End the connection; safe to call twice and while connecting."""

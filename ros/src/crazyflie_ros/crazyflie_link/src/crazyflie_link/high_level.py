@@ -1,4 +1,4 @@
-"""Commands that the vehicle's own planner carries out."""
+"""The vehicle's own planner: its commands, and trajectories that are kept in its memory."""
 
 import copy
 import math
@@ -10,14 +10,26 @@ from types import SimpleNamespace
 from typing import Self
 
 from cflib.crazyflie.high_level_commander import HighLevelCommander
+from cflib.crazyflie.mem import CompressedSegment, CompressedStart, MemoryElement
 from cflib.crtp.crtpstack import CRTPPacket, CRTPPort
+from typing_extensions import override
 
 from crazyflie_link.broadcast import SharedCommand
 from crazyflie_link.errors import AlreadyLandingError, NoReplyError, RefusedError, ValueRangeError
 from crazyflie_link.link import Link
-from crazyflie_link.subsystem import Subsystem, check_byte, check_duration, check_finite
+from crazyflie_link.subsystem import (
+    MaySend,
+    Subsystem,
+    check_byte,
+    check_duration,
+    check_finite,
+    check_positive,
+    find_memory,
+    write_memory,
+)
 from crazyflie_link.supervisor import read_state
 from crazyflie_link.transmission import REPLY_LIMIT, RESEND_PERIOD, Request, Send
+from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
 
 ALL_GROUPS = 0  #: Group mask of commands to all vehicles.
@@ -28,17 +40,22 @@ REPORT_LAG = 0.1  #: Time after which the supervisor, at 25 Hz, reports a takeof
 
 _BUSY = 1  #: Reply to a takeoff while the planner flies, and to a landing while it lands.
 
+#: Duration (s), and control points of x, y, z (m) and yaw (rad).
+Segment = tuple[float, Sequence[float], Sequence[float], Sequence[float], Sequence[float]]
+
+_POINTS = (0, 1, 3, 7)
+_MOST_METRES, _MOST_RADIANS = 32.767, math.radians(3276.7)
+_MOST_SECONDS = 65.535
+
 
 @dataclass
 class _Knowledge:
     """Trajectories and groups (bits, None if unknown), which cannot be read.
 
-    ``defined`` ones have bytes of the memory; ``overwritten`` ones have the trajectory whose upload
-    has overwritten them.
+    A trajectory has bytes of the memory, and another one whose upload has overwritten them, if any.
     """
 
-    defined: dict[int, range] = field(default_factory=dict)
-    overwritten: dict[int, int] = field(default_factory=dict)
+    trajectories: dict[int, tuple[range, int | None]] = field(default_factory=dict)
     groups: int | None = None
 
 
@@ -58,7 +75,7 @@ class HighLevel(Subsystem):
 
     def forget_trajectories(self) -> None:
         """Forget trajectories and groups: a vehicle that has restarted has none."""
-        self._knowledge.defined.clear()
+        self._knowledge.trajectories.clear()
         self._knowledge.groups = 0
 
     def dry_run(self) -> Self:
@@ -203,14 +220,14 @@ class HighLevel(Subsystem):
         check_byte("trajectory number", trajectory_id)
         check_duration("time scale", time_scale)
         check_byte("group mask", group_mask)
-        defined = self._knowledge.defined
-        if trajectory_id not in defined:
-            known = ", ".join(map(str, sorted(defined))) or "none"
+        trajectories = self._knowledge.trajectories
+        if (trajectory := trajectories.get(trajectory_id)) is None:
+            known = ", ".join(map(str, sorted(trajectories))) or "none"
             raise RefusedError(
                 f"the start of the trajectory: {trajectory_id} has not been uploaded since the "
                 f"vehicle was connected or restarted; known: {known}"
             )
-        writer = self._knowledge.overwritten.get(trajectory_id)
+        _, writer = trajectory
         if writer is not None:
             raise RefusedError(
                 f"the start of the trajectory: the upload of {writer} has overwritten "
@@ -241,15 +258,14 @@ class HighLevel(Subsystem):
             "the definition of the trajectory",
             lambda c: c.define_trajectory(trajectory_id, place.start, pieces, kind),
         )
-        self._knowledge.overwritten.pop(trajectory_id, None)
-        self._knowledge.defined[trajectory_id] = place
+        self._knowledge.trajectories[trajectory_id] = place, None
 
     def begin_upload(self, trajectory_id: int, place: range) -> None:
         """Mark the trajectories in these bytes of the memory as overwritten by another one."""
-        known = self._knowledge
-        for other, written in known.defined.items():
+        known = self._knowledge.trajectories
+        for other, (written, _) in known.items():
             if written.start < place.stop and place.start < written.stop:
-                known.overwritten[other] = trajectory_id
+                known[other] = written, trajectory_id
 
     def _command(self, what, send, resend=True):
         link = self._current_link()
@@ -323,3 +339,121 @@ def _check(what: str, duration: float, group_mask: int, *values: float) -> None:
     check_finite(what, *values)
     check_duration(f"{what}: duration", duration)
     check_byte("group mask", group_mask)
+
+
+class Trajectories(Subsystem):
+    """The vehicle's memory of trajectories."""
+
+    def __init__(self, current_link: Callable[[], Link], high_level: HighLevel):
+        super().__init__(current_link)
+        self._high_level = high_level
+
+    @override
+    def guarded(self, may_send: MaySend) -> Self:
+        guarded = super().guarded(may_send)
+        guarded._high_level = self._high_level.guarded(may_send)
+        return guarded
+
+    def upload(
+        self,
+        trajectory_id: int,
+        piece_offset: int,
+        pieces: Sequence[PolynomialPiece],
+        check: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Write pieces to the vehicle's memory and define a trajectory (0 to 255) of them; blocks.
+
+        The offset in the memory is counted in pieces. ``check()`` is called before every packet,
+        and ends the upload by raising. Raises `CrazyflieError` if the pieces do not fit, the
+        vehicle refuses them or does not reply.
+        """
+        if not pieces:
+            raise ValueRangeError(f"trajectory {trajectory_id} has no pieces")
+        link = self._current_link()
+        memory = find_memory(link, MemoryElement.TYPE_TRAJ, "trajectories")
+        begin = piece_offset * PIECE_SIZE
+        if begin + len(pieces) * PIECE_SIZE > memory.size:
+            raise ValueRangeError(
+                f"trajectory {trajectory_id}: {len(pieces)} pieces from piece {piece_offset} on "
+                f"do not fit: the vehicle has room for {memory.size // PIECE_SIZE}"
+            )
+        data = b"".join(map(_packed, pieces))
+        self._write(link, memory.id, trajectory_id, begin, data, len(pieces), check)
+
+    def upload_compressed(
+        self,
+        trajectory_id: int,
+        offset: int,
+        start: Sequence[float],
+        segments: Sequence[Segment],
+        check: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Write a compressed trajectory from a byte of the memory on, and define it; blocks.
+
+        It begins at ``start`` (x, y, z in m, yaw in rad). A segment is its duration (s), and the
+        control points of a Bezier curve for x, y, z and yaw without the first: 0, 1, 3 or 7.
+        """
+        if not segments:
+            raise ValueRangeError(f"trajectory {trajectory_id} has no segments; expected one")
+        link = self._current_link()
+        memory = find_memory(link, MemoryElement.TYPE_TRAJ, "trajectories")
+        data = bytes(_packed_start(start))
+        for number, segment in enumerate(segments):
+            data += _packed_segment(number, *segment)
+        # The firmware flies segments until one has no duration.
+        data += bytes(CompressedSegment(0.0, [], [], [], []).pack())
+        if offset + len(data) > memory.size:
+            raise ValueRangeError(
+                f"trajectory {trajectory_id}: {len(data)} bytes from byte {offset} on do not fit; "
+                f"the vehicle has {memory.size}"
+            )
+        count = min(len(segments), 255)
+        self._write(link, memory.id, trajectory_id, offset, data, count, check, is_compressed=True)
+
+    def _write(self, link, memory, trajectory_id, begin, data, count, check, is_compressed=False):
+        place = range(begin, begin + len(data))
+        self._high_level.begin_upload(trajectory_id, place)
+        write_memory(link, memory, begin, data, "the trajectory", check)
+        check()
+        self._high_level.define_trajectory(trajectory_id, place, count, is_compressed)
+
+
+def _packed(piece: PolynomialPiece) -> bytes:
+    check_positive("duration of a piece", piece.duration)
+    for name, coefficients in zip(("x", "y", "z", "yaw"), piece.axes, strict=True):
+        if len(coefficients) > COEFFICIENTS:
+            raise ValueRangeError(
+                f"polynomial of {name} has {len(coefficients)} coefficients; expected at "
+                f"most {COEFFICIENTS}"
+            )
+        check_finite(f"polynomial of {name}", *coefficients)
+    return piece.pack()
+
+
+def _packed_start(start: Sequence[float]) -> bytes:
+    for name, value in zip(("x", "y", "z", "yaw"), start, strict=True):
+        _check_points(f"start: {name}", name, [value])
+    return bytes(CompressedStart(*start).pack())
+
+
+def _packed_segment(number: int, duration: float, *axes: Sequence[float]) -> bytes:
+    what = f"segment {number}"
+    if not 0.001 <= duration <= _MOST_SECONDS:
+        raise ValueRangeError(
+            f"{what}: its duration is {duration:g} s; expected 0.001 to {_MOST_SECONDS:g} s"
+        )
+    for name, points in zip(("x", "y", "z", "yaw"), axes, strict=True):
+        if len(points) not in _POINTS:
+            raise ValueRangeError(
+                f"{what}: {name} has {len(points)} control points; expected 0, 1, 3 or 7"
+            )
+        _check_points(f"{what}: {name}", name, points)
+    return bytes(CompressedSegment(duration, *axes).pack())
+
+
+def _check_points(what, name, points):
+    most, unit = (_MOST_RADIANS, "rad") if name == "yaw" else (_MOST_METRES, "m")
+    for value in points:
+        # One that is not a number is refused as well.
+        if not abs(value) <= most:
+            raise ValueRangeError(f"{what} is {value:g} {unit}; expected at most +-{most:.6g}")

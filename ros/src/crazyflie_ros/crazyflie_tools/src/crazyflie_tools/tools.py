@@ -99,7 +99,7 @@ def _set_param(vehicle, options):
 
 def reboot(arguments: list[str] | None = None) -> int:
     """Restart a vehicle, or switch it off."""
-    from crazyflie_link.discovery import MODES
+    from crazyflie_link.crazyflie import MODES
 
     parser = make_parser("reboot", "Restart a vehicle, or switch it off; only by radio.")
     parser.add_argument(

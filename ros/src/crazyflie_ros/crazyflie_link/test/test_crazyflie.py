@@ -1,13 +1,13 @@
 """Effects of a vehicle's packets, on a mock of its link."""
 
-from unittest.mock import patch
+from unittest.mock import MagicMock, patch
 
 import pytest
 from cflib.crazyflie import Crazyflie as CflibCrazyflie
 
 from crazyflie_link.cflib_internals import packet, table_cache
 from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.link import Link, LinkHealth
+from crazyflie_link.link import Link, LinkHealth, LinkMonitor
 
 URI = "radio://0/25/2M/E7E7E7E701"
 LOG = 5, 2
@@ -20,6 +20,7 @@ class Bench:
         self.lines = []
         self.link = link_class.return_value
         self.link.cflib, self.link.error = CflibCrazyflie(), None
+        self.link.monitor = MagicMock(spec=LinkMonitor)
         self.link.health.return_value = LinkHealth.ALIVE, ""
         self.vehicle = Crazyflie(URI, on_console=self.lines.append, **options)
         self.vehicle.connect()

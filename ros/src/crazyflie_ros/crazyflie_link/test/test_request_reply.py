@@ -8,8 +8,15 @@ from crazyflie_link.errors import LinkLostError, NoReplyError
 from crazyflie_link.transmission import Request, RequestReply
 
 
+class Requests(RequestReply):
+    """Requests that are sent at once."""
+
+    def request(self, send, request):
+        return super().request(send, request, lambda send: send())
+
+
 def test_the_answer_is_the_first_packet_that_fits():
-    requests = RequestReply()
+    requests = Requests()
 
     def send():
         requests.receive(8, 1, b"\x07 other channel")
@@ -22,7 +29,7 @@ def test_the_answer_is_the_first_packet_that_fits():
 
 
 def test_equal_requests_are_answered_in_their_order():
-    requests = RequestReply()
+    requests = Requests()
     answers = {}
     asked = threading.Semaphore(0)
 
@@ -41,7 +48,7 @@ def test_equal_requests_are_answered_in_their_order():
 
 
 def test_a_lost_request_is_sent_again():
-    requests = RequestReply()
+    requests = Requests()
     sent = []
 
     def send():
@@ -53,7 +60,7 @@ def test_a_lost_request_is_sent_again():
 
 
 def test_what_must_not_be_done_twice_is_sent_once():
-    requests = RequestReply()
+    requests = Requests()
     sent = []
     with pytest.raises(NoReplyError, match="the jump: .* may or may not have been carried out"):
         requests.request(
@@ -62,8 +69,19 @@ def test_what_must_not_be_done_twice_is_sent_once():
     assert len(sent) == 1
 
 
+def test_a_request_that_has_ended_is_withdrawn_from_the_queue():
+    requests, queue, sent = RequestReply(), [], []
+    request = Request(8, 0, b"", "the jump", resend=False, limit=0.01)
+    with pytest.raises(NoReplyError):
+        requests.request(lambda: sent.append(True), request, queue.append)
+    for send in queue:
+        send()
+    assert len(queue) == 1
+    assert not sent
+
+
 def test_no_request_waits_for_an_answer_beyond_the_limit_or_the_end_of_the_link():
-    requests = RequestReply()
+    requests = Requests()
     with pytest.raises(NoReplyError, match="a test: the vehicle has not replied within 0.05 s"):
         requests.request(lambda: None, Request(8, 0, b"", "a test", limit=0.05))
     with pytest.raises(LinkLostError, match="a test: gone"):
@@ -73,7 +91,7 @@ def test_no_request_waits_for_an_answer_beyond_the_limit_or_the_end_of_the_link(
 
 
 def test_an_answer_without_a_request_is_nothing():
-    requests = RequestReply()
+    requests = Requests()
     requests.receive(8, 0, b"early")
     with pytest.raises(NoReplyError):
         requests.request(lambda: None, Request(8, 0, b"early", "a test", limit=0.01))

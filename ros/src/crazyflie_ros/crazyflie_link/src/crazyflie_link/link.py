@@ -271,7 +271,8 @@ class Link:
         self._limits = limits or LinkTimeouts()
         self._on_packet = on_packet
         self._setup = LinkSetup(address.uri, self._limits)
-        self._monitor: LinkMonitor | None = None
+        #: Age of the vehicle's packets, since the link was set up.
+        self.monitor = LinkMonitor(time.monotonic(), self._limits.lost)
         self._changed = threading.Condition()
         self._error: CrazyflieError | None = None
         self._is_complete = False
@@ -327,7 +328,7 @@ class Link:
             self.cflib.disconnect()
 
     def _on_connected(self, uri):
-        self._monitor = LinkMonitor(time.monotonic(), self._limits.lost)
+        self.monitor = LinkMonitor(time.monotonic(), self._limits.lost)
         # Without a single parameter cflib never reports that it is complete.
         if not self.cflib.param.toc.toc:
             self._on_complete(uri)
@@ -345,22 +346,13 @@ class Link:
         return self.cflib.platform.get_protocol_version()
 
     @property
-    def monitor(self) -> LinkMonitor:
-        """Age of the vehicle's packets; `LinkLostError` if the link is not set up."""
-        if self._monitor is None:
-            raise LinkLostError(f"{self.address.uri}: not connected yet")
-        return self._monitor
-
-    @property
     def error(self) -> CrazyflieError | None:
         """Why the link has ended; None while it is open."""
         return self._error
 
     def health(self) -> tuple[LinkHealth, str]:
-        """Return the health of the link by the vehicle's packets, and the same in words."""
-        if self._monitor is None:
-            return LinkHealth.ALIVE, "not connected yet"
-        state = self._monitor.state(time.monotonic())
+        """Return the health of an open link by the vehicle's packets, and the same in words."""
+        state = self.monitor.state(time.monotonic())
         if state is LinkHealth.ALIVE:
             return state, "connected"
         if state is LinkHealth.RESTARTED:
@@ -387,24 +379,14 @@ class Link:
     ) -> bytes:
         """Send a request and return the data of its answer; see `RequestReply.request`.
 
-        ``send`` is a call, or data for the port and channel of the answer. A request that still
-        waits for the link when this returns or raises is withdrawn.
+        ``send`` is a call, or data for the port and channel of the answer.
         """
         transmit = (
             partial(self.cflib.send_packet, packet(request.port, request.channel, send))
             if isinstance(send, bytes)
             else send
         )
-        is_over = False
-
-        def send_until_over() -> None:
-            if not is_over:
-                transmit()
-
-        try:
-            return self._request_reply.request(partial(put or self.put, send_until_over), request)
-        finally:
-            is_over = True
+        return self._request_reply.request(transmit, request, put or self.put)
 
     # End.
 
@@ -429,7 +411,7 @@ class Link:
                     # The driver continues, and the vehicle may be heard again.
                     self._radio_error = f" ({cause})"
                     return
-                if self._monitor is not None:
+                if self.cflib.is_connected():
                     cause = LinkLostError(f"the link was lost: {cause}")
                 self._error = cause
             self._changed.notify_all()
@@ -441,11 +423,10 @@ class Link:
         port, channel, data = received.port, received.channel, bytes(received.data)
         if not self._is_complete:
             self._setup.receive(port, channel, data)
-        if self._monitor is not None:
-            if (port, channel) == LOG_DATA:
-                self._monitor.log_received(time.monotonic())
-            elif (port, channel) == _PING:
-                self._monitor.ping_answered(data, time.monotonic())
+        if (port, channel) == LOG_DATA:
+            self.monitor.log_received(time.monotonic())
+        elif (port, channel) == _PING:
+            self.monitor.ping_answered(data, time.monotonic())
         self._request_reply.receive(port, channel, data)
         if self._on_packet is not None:
             try:
@@ -454,5 +435,5 @@ class Link:
                 _log.exception("the callback for packets failed")
 
     def _on_sent(self, sent):
-        if self._monitor is not None and (sent.port, sent.channel) == _PING:
-            self._monitor.ping_sent(bytes(sent.data))
+        if (sent.port, sent.channel) == _PING:
+            self.monitor.ping_sent(bytes(sent.data))

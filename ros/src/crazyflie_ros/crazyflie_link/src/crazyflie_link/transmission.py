@@ -143,13 +143,19 @@ class RequestReply:
                     pending.done.set()
                     return
 
-    def request(self, send: Send, request: Request) -> bytes:
-        """Send a request and return the data of the answer; blocks.
+    def request(self, send: Send, request: Request, put: Callable[[Send], None]) -> bytes:
+        """Have ``put`` queue a request, and return the data of the answer; blocks.
 
-        Raises `NoReplyError` after the limit, `LinkLostError` if the link ends meanwhile.
+        One that still waits in the queue when this ends is withdrawn. Raises `NoReplyError` after
+        the limit, `LinkLostError` if the link ends meanwhile.
         """
         what = request.what
         pending = _Pending(request)
+
+        def send_while_pending() -> None:
+            if pending in self._pending:
+                send()
+
         with self._lock:
             if self._closed is not None:
                 raise LinkLostError(f"{what}: {self._closed}")
@@ -157,7 +163,7 @@ class RequestReply:
         left = request.limit
         deadline = time.monotonic() + left
         try:
-            send()
+            put(send_while_pending)
             while not pending.done.wait(min(RESEND_PERIOD, left) if request.resend else left):
                 left = deadline - time.monotonic()
                 if left <= 0.0:
@@ -165,7 +171,7 @@ class RequestReply:
                         f"{what}: the vehicle has not replied within {request.limit:g} s"
                         + ("" if request.resend else "; it may or may not have been carried out")
                     )
-                send()
+                put(send_while_pending)
         finally:
             with self._lock:
                 if pending in self._pending:

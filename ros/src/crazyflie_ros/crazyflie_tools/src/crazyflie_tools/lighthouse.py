@@ -143,14 +143,12 @@ def solve(
         solution = LhGeoEstimationManager.estimate_geometry(container.get_data_copy())
     except (LhException, np.linalg.LinAlgError, ValueError, IndexError) as error:
         raise ValueRangeError(f"no geometry fits: {error}. Nothing is stored") from None
-    problem, figures = _judge(solution)
-    if problem:
-        raise ValueRangeError(f"{problem}. Nothing is stored")
+    figures = _judged(solution)
     return {number: _geometry(pose) for number, pose in solution.bs_poses.items()}, figures
 
 
-def _judge(solution: LighthouseGeometrySolution) -> tuple[str, str]:
-    # Returns a problem, if any, and figures.
+def _judged(solution: LighthouseGeometrySolution) -> str:
+    # Returns the figures of a good solution.
     if not (solution.progress_is_ok and solution.has_converged):
         reasons = (
             solution.general_failure_info,
@@ -158,10 +156,12 @@ def _judge(solution: LighthouseGeometrySolution) -> tuple[str, str]:
             solution.x_axis_samples_info and f"x axis: {solution.x_axis_samples_info}",
             solution.xy_plane_samples_info and f"floor: {solution.xy_plane_samples_info}",
         )
-        return f"no geometry fits: {'; '.join(filter(None, reasons)) or 'not converged'}", ""
+        reason = "; ".join(filter(None, reasons)) or "not converged"
+        raise ValueRangeError(f"no geometry fits: {reason}. Nothing is stored")
     places = np.array([sample.pose.translation for sample in solution.samples])
     worst = max(solution.samples, key=lambda sample: sample.error_distance)
     residual = worst.error_distance
+    height = np.abs(places[:, 2]).max()
     # Scaled as if the size of the deck were known, not the distance on the x axis.
     poses = [sample.pose for sample in solution.samples]
     *_, scale = LighthouseSystemScaler.scale_diagonals(
@@ -170,32 +170,29 @@ def _judge(solution: LighthouseGeometrySolution) -> tuple[str, str]:
     figures = (
         f"residual {1000.0 * residual:.1f} mm (at most {1000.0 * MAX_RESIDUAL:g}), distance on the "
         f"x axis by the size of the deck {scale:.2f} m, largest height on the floor "
-        f"{1000.0 * np.abs(places[:, 2]).max():.1f} mm"
+        f"{1000.0 * height:.1f} mm"
     )
     if residual > MAX_RESIDUAL:
-        number = solution.samples.index(worst) + 1
-        return (
-            f"residual {1000.0 * residual:.1f} mm, at position {number}; expected at most "
-            f"{1000.0 * MAX_RESIDUAL:g}: was the vehicle moved, or the light reflected?",
-            figures,
+        problem = (
+            f"residual {1000.0 * residual:.1f} mm, at position "
+            f"{solution.samples.index(worst) + 1}; expected at most {1000.0 * MAX_RESIDUAL:g}: was "
+            "the vehicle moved, or the light reflected?"
         )
-    if abs(scale - 1.0) > MAX_SCALE_ERROR:
-        return (
+    elif abs(scale - 1.0) > MAX_SCALE_ERROR:
+        problem = (
             f"position 2 is {scale:.2f} m from the origin by the size of the deck; expected "
-            f"{LhGeoEstimationManager.REFERENCE_DIST:.2f}",
-            figures,
+            f"{LhGeoEstimationManager.REFERENCE_DIST:.2f}"
         )
-    farthest = np.abs(places[2:, 1]).max()
-    if farthest < MIN_DISTANCE:
-        return (
+    elif (farthest := np.abs(places[2:, 1]).max()) < MIN_DISTANCE:
+        problem = (
             f"all positions are within {farthest:.2f} m of the x axis; expected one at "
-            f"{MIN_DISTANCE:g} m or more",
-            figures,
+            f"{MIN_DISTANCE:g} m or more"
         )
-    height = np.abs(places[:, 2]).max()
-    if height > MAX_HEIGHT:
-        return f"a position is {height:.3f} m off the floor; expected at most {MAX_HEIGHT}", figures
-    return "", figures
+    elif height > MAX_HEIGHT:
+        problem = f"a position is {height:.3f} m off the floor; expected at most {MAX_HEIGHT}"
+    else:
+        return figures
+    raise ValueRangeError(f"{problem}. Nothing is stored")
 
 
 def check(vehicle: crazyflie_link.Crazyflie) -> None:

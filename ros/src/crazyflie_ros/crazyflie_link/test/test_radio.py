@@ -221,7 +221,7 @@ def test_the_lowest_and_the_highest_radio_address(monkeypatch, address):
     assert scan(address) == ([], [])
 
 
-@pytest.mark.parametrize("address", ["", "10000000000", "hello", "-1"])
+@pytest.mark.parametrize("address", ["", "0x", "10000000000", "hello", "-1", "E7_E7", " E7"])
 def test_scanning_for_no_address(address):
     with pytest.raises(AddressError):
         scan(address)

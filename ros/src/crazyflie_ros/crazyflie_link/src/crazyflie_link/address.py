@@ -25,7 +25,7 @@ EXPECTED = (
 )
 
 _HIGHEST_CHANNEL = 125
-_DEFAULT_ADDRESS = "E7E7E7E7E7"  #: Address of new vehicles, for URIs without one.
+DEFAULT_ADDRESS = "E7E7E7E7E7"  #: Radio address of new vehicles, and of URIs without one.
 _HIGHEST_PORT = 65535
 #: Number of digits that cflib treats as a serial number; fewer are a dongle's number.
 _SERIAL_LENGTH = 10
@@ -82,7 +82,7 @@ class Address:
 
     @property
     def _radio_address(self):
-        return int(self._parts["address"] or _DEFAULT_ADDRESS, 16)
+        return int(self._parts["address"] or DEFAULT_ADDRESS, 16)
 
     @property
     def _parts(self):
@@ -106,6 +106,14 @@ class Address:
         if not 0 < int(parts.get("port") or 1) <= _HIGHEST_PORT:
             raise AddressError(f"{text!r}: no port {parts['port']}; expected {EXPECTED}")
         return cls(text, scheme)
+
+
+def radio_address(text: str) -> int:
+    """Return the radio address in a text; `AddressError` without up to 10 hexadecimal digits."""
+    digits = text.lower().removeprefix("0x")
+    if not re.fullmatch("[0-9a-f]{1,10}", digits):
+        raise AddressError(f"{text!r} is no radio address: expected up to 10 hexadecimal digits")
+    return int(digits, 16)
 
 
 def _host_key(host: str) -> str:

@@ -10,14 +10,12 @@ from collections.abc import Callable
 
 import cflib.crtp
 from cflib.crtp.crtpstack import CRTPPort
-from cflib.crtp.radiodriver import DEFAULT_ADDR
 from cflib.utils.power_switch import PowerSwitch
 
-from crazyflie_link.address import Address
+from crazyflie_link.address import DEFAULT_ADDRESS, Address, radio_address
 from crazyflie_link.broadcast import is_broadcast
 from crazyflie_link.cflib_internals import CLOSE_LIMIT, init_drivers, table_cache
 from crazyflie_link.errors import (
-    AddressError,
     CrazyflieError,
     LinkLostError,
     NoAnswerError,
@@ -33,8 +31,6 @@ from crazyflie_link.log import Log, LogBlock
 from crazyflie_link.parameters import FirmwareParameters
 from crazyflie_link.setpoints import Setpoints
 from crazyflie_link.supervisor import EmergencyStop, Supervisor
-
-DEFAULT_ADDRESS = f"{DEFAULT_ADDR:X}"  #: Radio address of new vehicles.
 
 #: Mode -> cflib's name of it: restart into the firmware or the boot loader, switch the main
 #: processor and the decks off or on again, switch everything off.
@@ -72,12 +68,7 @@ def scan(address: str = DEFAULT_ADDRESS) -> tuple[list[str], list[CrazyflieError
     Returns the addresses that were found, and an error for each interface that could not be
     searched, such as a missing Crazyradio.
     """
-    try:
-        number = int(address, 16)
-    except ValueError:
-        number = -1
-    if not 0 <= number < 1 << 40:
-        raise AddressError(f"{address!r} is no radio address: expected up to 10 hexadecimal digits")
+    number = radio_address(address)
     init_drivers()
     found: list[str] = []
     problems: list[CrazyflieError] = []

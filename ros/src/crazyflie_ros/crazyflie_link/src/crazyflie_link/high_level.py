@@ -18,7 +18,6 @@ from crazyflie_link.broadcast import SharedCommand
 from crazyflie_link.errors import AlreadyLandingError, NoReplyError, RefusedError, ValueRangeError
 from crazyflie_link.link import Link
 from crazyflie_link.subsystem import (
-    MaySend,
     Subsystem,
     check_byte,
     check_duration,
@@ -28,7 +27,7 @@ from crazyflie_link.subsystem import (
     write_memory,
 )
 from crazyflie_link.supervisor import read_state
-from crazyflie_link.transmission import REPLY_LIMIT, RESEND_PERIOD, Request, Send
+from crazyflie_link.transmission import REPLY_LIMIT, RESEND_PERIOD, MaySend, Request, Send
 from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
 

@@ -6,6 +6,7 @@ has come for a while. Firmware that restarts within that time answers pings, but
 blocks: so log data must also come.
 """
 
+import copy
 import enum
 import logging
 import struct
@@ -14,6 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Self
 
 from cflib.crazyflie.link_statistics import ECHO_CHANNEL
 from cflib.crazyflie.log import CHAN_LOGDATA
@@ -32,7 +34,7 @@ from crazyflie_link.errors import (
     ValueRangeError,
     explain,
 )
-from crazyflie_link.transmission import Request, RequestReply, Send, TransmitQueue
+from crazyflie_link.transmission import MaySend, Request, RequestReply, Send, TransmitQueue
 
 LOG_DATA = (CRTPPort.LOGGING, CHAN_LOGDATA)  #: Port and channel of log data.
 
@@ -371,12 +373,7 @@ class Link:
             )
         self.put(partial(self.cflib.send_packet, packet(port, channel, data)))
 
-    def request(
-        self,
-        send: Send | bytes,
-        request: Request,
-        put: Callable[[Send], None] | None = None,
-    ) -> bytes:
+    def request(self, send: Send | bytes, request: Request) -> bytes:
         """Send a request and return the data of its answer; see `RequestReply.request`.
 
         ``send`` is a call, or data for the port and channel of the answer.
@@ -386,7 +383,20 @@ class Link:
             if isinstance(send, bytes)
             else send
         )
-        return self._request_reply.request(transmit, request, put or self.put)
+        return self._request_reply.request(transmit, request, self.put)
+
+    def guarded(self, may_send: MaySend) -> Self:
+        """Return the same open link, whose commands and requests go out only if ``may_send()``.
+
+        A request that is held back ends like an unanswered one.
+        """
+        guarded, put = copy.copy(self), self.put
+
+        def put_guarded(send: Send, urgent: bool = False) -> None:
+            put(lambda: send() if may_send() else None, urgent)
+
+        guarded.put = put_guarded
+        return guarded
 
     # End.
 

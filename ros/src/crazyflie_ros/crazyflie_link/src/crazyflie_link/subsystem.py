@@ -4,14 +4,14 @@ import copy
 import math
 import struct
 from collections.abc import Callable
-from typing import Any, Self, TypeVar, cast
+from typing import Self, TypeVar
 
 from cflib.crazyflie.mem import CHAN_WRITE, MemoryElement, _WriteRequest
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.errors import RefusedError, ValueRangeError
 from crazyflie_link.link import Link
-from crazyflie_link.transmission import Request, Send
+from crazyflie_link.transmission import MaySend, Request
 
 #: Numbers go over the link in single precision; a smaller one may arrive as 0.
 SMALLEST_FLOAT, LARGEST_FLOAT = 1.2e-38, 3.4e38
@@ -53,34 +53,6 @@ def check_byte(what: str, value: int) -> None:
         raise ValueRangeError(f"{what} is {value}; expected 0 to 255")
 
 
-#: Returns whether a packet is sent; called in the thread that sends, right before the packet.
-MaySend = Callable[[], bool]
-
-
-class _GuardedLink:
-    """A `Link` whose commands and requests are sent only if ``may_send()``.
-
-    A request that is held back ends like an unanswered one.
-    """
-
-    def __init__(self, link: Link, may_send: MaySend):
-        self._link = link
-        self._may_send = may_send
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._link, name)
-
-    def put(self, send: Send, urgent: bool = False) -> None:
-        def transmit():
-            if self._may_send():
-                send()
-
-        self._link.put(transmit, urgent)
-
-    def request(self, send: Send | bytes, request: Request) -> bytes:
-        return self._link.request(send, request, self.put)
-
-
 class Subsystem:
     """A part of the firmware, reached over the vehicle's present link."""
 
@@ -88,9 +60,9 @@ class Subsystem:
         self._current_link = current_link
 
     def guarded(self, may_send: MaySend) -> Self:
-        """Return the same subsystem, whose commands and requests go out only if ``may_send()``."""
+        """Return the same subsystem, over a link that is guarded; see `Link.guarded`."""
         guarded, current_link = copy.copy(self), self._current_link
-        guarded._current_link = lambda: cast(Link, _GuardedLink(current_link(), may_send))
+        guarded._current_link = lambda: current_link().guarded(may_send)
         return guarded
 
 

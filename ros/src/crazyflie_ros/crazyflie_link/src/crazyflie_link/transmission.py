@@ -20,6 +20,8 @@ _MOST_COMMANDS = 256
 _log = logging.getLogger(__name__)
 
 Send = Callable[[], None]  #: Sends something.
+#: Returns whether a packet is sent; called in the thread that sends, right before the packet.
+MaySend = Callable[[], bool]
 
 
 class TransmitQueue:

@@ -7,11 +7,11 @@ import sys
 import threading
 from collections.abc import Callable
 
-from crazyflie_link.address import Address
+from crazyflie_link.address import DEFAULT_ADDRESS, Address
 from crazyflie_link.errors import AddressError, CrazyflieError
 
 FINE, FAILED = 0, 1  #: Exit statuses; argparse's own for wrong usage is 2.
-DEFAULT_URI = "radio://0/80/2M/E7E7E7E7E7"  #: Address of a new vehicle.
+DEFAULT_URI = f"radio://0/80/2M/{DEFAULT_ADDRESS}"  #: Address of a new vehicle.
 LIMIT = 40.0  #: Timeout (s), longer than that of a connection.
 
 

@@ -11,7 +11,8 @@ import time
 import numpy as np
 
 import crazyflie_link
-from crazyflie_link.errors import NoAnswerError
+from crazyflie_link.address import DEFAULT_ADDRESS, radio_address
+from crazyflie_link.errors import AddressError, NoAnswerError
 from crazyflie_tools.program import FINE, LIMIT, make_parser, run, seconds
 
 _CHECK_PERIOD = 0.1
@@ -29,7 +30,7 @@ def scan(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--address",
         type=_radio_address,
-        default="E7E7E7E7E7",
+        default=DEFAULT_ADDRESS,
         help="radio address to call; by default %(default)s",
     )
     options = parser.parse_args(arguments)
@@ -155,10 +156,10 @@ def _talk(parser, arguments, work):
 
 
 def _radio_address(text):
-    digits = text[2:] if text[:2].lower() == "0x" else text
-    if not (0 < len(digits) <= 10 and set(digits) <= set("0123456789abcdefABCDEF")):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected up to 10 hexadecimal digits")
-    return digits.upper()
+    try:
+        return f"{radio_address(text):X}"
+    except AddressError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _name(text):

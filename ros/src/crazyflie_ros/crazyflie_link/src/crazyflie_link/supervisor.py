@@ -53,12 +53,12 @@ class EmergencyStop:
     # Returns the link on which something can be sent, also if it is silent or being opened.
     _any_link: Callable[[], Link | None]
     _closed: threading.Event = field(default_factory=threading.Event)
-    _changed: threading.Condition = field(default_factory=threading.Condition)
+    _obeyed: threading.Event = field(default_factory=threading.Event)
+    _beginning: threading.Lock = field(default_factory=threading.Lock)
     _thread: threading.Thread | None = None
     _link: Link | None = None
     _heard: bool = False
     _repeats: int = 0
-    _is_obeyed: bool = False
 
     @property
     def is_requested(self) -> bool:
@@ -67,7 +67,7 @@ class EmergencyStop:
 
     def begin(self) -> None:
         """Send the stop before all queued packets, then repeat it; does not block."""
-        with self._changed:
+        with self._beginning:
             self._begin_on(self._any_link())
             if self._link is not None:
                 self._send(self._link, urgent=True)
@@ -85,12 +85,11 @@ class EmergencyStop:
         if self.is_requested and data[0] == ANSWER | CMD_GET_STATE_BITFIELD:
             state = SupervisorState(int.from_bytes(data[1:3], "little"))
             if SupervisorState.LOCKED in state:
-                self._note_obeyed()
+                self._obeyed.set()
 
     def wait(self, limit: float) -> bool:
         """Wait until it was sent and, if the firmware reports that, obeyed; at most ``limit`` s."""
-        with self._changed:
-            return self._changed.wait_for(lambda: self._is_obeyed, limit)
+        return self._obeyed.wait(limit)
 
     def close(self) -> None:
         """Stop sending."""
@@ -98,7 +97,8 @@ class EmergencyStop:
 
     def _begin_on(self, link):
         self._link, self._repeats = link, 0
-        self._heard = self._is_obeyed = False
+        self._heard = False
+        self._obeyed.clear()
 
     def _run(self):
         while not self._closed.wait(PERIOD):
@@ -110,20 +110,15 @@ class EmergencyStop:
         if link is not self._link:
             # The vehicle at its other end may have been restarted.
             self._begin_on(link)
-        if self._is_obeyed:
+        if self._obeyed.is_set():
             return
         if self._heard and 0 <= link.protocol < SUPERVISOR_PROTOCOL:
             self._repeats += 1
             if self._repeats > BLIND_REPEATS:
-                self._note_obeyed()
+                self._obeyed.set()
                 return
         self._heard = False
         self._send(link, urgent=False)
-
-    def _note_obeyed(self):
-        with self._changed:
-            self._is_obeyed = True
-            self._changed.notify_all()
 
     @staticmethod
     def _send(link: Link, urgent: bool) -> None:

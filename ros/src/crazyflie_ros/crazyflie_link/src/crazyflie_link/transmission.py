@@ -6,12 +6,14 @@ its port, its channel and its first bytes. A late answer to an earlier, equal re
 distinguished from the expected one.
 """
 
+import contextlib
 import logging
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from concurrent.futures import Future
+from dataclasses import dataclass
 
 from crazyflie_link.errors import LinkLostError, NoReplyError
 
@@ -120,29 +122,22 @@ class Request:
         return is_same and data.startswith(self.prefix) and self.accepts(data)
 
 
-@dataclass(eq=False)
-class _Pending:
-    request: Request
-    answer: bytes | None = None
-    done: threading.Event = field(default_factory=threading.Event)
-
-
 class RequestReply:
     """Pair answers with pending requests."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._pending: list[_Pending] = []
+        # The answers to come, in the order of their requests.
+        self._pending: dict[Future[bytes], Request] = {}
         self._closed: str | None = None
 
     def receive(self, port: int, channel: int, data: bytes) -> None:
         """Give a packet that arrived to the oldest request that it answers."""
         with self._lock:
-            for pending in self._pending:
-                if pending.request.is_answer(port, channel, data):
-                    self._pending.remove(pending)
-                    pending.answer = data
-                    pending.done.set()
+            for answer, request in self._pending.items():
+                if request.is_answer(port, channel, data):
+                    del self._pending[answer]
+                    answer.set_result(data)
                     return
 
     def request(self, send: Send, request: Request, put: Callable[[Send], None]) -> bytes:
@@ -151,41 +146,36 @@ class RequestReply:
         One that still waits in the queue when this ends is withdrawn. Raises `NoReplyError` after
         the limit, `LinkLostError` if the link ends meanwhile.
         """
-        what = request.what
-        pending = _Pending(request)
-
-        def send_while_pending() -> None:
-            if pending in self._pending:
-                send()
-
+        answer: Future[bytes] = Future()
         with self._lock:
             if self._closed is not None:
-                raise LinkLostError(f"{what}: {self._closed}")
-            self._pending.append(pending)
+                raise LinkLostError(f"{request.what}: {self._closed}")
+            self._pending[answer] = request
+
+        def send_while_pending() -> None:
+            if answer in self._pending:
+                send()
+
         left = request.limit
         deadline = time.monotonic() + left
         try:
-            put(send_while_pending)
-            while not pending.done.wait(min(RESEND_PERIOD, left) if request.resend else left):
-                left = deadline - time.monotonic()
-                if left <= 0.0:
-                    raise NoReplyError(
-                        f"{what}: the vehicle has not replied within {request.limit:g} s"
-                        + ("" if request.resend else "; it may or may not have been carried out")
-                    )
+            while left > 0.0:
                 put(send_while_pending)
+                with contextlib.suppress(TimeoutError):
+                    return answer.result(min(RESEND_PERIOD, left) if request.resend else left)
+                left = deadline - time.monotonic() if request.resend else 0.0
+            raise NoReplyError(
+                f"{request.what}: the vehicle has not replied within {request.limit:g} s"
+                + ("" if request.resend else "; it may or may not have been carried out")
+            )
         finally:
             with self._lock:
-                if pending in self._pending:
-                    self._pending.remove(pending)
-        if pending.answer is None:
-            raise LinkLostError(f"{what}: {self._closed}")
-        return pending.answer
+                self._pending.pop(answer, None)
 
     def close(self, reason: str) -> None:
         """Fail all pending requests, and later ones, with `LinkLostError`."""
         with self._lock:
             self._closed = reason
-            closed, self._pending = self._pending, []
-        for pending in closed:
-            pending.done.set()
+            closed, self._pending = self._pending, {}
+        for answer, request in closed.items():
+            answer.set_exception(LinkLostError(f"{request.what}: {reason}"))

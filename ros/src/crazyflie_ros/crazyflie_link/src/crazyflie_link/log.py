@@ -1,6 +1,6 @@
 """Log blocks: variables that the vehicle sends periodically."""
 
-import threading
+import queue
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -150,18 +150,12 @@ class Log(Subsystem):
         config = LogConfig(block.name, block.period_ms)
         for variable in block.variables:
             config.add_variable(variable)
-        decided = threading.Event()
-        refusals: list[str] = []
-
-        def refuse(_, text):
-            refusals.append(text)
-            decided.set()
+        # Reasons of a refusal; empty for a start.
+        outcomes: queue.SimpleQueue[str] = queue.SimpleQueue()
 
         def note_start(_, is_started):
             # cflib reports a start that is refused here, too, and not as an error.
-            if not is_started:
-                refusals.append(backend.log_error(config.err_no))
-            decided.set()
+            outcomes.put("" if is_started else backend.log_error(config.err_no))
 
         def deliver(time_ms, values, _):
             block.callback(
@@ -169,7 +163,7 @@ class Log(Subsystem):
                 tuple(values[variable] for variable in block.variables),
             )
 
-        config.error_cb.add_callback(refuse)
+        config.error_cb.add_callback(lambda _, text: outcomes.put(text))
         config.started_cb.add_callback(note_start)
         config.data_received_cb.add_callback(deliver)
         try:
@@ -178,10 +172,12 @@ class Log(Subsystem):
         except (AttributeError, KeyError) as error:
             # cflib's own check of what fits on the vehicle.
             raise RefusedError(f"log block {block.name!r}: {error}") from None
-        if not decided.wait(REPLY_LIMIT):
+        try:
+            refusal = outcomes.get(timeout=REPLY_LIMIT)
+        except queue.Empty:
             raise NoReplyError(
                 f"log block {block.name!r}: the vehicle has not replied within {REPLY_LIMIT:g} s"
-            )
-        if refusals:
-            raise RefusedError(f"log block {block.name!r}: the vehicle answers: {refusals[0]}")
+            ) from None
+        if refusal:
+            raise RefusedError(f"log block {block.name!r}: the vehicle answers: {refusal}")
         link.monitor.expect_log(block.period_ms / 1000.0, time.monotonic())

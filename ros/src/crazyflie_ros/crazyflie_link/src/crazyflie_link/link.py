@@ -276,7 +276,7 @@ class Link:
         #: Age of the vehicle's packets, since the link was set up.
         self.monitor = LinkMonitor(time.monotonic(), self._limits.lost)
         self._changed = threading.Condition()
-        self._error: CrazyflieError | None = None
+        self.error: CrazyflieError | None = None  #: Why the link has ended; None while it is open.
         self._is_complete = False
         self._radio_error = ""
         self._closing = threading.Lock()
@@ -315,8 +315,8 @@ class Link:
         with self._changed:
             while not self._is_complete:
                 self._changed.wait(0.05)
-                if self._error is not None:
-                    raise self._error
+                if self.error is not None:
+                    raise self.error
                 self._setup.check(self.protocol)
                 if self.protocol < 0 and time.monotonic() - asked > _SOURCE_PERIOD:
                     asked = time.monotonic()
@@ -346,11 +346,6 @@ class Link:
     def protocol(self) -> int:
         """Version of the protocol that the vehicle speaks; negative while it is not known."""
         return self.cflib.platform.get_protocol_version()
-
-    @property
-    def error(self) -> CrazyflieError | None:
-        """Why the link has ended; None while it is open."""
-        return self._error
 
     def health(self) -> tuple[LinkHealth, str]:
         """Return the health of an open link by the vehicle's packets, and the same in words."""
@@ -407,7 +402,7 @@ class Link:
                 return
             self._is_closed = True
         with self._changed:
-            self._error = self._error or LinkLostError(reason)
+            self.error = self.error or LinkLostError(reason)
             self._changed.notify_all()
         self._transmit_queue.close(reason)
         self._request_reply.close(reason)
@@ -415,7 +410,7 @@ class Link:
 
     def _fail(self, text):
         with self._changed:
-            if self._error is None:
+            if self.error is None:
                 cause = explain(self.address.uri, text)
                 if self._is_complete and UNANSWERED in text.lower():
                     # The driver continues, and the vehicle may be heard again.
@@ -423,7 +418,7 @@ class Link:
                     return
                 if self.cflib.is_connected():
                     cause = LinkLostError(f"the link was lost: {cause}")
-                self._error = cause
+                self.error = cause
             self._changed.notify_all()
 
     # An exception in here would end cflib's receiving thread.

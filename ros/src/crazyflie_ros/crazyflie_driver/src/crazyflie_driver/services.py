@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
+from std_srvs.srv import Empty, SetBool, SetBoolResponse
 from typing_extensions import override
 
 from crazyflie_driver import srv
@@ -29,6 +29,7 @@ CONTROLLER_PERIOD, CONTROLLER_LIMIT = 0.1, 3.0
 #: Namespace, below the vehicle's, of services whose names belong to other nodes.
 ASIDE = "driver"
 _SHARED = {"takeoff", "land"}  #: Services of controllers, unless they are remapped.
+_UPLOADS = {"upload_trajectory", "upload_compressed_trajectory"}
 _SOLID_COLOR = 7  #: The firmware's ring.effect for a given color.
 
 
@@ -75,26 +76,27 @@ class VehicleServices:
 
     def advertise(self) -> None:
         """Offer all services that the vehicle has, below `ASIDE` what is another node's; blocks."""
-        crazyflie = self._vehicle.crazyflie
-        services: dict[str, tuple[type, Callable[[Any], Any]]] = {
-            "emergency": (Empty, self._on_emergency),
-            "arm": (SetBool, self._on_arm),
-            "recover": (Empty, partial(self._on_job, "recovery", Empty, self._recover)),
-            "upload_trajectory": (srv.UploadTrajectory, self._on_upload_trajectory),
+        crazyflie, mirror = self._vehicle.crazyflie, self._mirror
+        at_once: dict[str, tuple[type, Callable[[Any], Any]]] = {
+            "emergency": (Empty, self._emergency),
+            "notify_setpoints_stop": (
+                srv.NotifySetpointsStop,
+                lambda r: self._commands.notify(r.remainValidMillisecs),
+            ),
+            "send_packet": (srv.sendPacket, self._send_packet),
+        }
+        jobs: dict[str, tuple[type, Callable[[Job, Any], Any]]] = {
+            "arm": (SetBool, self._arm),
+            "recover": (Empty, self._recover),
+            "upload_trajectory": (srv.UploadTrajectory, self._upload),
             "upload_compressed_trajectory": (
                 srv.UploadCompressedTrajectory,
-                self._on_upload_compressed,
+                self._upload_compressed,
             ),
-            "notify_setpoints_stop": (srv.NotifySetpointsStop, self._on_notify_setpoints_stop),
-            "send_packet": (srv.sendPacket, self._on_send_packet),
-        }
-        for name, service_type in SERVICE_TYPES.items():
-            services[name] = service_type, partial(self._on_command, name, service_type)
-        jobs: dict[str, tuple[type, Callable[[Any], Any]]] = {
-            "update_params": (srv.UpdateParams, lambda r: self._mirror.write(r.params)),
+            "update_params": (srv.UpdateParams, lambda _, r: mirror.write(r.params)),
             "set_group_mask": (
                 srv.SetGroupMask,
-                lambda r: crazyflie.high_level.set_group_mask(r.groupMask),
+                lambda _, r: crazyflie.high_level.set_group_mask(r.groupMask),
             ),
             "set_led_color": (srv.SetLedColor, self._set_led_color),
             "store_params": (srv.UpdateParams, partial(_for_each, crazyflie.parameters.store)),
@@ -104,20 +106,35 @@ class VehicleServices:
         }
         if crazyflie.address.is_radio:
             jobs["reboot"] = Empty, self._reboot
-        for name, (service_type, work) in jobs.items():
-            services[name] = service_type, partial(self._on_job, name, service_type, work)
+        services: dict[str, tuple[type, Callable[[Any], Any]]] = {
+            name: (kind, partial(_answer, kind, work)) for name, (kind, work) in at_once.items()
+        }
+        for name, (kind, work) in jobs.items():
+            services[name] = kind, partial(self._on_job, name, kind, work)
+        for name, kind in SERVICE_TYPES.items():
+            services[name] = kind, partial(self._on_command, name, kind)
         handle, prefix = self._vehicle.handle, self._vehicle.prefix
         nodes = handle.service_nodes()
-        for name, (service_type, callback) in services.items():
+        for name, (kind, callback) in services.items():
             free = desired = f"{prefix}/{name}"
             if desired in nodes:
                 free = f"{prefix}/{ASIDE}/{name}"
                 handle.warn(f"{desired} is a service of {nodes[desired]}: the driver's is {free}")
-            handle.advertise_service(free, service_type, callback)
+            handle.advertise_service(free, kind, callback)
+
+    def _on_command(self, name, kind, request):
+        return self._commands.send(requested(name, request), kind._response_class())
+
+    def _on_job(self, name, kind, work, request):
+        return self._vehicle.jobs.submit(
+            name,
+            lambda job: _answer(kind, partial(work, job), request),
+            is_flight=name in _UPLOADS,
+        )
 
     # At once.
 
-    def _on_emergency(self, _):
+    def _emergency(self, _):
         try:
             self._latch_emergency()
         except CrazyflieError as error:
@@ -127,98 +144,54 @@ class VehicleServices:
         self._vehicle.error(
             "emergency stop; to fly again remove the vehicle, restart it and add it again"
         )
-        return EmptyResponse()
 
-    def _on_notify_setpoints_stop(self, request):
-        try:
-            self._commands.notify(request.remainValidMillisecs)
-        except CrazyflieError as error:
-            raise ServiceError(str(error)) from None
-        return srv.NotifySetpointsStopResponse()
-
-    def _on_send_packet(self, request):
+    def _send_packet(self, request):
         packet = request.packet
         data = bytes(packet.data)
         if packet.size > len(data):
             raise ServiceError(f"size is {packet.size}; a packet has at most {len(data)} bytes")
         port, channel = packet.header >> 4, packet.header & 3
-        try:
-            self._vehicle.crazyflie.send_packet(port, channel, data[: packet.size])
-        except CrazyflieError as error:
-            raise ServiceError(str(error)) from None
-        return srv.sendPacketResponse()
+        self._vehicle.crazyflie.send_packet(port, channel, data[: packet.size])
 
     # As jobs.
 
-    def _on_command(self, name, service_type, request):
-        return self._commands.send(requested(name, request), service_type._response_class())
-
-    def _on_arm(self, request):
+    def _arm(self, _, request):
         vehicle = self._vehicle
+        try:
+            if request.data:
+                vehicle.refuse_after_emergency()
+            vehicle.crazyflie.supervisor.arm(request.data)
+            if request.data:
+                vehicle.gate.handle(GateEvent.FLIGHT_CALLED)
+        except (CrazyflieError, ServiceError) as error:
+            return SetBoolResponse(False, str(error))
+        return SetBoolResponse(True, "armed" if request.data else "disarmed")
 
-        def work(_):
-            try:
-                if request.data:
-                    vehicle.refuse_after_emergency()
-                vehicle.crazyflie.supervisor.arm(request.data)
-                if request.data:
-                    vehicle.gate.handle(GateEvent.FLIGHT_CALLED)
-            except (CrazyflieError, ServiceError) as error:
-                return SetBoolResponse(False, str(error))
-            return SetBoolResponse(True, "armed" if request.data else "disarmed")
-
-        return vehicle.jobs.submit("arming", work)
-
-    def _on_upload_trajectory(self, request):
+    def _upload(self, job, request):
         pieces = [
             PolynomialPiece(
                 piece.duration.to_sec(), piece.poly_x, piece.poly_y, piece.poly_z, piece.poly_yaw
             )
             for piece in request.pieces
         ]
-        return self._upload(
-            "upload_trajectory",
-            srv.UploadTrajectoryResponse(),
-            lambda memory, check: memory.upload(
-                request.trajectoryId, request.pieceOffset, pieces, check
-            ),
+        self._vehicle.crazyflie.trajectories.guarded(job.may_send).upload(
+            request.trajectoryId, request.pieceOffset, pieces, job.check
         )
 
-    def _on_upload_compressed(self, request):
+    def _upload_compressed(self, job, request):
         start = (request.start.x, request.start.y, request.start.z, request.startYaw)
         segments = [
             (each.duration.to_sec(), each.x, each.y, each.z, each.yaw) for each in request.segments
         ]
-        return self._upload(
-            "upload_compressed_trajectory",
-            srv.UploadCompressedTrajectoryResponse(),
-            lambda memory, check: memory.upload_compressed(
-                request.trajectoryId, request.offset, start, segments, check
-            ),
+        self._vehicle.crazyflie.trajectories.guarded(job.may_send).upload_compressed(
+            request.trajectoryId, request.offset, start, segments, job.check
         )
 
-    def _upload(self, name, response, upload):
-        def work(job):
-            upload(self._vehicle.crazyflie.trajectories.guarded(job.may_send), job.check)
-            return response
-
-        return self._vehicle.jobs.submit(name, work, is_flight=True)
-
-    def _on_job(self, name, service_type, work, request):
-        def run(_: Job) -> Any:
-            try:
-                response = work(request)
-            except ParameterError as error:
-                raise ServiceError(str(error)) from None
-            return service_type._response_class() if response is None else response
-
-        return self._vehicle.jobs.submit(name, run)
-
-    def _recover(self, _):
+    def _recover(self, *_):
         self._vehicle.refuse_after_emergency()
         self._vehicle.crazyflie.supervisor.recover()
 
-    def _set_led_color(self, request):
+    def _set_led_color(self, _, request):
         color = request.color
         parts = {"Red": color.r, "Green": color.g, "Blue": color.b}
         for name, value in parts.items():
@@ -229,12 +202,12 @@ class VehicleServices:
             self._mirror.set(f"ring.solid{name}", round(255 * value))
         self._mirror.set("ring.effect", _SOLID_COLOR)
 
-    def _state(self, request):
+    def _state(self, _, request):
         state = self._vehicle.crazyflie.parameters.stored(parsed_name(request.param))
         stored = math.nan if state.stored_value is None else state.stored_value
         return srv.ParamStateResponse(state.is_stored, state.default_value, stored)
 
-    def _write_lighthouse(self, request):
+    def _write_lighthouse(self, _, request):
         state = self._flight.read()
         if state is None or SupervisorState.FLYING in state:
             words = "unknown" if state is None else state.words()
@@ -246,7 +219,7 @@ class VehicleServices:
             request.file, self._vehicle.crazyflie.parameters
         )
 
-    def _reboot(self, _):
+    def _reboot(self, *_):
         try:
             state = self._flight.read()
         except LinkLostError:
@@ -265,7 +238,15 @@ class VehicleServices:
         self._vehicle.crazyflie.reboot()
 
 
-def _for_each(act, request):
+def _answer(kind, work, request):
+    try:
+        response = work(request)
+    except (CrazyflieError, ParameterError) as error:
+        raise ServiceError(str(error)) from None
+    return kind._response_class() if response is None else response
+
+
+def _for_each(act, _, request):
     for name in map(parsed_name, request.params):
         act(name)
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from crazyflie_driver.parameter_mirror import ParameterMirror
+from crazyflie_driver.services import ParameterMirror
 from crazyflie_link.errors import LinkLostError, NoReplyError, RefusedError
 from crazyflie_utils.testing import FakeProcess
 

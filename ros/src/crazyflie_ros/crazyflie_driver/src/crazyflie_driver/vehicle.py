@@ -9,14 +9,13 @@ from crazyflie_driver.flight_commands import FlightCommands, Reason
 from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.jobs import Delivery, Job, Jobs
 from crazyflie_driver.log_topics import LogTopics
-from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.parameters import (
     POSITIONING_PARAMETER,
     CrazyflieServerParameters,
     VehicleParameters,
 )
 from crazyflie_driver.positioning import MOCAP, SOURCES
-from crazyflie_driver.services import VehicleServices
+from crazyflie_driver.services import ParameterMirror, VehicleServices
 from crazyflie_driver.setpoint_gate import GateEvent, SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import StatusPublisher

@@ -3,7 +3,7 @@
 import queue
 import threading
 
-from crazyflie_driver.jobs import MAX_WAITING, Delivery
+from crazyflie_driver.vehicle_base import MAX_WAITING, Delivery
 
 LIMIT = 60.0
 

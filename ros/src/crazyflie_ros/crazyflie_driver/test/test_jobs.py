@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from crazyflie_driver.jobs import MOST_JOBS, Jobs
+from crazyflie_driver.vehicle_base import MOST_JOBS, Jobs
 from crazyflie_utils import ServiceError
 
 LIMIT = 60.0

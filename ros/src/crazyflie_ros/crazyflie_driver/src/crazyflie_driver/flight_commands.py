@@ -8,12 +8,11 @@ from typing import TypeVar
 
 from crazyflie_driver.commands import LAND, STOP, TAKEOFF, Command, Need
 from crazyflie_driver.flight_state import REPORT_LAG, FlightState
-from crazyflie_driver.jobs import Job
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import STEP, STEP_TIME, Charge, Next, Touchdown, landing_duration
 from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.setpoint_topics import Control, SetpointTopics
-from crazyflie_driver.vehicle_base import BaseVehicle
+from crazyflie_driver.vehicle_base import BaseVehicle, Job
 from crazyflie_link.errors import AlreadyLandingError, CrazyflieError, LinkLostError, NoReplyError
 from crazyflie_link.high_level import HighLevel
 from crazyflie_link.supervisor import Supervisor

@@ -14,7 +14,6 @@ from typing_extensions import override
 
 from crazyflie_driver.commands import SERVICE_TYPES, Command, Need, requested
 from crazyflie_driver.flight_commands import Reason
-from crazyflie_driver.jobs import Job
 from crazyflie_driver.parameters import (
     ADD,
     REMOVE,
@@ -30,6 +29,7 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_driver.status import diagnostics
 from crazyflie_driver.vehicle import DriverVehicle
+from crazyflie_driver.vehicle_base import Job
 from crazyflie_link.address import Address
 from crazyflie_link.broadcast import Broadcaster, SharedCommand
 from crazyflie_link.errors import AddressError, CrazyflieError, LinkLostError

@@ -14,9 +14,8 @@ from crazyflie_driver import srv
 from crazyflie_driver.commands import SERVICE_TYPES, requested
 from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.flight_state import FlightState
-from crazyflie_driver.jobs import Job
 from crazyflie_driver.setpoint_gate import GateEvent
-from crazyflie_driver.vehicle_base import BaseVehicle
+from crazyflie_driver.vehicle_base import BaseVehicle, Job
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_model.polynomials import PolynomialPiece

@@ -7,7 +7,6 @@ from concurrent.futures import Future
 
 from crazyflie_driver.flight_commands import FlightCommands, Reason
 from crazyflie_driver.flight_state import FlightState
-from crazyflie_driver.jobs import Delivery, Job, Jobs
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.parameters import (
     POSITIONING_PARAMETER,
@@ -19,7 +18,14 @@ from crazyflie_driver.services import ParameterMirror, VehicleServices
 from crazyflie_driver.setpoint_gate import GateEvent, SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import StatusPublisher
-from crazyflie_driver.vehicle_base import BaseVehicle, ConnectionEvent, ConnectionState
+from crazyflie_driver.vehicle_base import (
+    BaseVehicle,
+    ConnectionEvent,
+    ConnectionState,
+    Delivery,
+    Job,
+    Jobs,
+)
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.transmission import REPLY_LIMIT

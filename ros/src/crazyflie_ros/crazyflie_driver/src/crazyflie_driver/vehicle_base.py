@@ -1,14 +1,189 @@
-"""Common data of all parts of one vehicle, and the states of its connection."""
+"""What the parts of one vehicle share: the states of its connection, its data and its threads.
 
+The threads are those of its jobs, which wait for the vehicle, and of the delivery of its data.
+"""
+
+import contextlib
 import enum
+import queue
 import threading
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future, InvalidStateError
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, TypeVar
 
-from crazyflie_driver.jobs import Delivery, Jobs
 from crazyflie_driver.parameters import CrazyflieServerParameters, VehicleParameters
 from crazyflie_driver.setpoint_gate import SetpointGate
 from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.errors import CrazyflieError
 from crazyflie_utils import NodeHandle, ServiceError
+
+Result = TypeVar("Result")
+
+#: Largest number of queued jobs. Largest number of queued data; more are dropped. A vehicle logs
+#: some 300 packets a second.
+MOST_JOBS = 64
+MAX_WAITING = 1000
+
+
+@dataclass(eq=False)
+class Job:
+    """A call ``work(job)``, which takes time; an urgent job supersedes one that is for a flight.
+
+    A caller that waits no longer cancels `done`: the job is not begun, or may send nothing more.
+    """
+
+    work: Callable[["Job"], Any]
+    is_flight: bool = False
+    superseded_by: str = ""
+    done: Future[Any] = field(default_factory=Future)
+
+    def may_send(self) -> bool:
+        """Return whether nothing has superseded it, and its result is awaited."""
+        return not (self.superseded_by or self.done.cancelled())
+
+    def check(self) -> None:
+        """Raise `ServiceError` unless it may send."""
+        if not self.may_send():
+            reason = self.superseded_by or "its caller, who waits no longer"
+            raise ServiceError(f"given up for {reason}")
+
+    def start(self, name: str) -> Future[Any]:
+        """Do the job in a thread of its own with a name; return the future of its result."""
+        threading.Thread(target=self.run, name=name, daemon=True).start()
+        return self.done
+
+    def run(self) -> None:
+        """Call `work`; result or error go to `done`."""
+        # It may have been cancelled meanwhile.
+        with contextlib.suppress(InvalidStateError):
+            try:
+                self.check()
+                self.done.set_result(self.work(self))
+            except BaseException as error:
+                self.done.set_exception(error)
+
+
+class Jobs:
+    """A queue with a lane for urgent jobs; a thread for each lane does its jobs in their order.
+
+    Urgent jobs supersede every flight job that was submitted before them: a queued one is given up,
+    a running one is marked. When a job fails, ``on_error(text)`` is called in its thread.
+    """
+
+    def __init__(self, name: str, on_error: Callable[[str], None] = lambda text: None):
+        self._on_error = on_error
+        self._wake = threading.Condition()
+        self._queued: dict[bool, deque[Job]] = {False: deque(), True: deque()}
+        self._running: Job | None = None
+        self._is_closed = False
+        for urgent, suffix in ((False, ""), (True, "-urgent")):
+            threading.Thread(
+                target=self._run, args=(urgent,), name=name + suffix, daemon=True
+            ).start()
+
+    def submit(
+        self,
+        what: str,
+        work: Callable[[Job], Result],
+        is_flight: bool = False,
+        urgent: bool = False,
+    ) -> Future[Result]:
+        """Queue ``work(job)`` behind the jobs before it; return the future of its result.
+
+        An urgent one waits for earlier urgent ones only. Errors of the link and `ServiceError` are
+        logged, and fail the future with `ServiceError`.
+        """
+
+        def run(job):
+            try:
+                return work(job)
+            except (CrazyflieError, ServiceError) as error:
+                self._on_error(f"{what} failed: {error}")
+                raise ServiceError(str(error)) from None
+
+        if urgent:
+            self.supersede(what)
+        job = Job(run, is_flight)
+        with self._wake:
+            queued = self._queued[urgent]
+            if self._is_closed:
+                job.done.set_exception(ServiceError("the vehicle has been removed"))
+            elif len(queued) >= MOST_JOBS:
+                job.done.set_exception(ServiceError(f"{MOST_JOBS} calls wait for the vehicle"))
+            else:
+                queued.append(job)
+                self._wake.notify_all()
+        return job.done
+
+    def supersede(self, what: str) -> None:
+        """Give up all flight jobs for something else."""
+        with self._wake:
+            queued = self._queued[False]
+            for job in [*queued, *([self._running] if self._running else [])]:
+                if job.is_flight:
+                    job.superseded_by = what
+            # Their turn may be far off, and their callers are blocked.
+            given_up = [job for job in queued if job.is_flight]
+            self._queued[False] = deque(job for job in queued if not job.is_flight)
+        for job in given_up:
+            job.run()
+
+    def close(self) -> None:
+        """Take no more jobs; the threads end once the queue is empty."""
+        with self._wake:
+            self._is_closed = True
+            self._wake.notify_all()
+
+    def _run(self, urgent):
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._queued[urgent] or self._is_closed)
+                if not self._queued[urgent]:
+                    return
+                job = self._queued[urgent].popleft()
+                if not urgent:
+                    self._running = job
+            job.run()
+            if not urgent:
+                self._running = None
+
+
+class Delivery:
+    """A thread through which a link's threads call the node's callbacks without blocking.
+
+    `NodeHandle.submit` returns when a callback has run, and that waits for all callbacks before it.
+    A link whose thread blocks on that receives nothing meanwhile.
+    """
+
+    def __init__(self, handle: NodeHandle, name: str):
+        self._handle = handle
+        self._queue: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._is_closed = False
+        threading.Thread(target=self._run, name=f"{name}-delivery", daemon=True).start()
+
+    def submit(self, callback: Callable[..., None], *arguments: Any) -> None:
+        """Call ``callback(*arguments)`` in turn with the node's callbacks; does not block."""
+        self._queue.put(partial(callback, *arguments))
+
+    def submit_data(self, callback: Callable[..., None], *arguments: Any) -> None:
+        """Do the same with data, which are dropped when too many wait."""
+        if self._queue.qsize() < MAX_WAITING:
+            self.submit(callback, *arguments)
+
+    def close(self) -> None:
+        """Stop calling; discard the queue."""
+        self._is_closed = True
+        self._queue.put(lambda: None)
+
+    def _run(self):
+        while True:
+            callback = self._queue.get()
+            if self._is_closed:
+                return
+            self._handle.submit(callback)
 
 
 class ConnectionState(enum.Enum):

@@ -1,14 +1,20 @@
-"""High-level commands: their services, and their transmission to one vehicle."""
+"""High-level commands and their services, and flights by them as a vehicle reports them."""
 
 import enum
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from crazyflie_driver import srv
+from crazyflie_driver.log_topics import LogTopics
+from crazyflie_driver.setpoint_topics import SetpointTopics
+from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.broadcast import SharedCommand
+from crazyflie_link.errors import LinkLostError, NoReplyError
 from crazyflie_link.high_level import ALL_GROUPS, HighLevel
+from crazyflie_model.supervisor import SupervisorState
 
 #: Commands that differ from the others, which move a vehicle in the air.
 TAKEOFF, LAND, STOP = "takeoff", "land", "stop"
@@ -91,3 +97,101 @@ class Need(enum.Enum):
     #: No packet: a landing would start the motors of a vehicle on the ground.
     ON_GROUND = enum.auto()
     NOT_ADDRESSED = enum.auto()  #: No packet: the command is for other groups.
+
+
+#: Parameter of the firmware, and its value for the extended Kalman filter.
+_ESTIMATOR, _KALMAN = "stabilizer.estimator", 2
+#: Largest age of a logged state, s: the firmware's supervisor runs at 25 Hz, its log at 10 Hz.
+REPORT_LAG = 0.2
+_LOGGED_STATE_LIMIT = 1.0  #: Time limit of log data with the state, s; they come every 0.1 s.
+
+
+@dataclass(eq=False)
+class FlightState:
+    """Distinguish flights by the high-level commander from other states with FLYING.
+
+    FLYING holds until 2 s after the motors have stopped, and a landing that is commanded then
+    starts them again: a flight needs HIGH_LEVEL_ACTIVE, too. For firmware that does not report it
+    (before protocol 12), the last commands decide: when the planner was commanded to move, and when
+    it keeps the motors off.
+    """
+
+    _vehicle: BaseVehicle
+    _log: LogTopics
+    _setpoints: SetpointTopics
+    _planned: float = -math.inf
+    _plan_end: float = math.inf
+
+    def read(self) -> SupervisorState | None:
+        """Return the state, from supervisor or log; None if neither reports it; blocks.
+
+        Before protocol 12 the supervisor cannot be asked; very old firmware does not log it either.
+        """
+        try:
+            state = self._vehicle.crazyflie.supervisor.read()
+        except NoReplyError:
+            state = None
+        return self._log.next_state(_LOGGED_STATE_LIMIT) if state is None else state
+
+    def estimator_problem(self) -> str:
+        """Return why its positioning or Kalman filter is not ready; empty if unknown; blocks."""
+        positioning = self._log.positioning
+        if positioning is not None and (
+            problem := positioning.problem(self._vehicle.handle.time())
+        ):
+            return problem
+        try:
+            estimator = self._vehicle.crazyflie.parameters.values().get(_ESTIMATOR)
+        except LinkLostError:
+            return ""
+        return self._log.variances.problem() if estimator == _KALMAN else ""
+
+    def motion_sent(self) -> None:
+        """Record that the planner is commanded to move."""
+        self._planned, self._plan_end = self._vehicle.handle.time(), math.inf
+
+    def end_accepted(self, duration: float) -> None:
+        """Record that the planner stops the motors after a duration (s)."""
+        self._plan_end = self._vehicle.handle.time() + duration
+
+    def is_at_rest(self) -> bool:
+        """Return whether the planner is known to have no motion that has not ended."""
+        state = self._log.supervisor
+        if state is None or not state.reports_planner:
+            return False
+        is_old = self._vehicle.handle.time() - self._planned >= REPORT_LAG
+        return is_old and not self.is_moving(state)
+
+    def is_moving(self, state: SupervisorState) -> bool:
+        """Return whether a state shows a motion of the planner that has not ended."""
+        if not state.reports_planner:
+            return SupervisorState.FLYING in state
+        is_active = SupervisorState.HIGH_LEVEL_ACTIVE in state
+        return is_active and SupervisorState.TRAJECTORY_FINISHED not in state
+
+    def has_taken_off(self, state: SupervisorState) -> bool:
+        """Return whether a state shows a takeoff of the planner, also one that has ended."""
+        is_reported = state.reports_planner
+        return (
+            SupervisorState.HIGH_LEVEL_ACTIVE if is_reported else SupervisorState.FLYING
+        ) in state
+
+    def is_high_level(self, state: SupervisorState | None) -> bool:
+        """Return whether a state, None if unknown, is a flight by the high-level commander."""
+        return state is not None and SupervisorState.FLYING in state and self._may_move(state)
+
+    def is_on_ground(self) -> bool:
+        """Return whether neither setpoints nor planner can have the motors run; blocks."""
+        state = self.read()
+        is_streamed = self._setpoints.runs_motors
+        latest = max(self._planned, self._setpoints.last_time if is_streamed else -math.inf)
+        if state is None or self._vehicle.handle.time() - latest < REPORT_LAG:
+            return False
+        return not (self._may_move(state) or (is_streamed and SupervisorState.FLYING in state))
+
+    def _may_move(self, state):
+        # Whether the planner may run the motors.
+        if state.reports_planner:
+            return SupervisorState.HIGH_LEVEL_ACTIVE in state
+        is_latest = self._planned >= self._setpoints.last_time
+        return is_latest and self._vehicle.handle.time() < self._plan_end

@@ -6,8 +6,15 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import TypeVar
 
-from crazyflie_driver.commands import LAND, STOP, TAKEOFF, Command, Need
-from crazyflie_driver.flight_state import REPORT_LAG, FlightState
+from crazyflie_driver.commands import (
+    LAND,
+    REPORT_LAG,
+    STOP,
+    TAKEOFF,
+    Command,
+    FlightState,
+    Need,
+)
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import STEP, STEP_TIME, Charge, Next, Touchdown, landing_duration
 from crazyflie_driver.setpoint_gate import GateEvent

@@ -11,9 +11,8 @@ from std_srvs.srv import Empty, SetBool, SetBoolResponse
 from typing_extensions import override
 
 from crazyflie_driver import srv
-from crazyflie_driver.commands import SERVICE_TYPES, requested
+from crazyflie_driver.commands import SERVICE_TYPES, FlightState, requested
 from crazyflie_driver.flight_commands import FlightCommands
-from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.vehicle_base import BaseVehicle, Job
 from crazyflie_link.crazyflie import Crazyflie

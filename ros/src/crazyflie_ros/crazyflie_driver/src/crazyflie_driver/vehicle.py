@@ -5,8 +5,8 @@ import threading
 import time
 from concurrent.futures import Future
 
+from crazyflie_driver.commands import FlightState
 from crazyflie_driver.flight_commands import FlightCommands, Reason
-from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.parameters import (
     POSITIONING_PARAMETER,

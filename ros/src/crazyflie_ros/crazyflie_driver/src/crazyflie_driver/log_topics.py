@@ -19,6 +19,7 @@ from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.log import PERIOD_STEP_MS, LogBlock, quaternion_from_compressed
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_model.units import GRAVITY
+from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_utils import ServiceError
 from crazyflie_utils.topics import Publisher
 
@@ -151,7 +152,7 @@ class LogTopics:
     _on_status: Callable[[], None]
     battery: BatteryMonitor = field(init=False)
     rssi: float | None = None  #: Latest strength of the vehicle's reception (-dBm).
-    power_state: int | None = None  #: The firmware's pm.state.
+    power_state: int = VehicleStatus.PM_STATE_UNKNOWN  #: The firmware's pm.state.
     #: received_broadcasts, received_unicasts: Packets that the vehicle has counted, modulo 2^16.
     received_broadcasts: int = 0
     received_unicasts: int = 0
@@ -193,10 +194,10 @@ class LogTopics:
         """
         parameters = self._vehicle.parameters
         if "packets" in parameters.topics:
-            self._packets = self._publisher("packets", crtpPacket)
+            self._packets = self._vehicle.publisher("packets", crtpPacket)
         known = self._vehicle.crazyflie.log.variables()
-        self._heading = self._publisher("heading", Float32)
-        self._start_status(known, self._publisher("rssi", Float32))
+        self._heading = self._vehicle.publisher("heading", Float32)
+        self._start_status(known, self._vehicle.publisher("rssi", Float32))
         self._start_variances(known)
         if parameters.is_own_estimate:
             self._start_positioning(parameters.positioning, known)
@@ -258,11 +259,13 @@ class LogTopics:
         self.variances.is_logged = all(name in known for name in VARIANCES)
         if self.variances.is_logged:
             self._vehicle.crazyflie.add_log_block(
-                LogBlock("variances", VARIANCES_PERIOD_MS, VARIANCES, self._note_variances)
+                LogBlock(
+                    "variances",
+                    VARIANCES_PERIOD_MS,
+                    VARIANCES,
+                    lambda _, values: self.variances.add(values),
+                )
             )
-
-    def _note_variances(self, _, values):
-        self.variances.add(values)
 
     def _start_positioning(self, source, known):
         vehicle, system = self._vehicle, SYSTEMS[source]
@@ -274,9 +277,7 @@ class LogTopics:
                 "update the firmware"
             )
         positioning = self.positioning = Positioning(source)
-        publisher = vehicle.handle.publisher(
-            f"{vehicle.prefix}/{POSITIONING_TOPIC}", String, latch=True
-        )
+        publisher = vehicle.publisher(POSITIONING_TOPIC, String, latch=True)
         self._broadcast = vehicle.handle.broadcast_transforms()
 
         def follow():
@@ -319,7 +320,7 @@ class LogTopics:
     def _note_status(self, latest, rssi_publisher):
         if "pm.vbat" in latest:
             self.battery.update(latest["pm.vbat"], self._vehicle.handle.time())
-        self.power_state = latest.get("pm.state")
+        self.power_state = latest.get("pm.state", VehicleStatus.PM_STATE_UNKNOWN) & 0xFF
         self.received_broadcasts = latest.get("radio.numRxBc", 0)
         self.received_unicasts = latest.get("radio.numRxUc", 0)
         self.height = latest.get("stateEstimate.z")
@@ -338,7 +339,7 @@ class LogTopics:
         self._on_status()
 
     def _start_standard(self, group):
-        publishers = [self._publisher(topic.name, topic.message_type) for topic in group]
+        publishers = [self._vehicle.publisher(topic.name, topic.message_type) for topic in group]
         variables = sum((topic.variables for topic in group), ())
 
         def publish(stamp, values):
@@ -357,7 +358,7 @@ class LogTopics:
         self._add(name, group[0].period_ms, variables, publish, is_estimate)
 
     def _start_custom(self, block):
-        publisher = self._publisher(block.topic_name, GenericLogData)
+        publisher = self._vehicle.publisher(block.topic_name, GenericLogData)
 
         def publish(stamp, values):
             header = self._header(stamp, False)
@@ -379,9 +380,6 @@ class LogTopics:
                 self._vehicle.delivery.submit_data(publish, stamp, values)
 
         self._vehicle.crazyflie.add_log_block(LogBlock(name, period_ms, variables, deliver))
-
-    def _publisher(self, name, message_type):
-        return self._vehicle.handle.publisher(f"{self._vehicle.prefix}/{name}", message_type)
 
     def _stamp(self, time_ms):
         if self._vehicle.parameters.use_ros_time:

@@ -18,6 +18,7 @@ from crazyflie_driver.parameters import (
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.broadcast import Broadcaster
+from crazyflie_link.crazyflie import LinkState
 from crazyflie_link.errors import LinkLostError
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import VehicleStatus
@@ -25,12 +26,8 @@ from crazyflie_msgs.msg import VehicleStatus
 #: Least number of packets in a second for a meaningful fraction of received ones.
 _FEW_PACKETS = 10
 
-LINK_NAMES = {
-    VehicleStatus.DISCONNECTED: "disconnected",
-    VehicleStatus.CONNECTING: "connecting",
-    VehicleStatus.CONNECTED: "connected",
-    VehicleStatus.LOST: "lost",
-}
+#: VehicleStatus.link -> its name.
+LINK_NAMES = {getattr(VehicleStatus, state.name): state.value for state in LinkState}
 
 _EMERGENCY = "emergency stop: remove, restart and add the vehicle"
 _BLOCKED = "setpoints are ignored since the link was lost: pause them, or call a service"
@@ -140,8 +137,6 @@ def _number(value, factor, digits):
 
 PERIOD = 1.0  #: Period at which both are repeated, s: their absence shows that the driver is gone.
 
-_LINKS = {name: value for value, name in LINK_NAMES.items()}
-
 #: Fields of which a change is published at once.
 _STATES = ("text", "link", "supervisor", "has_supervisor", "is_emergency", "battery", "is_streamed")
 #: Largest number of packets in a second. The vehicle's counters have 16 bits; a larger difference
@@ -165,14 +160,12 @@ class StatusPublisher:
     _is_connected: bool = False
 
     def __post_init__(self) -> None:
-        handle, prefix = self._vehicle.handle, self._vehicle.prefix
-        self._text = handle.publisher(f"{prefix}/{STATUS_TOPIC}", String, latch=True)
-        self._typed = handle.publisher(
-            f"{prefix}/{VEHICLE_STATUS_TOPIC}", VehicleStatus, latch=True
-        )
-        self._connected = handle.publisher(f"{prefix}/{CONNECTED_TOPIC}", Bool, latch=True)
+        vehicle = self._vehicle
+        self._text = vehicle.publisher(STATUS_TOPIC, String, latch=True)
+        self._typed = vehicle.publisher(VEHICLE_STATUS_TOPIC, VehicleStatus, latch=True)
+        self._connected = vehicle.publisher(CONNECTED_TOPIC, Bool, latch=True)
         self._connected.publish(Bool(False))
-        handle.timer(PERIOD, self._repeat)
+        vehicle.handle.timer(PERIOD, self._repeat)
 
     def status(self) -> VehicleStatus:
         """Return the present status of the vehicle."""
@@ -180,7 +173,7 @@ class StatusPublisher:
         crazyflie, state = vehicle.crazyflie, self._log.supervisor
         message = VehicleStatus(
             header=Header(stamp=vehicle.handle.stamp()),
-            link=_LINKS[crazyflie.state.value],
+            link=getattr(VehicleStatus, crazyflie.state.name),
             link_text=vehicle.link_text,
             supervisor=int(state or 0),
             has_supervisor=state is not None,
@@ -196,7 +189,7 @@ class StatusPublisher:
             setpoints_ignored=self._setpoints.ignored,
             are_setpoints_blocked=vehicle.gate.is_blocking(vehicle.handle.time()),
             restarts=crazyflie.restarts,
-            pm_state=_power_state(self._log.power_state),
+            pm_state=self._log.power_state,
             supervisor_info=int(state or 0),
         )
         (
@@ -253,10 +246,6 @@ class StatusPublisher:
 
 def _or_nan(value):
     return math.nan if value is None else value
-
-
-def _power_state(state):
-    return VehicleStatus.PM_STATE_UNKNOWN if state is None else state & 0xFF
 
 
 def _milliseconds(latency):

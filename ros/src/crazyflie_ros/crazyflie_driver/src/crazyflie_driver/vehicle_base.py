@@ -19,6 +19,7 @@ from crazyflie_driver.setpoint_gate import SetpointGate
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils.topics import Publisher
 
 Result = TypeVar("Result")
 
@@ -275,6 +276,10 @@ class BaseVehicle:
     def is_closing(self) -> bool:
         """Return whether the vehicle is being removed, or has been."""
         return self.state in (ConnectionState.CLOSING, ConnectionState.CLOSED)
+
+    def publisher(self, name: str, message_type: type, latch: bool = False) -> Publisher:
+        """Announce a topic below `prefix`; see `NodeHandle.publisher`."""
+        return self.handle.publisher(f"{self.prefix}/{name}", message_type, latch)
 
     def info(self, text: str) -> None:
         """Log information about the vehicle."""

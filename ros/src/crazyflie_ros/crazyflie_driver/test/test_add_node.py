@@ -111,6 +111,7 @@ def test_two_launches_at_once_have_nodes_of_two_names():
         ({"enable_logging_imu": 1}, "enable_logging_imu"),
         ({"genericLogTopics": "a"}, "genericLogTopics"),
         ({"genericLogTopics": ["imu"]}, "genericLogTopics"),
+        ({"genericLogTopics": ["heading"]}, "genericLogTopics"),
         ({"genericLogTopics": ["/"]}, "genericLogTopics"),
         ({"genericLogTopicFrequencies": [5]}, "genericLogTopicFrequencies"),
         (

@@ -328,6 +328,7 @@ STANDARD_TOPICS = tuple(
 _OWN_TOPICS = (
     *STANDARD_TOPICS,
     "rssi",
+    "heading",
     STATUS_TOPIC,
     VEHICLE_STATUS_TOPIC,
     CONNECTED_TOPIC,

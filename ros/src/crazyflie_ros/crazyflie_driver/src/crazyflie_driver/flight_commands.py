@@ -252,23 +252,18 @@ class FlightCommands:
                 )
                 return False
         elif command.name != STOP:
-            if refusal := self._refusal():
-                raise ServiceError(f"no {command.name}: {refusal}")
-            self._check_leaving_stream()
+            self._check_motion(command)
         return True
 
-    def _refusal(self):
-        # Why no command may move the vehicle; empty if it may.
-        if self._log.battery.charge is Charge.CRITICAL:
-            return self._log.battery.words()
-        return "" if self._reason is None else self._reason.words
-
-    def _check_leaving_stream(self):
-        state = self._log.supervisor
-        if state is None or not self._setpoints.runs_motors:
-            return
-        if state.faults or SupervisorState.CAN_FLY not in state:
-            raise ServiceError(f"the vehicle cannot fly, its state is: {state.words()}")
+    def _check_motion(self, command):
+        battery, state = self._log.battery, self._log.supervisor
+        if battery.charge is Charge.CRITICAL:
+            raise ServiceError(f"no {command.name}: {battery.words()}")
+        if self._reason is not None:
+            raise ServiceError(f"no {command.name}: {self._reason.words}")
+        if state is not None and self._setpoints.runs_motors:
+            if state.faults or SupervisorState.CAN_FLY not in state:
+                raise ServiceError(f"the vehicle cannot fly, its state is: {state.words()}")
 
     def _check_and_arm(self, job: Job) -> None:
         # Arms a vehicle that is not armed; blocks.
@@ -360,18 +355,19 @@ class FlightCommands:
             if command.ends_flight or not is_sent:
                 raise
             self._unanswered = command
-            state = self._state_after(command, job, was_at_rest)
+            state, obeys = self._state_after(command, job, was_at_rest)
             if state is None:
                 raise NoReplyError(
                     f"{error}; when the vehicle is heard again, it is landed if it obeys"
                 ) from None
             self._unanswered = None
-            if not self._shows(state, command, was_at_rest):
+            if not obeys:
                 raise NoReplyError(f"{error}; the vehicle's state is: {state.words()}") from None
             self._vehicle.warn(f"{error}: the vehicle's state shows that it obeys")
             return True
 
     def _state_after(self, command, job, was_at_rest):
+        # Returns the state, None if the vehicle is silent, and whether it shows that it obeys.
         # The vehicle answers in the order in which it receives. It shows a command a little later.
         end = time.monotonic() + _LOOK_UP_LIMIT
         answered = None
@@ -384,17 +380,15 @@ class FlightCommands:
             now = time.monotonic()
             if state is not None:
                 answered = now if answered is None else answered
-                if self._shows(state, command, was_at_rest) or now - answered > REPORT_LAG:
-                    return state
+                if command.name == TAKEOFF:
+                    obeys = self._flight.has_taken_off(state)
+                else:
+                    obeys = was_at_rest and self._flight.is_moving(state)
+                if obeys or now - answered > REPORT_LAG:
+                    return state, obeys
             elif now > end:
-                return None
+                return None, False
             time.sleep(_LOOK_UP_PERIOD)
-
-    def _shows(self, state, command, was_at_rest):
-        # Whether a state is that of a vehicle that obeys.
-        if command.name == TAKEOFF:
-            return self._flight.has_taken_off(state)
-        return was_at_rest and self._flight.is_moving(state)
 
     def _obeys(self, job):
         # Whether it carries out what was refused. If it is not heard, it is looked up again.
@@ -403,11 +397,10 @@ class FlightCommands:
         if command is None or is_emergency or self._setpoints.is_streaming:
             self._unanswered = None
             return False
-        state = self._state_after(command, job, True)
-        if state is None:
-            return False
-        self._unanswered = None
-        return self._shows(state, command, True)
+        state, obeys = self._state_after(command, job, True)
+        if state is not None:
+            self._unanswered = None
+        return obeys
 
     def _check_unanswered(self):
         # Whether the vehicle carries out a command that was refused as not answered, once.

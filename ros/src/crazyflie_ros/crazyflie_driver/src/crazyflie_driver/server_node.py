@@ -206,6 +206,7 @@ class CrazyflieServerNode(Node):
     def _finish_adding(self, vehicle, done):
         if done.exception() is not None:
             self._forget(vehicle)
+        done.result()
         return AddCrazyflieResponse()
 
     def _on_remove(self, request):
@@ -294,19 +295,9 @@ class CrazyflieServerNode(Node):
 
     def _when_done(self, done, finish, vehicle):
         # ``finish`` runs in its turn with the other callbacks, before the answer goes out.
-        answer: Future[Any] = Future()
-
-        def finish_answer():
-            try:
-                response = finish(vehicle, done)
-                done.result()
-            except Exception as error:
-                answer.set_exception(error)
-            else:
-                answer.set_result(response)
-
-        done.add_done_callback(lambda _: self._handle.submit(finish_answer))
-        return answer
+        answer = Job(lambda _: finish(vehicle, done))
+        done.add_done_callback(lambda _: self._handle.submit(answer.run))
+        return answer.done
 
     def _publish_diagnostics(self):
         component = self._handle.name.strip("/")

@@ -334,7 +334,7 @@ class VehicleServices:
 def _answer(kind, work, request):
     try:
         response = work(request)
-    except (CrazyflieError, ParameterError) as error:
+    except CrazyflieError as error:
         raise ServiceError(str(error)) from None
     return kind._response_class() if response is None else response
 

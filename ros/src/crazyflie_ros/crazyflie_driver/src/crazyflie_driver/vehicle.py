@@ -30,7 +30,7 @@ from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.transmission import REPLY_LIMIT
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_utils import NodeHandle, ParameterError, ServiceError
+from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.parameters.types import Text
 
 _EMERGENCY_LIMIT = 1.0  #: Time limit of the vehicle's confirmation of an emergency stop, s.
@@ -135,10 +135,7 @@ class DriverVehicle(BaseVehicle):
 
     def _choose_positioning(self):
         name = f"{self.prefix}/{POSITIONING_PARAMETER}"
-        try:
-            source = self.handle.get_param(name, Text(SOURCES), MOCAP)
-        except ParameterError as error:
-            raise ServiceError(str(error)) from None
+        source = self.handle.get_param(name, Text(SOURCES), MOCAP)
         self.parameters = dataclasses.replace(self.parameters, positioning=source)
 
     def _announce(self):

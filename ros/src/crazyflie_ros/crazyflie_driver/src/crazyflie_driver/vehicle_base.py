@@ -18,7 +18,7 @@ from crazyflie_driver.parameters import CrazyflieServerParameters, VehicleParame
 from crazyflie_driver.setpoint_gate import SetpointGate
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
-from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils import NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.topics import Publisher
 
 Result = TypeVar("Result")
@@ -94,14 +94,14 @@ class Jobs:
     ) -> Future[Result]:
         """Queue ``work(job)`` behind the jobs before it; return the future of its result.
 
-        An urgent one waits for earlier urgent ones only. Errors of the link and `ServiceError` are
-        logged, and fail the future with `ServiceError`.
+        An urgent one waits for earlier urgent ones only. Errors of the link and of parameters and
+        `ServiceError` are logged, and fail the future with `ServiceError`.
         """
 
         def run(job):
             try:
                 return work(job)
-            except (CrazyflieError, ServiceError) as error:
+            except (CrazyflieError, ParameterError, ServiceError) as error:
                 self._on_error(f"{what} failed: {error}")
                 raise ServiceError(str(error)) from None
 

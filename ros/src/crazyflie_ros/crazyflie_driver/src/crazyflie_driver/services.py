@@ -35,6 +35,25 @@ _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 _COMMANDS = ("kalman.resetEstimation",)
 
 
+@dataclass(frozen=True)
+class _Value(ParameterType):
+    types: tuple[type, ...]
+    words: str
+
+    @override
+    def __call__(self, value: Any) -> Any:
+        if not isinstance(value, self.types):
+            raise ValueError
+        return value
+
+    def __str__(self) -> str:
+        return self.words
+
+
+_FIRMWARE_VALUE = _Value((bool, int, float), "a number")
+_NAMESPACE = _Value((dict,), "a namespace")
+
+
 @dataclass(eq=False)
 class ParameterMirror:
     """Copy the firmware's parameters to ROS, as PREFIX/GROUP/NAME, and back; all methods block."""
@@ -81,7 +100,7 @@ class ParameterMirror:
         for name in names:
             try:
                 known = parsed_name(name)
-                self.set(known, self._handle.get_param(self._full_name(known), _FirmwareValue()))
+                self.set(known, self._handle.get_param(self._full_name(known), _FIRMWARE_VALUE))
             except (CrazyflieError, ParameterError) as error:
                 problems.append(str(error))
         if problems:
@@ -103,22 +122,6 @@ def parsed_name(name: str) -> str:
     if not group or not parameter:
         raise ParameterError(f"{name!r} is no firmware parameter; expected GROUP/NAME")
     return f"{group}.{parameter}"
-
-
-class _FirmwareValue(ParameterType):
-    """A number, or a truth value for a switch."""
-
-    label = "float"
-
-    @override
-    def __call__(self, value: object) -> int | float:
-        if not isinstance(value, (bool, int, float)):
-            raise ValueError
-        return value
-
-    def __str__(self) -> str:
-        """Return what is expected."""
-        return "a number"
 
 
 def _portable(value):
@@ -151,8 +154,12 @@ class VehicleServices:
         ended long ago: therefore the wait has a limit.
         """
         vehicle = self._vehicle
-        names = vehicle.handle.get_param(vehicle.prefix or "/", _Controllers(), frozenset())
-        awaited = {f"{vehicle.prefix}/{name}" for name in names}
+        values = vehicle.handle.get_param(vehicle.prefix or "/", _NAMESPACE, {})
+        awaited = {
+            f"{vehicle.prefix}/{name}"
+            for name, below in values.items()
+            if isinstance(below, dict) and "PIDs" in below
+        }
         end = time.monotonic() + CONTROLLER_LIMIT
         while awaited and not vehicle.is_closing() and time.monotonic() < end:
             awaited = {node for node in awaited if not self._is_ready(node)}
@@ -342,21 +349,3 @@ def _answer(kind, work, request):
 def _for_each(act, _, request):
     for name in map(parsed_name, request.params):
         act(name)
-
-
-class _Controllers(ParameterType):
-    """A namespace; as a value, the names of the nodes in it that have gains of controllers."""
-
-    label = "dictionary"
-
-    @override
-    def __call__(self, value: object) -> frozenset[str]:
-        if not isinstance(value, dict):
-            raise ValueError
-        return frozenset(
-            name for name, below in value.items() if isinstance(below, dict) and "PIDs" in below
-        )
-
-    def __str__(self) -> str:
-        """Return what is expected."""
-        return "a namespace"

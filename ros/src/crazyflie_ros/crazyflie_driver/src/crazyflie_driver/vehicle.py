@@ -58,7 +58,7 @@ class DriverVehicle(BaseVehicle):
                 reconnect=True,
                 on_state=self._on_link_state,
                 on_console=self.info,
-                on_packet=self._on_packet,
+                on_packet=lambda *packet: self.log.publish_packet(*packet),
             ),
             SetpointGate(),
             Jobs(name, self.error),
@@ -245,10 +245,6 @@ class DriverVehicle(BaseVehicle):
             )
         if not self.is_closing():
             self.delivery.submit(self._report, state, text)
-
-    def _on_packet(self, port, channel, data):
-        if not self.is_closing():
-            self.log.publish_packet(port, channel, data)
 
     # In turn with the callbacks of the node.
 

@@ -16,8 +16,9 @@ from safety_helpers import (
     wait_for_words,
 )
 
+from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.srv import UpdateParamsRequest
-from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import READ_ONLY, virtual_vehicle
@@ -144,6 +145,26 @@ def test_the_end_of_the_server_is_a_landing_for_an_old_vehicle(server):
     threading.Thread(target=obey, daemon=True).start()
     server.process.executor.submit(server.node.shutdown)
     assert commands(vehicle) == [(7, 1), (8, 0)]
+
+
+def test_a_link_that_is_set_up_again_while_services_are_announced(server, monkeypatch):
+    """The vehicle may have been restarted meanwhile, and its thrust be locked again."""
+    vehicle = server.make_vehicle()
+    advertise = VehicleServices.advertise
+
+    def advertise_late(services):
+        crazyflie = services._vehicle.crazyflie
+        vehicle.is_frozen = True
+        wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
+        vehicle.received.clear()
+        vehicle.is_frozen = False
+        wait_until(lambda: crazyflie.state is LinkState.CONNECTED, "the new link")
+        advertise(services)
+
+    monkeypatch.setattr(VehicleServices, "advertise", advertise_late)
+    server.add(vehicle.uri)
+    vehicle.wait_for_packets(7, 1)
+    assert commands(vehicle) == UNLOCKED
 
 
 def test_a_parameter_that_is_refused_later_does_not_keep_the_thrust_locked(server):

@@ -126,6 +126,10 @@ class DriverVehicle(BaseVehicle):
                 self._connection_count = self.crazyflie.connection_count
                 self._announce()
                 self.transition(ConnectionEvent.ANNOUNCED)
+                if self._connection_count != self.crazyflie.connection_count:
+                    # A new link came before the vehicle was ready to take it up.
+                    self.transition(ConnectionEvent.LINK_RENEWED)
+                    self.jobs.submit("taking up the link again", self._resume)
         except BaseException:
             self.transition(ConnectionEvent.REMOVAL)
             self._end()

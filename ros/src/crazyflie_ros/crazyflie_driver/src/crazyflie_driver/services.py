@@ -27,7 +27,7 @@ CONTROLLER_PERIOD, CONTROLLER_LIMIT = 0.1, 3.0
 #: Namespace, below the vehicle's, of services whose names belong to other nodes.
 ASIDE = "driver"
 _SHARED = {"takeoff", "land"}  #: Services of controllers, unless they are remapped.
-_UPLOADS = {"upload_trajectory", "upload_compressed_trajectory"}
+_UPLOADS = {"upload_trajectory", "upload_compressed_trajectory"}  #: They end before a landing.
 _SOLID_COLOR = 7  #: The firmware's ring.effect for a given color.
 _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 

@@ -216,11 +216,7 @@ class StatusPublisher:
             self._typed.publish(message)
         if before is None or message.text != before.text:
             self._text.publish(String(message.text))
-        is_connected = message.link == VehicleStatus.CONNECTED
-        self.publish_connected(is_connected and self._vehicle.is_ready())
-
-    def publish_connected(self, is_connected: bool) -> None:
-        """Publish whether the vehicle is connected, if that has changed."""
+        is_connected = message.link == VehicleStatus.CONNECTED and self._vehicle.is_ready()
         if is_connected != self._is_connected:
             self._is_connected = is_connected
             self._connected.publish(Bool(is_connected))

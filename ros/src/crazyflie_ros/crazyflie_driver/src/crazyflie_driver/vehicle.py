@@ -107,7 +107,7 @@ class DriverVehicle(BaseVehicle):
         be done, and is empty after a success.
         """
         self.transition(ConnectionEvent.REMOVAL)
-        self.status.publish_connected(False)
+        self.status.publish()
         self.gate.handle(GateEvent.REMOVAL)
         self.jobs.supersede("the removal")
         return Job(lambda _: self._remove(limit)).start(f"{self.name}-close")

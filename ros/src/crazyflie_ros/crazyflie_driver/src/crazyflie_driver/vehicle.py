@@ -126,10 +126,8 @@ class DriverVehicle(BaseVehicle):
                 self._connection_count = self.crazyflie.connection_count
                 self._announce()
                 self.transition(ConnectionEvent.ANNOUNCED)
-                if self._connection_count != self.crazyflie.connection_count:
-                    # A new link came before the vehicle was ready to take it up.
-                    self.transition(ConnectionEvent.LINK_RENEWED)
-                    self.jobs.submit("taking up the link again", self._resume)
+                # A new link may have come meanwhile.
+                self._take_up_link()
         except BaseException:
             self.transition(ConnectionEvent.REMOVAL)
             self._end()
@@ -243,12 +241,15 @@ class DriverVehicle(BaseVehicle):
             self.transition(ConnectionEvent.LINK_LOST)
         elif state is LinkState.CONNECTED:
             self.gate.handle(GateEvent.LINK_BACK)
-            is_known = self.crazyflie.connection_count == self._connection_count
-            self.transition(
-                ConnectionEvent.LINK_HEARD if is_known else ConnectionEvent.LINK_RENEWED
-            )
+            self._take_up_link()
         if not self.is_closing():
             self.delivery.submit(self._report, state, text)
+
+    def _take_up_link(self):
+        is_known = self.crazyflie.connection_count == self._connection_count
+        event = ConnectionEvent.LINK_HEARD if is_known else ConnectionEvent.LINK_RENEWED
+        if self.transition(event) is ConnectionState.RESUMING:
+            self.jobs.submit("taking up the link again", self._resume)
 
     # In turn with the callbacks of the node.
 
@@ -258,8 +259,6 @@ class DriverVehicle(BaseVehicle):
             self.error(f"{text}; trying to connect again")
         elif state is LinkState.CONNECTED and self.is_ready():
             self.warn(text)
-            if self.state is ConnectionState.RESUMING:
-                self.jobs.submit("taking up the link again", self._resume)
 
     def _on_log(self):
         self.commands.follow()

@@ -16,9 +16,10 @@ from safety_helpers import (
     wait_for_words,
 )
 
-from crazyflie_driver.services import VehicleServices
+from crazyflie_driver.services import ParameterMirror, VehicleServices
 from crazyflie_driver.srv import UpdateParamsRequest
 from crazyflie_link.crazyflie import Crazyflie, LinkState
+from crazyflie_link.errors import LinkLostError
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import READ_ONLY, virtual_vehicle
@@ -164,6 +165,33 @@ def test_a_link_that_is_set_up_again_while_services_are_announced(server, monkey
     monkeypatch.setattr(VehicleServices, "advertise", advertise_late)
     server.add(vehicle.uri)
     vehicle.wait_for_packets(7, 1)
+    assert commands(vehicle) == UNLOCKED
+
+
+def test_a_link_that_is_silent_while_it_is_taken_up_is_taken_up_when_it_is_heard(
+    server, monkeypatch
+):
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri)
+    crazyflie = server.node._vehicles[vehicle.uri].crazyflie
+    reapply, is_lost = ParameterMirror.reapply_parameters, threading.Event()
+
+    def lose_link(_):
+        monkeypatch.setattr(ParameterMirror, "reapply_parameters", reapply)
+        vehicle.is_frozen = True
+        wait_until(lambda: crazyflie.state is LinkState.LOST, "the silence")
+        vehicle.received.clear()
+        is_lost.set()
+        vehicle.is_frozen = False
+        raise LinkLostError("no link to the vehicle")
+
+    monkeypatch.setattr(ParameterMirror, "reapply_parameters", lose_link)
+    vehicle.is_frozen = True
+    wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
+    vehicle.is_frozen = False
+    assert is_lost.wait(LIMIT)
+    vehicle.wait_for_packets(7, 1)
+    assert crazyflie.connection_count == 2
     assert commands(vehicle) == UNLOCKED
 
 

@@ -156,12 +156,13 @@ class DriverVehicle(BaseVehicle):
         try:
             if self.gate.is_emergency or self._connection_count == count:
                 return
-            self._connection_count = count
             for problem in self._mirror.reapply_parameters():
                 self.warn(f"not written again: {problem}")
             if self.parameters.enable_parameters:
                 self._mirror.publish()
             self.setpoints.open_thrust_lock(self.flight.read())
+            # If it fails before, it is done when the vehicle is heard again.
+            self._connection_count = count
         finally:
             self.transition(ConnectionEvent.RESUMED)
 

@@ -160,6 +160,18 @@ def command(watch, thrust=9.81, roll=0.0):
     watch.graph.publish("/control/final", ControlStamped(control=Control(thrust=thrust, roll=roll)))
 
 
+def test_a_vehicle_that_a_filter_catches_above_its_reference_is_where_it_may_be(watch):
+    watch.may_fly = watch.may_fall = True
+    watch.allow(2.0)
+    is_at(watch, 2.0)
+    is_at(watch, 1.99)
+    # It sinks at 1 m/s, and would be 0.6 m further down after 2 s.
+    command(watch, thrust=GRAVITY + 0.7)
+    watch.renew()
+    is_at(watch, 1.98)
+    assert watch.violations == []
+
+
 def test_a_flight_as_it_should_be(watch):
     watch.may_fly = True
     watch.allow(1.0)

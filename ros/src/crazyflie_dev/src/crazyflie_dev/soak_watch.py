@@ -167,5 +167,6 @@ def _rise(climb, acceleration):
     """Return how far a vehicle rises (m) with the last thrust, which the firmware keeps."""
     final = climb + acceleration * OFF_AGE
     if final > 0.0:
-        return (climb + final) / 2.0 * OFF_AGE + final**2 / (2.0 * GRAVITY)
+        # One that sinks first may not come up to where it was.
+        return max((climb + final) / 2.0 * OFF_AGE + final**2 / (2.0 * GRAVITY), 0.0)
     return climb**2 / (-2.0 * acceleration) if climb > 0.0 else 0.0

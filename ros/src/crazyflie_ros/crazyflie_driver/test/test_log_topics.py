@@ -165,6 +165,7 @@ def test_topics_that_the_firmware_cannot_fill_are_left_out(server):
         ([("test", 100)], "no variables"),
         ([("test", 100, "mag.x"), ("test", 10, "mag.x")], "two log blocks are called 'test'"),
         ([("imu", 100, "mag.x")], "log_blocks/topic_name is .*the driver itself has a topic 'imu'"),
+        ([("cmd_hover", 100, "mag.x")], "the driver itself has a topic 'cmd_hover'"),
         ([("my log", 100, "mag.x")], "'my log'.; expected a list, each entry the name of a topic"),
     ],
 )

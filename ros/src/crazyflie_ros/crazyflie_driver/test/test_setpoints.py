@@ -8,7 +8,9 @@ from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
 from std_msgs.msg import Empty as EmptyMessage
 
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
+from crazyflie_driver.parameters import INPUT_TOPICS
 from crazyflie_driver.setpoint_gate import OVERLAP
+from crazyflie_driver.setpoint_topics import CMD_STOP, CMD_VEL, EXTERNAL, SETPOINTS
 
 NAN = math.nan
 
@@ -175,3 +177,7 @@ def test_poses_that_have_ended_do_not_let_a_vehicle_land_by_itself(flying):
     assert setpoints.can_land_autonomously()
     server.process.advance(1.1)
     assert not setpoints.can_land_autonomously()
+
+
+def test_no_log_block_can_have_the_name_of_a_topic_that_is_subscribed():
+    assert {CMD_VEL, CMD_STOP, *SETPOINTS, *EXTERNAL} == set(INPUT_TOPICS)

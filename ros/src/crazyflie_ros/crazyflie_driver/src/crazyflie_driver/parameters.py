@@ -324,9 +324,21 @@ STANDARD_TOPICS = tuple(
     if declaration.name.startswith(_SWITCH)
 )
 
+#: Topics of setpoints and of measured positions, to which the driver subscribes.
+INPUT_TOPICS = (
+    "cmd_vel",
+    "cmd_stop",
+    "cmd_full_state",
+    "cmd_velocity_world",
+    "cmd_hover",
+    "cmd_position",
+    "external_position",
+    "external_pose",
+)
 
 _OWN_TOPICS = (
     *STANDARD_TOPICS,
+    *INPUT_TOPICS,
     "rssi",
     "heading",
     STATUS_TOPIC,

@@ -24,13 +24,9 @@ STARVED_OVERSHOOT = 2.5
 #: descent and the fall after it; the descent at `SINK_SPEED` is added.
 BLIND_LIMIT = 8.0
 
-#: Largest distance of a vehicle from its reference (m): `reference/max_jump`, and what it flies on
-#: if it has just flown the other way.
-MOST_WAY = 3.0 + 0.3
-
-#: Largest speed of a vehicle (m/s): it tilts about both axes as far as it may over the first half
-#: of the way.
-MOST_SPEED = math.sqrt(MOST_WAY * math.hypot(1.0, 1.0) * GRAVITY * math.tan(MOST_TILT))
+#: Largest speed of a vehicle (m/s): a reference is at most 3 m away (`reference/max_jump`), and the
+#: vehicle tilts about both axes as far as it may over the first half of the way.
+MOST_SPEED = math.sqrt(3.0 * math.hypot(1.0, 1.0) * GRAVITY * math.tan(MOST_TILT))
 
 #: Largest distance from the middle in a flight that begins there (m): the models of 7 states have
 #: no drag, and keep their speed while they descend without poses.

@@ -1,5 +1,7 @@
 """A filter in closed loop with a vehicle that moves up and down, with a clock moved by hand."""
 
+from random import Random
+
 from takeoff_helpers import PointMass
 
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, LossTimeouts
@@ -21,14 +23,17 @@ def level(thrust):
 class Flight:
     """A filter above a vehicle, whose true hover thrust is not what it is believed to be."""
 
-    def __init__(self, height=1.0, hover=G, speed=0.0, sees=True, with_state=True):
-        self.filter = FilterMachine(TIMEOUTS, LIMITS)
+    def __init__(
+        self, height=1.0, hover=G, speed=0.0, sees=True, with_state=True, limits=LIMITS, noise=0.0
+    ):
+        self.filter = FilterMachine(TIMEOUTS, limits)
         self.vehicle = PointMass(height)
         self.vehicle.z_dot = speed
         self.hover = hover
         self.ticks = 0
         self.controls = True
         self.sees = sees
+        self.noise, self.random = noise, Random(1)  # Of the measured z_dot (m/s).
         self.target = speed
         self.flown = []
         self.filter.stop_listening(0.0)
@@ -54,7 +59,8 @@ class Flight:
             self.vehicle.advance(0.01)
             if self.sees:
                 position = (0.0, 0.0, self.vehicle.z)
-                self.filter.measure(Motion(position, (0.0, 0.0, self.vehicle.z_dot)))
+                z_dot = self.vehicle.z_dot + self.random.gauss(0.0, self.noise)
+                self.filter.measure(Motion(position, (0.0, 0.0, z_dot)))
             if self.controls:
                 thrust = self.hover + 2.0 * (self.target - self.vehicle.z_dot)
                 self.fly(self.filter.commanded(self.time, thrust, level(thrust)))

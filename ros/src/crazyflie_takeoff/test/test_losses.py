@@ -1,11 +1,14 @@
 """The filter holds the vehicle and brings it down when no control comes."""
 
+from dataclasses import replace
+
 import pytest
 from filter_flight import FLYING, LANDING, LIMITS, ON_GROUND, TAKING_OFF, TIMEOUTS, Flight, G, level
 from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState
+from crazyflie_takeoff.limits import Box
 from crazyflie_takeoff.safe_control import (
     SINK_SPEED,
     SafeSetpoint,
@@ -103,6 +106,15 @@ def test_a_vehicle_that_weighs_less_than_was_learned_is_brought_down_with_its_mo
     flight.lose(pose=False).run_until_off(20.0)
     assert flight.vehicle.z == 0.0
     assert flight.vehicle.touchdown_speed < 0.5
+
+
+def test_noise_of_the_speed_does_not_stop_the_motors_in_a_slow_descent():
+    high = replace(LIMITS, box=Box((-2.0, -2.0, -1.0), (2.0, 2.0, 12.0)))
+    flight = Flight(8.0, limits=high, noise=0.1).run(8.0)
+    # With less weight than was learned it is still in the air when its time is over.
+    flight.hover *= 0.95
+    flight.lose(pose=False).run_until_off(40.0)
+    assert flight.vehicle.z == 0.0
 
 
 def test_it_holds_the_vehicle_with_the_thrust_that_was_learned():

@@ -129,6 +129,26 @@ def test_a_vehicle_less_than_10_cm_above_the_ground_is_on_it():
     assert not ground.has_touched_down(None)
 
 
+def test_a_single_measurement_does_not_show_that_a_vehicle_has_stopped_sinking():
+    ground = Ground()
+    assert not ground.sinks(at(1.0, -0.09))
+    assert ground.sinks(at(1.0, -0.11))
+    for _ in range(100):
+        ground.advance(0.01, at(1.0, -0.3), 1.0)
+    assert ground.sinks(at(1.0, 0.2))
+    assert not ground.sinks(None)
+    # ln(0.3 / 0.1) times the time constant of 0.5 s.
+    sinking = 0
+    while ground.sinks(at(1.0)):
+        ground.advance(0.01, at(1.0), 1.0)
+        sinking += 1
+    assert sinking == pytest.approx(55, abs=1)
+    ground.advance(0.01, at(1.0, -0.3), 1.0)
+    ground.begin_descent()
+    ground.advance(0.01, None, 1.0)
+    assert not ground.sinks(at(1.0))
+
+
 def test_what_has_flown_is_down_where_it_stays_without_enough_thrust():
     ground = Ground()
     ground.measure(at(0.75), is_on_ground=True, in_flight=False)

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.limits import OVERLAP, Box, Limits
-from crazyflie_takeoff.motion import Motion, is_sinking
+from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.relay import Relay
 from crazyflie_takeoff.safe_control import (
     LONGEST_STEP,
@@ -514,8 +514,8 @@ class FilterMachine(Generic[Control]):
         return self._ground.has_touched_down(self._measured.fresh)
 
     def _descent_is_over(self):
-        motion = self._measured.fresh
-        return self.elapsed > self._descent_limit and (motion is None or not is_sinking(motion))
+        is_long = self.elapsed > self._descent_limit
+        return is_long and not self._ground.sinks(self._measured.fresh)
 
     def _may_be_reset(self):
         return self.elapsed >= RESET_DELAY

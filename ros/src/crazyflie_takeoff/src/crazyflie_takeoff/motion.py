@@ -17,6 +17,7 @@ TOUCHDOWN_SPEED = 0.1  #: Largest speed of a vehicle that is down (m/s).
 #: speeds below `TOUCHDOWN_SPEED` within 0.1 s.
 SINKING_THRUST = 0.75
 REST_TIME = 0.3  #: Time for which a vehicle that is down rests with so little thrust (s).
+SPEED_AVERAGING = 0.5  #: Time constant of the mean of the vertical speed in a descent (s).
 
 Position = tuple[float, float, float]  #: x, y, z in m, fixed frame, z up.
 
@@ -153,6 +154,7 @@ class Ground:
         self.z = 0.0  # Where the vehicle took off (m, fixed frame).
         self._has_flown = False
         self._rest = 0.0
+        self._z_dot: float | None = None
 
     def measure(self, motion: Motion, is_on_ground: bool, in_flight: bool) -> None:
         """Process a measured state, and whether the server reports ground or flight."""
@@ -162,8 +164,8 @@ class Ground:
             self._has_flown = True
 
     def begin_descent(self) -> None:
-        """Start the measurement of rest."""
-        self._rest = 0.0
+        """Start the measurement of rest and of the mean vertical speed."""
+        self._rest, self._z_dot = 0.0, None
 
     def height(self, motion: Motion) -> float:
         """Return the height above the ground where the vehicle took off, m."""
@@ -173,6 +175,20 @@ class Ground:
         """Advance by ``step`` (s) with a thrust, as a fraction of that of hover."""
         rests = motion is not None and abs(motion.velocity[2]) < TOUCHDOWN_SPEED
         self._rest = self._rest + step if rests and thrust < SINKING_THRUST else 0.0
+        if motion is None or self._z_dot is None:
+            self._z_dot = None if motion is None else motion.velocity[2]
+        else:
+            share = step / (SPEED_AVERAGING + step)
+            self._z_dot += share * (motion.velocity[2] - self._z_dot)
+
+    def sinks(self, motion: Motion | None) -> bool:
+        """Return whether a vehicle still sinks, now or on average; False if it is not seen.
+
+        Noise of a single measurement does not show that it is down.
+        """
+        if motion is None:
+            return False
+        return is_sinking(motion) or (self._z_dot is not None and self._z_dot <= -TOUCHDOWN_SPEED)
 
     def has_touched_down(self, motion: Motion | None) -> bool:
         """Return whether a vehicle that is to sink is down; False if its state is not known."""

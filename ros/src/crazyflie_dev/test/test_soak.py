@@ -12,7 +12,7 @@ from crazyflie_dev.soak import Soak, soak
 from crazyflie_dev.soak_faults import FAULTS, LIVE_VALUES, NODES, SoakFlight, live_parameters
 from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
 from crazyflie_model.units import GRAVITY
-from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
+from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus, PositionVelocityStateStamped
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
 
@@ -184,6 +184,29 @@ def test_a_flight_as_it_should_be(watch):
         command(watch)
     assert watch.violations == []
     assert watch.highest == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("reference", "is_legal"), [(None, False), (math.nan, False), (-2.0, True), (3.0, True)]
+)
+def test_a_vehicle_is_faster_where_a_reference_comes_in_its_motion(watch, reference, is_legal):
+    watch.may_fly = True
+    watch.allow(1.0)
+    for x in (0.0, 0.03):
+        is_at(watch, 1.0, x=x)
+    if reference is not None:
+        message = PositionVelocityStateStamped()
+        message.state.x, message.state.z = reference, 1.0
+        watch.graph.publish("/ref", message)
+    # Reaching 3 m/s, or stopping, takes 1.2 m: 3.35 m/s on 3 m, 3.96 m/s on 4.2 m.
+    is_at(watch, 1.0, x=-0.008)
+    assert (watch.violations == []) == is_legal
+    # The next flight begins from rest.
+    watch.renew()
+    watch.allow(1.0)
+    is_at(watch, 1.0, x=-0.046)
+    assert len(watch.violations) == (1 if is_legal else 2)
+    assert "too fast: 3.80 m/s" in watch.violations[-1]
 
 
 def test_complaints(watch):

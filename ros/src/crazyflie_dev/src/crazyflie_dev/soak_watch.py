@@ -24,9 +24,12 @@ STARVED_OVERSHOOT = 2.5
 #: descent and the fall after it; the descent at `SINK_SPEED` is added.
 BLIND_LIMIT = 8.0
 
-#: Largest speed of a vehicle (m/s): a reference is at most 3 m away (`reference/max_jump`), and the
-#: vehicle tilts about both axes as far as it may over the first half of the way.
-MOST_SPEED = math.sqrt(3.0 * math.hypot(1.0, 1.0) * GRAVITY * math.tan(MOST_TILT))
+#: Horizontal acceleration of a vehicle that tilts about both axes as far as it may (m/s^2).
+_ACCELERATION = math.hypot(1.0, 1.0) * GRAVITY * math.tan(MOST_TILT)
+#: Longest way from rest (m): a reference is at most that far away (`reference/max_jump`). A vehicle
+#: accelerates over half of it, and so becomes as fast as the root of way times acceleration.
+_WAY = 3.0
+_JUMP = 0.5  #: Least distance between two references of which the second is a new one (m).
 
 #: Largest distance from the middle in a flight that begins there (m): the models of 7 states have
 #: no drag, and keep their speed while they descend without poses.
@@ -66,6 +69,9 @@ class Watch:
     distance: float = 0.0  #: Distance from the middle now (m).
     state: str = ""  #: State of the flight, as the server publishes it.
     _reference: float = 0.0
+    _velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
+    _goal: tuple[float, ...] = (math.inf, math.inf, math.inf)  #: Position of the last reference.
+    _way: float = _WAY  #: Longest way that a reference has made in this flight (m).
     _blind_since: float = math.inf
     _last: tuple[float, tuple[float, ...], float] | None = None
     _climb: float = 0.0
@@ -75,13 +81,14 @@ class Watch:
     def begin(self) -> None:
         """Begin to listen."""
         self.graph.listen("/tf", self._on_tf)
+        self.graph.listen("/ref", self._on_reference)
         self.graph.listen("/control/final", self._on_control)
         self.graph.listen("/in_flight_flight_status", self._on_status)
 
     def renew(self) -> None:
         """Begin another flight."""
         self._said.clear()
-        self._reference = 0.0
+        self._reference, self._way = 0.0, _WAY
         self.is_starved = False
         self.is_calm = True
 
@@ -115,7 +122,8 @@ class Watch:
         height = self.height = position[2]
         self.distance = math.hypot(*position[:2])
         is_airborne = height > _AIRBORNE
-        speed = math.dist(position, before[1]) / elapsed
+        self._velocity = tuple((b - a) / elapsed for a, b in zip(before[1], position, strict=True))
+        speed, most_speed = math.hypot(*self._velocity), math.sqrt(self._way * _ACCELERATION)
         self.highest = max(self.highest, height - self._reference)
         if is_airborne:
             # The ground of the models of 7 states has no friction.
@@ -132,12 +140,23 @@ class Watch:
         self.check(height <= 0.1 or self.may_fly, f"in the air unasked: {height:.2f} m")
         far = self.distance > FLY_AWAY and is_airborne
         self.check(not far, f"flown away: {self.distance:.2f} m")
-        self.check(speed <= MOST_SPEED or self.may_fall, f"too fast: {speed:.2f} m/s")
+        self.check(speed <= most_speed or self.may_fall, f"too fast: {speed:.2f} m/s")
         if not (self.is_blind and is_airborne):
             self._blind_since = time
         blind = time - self._blind_since
         limit = BLIND_LIMIT + self._reference / SINK_SPEED
         self.check(blind <= limit, f"in the air without a pose: for {blind:.1f} s")
+
+    def _on_reference(self, message):
+        """Add the way that the present speed is worth to that to a reference which has jumped."""
+        goal = (message.state.x, message.state.y, message.state.z)
+        if self._last is not None and not math.dist(goal, self._goal) < _JUMP:
+            offset = [b - a for a, b in zip(self._last[1], goal, strict=True)]
+            ahead = sum(a * b for a, b in zip(self._velocity, offset, strict=True))
+            # Towards the reference or away from it; one that is not finite has no direction.
+            speed = ahead / (math.hypot(*offset) or 1.0)
+            self._way = max(self._way, _WAY + speed**2 / (2.0 * _ACCELERATION))
+        self._goal = goal
 
     def _on_control(self, message):
         control = message.control

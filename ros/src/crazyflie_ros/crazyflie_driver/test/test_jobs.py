@@ -90,6 +90,16 @@ def test_an_error_is_the_callers(jobs):
     assert jobs.submit("test", lambda _: 1).result(LIMIT) == 1
 
 
+def test_an_error_that_nobody_expects_is_logged():
+    errors = []
+    jobs = Jobs("test", errors.append)
+    done = jobs.submit("the test", lambda _: int("one"))
+    with pytest.raises(ValueError, match="one"):
+        done.result(LIMIT)
+    assert len(errors) == 1 and errors[0].startswith("the test failed: ValueError(")
+    jobs.close()
+
+
 def test_calls_without_an_answer_leave_no_threads(jobs, slow):
     count = threading.active_count()
     waiting = [jobs.submit("test", slow) for _ in range(3 * MOST_JOBS)]

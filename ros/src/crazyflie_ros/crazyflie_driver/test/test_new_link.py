@@ -1,12 +1,15 @@
 """A new link to a vehicle that flies, and the end of one: nothing that is sent stops its motors."""
 
 import threading
+from concurrent.futures import Future
+from unittest.mock import Mock
 
 import pytest
 from safety_helpers import (
     FLYING,
     HIGH_LEVEL,
     READY,
+    TAKEOFF,
     UNLOCKED,
     begin_removing,
     commands,
@@ -193,6 +196,27 @@ def test_a_link_that_is_silent_while_it_is_taken_up_is_taken_up_when_it_is_heard
     vehicle.wait_for_packets(7, 1)
     assert crazyflie.connection_count == 2
     assert commands(vehicle) == UNLOCKED
+
+
+def test_a_new_link_is_taken_up_without_the_master(server, monkeypatch):
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri, enable_parameters=True)
+    transport = server.process.transport
+    monkeypatch.setattr(transport, "set_param", Mock(side_effect=ConnectionRefusedError))
+    later = Mock(side_effect=lambda *_: Future())
+    monkeypatch.setattr(transport, "set_param_later", later)
+    monkeypatch.setattr("crazyflie_driver.services.MASTER_LIMIT", 0.1)
+    wait_for_words(server, "ready")
+    vehicle.is_frozen = True
+    crazyflie = server.node._vehicles[vehicle.uri].crazyflie
+    wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
+    vehicle.received.clear()
+    vehicle.is_frozen = False
+    vehicle.wait_for_packets(7, 1)
+    assert commands(vehicle) == UNLOCKED
+    # The next job has its turn.
+    server.call("/cf1/takeoff", TAKEOFF)
+    assert later.call_args_list
 
 
 def test_a_parameter_that_is_refused_later_does_not_keep_the_thrust_locked(server):

@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable
+from concurrent.futures import wait
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -24,6 +25,8 @@ from crazyflie_utils.parameters.types import ParameterType
 
 #: Period and limit of the wait for a controller that has parameters, s.
 CONTROLLER_PERIOD, CONTROLLER_LIMIT = 0.1, 3.0
+#: Longest wait for ROS parameters to be set (s): without the master, jobs for the vehicle go on.
+MASTER_LIMIT = 3.0
 #: Namespace, below the vehicle's, of services whose names belong to other nodes.
 ASIDE = "driver"
 _SHARED = {"takeoff", "land"}  #: Services of controllers, unless they are remapped.
@@ -81,14 +84,13 @@ class ParameterMirror:
         return problems
 
     def publish(self) -> None:
-        """Set the ROS parameters to the firmware's values."""
+        """Set the ROS parameters to the firmware's values; see `MASTER_LIMIT`."""
         groups: dict[str, dict[str, int | float]] = {}
         for name, value in self._crazyflie.parameters.values().items():
             group, _, parameter = name.partition(".")
             groups.setdefault(group, {})[parameter] = _portable(value)
         # Group by group: all in one would take everything else below the prefix away.
-        for group, parameters in groups.items():
-            self._handle.set_param(f"{self._prefix}/{group}", parameters)
+        self._set_on_master({f"{self._prefix}/{group}": each for group, each in groups.items()})
 
     def write(self, names: list[str]) -> None:
         """Write parameters, named GROUP/NAME, with the values of the ROS parameters.
@@ -110,7 +112,11 @@ class ParameterMirror:
         """Write a parameter, named GROUP.NAME; the ROS parameter is then what is confirmed."""
         confirmed = self._crazyflie.parameters.write(name, value)
         self._written[name] = value
-        self._handle.set_param(self._full_name(name), _portable(confirmed))
+        self._set_on_master({self._full_name(name): _portable(confirmed)})
+
+    def _set_on_master(self, values):
+        later = self._handle.set_param_later
+        wait([later(name, value) for name, value in values.items()], MASTER_LIMIT)
 
     def _full_name(self, name):
         return f"{self._prefix}/{name.replace('.', '/')}"

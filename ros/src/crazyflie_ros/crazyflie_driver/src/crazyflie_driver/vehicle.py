@@ -158,11 +158,11 @@ class DriverVehicle(BaseVehicle):
                 return
             for problem in self._mirror.reapply_parameters():
                 self.warn(f"not written again: {problem}")
-            if self.parameters.enable_parameters:
-                self._mirror.publish()
             self.setpoints.open_thrust_lock(self.flight.read())
             # If it fails before, it is done when the vehicle is heard again.
             self._connection_count = count
+            if self.parameters.enable_parameters:
+                self._mirror.publish()
         finally:
             self.transition(ConnectionEvent.RESUMED)
 

@@ -94,8 +94,8 @@ class Jobs:
     ) -> Future[Result]:
         """Queue ``work(job)`` behind the jobs before it; return the future of its result.
 
-        An urgent one waits for earlier urgent ones only. Errors of the link and of parameters and
-        `ServiceError` are logged, and fail the future with `ServiceError`.
+        An urgent one waits for earlier urgent ones only. Errors are logged; those of the link and
+        of parameters fail the future with `ServiceError`.
         """
 
         def run(job):
@@ -104,6 +104,10 @@ class Jobs:
             except (CrazyflieError, ParameterError, ServiceError) as error:
                 self._on_error(f"{what} failed: {error}")
                 raise ServiceError(str(error)) from None
+            except Exception as error:
+                # Nobody may look at the future.
+                self._on_error(f"{what} failed: {error!r}")
+                raise
 
         if urgent:
             self.supersede(what)

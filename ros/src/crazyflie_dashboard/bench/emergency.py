@@ -23,7 +23,7 @@ from pages import Browser, Server, chromium, wait_for
 from selenium.webdriver.common.keys import Keys
 
 from crazyflie_dashboard.dashboard import Dashboard
-from crazyflie_dashboard.dashboard_node import new_lane
+from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action
@@ -44,7 +44,9 @@ class Bench:
     def __init__(self, driver: Any) -> None:
         self.process, self.end = begin_script("emergency")
         handle = self.process.handle("/dashboard")
-        self.dashboard = Dashboard(handle, Master("/dashboard"), new_lane(handle), [])
+        master = Master("/dashboard")
+        lane = EmergencyLane(master, handle.warn)
+        self.dashboard = Dashboard(handle, master, lane, [])
         self.stopped: dict[str, float] = {}
         for name in NAMES:
             handle.subscribe(

@@ -9,7 +9,8 @@ from pages import stopped
 
 from crazyflie_dashboard.control import ControlError
 from crazyflie_dashboard.dashboard import Dashboard
-from crazyflie_dashboard.dashboard_node import example_folders, new_lane
+from crazyflie_dashboard.dashboard_node import example_folders
+from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action, Kind
@@ -25,12 +26,8 @@ LIMIT = 30.0
 def dashboard():
     process = ros_process()
     handle = process.handle("/dashboard")
-    found = Dashboard(
-        handle,
-        Master("/dashboard"),
-        new_lane(handle),
-        example_folders(),
-    )
+    master = Master("/dashboard")
+    found = Dashboard(handle, master, EmergencyLane(master, handle.warn), example_folders())
     process.start()
     yield found
     found.close()

@@ -8,7 +8,7 @@ from pages import Browser, Server, chromium, stopped, wait_for
 from selenium.webdriver.common.keys import Keys
 
 from crazyflie_dashboard.dashboard import Dashboard
-from crazyflie_dashboard.dashboard_node import new_lane
+from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.master import Master
 from crazyflie_utils.main import ros_process
 
@@ -17,7 +17,8 @@ from crazyflie_utils.main import ros_process
 def dashboard():
     process = ros_process()
     handle = process.handle("/dashboard")
-    found = Dashboard(handle, Master("/dashboard"), new_lane(handle), [])
+    master = Master("/dashboard")
+    found = Dashboard(handle, master, EmergencyLane(master, handle.warn), [])
     process.start()
     yield found
     found.close()

@@ -61,22 +61,25 @@ class Bench:
     def __init__(self, *names):
         self.calls, self.reports = [], []
         self.is_master_there = True
-        self.services = {name: Service(name, self.calls) for name in names}
-        self.lane = EmergencyLane("/test", self._list, self._lookup, self.reports.append)
+        self.nodes = {name: Service(name, self.calls) for name in names}
+        self.caller = "/test"
+        self.lane = EmergencyLane(self, self.reports.append)
 
-    def _list(self):
+    # The master.
+
+    def services(self):
         if not self.is_master_there:
             raise OSError("no answer of the master")
-        nodes = {name: f"/node{id(service)}" for name, service in self.services.items()}
+        nodes = {name: f"/node{id(service)}" for name, service in self.nodes.items()}
         return {**nodes, "/cf1/land": "/node", "/cf1/high_level/emergency": "/node"}
 
-    def _lookup(self, name):
+    def lookup(self, name):
         if not self.is_master_there:
             raise OSError("no answer of the master")
-        return self.services[name].address
+        return self.nodes[name].address
 
     def wait(self):
-        wait_until(lambda: set(self.lane.ready) == self.services.keys(), "connections", LIMIT)
+        wait_until(lambda: set(self.lane.ready) == self.nodes.keys(), "connections", LIMIT)
 
     def stop(self, services=None, age=0.0):
         outcomes = self.lane.stop(services, age).result(LIMIT)
@@ -93,20 +96,20 @@ def bench():
 def test_all_are_told_without_a_master_over_connections_that_were_open(bench):
     bench.wait()
     bench.is_master_there = False
-    accepted = [len(each.connections) for each in bench.services.values()]
+    accepted = [len(each.connections) for each in bench.nodes.values()]
     for _ in range(3):
         assert bench.stop() == dict.fromkeys((*ALL, "/cf1/emergency", "/cf2/emergency"), "")
-    assert sorted(bench.calls) == sorted(3 * list(bench.services))
-    assert accepted == [len(each.connections) for each in bench.services.values()]
+    assert sorted(bench.calls) == sorted(3 * list(bench.nodes))
+    assert accepted == [len(each.connections) for each in bench.nodes.values()]
     assert bench.reports[-1] == "emergency for all vehicles: all services have answered"
 
 
 def test_a_node_that_has_stopped_delays_no_other_and_is_named(bench):
     bench.wait()
-    stopped = bench.services[ALL[0]]
+    stopped = bench.nodes[ALL[0]]
     stopped.is_running.clear()
     result = bench.lane.stop(None, 0.0)
-    others = set(bench.services) - {ALL[0]}
+    others = set(bench.nodes) - {ALL[0]}
     wait_until(lambda: set(bench.calls) == others, "the others", LIMIT)
     assert not result.done()
     # A second click does not wait for the answer of the first.
@@ -119,9 +122,9 @@ def test_a_node_that_has_stopped_delays_no_other_and_is_named(bench):
 
 def test_a_node_that_has_gone_is_named_and_one_that_was_started_again_is_told(bench):
     bench.wait()
-    bench.services["/cf1/emergency"].end()
-    bench.services["/cf2/emergency"].end()
-    bench.services["/cf2/emergency"] = Service("/cf2/emergency", bench.calls)
+    bench.nodes["/cf1/emergency"].end()
+    bench.nodes["/cf2/emergency"].end()
+    bench.nodes["/cf2/emergency"] = Service("/cf2/emergency", bench.calls)
     texts = bench.stop()
     assert "Connection refused" in texts.pop("/cf1/emergency")
     assert texts == dict.fromkeys((*ALL, "/cf2/emergency"), "")
@@ -129,7 +132,7 @@ def test_a_node_that_has_gone_is_named_and_one_that_was_started_again_is_told(be
 
 def test_a_refusal_is_in_the_words_of_the_service(bench):
     bench.wait()
-    bench.services["/cf1/emergency"].answer = b"\0" + struct.pack("<I", 7) + b"no link"
+    bench.nodes["/cf1/emergency"].answer = b"\0" + struct.pack("<I", 7) + b"no link"
     assert bench.stop(["/cf1/emergency"]) == {"/cf1/emergency": "no link"}
 
 

@@ -1,12 +1,11 @@
 """Firmware parameters in headless Chromium: a virtual vehicle, the driver, a whole dashboard."""
 
 import pytest
-from fake_fleet import FakeMaster
+from fake_fleet import FakeLane, FakeMaster
 from pages import Browser, wait_for
 
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.discovery import Graph
-from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.page import server as page_server
 from crazyflie_dashboard.page.view import View
 from crazyflie_driver.server_node import CrazyflieServerNode
@@ -36,9 +35,7 @@ def live(driven, server, driver, monkeypatch):
     process, firmware = driven
     services = dict.fromkeys(process.transport.services, "/crazyflie_server")
     handle, graph = process.handle("/dashboard"), Graph(services=services)
-    # No emergency service is on its graph.
-    lane = EmergencyLane("/dashboard", dict, str)
-    dashboard = Dashboard(handle, FakeMaster(lambda: graph), lane, [])
+    dashboard = Dashboard(handle, FakeMaster(lambda: graph), FakeLane(), [])
     # NiceGUI has one server in a process: its next page shows this dashboard.
     monkeypatch.setattr(page_server, "View", lambda _: View(dashboard))
     browser = Browser(driver, server.url)

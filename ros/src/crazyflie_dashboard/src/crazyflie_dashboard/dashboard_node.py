@@ -62,7 +62,9 @@ class DashboardNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         folders = [path for path in self._parameters.folders.split(":") if path]
         folders = folders or example_folders()
-        dashboard = Dashboard(handle, Master(handle.name), new_lane(handle), folders)
+        master = Master(handle.name)
+        lane = EmergencyLane(master, handle.warn)
+        dashboard = Dashboard(handle, master, lane, folders)
         self._open.callback(dashboard.close)
         # NiceGUI takes a second to import, which programs that only read the parameters'
         # declaration do not need.
@@ -75,12 +77,6 @@ class DashboardNode(Node):
     @override
     def shutdown(self) -> None:
         self._open.close()
-
-
-def new_lane(handle: NodeHandle) -> EmergencyLane:
-    """Return the lane for emergencies of the running graph; their outcomes are logged."""
-    master = Master(handle.name)
-    return EmergencyLane(handle.name, master.services, master.lookup, handle.warn)
 
 
 def example_folders() -> list[str]:

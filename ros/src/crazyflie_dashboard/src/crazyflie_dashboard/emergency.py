@@ -10,7 +10,7 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from urllib.parse import urlsplit
 
@@ -21,6 +21,7 @@ from rosgraph.network import (
 )
 from std_srvs.srv import Empty
 
+from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.page_data import Outcome
 
 #: Largest age of a click, and longest time for an answer (s).
@@ -46,26 +47,14 @@ class EmergencyLane:
 
     Parameters
     ----------
-    caller : str
-        Name of the node that calls.
-    services : callable
-        Returns service -> node of all services that the master knows, within some seconds.
-    lookup : callable
-        ``lookup(service)`` returns the address of a service, as in rosrpc://host:port, within some
-        seconds. Both raise OSError when the master does not answer.
+    master : Master
+        The one that is asked for services.
     report : callable
         ``report(text)`` is called for each emergency and its outcome.
     """
 
-    def __init__(
-        self,
-        caller: str,
-        services: Callable[[], Mapping[str, str]],
-        lookup: Callable[[str], str],
-        report: Callable[[str], None] = lambda text: None,
-    ):
-        self._caller, self._services, self._lookup = caller, services, lookup
-        self._report = report
+    def __init__(self, master: Master, report: Callable[[str], None]):
+        self._master, self._report = master, report
         self._lock = threading.Lock()
         self._nodes: dict[str, str] = {}
         self._addresses: dict[str, str] = {}
@@ -181,7 +170,7 @@ class EmergencyLane:
         if address is not None:
             with contextlib.suppress(OSError, _CallError):
                 return self._connect(name, address, deadline)
-        return self._connect(name, self._lookup(name), deadline)
+        return self._connect(name, self._master.lookup(name), deadline)
 
     def _connect(self, name: str, address: str, deadline: float) -> socket.socket:
         limit = deadline - time.monotonic()
@@ -193,7 +182,7 @@ class EmergencyLane:
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
             header = {
-                "callerid": self._caller,
+                "callerid": self._master.caller,
                 "service": name,
                 "md5sum": Empty._md5sum,
                 "type": Empty._type,
@@ -222,7 +211,8 @@ class EmergencyLane:
         while not self._is_closed.is_set():
             began = time.monotonic()
             try:
-                self._update({n: node for n, node in self._services().items() if is_emergency(n)})
+                known = self._master.services().items()
+                self._update({name: node for name, node in known if is_emergency(name)})
                 self._trouble = "no node on the graph offers it"
             except Exception as error:
                 # Any error is ignored: the next request may succeed, and known services stay.

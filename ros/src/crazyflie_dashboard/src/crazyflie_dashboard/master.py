@@ -1,13 +1,15 @@
 """Requests to the ROS master, each with a timeout; for threads that may wait."""
 
+import contextlib
 import http.client
 import xmlrpc.client
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import rosgraph
 
 from crazyflie_dashboard.discovery import Graph
+from crazyflie_utils.ros1.master_watch import bounded_master
 
 _LIMIT = 2.0  #: Longest time for an answer of the master (s).
 
@@ -20,12 +22,13 @@ class Master:
     """The ROS master, as it answers a node; every method may raise `MasterError`."""
 
     def __init__(self, caller: str):
-        self._caller = caller
+        self.caller = caller
 
     def graph(self) -> Graph:
         """Return all topics and services."""
-        types = dict(self._ask("getTopicTypes"))
-        published, _, services = self._ask("getSystemState")
+        with self._asked() as master:
+            types = dict(master.getTopicTypes())
+            published, _, services = master.getSystemState()
         return Graph(
             topics={topic: types[topic] for topic, _ in published if topic in types},
             types=types,
@@ -34,44 +37,33 @@ class Master:
 
     def services(self) -> Mapping[str, str]:
         """Return service -> node."""
-        _, _, found = self._ask("getSystemState")
+        with self._asked() as master:
+            _, _, found = master.getSystemState()
         return {name: nodes[0] for name, nodes in found if nodes}
 
     def lookup(self, service: str) -> str:
         """Return the address of a service, as in rosrpc://host:port."""
-        return self._ask("lookupService", service)
+        with self._asked() as master:
+            return master.lookupService(service)
 
     def parameters(self, names: Iterable[str]) -> dict[str, Any]:
         """Return the values of those parameters that are set, in one request."""
         names = list(dict.fromkeys(names))
-
-        def ask(proxy):
-            several: Any = xmlrpc.client.MultiCall(proxy)
+        with self._asked() as master:
+            several: Any = xmlrpc.client.MultiCall(master.handle)
             for name in names:
-                several.getParam(self._caller, name)
-            return [*several()]
+                several.getParam(self.caller, name)
+            answers = zip(names, several(), strict=True)
+            return {name: value for name, (code, _, value) in answers if code == 1}
 
-        answers = zip(names, _answer(ask), strict=True)
-        return {name: value for name, (code, _, value) in answers if code == 1}
-
-    def _ask(self, method, *arguments):
-        code, text, value = _answer(lambda proxy: getattr(proxy, method)(self._caller, *arguments))
-        if code != 1:
-            raise MasterError(text)
-        return value
-
-
-class _Transport(xmlrpc.client.Transport):
-    def make_connection(self, host):
-        connection = super().make_connection(host)
-        connection.timeout = _LIMIT
-        return connection
-
-
-def _answer(ask: Callable[[Any], Any]) -> Any:
-    uri = rosgraph.get_master_uri()
-    try:
-        with xmlrpc.client.ServerProxy(uri, transport=_Transport()) as proxy:
-            return ask(proxy)
-    except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
-        raise MasterError(f"the master at {uri} does not answer: {error}") from None
+    @contextlib.contextmanager
+    def _asked(self) -> Iterator[rosgraph.Master]:
+        master = bounded_master(self.caller, _LIMIT)
+        try:
+            with master.handle:
+                yield master
+        except rosgraph.MasterException as error:
+            raise MasterError(str(error)) from None
+        except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
+            uri = master.master_uri
+            raise MasterError(f"the master at {uri} does not answer: {error}") from None

@@ -9,9 +9,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from urllib.parse import urlsplit
-from xmlrpc.client import ServerProxy
 
-import rosgraph
 import roslib.message
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph.network import read_ros_handshake_header, write_ros_handshake_header
@@ -22,6 +20,7 @@ from crazyflie_doctor.graph import Graph, Type
 from crazyflie_doctor.timing import TimingRecording, Transform
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils.main import begin
+from crazyflie_utils.ros1.master_watch import bounded_master, bounded_proxy
 
 LIMIT = 2.0  #: Longest wait for one answer (s).
 
@@ -43,25 +42,18 @@ def own_md5(kind: str, name: str) -> str | None:
 
 def is_master_online() -> bool:
     """Tell whether a ROS master answers in time."""
-    with _limited():
-        try:
-            # Nodes answer what `rosgraph.is_master_online` asks, too.
-            rosgraph.Master(_NAME).getUri()
-        except Exception:
-            # No answer, an answer that is not a master's, or an invalid URI.
-            return False
-        return True
-
-
-@contextlib.contextmanager
-def _limited():
-    """Set a time limit for sockets made in this context; rospy's, made later, have none."""
-    before = socket.getdefaulttimeout()
-    socket.setdefaulttimeout(LIMIT)
     try:
-        yield
-    finally:
-        socket.setdefaulttimeout(before)
+        # Nodes answer what `rosgraph.is_master_online` asks, too.
+        _master().getUri()
+    except Exception:
+        # No answer, an answer that is not a master's, or an invalid URI.
+        return False
+    return True
+
+
+def _master():
+    # One for each thread.
+    return bounded_master(_NAME, LIMIT)
 
 
 def graph() -> Graph:
@@ -69,11 +61,7 @@ def graph() -> Graph:
 
     OSError or rosgraph.MasterException: the master does not answer.
     """
-    with _limited():
-        return _graph(rosgraph.Master(_NAME))
-
-
-def _graph(master):
+    master = _master()
     publishers, subscribers, services = (
         {name: set(nodes) for name, nodes in part} for part in master.getSystemState()
     )
@@ -117,10 +105,9 @@ def _flatten(prefix, tree):
 def _ask(node: str) -> tuple[str, list[Any]] | str:
     """Return address and connections of a node; a text if it does not answer."""
     try:
-        # A proxy of the master serves one thread only.
-        uri = rosgraph.Master(_NAME).lookupNode(node)
-        answer: Any = ServerProxy(uri).getBusInfo(_NAME)
-        return uri, answer[2]
+        uri = _master().lookupNode(node)
+        _, _, connections = bounded_proxy(uri, LIMIT).getBusInfo(_NAME)
+        return uri, connections
     except Exception as error:
         # Another program may listen on the port of a node that has ended.
         return str(error) or type(error).__name__
@@ -130,8 +117,7 @@ def _offer(uri: str, topic: str) -> Type | None:
     """Return the type that a publisher offers; None if it cannot be asked."""
     # Another program may listen on that port. `_ask` finds publishers that do not answer.
     with contextlib.suppress(Exception):
-        answer: Any = ServerProxy(uri).requestTopic(_NAME, topic, [["TCPROS"]])
-        _, host, port = answer[2]
+        _, _, (_, host, port) = bounded_proxy(uri, LIMIT).requestTopic(_NAME, topic, [["TCPROS"]])
         with socket.create_connection((host, port), LIMIT) as connection:
             return _handshake(connection, {"topic": topic})
     return None
@@ -140,7 +126,7 @@ def _offer(uri: str, topic: str) -> Type | None:
 def _service_type(service: str) -> Type | None:
     # Likewise.
     with contextlib.suppress(Exception):
-        uri = urlsplit(rosgraph.Master(_NAME).lookupService(service))
+        uri = urlsplit(_master().lookupService(service))
         with socket.create_connection((uri.hostname or "", uri.port or 0), LIMIT) as connection:
             return _handshake(connection, {"service": service, "probe": "1"})
     return None

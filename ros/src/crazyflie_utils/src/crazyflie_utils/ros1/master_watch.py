@@ -67,11 +67,27 @@ _ANSWER_LIMIT = 3.0  #: Time after which a node that does not answer is dead (s)
 
 
 class _BoundedTransport(xmlrpc.client.Transport):
+    def __init__(self, limit: float):
+        super().__init__()
+        self._limit = limit
+
     @override
     def make_connection(self, host):
         connection = super().make_connection(host)
-        connection.timeout = _ANSWER_LIMIT
+        connection.timeout = self._limit
         return connection
+
+
+def bounded_proxy(uri: str, limit: float) -> Any:
+    """Return a proxy, for one thread, of a master or node; ``limit`` is that of an answer (s)."""
+    return xmlrpc.client.ServerProxy(uri, transport=_BoundedTransport(limit))
+
+
+def bounded_master(caller: str, limit: float) -> rosgraph.Master:
+    """Return the master, as it answers a node; see `bounded_proxy`."""
+    master = rosgraph.Master(caller)
+    master.handle = bounded_proxy(master.master_uri, limit)
+    return master
 
 
 def living_node(name: str) -> str | None:
@@ -79,7 +95,7 @@ def living_node(name: str) -> str | None:
     caller = rospy.get_name()
     try:
         uri = rosgraph.Master(caller).lookupNode(name)
-        node: Any = xmlrpc.client.ServerProxy(uri, transport=_BoundedTransport())
+        node = bounded_proxy(uri, _ANSWER_LIMIT)
         _, _, pid = node.getPid(caller)
     except (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException):
         return None

@@ -64,13 +64,11 @@ def test_a_page_that_is_lost_has_no_control_when_it_comes_back(told):
         told.control.take(page)
 
 
-def test_the_first_and_the_last_page_are_noticed(told):
+def test_pages_that_open_and_close_are_noticed(told):
     seen = []
-    told.control.on_first = lambda: seen.append("first")
-    told.control.on_close = lambda page: seen.append(page)
-    told.control.on_empty = lambda: seen.append("empty")
+    told.control.on_change = lambda: seen.append(told.control.pages)
     one, two = told.open(), told.open()
     told.control.close(one)
     told.control.close(two)
     told.control.close(two)
-    assert seen == ["first", one, two, "empty"]
+    assert seen == [(one,), (one, two), (two,), ()]

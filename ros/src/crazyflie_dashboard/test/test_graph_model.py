@@ -67,12 +67,12 @@ def test_vehicles_come_and_go(fleet):
 
 def test_a_master_that_does_not_answer_leaves_the_vehicles_there(fleet):
     fleet.graph = None  # `vehicles` would raise: as an answer that cannot be read.
-    read = fleet.dashboard._model._read_graph
-    fleet.dashboard._model._read_graph = lambda: (_ for _ in ()).throw(OSError("no master"))
+    read = fleet.master.graph
+    fleet.master.graph = lambda: (_ for _ in ()).throw(OSError("no master"))
     fleet.process.advance(5.0)
     assert list(fleet.vehicles) == ["cf1", "cf2", "cf3"]
     assert any("no master" in text for text in fleet.process.logged("warn"))
-    fleet.dashboard._model._read_graph = read
+    fleet.master.graph = read
 
 
 def test_nothing_is_received_without_a_page():

@@ -2,7 +2,7 @@
 
 import math
 import subprocess
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +14,7 @@ from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest
 
 from crazyflie_dashboard.answers import any_of, failed, gathered, settle
 from crazyflie_dashboard.discovery import FoundVehicle, Graph, Service
-from crazyflie_dashboard.frames import Frames
+from crazyflie_dashboard.graph_model import GraphModel
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.moves import Move, expect_apart, formation, in_frame
 from crazyflie_dashboard.page_data import MAX_COMMAND_AGE, Command, Outcome
@@ -68,8 +68,8 @@ class Actions:
     workers : concurrent.futures.Executor
         Its threads may wait for the master.
     master : Master
-    frames : Frames
-        Frames in which the page shows vehicles.
+    model : GraphModel
+        The vehicles that are commanded.
     time : callable
         time.monotonic.
     """
@@ -79,20 +79,16 @@ class Actions:
         handle: NodeHandle,
         workers: Executor,
         master: Master,
-        frames: Frames,
+        model: GraphModel,
         time: Callable[[], float],
     ):
         self._handle, self._workers, self._time = handle, workers, time
-        self._master, self._frames = master, frames
+        self._master, self._model = master, model
         self._moves: dict[str, Move] = {}
         self._commanders: dict[str, subprocess.Popen[bytes]] = {}
 
-    def carry_out(
-        self, command: Command, targets: Mapping[str, Target], graph: Graph, fixed: str
-    ) -> "Future[tuple[Outcome, ...]]":
+    def carry_out(self, command: Command) -> "Future[tuple[Outcome, ...]]":
         """Call the services that a command needs; return a future of all outcomes.
-
-        ``fixed`` is the frame of the command's goal.
 
         Raises
         ------
@@ -101,12 +97,18 @@ class Actions:
         """
         expect_fresh(command.action.value, self._time() - command.clicked)
         _check(command)
+        scene = self._model.scene
+        targets = {
+            name: Target(model.vehicle, scene.vehicles[name], self._model.fence(model.vehicle))
+            for name, model in self._model.models.items()
+            if name in scene.vehicles
+        }
         if command.action == Action.GO_TO:
-            return self._go_to(command, targets, graph, fixed)
-        answers = self._land_all(command, targets, graph)
+            return self._go_to(command, targets, scene.fixed_frame)
+        answers = self._land_all(command, targets)
         for name in command.vehicles:
             if name not in answers:
-                answers[name] = self._command(command, targets.get(name), name, graph)
+                answers[name] = self._command(command, targets.get(name), name)
         return gathered(answers)
 
     def close(self) -> None:
@@ -114,22 +116,23 @@ class Actions:
         for process in self._commanders.values():
             process.terminate() if process.poll() is None else None
 
-    def _land_all(self, command, targets, graph):
+    def _land_all(self, command, targets):
         """Return the answer of the fleet for its vehicles: it lands them in rounds."""
-        node = graph.services.get("/all/land")
+        nodes = self._model.graph.services
+        node = nodes.get("/all/land")
         if command.action != Action.LAND or set(command.vehicles) < set(targets) or node is None:
             return {}
         own = [
             name
             for name, target in targets.items()
-            if any(graph.services.get(s.name) == node for s in _services(target, Action.LAND))
+            if any(nodes.get(s.name) == node for s in _services(target, Action.LAND))
         ]
         if len(own) < 2:
             return {}
         answer = self._call(command, Service("/all/land", Empty), EmptyRequest())
         return dict.fromkeys(own, answer)
 
-    def _command(self, command, target, name, graph):
+    def _command(self, command, target, name):
         services = () if target is None else _services(target, command.action)
         if not services:
             return failed(_why_no_service(command.action, target))
@@ -152,7 +155,7 @@ class Actions:
         if command.action == Action.TAKEOFF and may_move:
             go_to = _services(target, Action.GO_TO)
             if any(each.needs_commander for each in go_to):
-                self._start_commander(target.vehicle, graph)
+                self._start_commander(target.vehicle)
         answers = [self._call(command, s, _request(command, s, target)) for s in services]
         return answers[0] if len(answers) == 1 else any_of(answers)
 
@@ -197,15 +200,15 @@ class Actions:
 
     # Go-to commands for several vehicles.
 
-    def _go_to(self, command, targets, graph, fixed):
+    def _go_to(self, command, targets, fixed):
         """Send vehicles so that their centre comes to the goal: all of them, or none."""
-        reasons = {n: self._why_it_stays(targets.get(n), graph) for n in command.vehicles}
+        reasons = {n: self._why_it_stays(targets.get(n)) for n in command.vehicles}
         if any(reasons.values()):
             return gathered({name: failed(text or _STAYS) for name, text in reasons.items()})
         chosen = {name: targets[name] for name in command.vehicles}
         moving = {name: move for name, move in self._moves.items() if name in targets}
         ready = self._workers.submit(
-            self._prepared, command, chosen, targets, moving, graph, fixed, self._time()
+            self._prepared, command, chosen, targets, moving, fixed, self._time()
         )
         outcome: Future[tuple[Outcome, ...]] = Future()
 
@@ -233,12 +236,12 @@ class Actions:
         ready.add_done_callback(lambda _: self._handle.submit(call))
         return outcome
 
-    def _why_it_stays(self, target, graph):
+    def _why_it_stays(self, target):
         services = () if target is None else _services(target, Action.GO_TO)
         if not services:
             return _why_no_service(Action.GO_TO, target)
         if services[0].needs_commander:
-            self._start_commander(target.vehicle, graph)
+            self._start_commander(target.vehicle)
             return "it had no services for moves; they are being started, try again in a moment"
         if target.now.position is None or target.now.is_stale:
             return "its position is not known; expected a new one"
@@ -246,10 +249,12 @@ class Actions:
             return f"the vehicle is {target.now.state}; expected it to fly"
         return ""
 
-    def _prepared(self, command, chosen, targets, moving, graph, fixed, now):
+    def _prepared(self, command, chosen, targets, moving, fixed, now):
         """Return moves, and services with requests, of vehicles; waits for the master."""
         services = {name: _services(target, Action.GO_TO)[0] for name, target in chosen.items()}
-        spaces = {name: _namespace(service, graph) for name, service in services.items()}
+        spaces = {
+            name: _namespace(service, self._model.graph) for name, service in services.items()
+        }
         wanted = {name: f"{each.vehicle.namespace}/{BUFFER}" for name, each in targets.items()}
         known = self._master.parameters(
             [
@@ -266,7 +271,11 @@ class Actions:
         for name, target in chosen.items():
             space = spaces[name]
             has_yaw = known.get(f"{space}/{_YAW}", target.vehicle.has_driver)
-            own = known.get(f"{space}/{_FIXED}") or self._frames.parent(target.now.frame) or fixed
+            own = (
+                known.get(f"{space}/{_FIXED}")
+                or self._model.frames.parent(target.now.frame)
+                or fixed
+            )
             yaw = rpy_from_quaternion(*target.now.rotation)[2]
             yaw = yaw if command.yaw is None else command.yaw
             goal, yaw = self._in_own_frame(name, goals[name], yaw, own.strip("/"), fixed)
@@ -281,7 +290,7 @@ class Actions:
     def _in_own_frame(self, name, goal, yaw, own, fixed):
         if own == fixed:
             return goal, yaw
-        place = self._frames.in_fixed(own, fixed)
+        place = self._model.frames.in_fixed(own, fixed)
         if place is None:
             raise RefusalError(
                 f"go to: {name} is commanded in the frame {own}, and the page shows {fixed}; "
@@ -296,12 +305,12 @@ class Actions:
             (service,) = _services(target, Action.GO_TO)
             self._handle.call_service(service.name, srv.GoTo, _hold_request(), _TIMEOUT)
 
-    def _start_commander(self, vehicle, graph):
+    def _start_commander(self, vehicle):
         name = vehicle.commander
         running = self._commanders.get(name)
         if running is not None and running.poll() is None:
             return
-        has_yaw = graph.types.get(f"{vehicle.namespace}/ref") == _YAW_REFERENCE
+        has_yaw = self._model.graph.types.get(f"{vehicle.namespace}/ref") == _YAW_REFERENCE
         self._handle.set_param_later(f"{name}/reference/yaw", has_yaw)
         (program,) = roslib.packages.find_node("crazyflie_mission_api", "high_level_node")[:1]
         # A process of its own, so that it continues when this one ends.

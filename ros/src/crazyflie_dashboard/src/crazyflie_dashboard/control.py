@@ -19,11 +19,8 @@ class PageControl:
     """
 
     def __init__(self) -> None:
-        #: on_first, on_close, on_empty: ``on_first()`` is called when the first page has opened,
-        #: ``on_close(page)`` when one has closed, and then ``on_empty()`` if it was the last.
-        self.on_first: Callable[[], None] = lambda: None
-        self.on_close: Callable[[int], None] = lambda page: None
-        self.on_empty: Callable[[], None] = lambda: None
+        #: Called when a page has opened or closed.
+        self.on_change: Callable[[], None] = lambda: None
         #: Called with a text when another page has control.
         self.log: Callable[[str], None] = lambda text: None
         self._lock = threading.RLock()
@@ -39,9 +36,7 @@ class PageControl:
         with self._lock:
             page = next(self._numbers)
             self._tell[page] = tell
-            is_first = len(self._tell) == 1
-        if is_first:
-            self.on_first()
+        self.on_change()
         return page
 
     def close(self, page: int) -> None:
@@ -50,10 +45,7 @@ class PageControl:
             self.release(page)
             if self._tell.pop(page, None) is None:
                 return
-            is_last = not self._tell
-        self.on_close(page)
-        if is_last:
-            self.on_empty()
+        self.on_change()
 
     def take(self, page: int) -> None:
         """Give a page control if no other has it.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from crazyflie_dashboard import missions
-from crazyflie_dashboard.actions import Actions, Target, expect_fresh
+from crazyflie_dashboard.actions import Actions, expect_fresh
 from crazyflie_dashboard.answers import listed, settle, summary, words
 from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.emergency import EmergencyLane
@@ -68,8 +68,8 @@ class Dashboard:
         # A thread that submits work to an idle node also carries out the queue: this thread does
         # so, not the one that serves all pages.
         self._turns = workers or ThreadPoolExecutor(1, "dashboard_turns")
-        self._model = GraphModel(handle, self._workers, master.graph, clock)
-        self._actions = Actions(handle, self._workers, master, self._model.frames, clock)
+        self._model = GraphModel(handle, self._workers, master, clock)
+        self._actions = Actions(handle, self._workers, master, self._model, clock)
         self._lane = lane
         self._parameters = LiveParameters(handle, self._workers, self._model)
         self._missions = missions.Missions()
@@ -78,9 +78,7 @@ class Dashboard:
         self._model.recording = lambda: self._recording.text
         self._open: dict[int, PageState] = {}
         self.pages.log = handle.info
-        self.pages.on_first = lambda: self._submit(self._model.begin)
-        self.pages.on_close = lambda page: self._submit(self._close, page)
-        self.pages.on_empty = lambda: self._submit(self._model.end)
+        self.pages.on_change = lambda: self._submit(self._follow_pages)
 
     def close(self) -> None:
         """End all activities that were started here, except flights."""
@@ -121,19 +119,7 @@ class Dashboard:
 
     def command(self, page: int, command: Command) -> "Future[tuple[Outcome, ...]]":
         """Carry out a command of the page that has control; return an outcome for each vehicle."""
-
-        def do():
-            self.pages.expect_control(page)
-            now = self._model.scene.vehicles
-            targets = {
-                name: Target(model.vehicle, now[name], self._model.fence(model.vehicle))
-                for name, model in self._model.models.items()
-                if name in now
-            }
-            fixed = self._model.scene.fixed_frame
-            return self._actions.carry_out(command, targets, self._model.graph, fixed)
-
-        return self._do(do, what=f"page {page}: {command.words}")
+        return self._control(page, command.words, self._actions.carry_out, command)
 
     def emergency(
         self, vehicles: tuple[str, ...] | None, age: float
@@ -164,13 +150,8 @@ class Dashboard:
         self, page: int, parameter: ParameterInfo, text: str
     ) -> "Future[ParameterInfo]":
         """Set a parameter to the typed value; the result has the value that came back."""
-
-        def do():
-            self.pages.expect_control(page)
-            return self._parameters.set(parameter, text)
-
-        what = f"page {page}: set {parameter.name} of {parameter.owner} to {text!r}"
-        return self._do(do, what=what)
+        what = f"set {parameter.name} of {parameter.owner} to {text!r}"
+        return self._control(page, what, self._parameters.set, parameter, text)
 
     def mission_files(self) -> tuple[MissionFile, ...]:
         """Return the missions and trajectories that can be flown."""
@@ -199,30 +180,25 @@ class Dashboard:
         """Fly a mission after its dry run has passed; the future is done when it has ended."""
 
         def do():
-            self.pages.expect_control(page)
             expect_fresh(mission.title, self._clock() - clicked)
             return self._missions.fly(mission, vehicles, self._places(vehicles))
 
-        return self._do(do, what=f"page {page}: fly {mission.path} for {listed(vehicles)}")
+        return self._control(page, f"fly {mission.path} for {listed(vehicles)}", do)
 
     def stop_mission(self, page: int, clicked: float) -> "Future[None]":
         """End the mission that flies; its vehicles land."""
 
         def do():
-            self.pages.expect_control(page)
             expect_fresh("stop", self._clock() - clicked)
             self._missions.stop()
 
-        return self._do(do, what=f"page {page}: stop the mission")
+        return self._control(page, "stop the mission", do)
 
     def record(self, page: int, is_on: bool) -> "Future[str | None]":
         """Start or end a recording; at the end the future is done when the report exists."""
-
-        def do():
-            self.pages.expect_control(page)
-            return self._recording.start() if is_on else self._recording.stop()
-
-        return self._do(do, what=f"page {page}: {'record' if is_on else 'stop recording'}")
+        if is_on:
+            return self._control(page, "record", self._recording.start)
+        return self._control(page, "stop recording", self._recording.stop)
 
     def report(self) -> Path | None:
         """Return the report on the last recording that was ended here."""
@@ -253,13 +229,8 @@ class Dashboard:
         with contextlib.suppress(RuntimeError):
             self._turns.submit(self._handle.submit, work, *arguments)
 
-    # Called in the node's turn.
-
-    def _do(self, work: Callable[..., Any], *arguments: Any, what: str = "") -> "Future[Any]":
-        """Do work in the node's turn; the future has its result, or that of its future.
-
-        With ``what`` the request and its outcome are logged.
-        """
+    def _do(self, work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """Do work in the node's turn; the future has its result, or that of its future."""
         outcome: Future[Any] = Future()
 
         def run():
@@ -273,6 +244,19 @@ class Dashboard:
             else:
                 outcome.set_result(result)
 
+        self._submit(run)
+        return outcome
+
+    def _control(
+        self, page: int, what: str, work: Callable[..., Any], *arguments: Any
+    ) -> "Future[Any]":
+        """Do work as `_do` for the page that has control; log the request and its outcome."""
+        what = f"page {page}: {what}"
+
+        def do():
+            self.pages.expect_control(page)
+            return work(*arguments)
+
         def log(done):
             error, result = done.exception(), None if done.exception() else done.result()
             refused = [words(error)] if error else []
@@ -283,11 +267,12 @@ class Dashboard:
             else:
                 self._handle.info(f"{what}: done")
 
-        if what:
-            self._handle.info(what)
-            outcome.add_done_callback(log)
-        self._submit(run)
+        self._handle.info(what)
+        outcome = self._do(do)
+        outcome.add_done_callback(log)
         return outcome
+
+    # Called in the node's turn.
 
     def _places(self, names):
         known = self._model.scene.vehicles
@@ -298,12 +283,12 @@ class Dashboard:
             raise RefusalError(f"page {number} is closed; load it again")
         return self._open.setdefault(number, PageState(self._handle, self._workers, self._clock))
 
-    def _close(self, number):
-        page = self._open.pop(number, None)
-        if page is not None:
-            page.close()
-            self._update_watched()
+    def _follow_pages(self):
+        pages = self.pages.pages
+        for number in self._open.keys() - {*pages}:
+            self._open.pop(number).close()
+        self._update_watched()
+        (self._model.begin if pages else self._model.end)()
 
     def _update_watched(self):
-        chosen = {page.vehicle for page in self._open.values()}
-        self._model.watch({name for name in self._model.models if name in chosen})
+        self._model.watch({page.vehicle for page in self._open.values() if page.vehicle})

@@ -18,6 +18,7 @@ from tf2_msgs.msg import TFMessage
 from crazyflie_dashboard.answers import listed
 from crazyflie_dashboard.discovery import FoundVehicle, Graph, vehicles
 from crazyflie_dashboard.frames import Frames
+from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.messages import Diagnostics, log_line
 from crazyflie_dashboard.page_state import IMAGES
 from crazyflie_dashboard.plots import VehiclePlots
@@ -61,15 +62,14 @@ class GraphModel:
     handle : NodeHandle
     workers : concurrent.futures.Executor
         Its threads may wait for the master.
-    read_graph : callable
-        Returns the `Graph`; it may wait.
+    master : Master
     """
 
     def __init__(
         self,
         handle: NodeHandle,
         workers: Executor,
-        read_graph: Callable[[], Graph],
+        master: Master,
         clock: Callable[[], float] = time.monotonic,
     ):
         self.scene = Scene()  #: The newest one.
@@ -81,7 +81,7 @@ class GraphModel:
         self.sentences: tuple[Sentence, ...] = ()
         self.missions: Callable[[], tuple[str, ...]] = tuple
         self.recording: Callable[[], str] = str
-        self._parent, self._workers, self._read_graph = handle, workers, read_graph
+        self._parent, self._workers, self._master = handle, workers, master
         self._clock = clock
         self._handle: NodeHandle | None = None
         ahead = MAX_FUTURE_STAMP_SIMULATED if handle.uses_sim_time else MAX_FUTURE_STAMP
@@ -152,7 +152,7 @@ class GraphModel:
         if self._clock() >= self._poll_at and not self._is_polling:
             self._is_polling = True
             began = self._clock()
-            self._workers.submit(self._read_graph).add_done_callback(
+            self._workers.submit(self._master.graph).add_done_callback(
                 lambda done: self._parent.submit(self._on_graph, done, began)
             )
         self.frames.update()

@@ -1,5 +1,6 @@
 """A dashboard on a fake process, with vehicles that are services and poses only."""
 
+import contextlib
 from concurrent.futures import Future
 
 from crazyflie_dashboard.dashboard import Dashboard
@@ -31,17 +32,21 @@ class Workers:
 
 
 class FakeMaster:
-    """Answers with a graph, and with parameters that are set."""
+    """Answers with a graph, and with the parameters of a fake process."""
 
-    def __init__(self, graph):
-        self._graph = graph
-        self.values = {}
+    def __init__(self, process, graph):
+        self._get_param, self._graph = process.transport.get_param, graph
+        self.values = process.transport.parameters
 
     def graph(self):
         return self._graph()
 
     def parameters(self, names):
-        return {name: self.values[name] for name in names if name in self.values}
+        found = {}
+        for name in names:
+            with contextlib.suppress(KeyError):
+                found[name] = self._get_param(name)
+        return found
 
 
 class FakeLane:
@@ -95,7 +100,7 @@ class FakeFleet:
         topics = {f"/{each}/state": STATE for each in self.names}
         topics |= {f"/{each}/{STATUS}": "crazyflie_msgs/FlightStatus" for each in self.names}
         self.graph = Graph(topics, topics, services)
-        self.master = FakeMaster(lambda: self.graph)
+        self.master = FakeMaster(self.process, lambda: self.graph)
         self.dashboard = Dashboard(
             self.process.handle("/dashboard"),
             self.master,

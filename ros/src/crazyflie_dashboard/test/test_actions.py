@@ -11,6 +11,7 @@ from fake_fleet import FakeFleet, FakeLane
 from crazyflie_dashboard.control import ControlError
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.discovery import Graph
+from crazyflie_dashboard.master import MasterError
 from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action
 from crazyflie_driver import srv
@@ -298,3 +299,14 @@ def test_lights_show_which_one_it_is_for_a_while(fleet):
     assert lights == [(["led/bitmask"], 255)]
     fleet.process.advance(5.1)
     assert lights[1:] == [(["led/bitmask"], 0)]
+
+
+def test_without_a_master_a_move_is_refused_with_the_reason(fleet, monkeypatch):
+    def ask(names):
+        raise MasterError("the master does not answer: timed out")
+
+    monkeypatch.setattr(fleet.master, "parameters", ask)
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(4.0, 0.0, 1.0), cf3=(2.0, 2.0, 1.0))
+    with pytest.raises(RefusalError, match="the master does not answer: timed out"):
+        fleet.command(Action.GO_TO, ["cf1"], goal=(2.0, 0.0, 1.0))
+    assert fleet.calls == []

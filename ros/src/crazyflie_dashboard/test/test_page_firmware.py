@@ -35,7 +35,7 @@ def live(driven, server, driver, monkeypatch):
     process, firmware = driven
     services = dict.fromkeys(process.transport.services, "/crazyflie_server")
     handle, graph = process.handle("/dashboard"), Graph(services=services)
-    dashboard = Dashboard(handle, FakeMaster(lambda: graph), FakeLane(), [])
+    dashboard = Dashboard(handle, FakeMaster(process, lambda: graph), FakeLane(), [])
     # NiceGUI has one server in a process: its next page shows this dashboard.
     monkeypatch.setattr(page_server, "View", lambda _: View(dashboard))
     browser = Browser(driver, server.url)

@@ -3,7 +3,7 @@
 import math
 import subprocess
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ import roslib.packages
 from geometry_msgs.msg import Point
 from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest
 
-from crazyflie_dashboard.answers import any_of, failed, gathered, settle
+from crazyflie_dashboard.answers import Steps, any_of, follow, gathered
 from crazyflie_dashboard.discovery import FoundVehicle, Graph, Service
 from crazyflie_dashboard.graph_model import GraphModel
 from crazyflie_dashboard.master import Master
@@ -87,8 +87,8 @@ class Actions:
         self._moves: dict[str, Move] = {}
         self._commanders: dict[str, subprocess.Popen[bytes]] = {}
 
-    def carry_out(self, command: Command) -> "Future[tuple[Outcome, ...]]":
-        """Call the services that a command needs; return a future of all outcomes.
+    def carry_out(self, command: Command) -> "Steps[tuple[Outcome, ...]]":
+        """Call the services that a command needs; return all outcomes.
 
         Raises
         ------
@@ -104,17 +104,20 @@ class Actions:
             if name in scene.vehicles
         }
         if command.action == Action.GO_TO:
-            return self._go_to(command, targets, scene.fixed_frame)
+            return (yield from self._go_to(command, targets, scene.fixed_frame))
         answers = self._land_all(command, targets)
         for name in command.vehicles:
             if name not in answers:
-                answers[name] = self._command(command, targets.get(name), name)
-        return gathered(answers)
+                answers[name] = self._begin(self._command(command, targets.get(name), name))
+        return (yield gathered(answers))
 
     def close(self) -> None:
         """End the commanders that were started here; each lives until its vehicle has landed."""
         for process in self._commanders.values():
             process.terminate() if process.poll() is None else None
+
+    def _begin(self, steps):
+        return follow(steps, self._handle.submit)
 
     def _land_all(self, command, targets):
         """Return the answer of the fleet for its vehicles: it lands them in rounds."""
@@ -129,74 +132,63 @@ class Actions:
         ]
         if len(own) < 2:
             return {}
-        answer = self._call(command, Service("/all/land", Empty), EmptyRequest())
+        answer = self._begin(self._call(command, Service("/all/land", Empty), EmptyRequest()))
         return dict.fromkeys(own, answer)
 
     def _command(self, command, target, name):
         services = () if target is None else _services(target, command.action)
         if not services:
-            return failed(_why_no_service(command.action, target))
+            raise RefusalError(_why_no_service(command.action, target))
         if command.action in _GROUND_ONLY and target.now.is_in_flight:
-            return failed(
+            raise RefusalError(
                 f"{command.action.value}: the vehicle is {target.now.state}; expected it to be on "
                 "the ground"
             )
         if command.action == Action.TAKEOFF and target.fence is not None:
             top = target.fence.upper[2]
             if command.height > top:
-                return failed(
+                raise RefusalError(
                     f"take off: the height is {command.height:g} m; expected at most {top:g} m, "
                     "where the geofence ends"
                 )
         if command.action == Action.IDENTIFY:
-            return self._light(services[0].name.rpartition("/")[0], command)
+            yield from self._light(services[0].name.rpartition("/")[0], command)
+            return
         self._moves.pop(name, None)
         may_move = Action.GO_TO in target.now.actions
         if command.action == Action.TAKEOFF and may_move:
             go_to = _services(target, Action.GO_TO)
             if any(each.needs_commander for each in go_to):
                 self._start_commander(target.vehicle)
-        answers = [self._call(command, s, _request(command, s, target)) for s in services]
-        return answers[0] if len(answers) == 1 else any_of(answers)
+        calls = [self._call(command, s, _request(command, s, target)) for s in services]
+        yield any_of([*map(self._begin, calls)])
 
-    def _call(self, command: Command, service: Service, request: Any) -> "Future[Any]":
+    def _call(self, command: Command, service: Service, request: Any) -> Steps[None]:
         """Call a service unless the command becomes too old before the service is reached."""
         age = self._time() - command.clicked
-        try:
-            expect_fresh(command.action.value, age)
-        except RefusalError as error:
-            return failed(str(error))
+        expect_fresh(command.action.value, age)
         limit = _FLIGHT_TIMEOUT if command.action in (Action.TAKEOFF, Action.LAND) else _TIMEOUT
-        outcome: Future[Any] = Future()
         # A call that does not reach its node is withdrawn: a frozen node must not carry it out
         # later.
-        answer = self._handle.call_service(
+        answer = yield self._handle.call_service(
             service.name, service.kind, request, limit, MAX_COMMAND_AGE - age
         )
-        answer.add_done_callback(lambda done: settle(done, outcome))
-        return outcome
+        if getattr(answer, "success", True) is False:
+            raise RefusalError(answer.message)
 
     def _light(self, driver, command):
         """Switch on all lights of a vehicle for `_LIGHT_TIME`, by its firmware."""
         service = Service(f"{driver}/update_params", srv.UpdateParams)
         request = srv.UpdateParamsRequest([_LIGHTS])
-        outcome: Future[Any] = Future()
-
-        def turn(value, act):
-            done = self._handle.set_param_later(f"{driver}/{_LIGHTS}", value)
-            done.add_done_callback(lambda _: self._handle.submit(act))
-
-        def on():
-            self._call(command, service, request).add_done_callback(lambda d: settle(d, outcome))
 
         def off():
             timer.stop()
-            arguments = service.name, service.kind, request, _TIMEOUT
-            turn(0, lambda: self._handle.call_service(*arguments))
+            yield self._handle.set_param_later(f"{driver}/{_LIGHTS}", 0)
+            self._handle.call_service(service.name, service.kind, request, _TIMEOUT)
 
-        turn(_ALL_LIGHTS, on)
-        timer = self._handle.timer(_LIGHT_TIME, off, steady=True)
-        return outcome
+        timer = self._handle.timer(_LIGHT_TIME, lambda: self._begin(off()), steady=True)
+        yield self._handle.set_param_later(f"{driver}/{_LIGHTS}", _ALL_LIGHTS)
+        yield from self._call(command, service, request)
 
     # Go-to commands for several vehicles.
 
@@ -204,37 +196,25 @@ class Actions:
         """Send vehicles so that their centre comes to the goal: all of them, or none."""
         reasons = {n: self._why_it_stays(targets.get(n)) for n in command.vehicles}
         if any(reasons.values()):
-            return gathered({name: failed(text or _STAYS) for name, text in reasons.items()})
+            return tuple(Outcome(name, text or _STAYS) for name, text in reasons.items())
         chosen = {name: targets[name] for name in command.vehicles}
         moving = {name: move for name, move in self._moves.items() if name in targets}
-        ready = self._workers.submit(
+        moves, requests = yield self._workers.submit(
             self._prepared, command, chosen, targets, moving, fixed, self._time()
         )
-        outcome: Future[tuple[Outcome, ...]] = Future()
-
-        def call():
-            error = ready.exception()
-            if error is not None:
-                outcome.set_exception(error)
-                return
-            moves, requests = ready.result()
-            answers = {name: self._call(command, *each) for name, each in requests.items()}
-            self._moves = {**moving, **moves}
-            gathered(answers).add_done_callback(lambda done: end(done.result()))
-
-        def end(outcomes):
-            gone = [each for each in outcomes if not each.text]
-            if 0 < len(gone) < len(outcomes):
-                # The paths were checked for all vehicles together.
-                self._handle.submit(self._hold, [targets[each.vehicle] for each in gone])
-                outcomes = tuple(
-                    each if each.text else Outcome(each.vehicle, f"is held: {_STAYS}")
-                    for each in outcomes
-                )
-            outcome.set_result(outcomes)
-
-        ready.add_done_callback(lambda _: self._handle.submit(call))
-        return outcome
+        calls = {name: self._call(command, *each) for name, each in requests.items()}
+        answers = {name: self._begin(call) for name, call in calls.items()}
+        self._moves = {**moving, **moves}
+        outcomes = yield gathered(answers)
+        gone = [targets[each.vehicle] for each in outcomes if not each.text]
+        if 0 < len(gone) < len(outcomes):
+            # The paths were checked for all vehicles together.
+            self._hold(gone)
+            outcomes = tuple(
+                each if each.text else Outcome(each.vehicle, f"is held: {_STAYS}")
+                for each in outcomes
+            )
+        return outcomes
 
     def _why_it_stays(self, target):
         services = () if target is None else _services(target, Action.GO_TO)

@@ -2,14 +2,14 @@
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from crazyflie_dashboard import missions
 from crazyflie_dashboard.actions import Actions, expect_fresh
-from crazyflie_dashboard.answers import listed, settle, summary, words
+from crazyflie_dashboard.answers import follow, listed, summary, words
 from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.graph_model import GraphModel
@@ -27,7 +27,7 @@ from crazyflie_dashboard.page_data import (
 from crazyflie_dashboard.page_state import PageState
 from crazyflie_dashboard.recording import Recording
 from crazyflie_dashboard.snapshot import Action, Scene
-from crazyflie_utils import NodeHandle
+from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 
 
@@ -71,7 +71,7 @@ class Dashboard:
         self._model = GraphModel(handle, self._workers, master, clock)
         self._actions = Actions(handle, self._workers, master, self._model, clock)
         self._lane = lane
-        self._parameters = LiveParameters(handle, self._workers, self._model)
+        self._parameters = LiveParameters(handle, self._workers, master, self._model)
         self._missions = missions.Missions()
         self._model.missions = lambda: self._missions.running
         self._recording = Recording()
@@ -162,14 +162,10 @@ class Dashboard:
     ) -> "Future[DryRunResult]":
         """Fly a mission with ideal vehicles that stand where the real ones are."""
 
-        def show(done):
-            if done.exception() is None:
-                self._model.paths = dict(done.result().paths)
-
         def do():
             self.pages.expect_control(page)
-            result = self._missions.dry_run(mission, vehicles, self._places(vehicles))
-            result.add_done_callback(lambda done: self._handle.submit(show, done))
+            result = yield self._missions.dry_run(mission, vehicles, self._places(vehicles))
+            self._model.paths = dict(result.paths)
             return result
 
         return self._do(do)
@@ -207,13 +203,10 @@ class Dashboard:
     def examine(self) -> "Future[None]":
         """Run the doctor on the graph: its findings are in the scene 10 s later."""
 
-        def show(sentences):
-            self._model.sentences = sentences
+        def do():
+            self._model.sentences = yield self._workers.submit(examine)
 
-        def work():
-            self._handle.submit(show, examine())
-
-        return self._workers.submit(work)
+        return self._do(do)
 
     def watch_image(self, page: int, topic: str | None) -> "Future[None]":
         """Choose the camera that a page shows."""
@@ -230,21 +223,21 @@ class Dashboard:
             self._turns.submit(self._handle.submit, work, *arguments)
 
     def _do(self, work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-        """Do work in the node's turn; the future has its result, or that of its future."""
-        outcome: Future[Any] = Future()
+        """Do work in the node's turn; the future has its result, or that of its future or steps."""
+        turn: Future[None] = Future()
 
-        def run():
+        def steps():
+            yield turn
             try:
                 result = work(*arguments)
-            except Exception as error:
-                outcome.set_exception(error)
-                return
-            if isinstance(result, Future):
-                result.add_done_callback(lambda done: settle(done, outcome))
-            else:
-                outcome.set_result(result)
+                if isinstance(result, Generator):
+                    return (yield from result)
+                return (yield result) if isinstance(result, Future) else result
+            except (OSError, ServiceError) as error:
+                raise RefusalError(words(error)) from None
 
-        self._submit(run)
+        outcome = follow(steps(), self._handle.submit)
+        self._submit(turn.set_result, None)
         return outcome
 
     def _control(

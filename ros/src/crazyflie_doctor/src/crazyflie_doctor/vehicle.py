@@ -4,10 +4,11 @@ Normal ranges are those of a Crazyflie 2.1 with the stock battery; figures of a 
 """
 
 import math
-import threading
+import statistics
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 
 from crazyflie_doctor.finding import Check, Finding, error, warn
 from crazyflie_link.crazyflie import Crazyflie
@@ -28,8 +29,12 @@ _PERIOD_MS = 100
 _SELF_TEST_LIMIT = 10.0  #: s.
 #: Port, channel and first byte of the question for the firmware's version, and of its answer.
 _VERSION = (13, 1, b"\x01")
-_VARIANCES = ("kalman.varPX", "kalman.varPY", "kalman.varPZ")
-_HEALTH = ("health.motorPass", "health.batteryPass", "health.motorTestCount")
+#: Blocks of the log that are recorded, as far as the firmware has their variables.
+_BLOCKS = {
+    "battery": ("pm.vbat",),
+    "variances": ("kalman.varPX", "kalman.varPY", "kalman.varPZ"),
+    "health": ("health.motorPass", "health.batteryPass", "health.motorTestCount"),
+}
 
 
 @dataclass
@@ -138,46 +143,33 @@ def _battery_test(facts: VehicleFacts) -> Iterator[Finding]:
         yield error("its voltage sags too far under load", "change the battery, clean its contacts")
 
 
-@dataclass(eq=False)
-class _Watch:
-    """The log and the answers of the vehicle, from its link's thread."""
-
-    voltages: list[float] = field(default_factory=list)
-    variances: list[tuple[float, ...]] = field(default_factory=list)
-    health: tuple[float, ...] = ()
-    firmware: str = ""
-    came: threading.Event = field(default_factory=threading.Event)
-
-    def on_packet(self, port: int, channel: int, data: bytes) -> None:
-        if (port, channel, data[:1]) == _VERSION:
-            self.firmware = data[1:].split(b"\0")[0].decode(errors="replace")
-
-    def on_health(self, _: int, values: tuple[float, ...]) -> None:
-        self.health = values
-        self.came.set()
-
-
 def examine(uri: str, duration: float = 10.0, motors: bool = False) -> VehicleFacts:
     """Connect to a vehicle and watch it for a duration (s); blocks.
 
     With ``motors`` it does the self tests, in which the propellers turn.
     """
-    watch = _Watch()
+    versions: list[bytes] = []
+
+    def on_packet(port: int, channel: int, data: bytes) -> None:
+        if (port, channel, data[:1]) == _VERSION:
+            versions.append(data[1:].split(b"\0")[0])
+
     try:
-        with Crazyflie(uri, on_packet=watch.on_packet) as vehicle:
-            return _watch(vehicle, watch, duration, motors)
+        with Crazyflie(uri, on_packet=on_packet) as vehicle:
+            return _watch(vehicle, versions, duration, motors)
     except CrazyflieError as failure:
         return VehicleFacts(failure=str(failure))
 
 
-def _watch(vehicle: Crazyflie, watch: _Watch, duration: float, motors: bool) -> VehicleFacts:
+def _watch(
+    vehicle: Crazyflie, versions: list[bytes], duration: float, motors: bool
+) -> VehicleFacts:
     known = vehicle.log.variables()
-    for name, variables, on_values in (
-        ("battery", ("pm.vbat",), lambda _, values: watch.voltages.append(values[0])),
-        ("variances", _VARIANCES, lambda _, values: watch.variances.append(tuple(values))),
-        ("health", _HEALTH, watch.on_health),
-    ):
+    # The link's thread adds rows.
+    rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in _BLOCKS}
+    for name, variables in _BLOCKS.items():
         if all(each in known for each in variables):
+            on_values = partial(lambda own, _, values: own.append(tuple(values)), rows[name])
             vehicle.add_log_block(LogBlock(name, _PERIOD_MS, variables, on_values))
     vehicle.send_packet(*_VERSION)
     end = time.monotonic() + duration
@@ -186,31 +178,31 @@ def _watch(vehicle: Crazyflie, watch: _Watch, duration: float, motors: bool) -> 
         vehicle.link()
         time.sleep(_PERIOD_MS / 1000.0)
     decks = [name.partition(".") for name, value in vehicle.parameters.values().items() if value]
-    deviations = [tuple(map(_root, sample)) for sample in watch.variances]
+    voltages = [voltage for (voltage,) in rows["battery"]]
+    deviations = [tuple(map(_root, sample)) for sample in rows["variances"]]
     facts = VehicleFacts(
-        voltage=sum(watch.voltages) / len(watch.voltages) if watch.voltages else math.nan,
+        voltage=statistics.fmean(voltages) if voltages else math.nan,
         quality=vehicle.quality(),
         latency=vehicle.latency(),
         decks=tuple(sorted(name for prefix, _, name in decks if prefix == "deck")),
-        firmware=watch.firmware,
+        firmware=versions[-1].decode(errors="replace") if versions else "",
         deviations=deviations[-1] if deviations else (),
         changes=tuple(max(axis) - min(axis) for axis in zip(*deviations, strict=True)),
     )
-    if motors and watch.health:
-        facts.motors = int(_self_test(vehicle, watch, "health.startPropTest")[0])
-        facts.battery_passed = bool(_self_test(vehicle, watch, "health.startBatTest")[1])
+    if motors and rows["health"]:
+        facts.motors = int(_self_test(vehicle, rows["health"], "health.startPropTest")[0])
+        facts.battery_passed = bool(_self_test(vehicle, rows["health"], "health.startBatTest")[1])
     return facts
 
 
-def _self_test(vehicle, watch, parameter):
+def _self_test(vehicle, health, parameter):
     """Start a self test and return the health that follows it."""
-    before = watch.health[2]
+    before = health[-1][2]
     vehicle.parameters.write(parameter, 1)
     end = time.monotonic() + _SELF_TEST_LIMIT
-    while watch.health[2] == before and time.monotonic() < end:
-        watch.came.clear()
-        watch.came.wait(_PERIOD_MS / 1000.0)
-    return watch.health
+    while health[-1][2] == before and time.monotonic() < end:
+        time.sleep(_PERIOD_MS / 1000.0)
+    return health[-1]
 
 
 def _root(variance):

@@ -62,9 +62,7 @@ class PageControl:
                     f"page {self._controller} has control; you can take it over, and both pages "
                     "will say so"
                 )
-            is_new, self._controller = self._controller is None, page
-        if is_new:
-            self._tell_others(page, f"page {page} has control")
+            self.take_over(page)
 
     def take_over(self, page: int) -> None:
         """Give a page control, even if another one has it; all pages are notified."""

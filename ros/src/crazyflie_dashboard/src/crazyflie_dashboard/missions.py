@@ -70,6 +70,8 @@ class MissionFlight:
         self.command = ""  #: The last one.
         self.is_stopped: bool = known["is_stopped"]
         self.said = ""  #: The end of its output.
+        #: Its process if it is a child of this one.
+        self.child: subprocess.Popen[Any] | None = None
         self._record, self._known, self._pid = record, known, known["pid"]
         # From here on the process number cannot be reused.
         self._process = os.pidfd_open(self._pid)
@@ -80,7 +82,7 @@ class MissionFlight:
     @staticmethod
     def begin(
         folder: Path, title: str, command: list[str], environment: Mapping[str, str]
-    ) -> "tuple[MissionFlight, subprocess.Popen[Any]]":
+    ) -> "MissionFlight":
         """Start a mission, with its files in a folder."""
         folder.mkdir(parents=True, exist_ok=True)
         for old in folder.glob("*.out"):
@@ -93,9 +95,11 @@ class MissionFlight:
         started.rename(record.with_suffix(".out"))
         known = {"title": title, "pid": process.pid, "began": _began(process.pid)}
         record.write_text(json.dumps({**known, "master": _master(), "is_stopped": False}))
-        return MissionFlight(record), process
+        flight = MissionFlight(record)
+        flight.child = process
+        return flight
 
-    def wait(self, process: "subprocess.Popen[Any] | None" = None) -> int:
+    def wait(self) -> int:
         """Wait for its end; return its exit status, or 0 if another process started it."""
         with self._record.with_suffix(".out").open(errors="replace") as output:
             has_ended = False
@@ -105,7 +109,7 @@ class MissionFlight:
                     self.said = (self.said + line)[-_MAX_OUTPUT:]
                     if match := _COMMAND.match(line):
                         self.command = match[1]
-        status = 0 if process is None else process.wait()
+        status = 0 if self.child is None else self.child.wait()
         self._record.unlink(missing_ok=True)
         return status
 
@@ -167,7 +171,7 @@ class Missions:
                 flight = MissionFlight(record)
             except (OSError, ValueError, KeyError):
                 continue
-            self._follow(flight, None, lambda status: None)
+            self._follow(flight, lambda status: None)
             if flight.is_stopped:
                 flight.limit()
 
@@ -226,9 +230,8 @@ class Missions:
                         f"{mission.title}: {name} is not where it was at the dry run; expected "
                         "another one"
                     )
-        flight, process = MissionFlight.begin(
-            self._folder, mission.title, command, _environment(vehicles)
-        )
+        environment = _environment(vehicles)
+        flight = MissionFlight.begin(self._folder, mission.title, command, environment)
 
         def finish(status):
             # Stopped while Python itself was starting: nothing has flown.
@@ -238,7 +241,7 @@ class Missions:
             else:
                 end.set_exception(RefusalError(_last(flight.said, status)))
 
-        self._follow(flight, process, finish)
+        self._follow(flight, finish)
         return end
 
     def stop(self) -> None:
@@ -256,17 +259,12 @@ class Missions:
         for flight in flights:
             flight.stop()
 
-    def _follow(
-        self,
-        flight: MissionFlight,
-        process: "subprocess.Popen[Any] | None",
-        finish: Callable[[int], None],
-    ) -> None:
+    def _follow(self, flight: MissionFlight, finish: Callable[[int], None]) -> None:
         with self._lock:
             self._flights.append(flight)
 
         def work():
-            status = flight.wait(process)
+            status = flight.wait()
             with self._lock:
                 self._flights.remove(flight)
             finish(status)

@@ -9,7 +9,7 @@ from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
-from crazyflie_dashboard.control import ControlError, PageControl
+from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.moves import formation
 from crazyflie_dashboard.page_data import (
     DryRunResult,
@@ -143,7 +143,7 @@ class FakeDashboard:
         age = time.monotonic() - command.clicked
         try:
             self.pages.expect_control(page)
-        except ControlError as error:
+        except RefusalError as error:
             return failed(error)
         if age > self.max_age:
             return failed(RefusalError(f"the click is {age:.0f} s old"))

@@ -7,7 +7,6 @@ import pytest
 import rosgraph
 from pages import stopped
 
-from crazyflie_dashboard.control import ControlError
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.dashboard_node import example_folders
 from crazyflie_dashboard.emergency import EmergencyLane
@@ -79,7 +78,7 @@ def test_vehicles_are_found(dashboard, page):
 
 
 def test_a_page_without_control_only_looks(dashboard, page):
-    with pytest.raises(ControlError, match="no page has control"):
+    with pytest.raises(RefusalError, match="no page has control"):
         command(dashboard, page, Action.TAKEOFF)
 
 

@@ -8,7 +8,6 @@ from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.msg import Config
 from fake_fleet import FakeFleet, FakeLane
 
-from crazyflie_dashboard.control import ControlError
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.master import MasterError
@@ -210,7 +209,7 @@ def test_what_a_vehicle_does_not_have_is_reported(fleet):
 
 def test_a_page_without_control_stops_motors_only(fleet):
     fleet.dashboard.pages.release(fleet.page)
-    with pytest.raises(ControlError):
+    with pytest.raises(RefusalError, match="no page has control; take it first"):
         fleet.command(Action.LAND)
     fleet.dashboard.emergency(None, 0.0)
     fleet.dashboard.emergency(("cf1", "/"), 0.0)
@@ -265,7 +264,7 @@ def test_what_a_page_asks_for_does_not_wait_for_callbacks_of_the_node(fleet):
     answer = dashboard.command(page, Command(Action.LAND, ("cf1",), 0.0))
     assert not goes_on.is_set() and not answer.done()
     goes_on.set()
-    with pytest.raises(ControlError, match="no page has control"):
+    with pytest.raises(RefusalError, match="no page has control"):
         answer.result(LIMIT)
     dashboard.close()
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from crazyflie_dashboard.control import ControlError, PageControl
+from crazyflie_dashboard.control import PageControl
+from crazyflie_utils.refusal import RefusalError
 
 
 class Told:
@@ -26,7 +27,7 @@ def told():
 
 def test_a_new_page_only_looks(told):
     page = told.open()
-    with pytest.raises(ControlError, match="no page has control; take it first"):
+    with pytest.raises(RefusalError, match="no page has control; take it first"):
         told.control.expect_control(page)
 
 
@@ -34,7 +35,7 @@ def test_control_is_taken_once(told):
     one, two = told.open(), told.open()
     told.control.take(one)
     told.control.expect_control(one)
-    with pytest.raises(ControlError, match=f"page {one} has control"):
+    with pytest.raises(RefusalError, match=f"page {one} has control"):
         told.control.take(two)
     assert told.control.controller == one
     assert told.texts[two] == [f"page {one} has control"]
@@ -44,7 +45,7 @@ def test_both_are_told_of_a_takeover(told):
     one, two, three = told.open(), told.open(), told.open()
     told.control.take(one)
     told.control.take_over(two)
-    with pytest.raises(ControlError):
+    with pytest.raises(RefusalError, match="take it first"):
         told.control.expect_control(one)
     assert told.texts[one] == [f"page {two} has taken over control: this page can only watch now"]
     assert told.texts[two][-1] == f"this page has taken over control from page {one}"
@@ -58,9 +59,9 @@ def test_a_page_that_is_lost_has_no_control_when_it_comes_back(told):
     assert told.control.controller is None
     again = told.open()
     assert again != page
-    with pytest.raises(ControlError):
+    with pytest.raises(RefusalError, match="take it first"):
         told.control.expect_control(again)
-    with pytest.raises(ControlError, match="is closed"):
+    with pytest.raises(RefusalError, match="is closed"):
         told.control.take(page)
 
 

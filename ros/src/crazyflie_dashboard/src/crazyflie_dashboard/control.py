@@ -7,10 +7,6 @@ from collections.abc import Callable
 from crazyflie_utils.refusal import RefusalError
 
 
-class ControlError(RefusalError):
-    """A page may not do what it asked for; the text says why."""
-
-
 class PageControl:
     """Pages that are open, and the one that has control. For any thread.
 
@@ -52,13 +48,13 @@ class PageControl:
 
         Raises
         ------
-        ControlError
+        RefusalError
             Another page has control: the operator must confirm `take_over`.
         """
         with self._lock:
             self._expect_open(page)
             if self._controller not in (None, page):
-                raise ControlError(
+                raise RefusalError(
                     f"page {self._controller} has control; you can take it over, and both pages "
                     "will say so"
                 )
@@ -85,12 +81,12 @@ class PageControl:
         self._tell_others(page, f"page {page} has given up control: no page has it")
 
     def expect_control(self, page: int) -> None:
-        """Raise `ControlError` unless a page has control."""
+        """Raise `RefusalError` unless a page has control."""
         with self._lock:
             self._expect_open(page)
             if self._controller != page:
                 has = "no page" if self._controller is None else f"page {self._controller}"
-                raise ControlError(f"this page can only watch: {has} has control; take it first")
+                raise RefusalError(f"this page can only watch: {has} has control; take it first")
 
     @property
     def controller(self) -> int | None:
@@ -105,7 +101,7 @@ class PageControl:
 
     def _expect_open(self, page):
         if page not in self._tell:
-            raise ControlError(f"page {page} is closed; load it again")
+            raise RefusalError(f"page {page} is closed; load it again")
 
     def _tell_others(self, page, text, excluding=None):
         self.log(text)

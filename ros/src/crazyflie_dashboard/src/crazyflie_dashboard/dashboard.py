@@ -13,7 +13,6 @@ from crazyflie_dashboard.answers import follow, listed, summary, words
 from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.graph_model import GraphModel
-from crazyflie_dashboard.live_parameters import LiveParameters
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.messages import examine
 from crazyflie_dashboard.page_data import (
@@ -25,6 +24,7 @@ from crazyflie_dashboard.page_data import (
     Series,
 )
 from crazyflie_dashboard.page_state import PageState
+from crazyflie_dashboard.parameters import LiveParameters
 from crazyflie_dashboard.recording import Recording
 from crazyflie_dashboard.snapshot import Action, Scene
 from crazyflie_utils import NodeHandle, ServiceError

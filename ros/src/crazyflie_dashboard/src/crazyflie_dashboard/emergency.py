@@ -35,10 +35,6 @@ _SHARE = 0.02  #: Largest fraction of time that requests to the master take.
 _EMPTY = struct.pack("<I", 0)  #: A serialized request of std_srvs/Empty: a length of zero.
 
 
-class _CallError(Exception):
-    """Why a service could not be called."""
-
-
 class EmergencyLane:
     """Calls of all emergency services of the graph.
 
@@ -124,7 +120,7 @@ class EmergencyLane:
             try:
                 connection = self._reach(name, deadline)
                 _send(connection)
-            except (OSError, _CallError) as error:
+            except OSError as error:
                 finish(name, str(error) or "it does not answer")
             else:
                 finish(name, self._answer(name, connection, deadline))
@@ -168,14 +164,14 @@ class EmergencyLane:
         """Open a connection where the service was last, or where the master says that it is."""
         address = self._addresses.get(name)
         if address is not None:
-            with contextlib.suppress(OSError, _CallError):
+            with contextlib.suppress(OSError):
                 return self._connect(name, address, deadline)
         return self._connect(name, self._master.lookup(name), deadline)
 
     def _connect(self, name: str, address: str, deadline: float) -> socket.socket:
         limit = deadline - time.monotonic()
         if limit <= 0.0:
-            raise _CallError(f"it has not answered within {MAX_EMERGENCY_AGE:g} s")
+            raise OSError(f"it has not answered within {MAX_EMERGENCY_AGE:g} s")
         uri = urlsplit(address)
         connection = socket.create_connection((uri.hostname or "", uri.port or 0), limit)
         try:
@@ -193,16 +189,12 @@ class EmergencyLane:
             # stopped one.
             answer = read_ros_handshake_header(connection, io.BytesIO(), 4096)
             if "error" in answer:
-                raise _CallError(answer["error"])
-        except TimeoutError:
+                raise OSError(answer["error"])
+        except (OSError, ROSHandshakeException) as error:
             connection.close()
-            raise _CallError(f"it has not answered within {limit:.0f} s") from None
-        except ROSHandshakeException as error:
-            connection.close()
-            raise _CallError(str(error)) from None
-        except (OSError, _CallError):
-            connection.close()
-            raise
+            is_late = isinstance(error, TimeoutError)
+            text = f"it has not answered within {limit:.0f} s" if is_late else str(error)
+            raise OSError(text) from None
         with self._lock:
             self._addresses[name] = address
         return connection
@@ -223,7 +215,7 @@ class EmergencyLane:
                     self._open.pop(name).close()
                 missing = [name for name in self._nodes if name not in self._open]
             for name in sorted(missing, key=_order):
-                with contextlib.suppress(OSError, _CallError):
+                with contextlib.suppress(OSError):
                     self._keep(name, self._reach(name, time.monotonic() + _CONNECT_LIMIT))
             self._is_closed.wait(max(_PERIOD, (time.monotonic() - began) / _SHARE * _PERIOD))
 

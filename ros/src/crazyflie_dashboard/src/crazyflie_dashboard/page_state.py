@@ -7,6 +7,7 @@ from typing import Any
 import roslib.message
 
 from crazyflie_dashboard import images
+from crazyflie_dashboard.answers import follow
 from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.plots import Ring, expect_field, number_in, split_path
 from crazyflie_utils import NodeHandle
@@ -86,24 +87,21 @@ class PageState:
             self.remove_field(path)
 
     def _on_image(self, message):
-        now = self._clock()
         if self._is_encoding:
             self._waiting = message
-        elif now - self._image_at >= _IMAGE_PERIOD:
-            self._encode(message)
+        elif self._clock() - self._image_at >= _IMAGE_PERIOD:
+            follow(self._encode(message), self._handle.submit)
 
     def _encode(self, message):
-        self._is_encoding, self._image_at = True, self._clock()
-        camera = self._camera
-        # In another thread: a large picture takes tens of milliseconds.
-        self._workers.submit(images.encoded, message).add_done_callback(
-            lambda done: self._handle.submit(self._show, camera, done)
-        )
-
-    def _show(self, camera, done):
+        self._is_encoding = True
+        while message is not None:
+            self._image_at, camera = self._clock(), self._camera
+            try:
+                # In another thread: a large picture takes tens of milliseconds.
+                image = yield self._workers.submit(images.encoded, message)
+            except Exception as error:
+                image = str(error)
+            if camera is self._camera is not None:
+                self.image = image
+            message, self._waiting = self._waiting, None
         self._is_encoding = False
-        if camera is self._camera is not None:
-            self.image = str(done.exception()) if done.exception() else done.result()
-        waiting, self._waiting = self._waiting, None
-        if waiting is not None:
-            self._encode(waiting)

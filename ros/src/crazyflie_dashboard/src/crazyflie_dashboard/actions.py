@@ -109,7 +109,7 @@ class Actions:
         for name in command.vehicles:
             if name not in answers:
                 answers[name] = self._begin(self._command(command, targets.get(name), name))
-        return (yield gathered(answers))
+        return (yield from gathered(answers))
 
     def close(self) -> None:
         """End the commanders that were started here; each lives until its vehicle has landed."""
@@ -144,22 +144,20 @@ class Actions:
                 f"{command.action.value}: the vehicle is {target.now.state}; expected it to be on "
                 "the ground"
             )
-        if command.action == Action.TAKEOFF and target.fence is not None:
-            top = target.fence.upper[2]
-            if command.height > top:
-                raise RefusalError(
-                    f"take off: the height is {command.height:g} m; expected at most {top:g} m, "
-                    "where the geofence ends"
-                )
+        top = math.inf if target.fence is None else target.fence.upper[2]
+        if command.action == Action.TAKEOFF and command.height > top:
+            raise RefusalError(
+                f"take off: the height is {command.height:g} m; expected at most {top:g} m, "
+                "where the geofence ends"
+            )
         if command.action == Action.IDENTIFY:
             yield from self._light(services[0].name.rpartition("/")[0], command)
             return
         self._moves.pop(name, None)
-        may_move = Action.GO_TO in target.now.actions
-        if command.action == Action.TAKEOFF and may_move:
-            go_to = _services(target, Action.GO_TO)
-            if any(each.needs_commander for each in go_to):
-                self._start_commander(target.vehicle)
+        if command.action == Action.TAKEOFF and any(
+            each.needs_commander for each in _services(target, Action.GO_TO)
+        ):
+            self._start_commander(target.vehicle)
         calls = [self._call(command, s, _request(command, s, target)) for s in services]
         yield any_of([*map(self._begin, calls)])
 
@@ -205,7 +203,7 @@ class Actions:
         calls = {name: self._call(command, *each) for name, each in requests.items()}
         answers = {name: self._begin(call) for name, call in calls.items()}
         self._moves = {**moving, **moves}
-        outcomes = yield gathered(answers)
+        outcomes = yield from gathered(answers)
         gone = [targets[each.vehicle] for each in outcomes if not each.text]
         if 0 < len(gone) < len(outcomes):
             # The paths were checked for all vehicles together.
@@ -232,9 +230,8 @@ class Actions:
     def _prepared(self, command, chosen, targets, moving, fixed, now):
         """Return moves, and services with requests, of vehicles; waits for the master."""
         services = {name: _services(target, Action.GO_TO)[0] for name, target in chosen.items()}
-        spaces = {
-            name: _namespace(service, self._model.graph) for name, service in services.items()
-        }
+        graph, frames = self._model.graph, self._model.frames
+        spaces = {name: _namespace(service, graph) for name, service in services.items()}
         wanted = {name: f"{each.vehicle.namespace}/{BUFFER}" for name, each in targets.items()}
         known = self._master.parameters(
             [
@@ -251,11 +248,7 @@ class Actions:
         for name, target in chosen.items():
             space = spaces[name]
             has_yaw = known.get(f"{space}/{_YAW}", target.vehicle.has_driver)
-            own = (
-                known.get(f"{space}/{_FIXED}")
-                or self._model.frames.parent(target.now.frame)
-                or fixed
-            )
+            own = known.get(f"{space}/{_FIXED}") or frames.parent(target.now.frame) or fixed
             yaw = rpy_from_quaternion(*target.now.rotation)[2]
             yaw = yaw if command.yaw is None else command.yaw
             goal, yaw = self._in_own_frame(name, goals[name], yaw, own.strip("/"), fixed)

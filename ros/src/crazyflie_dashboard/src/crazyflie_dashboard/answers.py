@@ -11,7 +11,6 @@ from crazyflie_utils import ServiceError
 
 _MAX_NAMES = 8  #: Largest number of vehicle names in one text.
 
-
 Result = TypeVar("Result")
 
 #: A generator that yields a future where it waits for one, and returns its result.
@@ -62,20 +61,15 @@ def any_of(answers: "list[Future[Any]]") -> "Future[Any]":
     return outcome
 
 
-def gathered(answers: "Mapping[str, Future[Any]]") -> "Future[tuple[Outcome, ...]]":
+def gathered(answers: "Mapping[str, Future[Any]]") -> Steps[tuple[Outcome, ...]]:
     """Return the outcomes of all vehicles, when the last one has answered."""
-    outcomes: Future[tuple[Outcome, ...]] = Future()
-    texts: dict[str, str] = {}
-
-    def note(name, done):
-        error = done.exception()
-        texts[name] = "" if error is None else words(error)
-        if len(texts) == len(answers):
-            outcomes.set_result(tuple(Outcome(each, texts[each]) for each in answers))
-
+    texts = dict.fromkeys(answers, "")
     for name, answer in answers.items():
-        answer.add_done_callback(partial(note, name))
-    return outcomes
+        try:
+            yield answer
+        except Exception as error:
+            texts[name] = words(error)
+    return tuple(Outcome(name, text) for name, text in texts.items())
 
 
 def summary(outcomes: Iterable[Outcome]) -> list[str]:

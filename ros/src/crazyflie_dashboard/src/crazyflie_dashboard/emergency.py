@@ -23,6 +23,7 @@ from std_srvs.srv import Empty
 
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.page_data import Outcome
+from crazyflie_utils.ros1.calls import has_closed
 
 #: Largest age of a click, and longest time for an answer (s).
 MAX_EMERGENCY_AGE = 5.0
@@ -141,12 +142,16 @@ class EmergencyLane:
         """Return why a call has failed, or ""; a connection that has answered stays open."""
         try:
             connection.settimeout(max(deadline - time.monotonic(), 0.001))
-            is_done, length = struct.unpack("<BI", _receive(connection, 5))
-            words = _receive(connection, length).decode(errors="replace")
+            with connection.makefile("rb") as stream:
+                head = stream.read(5)
+                if len(head) < 5:
+                    raise OSError("the other side has closed it")
+                is_done, length = struct.unpack("<BI", head)
+                words = stream.read(length).decode(errors="replace")
         except TimeoutError:
             connection.close()
             return f"it has not answered within {MAX_EMERGENCY_AGE:g} s"
-        except (OSError, struct.error) as error:
+        except OSError as error:
             connection.close()
             return f"the connection has ended: {error}"
         self._keep(name, connection)
@@ -253,19 +258,4 @@ def _send(connection: socket.socket) -> bool:
 
 def _has_ended(connection):
     connection.setblocking(False)
-    try:
-        return not connection.recv(1, socket.MSG_PEEK)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True
-
-
-def _receive(connection: socket.socket, count: int) -> bytes:
-    received = b""
-    while len(received) < count:
-        part = connection.recv(count - len(received))
-        if not part:
-            raise OSError("the other side has closed it")
-        received += part
-    return received
+    return has_closed(connection)

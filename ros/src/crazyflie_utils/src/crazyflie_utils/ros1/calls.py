@@ -120,7 +120,7 @@ class WithdrawableService(rospy.Service):
 
     def handle(self, transport: TCPROSTransport, header: dict[str, str]) -> None:
         """Answer the requests of a connection, in its own thread."""
-        _in_thread.is_withdrawn = partial(_has_closed, transport.socket)
+        _in_thread.is_withdrawn = partial(has_closed, transport.socket)
         super().handle(transport, header)
 
 
@@ -129,7 +129,8 @@ def withdrawn() -> Callable[[], bool]:
     return getattr(_in_thread, "is_withdrawn", lambda: False)
 
 
-def _has_closed(connection: socket.socket) -> bool:
+def has_closed(connection: socket.socket) -> bool:
+    """Return whether the other side has closed a connection that has no timeout."""
     try:
         return not connection.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
     except BlockingIOError:

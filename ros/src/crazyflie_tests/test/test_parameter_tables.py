@@ -28,10 +28,18 @@ def syntax():
 
 
 def classes_that_nodes_load():
-    """Return the names of the classes that are given to ``handle.load``.
+    """Return the names of the classes that are given to ``handle.load`` or ``Node[...]``.
 
     A class attribute in their place, such as ``self.parameters_type``, stands for all its values.
     """
+    declared = {
+        base.slice.id
+        for owner in syntax()
+        if isinstance(owner, ast.ClassDef)
+        for base in owner.bases
+        if isinstance(base, ast.Subscript) and isinstance(base.slice, ast.Name)
+    }
+    declared = {name for name in declared if "Parameters" in full_ancestry(name)}
     given = [
         call.args[0]
         for call in syntax()
@@ -41,15 +49,19 @@ def classes_that_nodes_load():
         and ast.unparse(call.func.value).endswith("handle")
     ]
     attributes = {each.attr for each in given if isinstance(each, ast.Attribute)}
-    return {each.id for each in given if isinstance(each, ast.Name)} | {
-        statement.value.id
-        for owner in syntax()
-        if isinstance(owner, ast.ClassDef)
-        for statement in owner.body
-        if isinstance(statement, ast.Assign | ast.AnnAssign)
-        and isinstance(statement.value, ast.Name)
-        and attributes & {target.id for target in targets(statement)}
-    }
+    return (
+        declared
+        | {each.id for each in given if isinstance(each, ast.Name)}
+        | {
+            statement.value.id
+            for owner in syntax()
+            if isinstance(owner, ast.ClassDef)
+            for statement in owner.body
+            if isinstance(statement, ast.Assign | ast.AnnAssign)
+            and isinstance(statement.value, ast.Name)
+            and attributes & {target.id for target in targets(statement)}
+        }
+    )
 
 
 def targets(statement):
@@ -67,10 +79,14 @@ def bases():
     }
 
 
-def ancestry(name):
+def full_ancestry(name):
     """Return the names of a class and of all that it is derived from."""
-    own = {name} - {"Parameters"}
-    return own.union(*map(ancestry, bases().get(name, ())))
+    return {name}.union(*map(full_ancestry, bases().get(name, ())))
+
+
+def ancestry(name):
+    """Return the names of a class and of all that it is derived from, except `Parameters`."""
+    return full_ancestry(name) - {"Parameters"}
 
 
 @pytest.mark.parametrize("page", documented()[0], ids=lambda page: str(page.relative_to(TOP)))

@@ -1,9 +1,12 @@
 """The base class of all nodes."""
 
 import pytest
+from dynamic_reconfigure.msg import Config, DoubleParameter
+from dynamic_reconfigure.srv import ReconfigureRequest
 from std_msgs.msg import String
 
 from crazyflie_utils.node import Node
+from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import POSITIVE
 
 
@@ -140,7 +143,55 @@ def test_default_is_silence(process):
     assert process.logged("error") == []
 
 
-@pytest.mark.parametrize("method", ["load_parameters", "register_callbacks"])
-def test_subclasses_must_say_what_they_do(method):
+def test_subclasses_must_say_what_they_do(process):
     with pytest.raises(NotImplementedError):
-        getattr(Node(), method)(None)
+        Node().register_callbacks(None)
+    assert not process.launch(Node(), "/ns/node")
+    assert "has no attribute 'parameters_type'" in process.logged("error")[0]
+
+
+class GainParameters(Parameters):
+    """Parameters of `Amplifier`."""
+
+    gain: float = parameter(POSITIVE, "", live=True)
+    offset: float = parameter(POSITIVE, "", 1.0)
+
+
+class Amplifier(Node[GainParameters]):
+    """A node without an algorithm."""
+
+    def register_callbacks(self, handle):
+        handle.info(f"gain {self._parameters.gain:g}, offset {self._parameters.offset:g}")
+        handle.timer(1.0, lambda: handle.info(f"gain {self._parameters.gain:g}"))
+
+
+class LoudAmplifier(Amplifier):
+    """One whose declaration is that of its base class."""
+
+
+class OffsetParameters(Parameters):
+    """Parameters that cannot be changed."""
+
+    offset: float = parameter(POSITIVE, "", 1.0)
+
+
+class Offset(Node[OffsetParameters]):
+    """A node that offers no changes."""
+
+    def register_callbacks(self, handle):
+        pass
+
+
+@pytest.mark.parametrize("node_class", [Amplifier, LoudAmplifier])
+def test_the_declared_parameters_are_loaded_and_replaced(process, node_class):
+    assert process.launch(node_class(), "/ns/amplifier", {"gain": 2.0})
+    assert process.logged("info") == ["/ns/amplifier: gain 2, offset 1"]
+    request = ReconfigureRequest(Config(doubles=[DoubleParameter("gain", 3.0)]))
+    process.call("/ns/amplifier/set_parameters", request)
+    process.advance(1.0)
+    assert process.logged("info")[1:] == ["/ns/amplifier: gain 3"]
+
+
+def test_a_node_without_live_parameters_offers_no_changes(process):
+    assert process.launch(Offset(), "/ns/offset")
+    assert process.transport.publishers == {}

@@ -59,19 +59,15 @@ class MoveServerParameters(Parameters):
     )
 
 
-class MoveServerNode(Node):
+class MoveServerNode(Node[MoveServerParameters]):
     """Publish the next point of a route as reference whenever the service is called."""
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(MoveServerParameters)
-        self._route = itertools.cycle(self._parameters.points)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher(
             self._parameters.reference_topic, PositionVelocityStateStamped, latch=True
         )
+        self._route = itertools.cycle(self._parameters.points)
         handle.advertise_service(self._parameters.service, Empty, self._on_move)
 
     def _on_move(self, _):

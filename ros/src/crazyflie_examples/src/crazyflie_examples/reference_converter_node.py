@@ -30,7 +30,7 @@ class ReferenceConverterParameters(Parameters):
     )
 
 
-class ReferenceConverterNode(Node):
+class ReferenceConverterNode(Node[ReferenceConverterParameters]):
     """Pass references on as another message; missing fields are zero: level, yaw 0.
 
     References of a descent, on the topics' names + ``_descent``, are also converted.
@@ -39,13 +39,9 @@ class ReferenceConverterNode(Node):
     needed_in_flight = True
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(ReferenceConverterParameters)
-        self._type = TYPES[self._parameters.state]
-
-    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
+        self._type = TYPES[parameters.state]
         # Latched, since a reference is often sent once, and the controller may start late; a late
         # reference of a descent is useless.
         for suffix, latch in (("", True), ("_descent", False)):

@@ -41,7 +41,7 @@ class ExcitationParameters(Parameters):
     )
 
 
-class ExcitationNode(Node):
+class ExcitationNode(Node[ExcitationParameters]):
     """Passes controls on, and adds small sines while a vehicle hovers after its takeoff.
 
     The sines begin 3 s after the takeoff, once in a flight, and end after the duration. They end at
@@ -57,10 +57,6 @@ class ExcitationNode(Node):
         self._is_over = False
         self._middle = (0.0, 0.0, 0.0)
         self._position: tuple[float, float, float] | None = None
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(ExcitationParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

@@ -89,13 +89,13 @@ class NodeHandle:
     def load(self, parameters: type[P], on_change: Callable[[P], None] | None = None) -> P:
         """Return the node's own (private) parameters; `ParameterError` lists all errors.
 
-        With ``on_change``, dynamic_reconfigure can change the live ones: after a change the
+        With ``on_change``, dynamic_reconfigure can change live ones, if any: after a change the
         function is called with all parameters, checked. It may raise `ParameterError` to refuse the
         change.
         """
         source = PrivateParameters(self._process.transport.get_param, self.name, self.resolve)
         loaded = parameters.read(source.get, source.full_name)
-        if on_change is not None:
+        if on_change is not None and any(each.live for each in parameters.declarations()):
             Reconfiguration(self, loaded, source.get, on_change)
         return loaded
 

@@ -1,12 +1,16 @@
 """The base class of all nodes, and the process in which they run."""
 
 import traceback
-from typing import ClassVar
+from typing import Any, ClassVar, Generic, get_args
+
+from typing_extensions import TypeVar
 
 from crazyflie_utils.context import ProcessContext
 from crazyflie_utils.handle import NodeHandle
-from crazyflie_utils.parameters.declaration import ParameterError
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters
 from crazyflie_utils.program import missing_module
+
+P = TypeVar("P", bound=Parameters, default=Any)
 
 
 def initialization_failure(error: Exception) -> str:
@@ -15,11 +19,12 @@ def initialization_failure(error: Exception) -> str:
     return missing_module(error) or f"failed to initialize\n{trace}"
 
 
-class Node:
+class Node(Generic[P]):
     """A ROS node as an object, which is initialized with a `NodeHandle`.
 
-    A subclass overrides `load_parameters`, `register_callbacks` and, if silence is not safe enough,
-    `enter_safe_state`. ``__init__`` defines the state of the node, and makes no ROS call.
+    A subclass ``MyNode(Node[MyParameters])`` overrides `register_callbacks`, and `load_parameters`
+    if it has an algorithm to build, and `enter_safe_state` if silence is not safe enough.
+    ``__init__`` defines the state of the node, and makes no ROS call.
 
     Callbacks never run before `initialize` has returned and never at the same time, so a node
     needs no locks.
@@ -28,7 +33,17 @@ class Node:
     #: Whether a process with this node continues after SIGINT until flights have ended.
     needed_in_flight: ClassVar[bool] = False
 
+    parameters_type: type[Any]  #: Declaration of the parameters: ``P`` of ``Node[P]``.
+
     _handle: NodeHandle
+    _parameters: P
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        for base in cls.__dict__.get("__orig_bases__", ()):
+            for argument in get_args(base):
+                if isinstance(argument, type) and issubclass(argument, Parameters):
+                    cls.parameters_type = argument
 
     def initialize(self, handle: NodeHandle) -> bool:
         """Load parameters, register callbacks; return False if that fails, and log the reason."""
@@ -48,9 +63,13 @@ class Node:
     def load_parameters(self, handle: NodeHandle) -> None:
         """Load the parameters, with `NodeHandle.load`, and build the algorithm.
 
-        May raise `ParameterError`, with full names and the expected values.
+        By default `parameters_type` is loaded, and its live parameters may be changed. May raise
+        `ParameterError`, with full names and the expected values.
         """
-        raise NotImplementedError
+        self._parameters = handle.load(self.parameters_type, self._reconfigure)
+
+    def _reconfigure(self, parameters: P) -> None:
+        self._parameters = parameters
 
     def register_callbacks(self, handle: NodeHandle) -> None:
         """Create publishers, services, subscribers and timers, in this order."""

@@ -13,15 +13,11 @@ class ExternalParameters(Parameters):
     topic: str = parameter(TOPIC, "where motion capture publishes the vehicle")
 
 
-class _ExternalNode(Node):
+class _ExternalNode(Node[ExternalParameters]):
     """Pass a measurement on, with stamp and frame; drop it if not finite."""
 
     input_type: type = TransformStamped
     output_type: type = PointStamped
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(ExternalParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

@@ -1,11 +1,11 @@
 """ROS interfaces of flights by high-level commands: there and back, and along a trajectory."""
 
 from collections import deque
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import genpy
 from geometry_msgs.msg import Point
-from typing_extensions import override
+from typing_extensions import TypeVar, override
 
 from crazyflie_demo.trajectory_file import load, summary
 from crazyflie_driver import srv
@@ -59,13 +59,14 @@ class FlightPlanParameters(Parameters):
         return _LANDING * self.duration
 
 
-class FlightPlanNode(Node):
+P = TypeVar("P", bound=FlightPlanParameters, default=Any)
+
+
+class FlightPlanNode(Node[P]):
     """Take off, carry out the steps of a subclass, land; then end the process.
 
     If a step fails, and when the process is ended in flight, the vehicle is landed.
     """
-
-    _parameters: FlightPlanParameters
 
     def __init__(self) -> None:
         self._is_flying = False
@@ -176,14 +177,8 @@ class HighLevelFlightParameters(FlightPlanParameters):
     distance: float = parameter(METRES, "distance that the vehicle flies ahead", 0.5)
 
 
-class HighLevelFlightNode(FlightPlanNode):
+class HighLevelFlightNode(FlightPlanNode[HighLevelFlightParameters]):
     """Take off, fly ahead and back, land."""
-
-    _parameters: HighLevelFlightParameters
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(HighLevelFlightParameters)
 
     @override
     def manoeuvres(self) -> list[Step]:
@@ -211,14 +206,12 @@ class TrajectoryFlightParameters(FlightPlanParameters):
     reversed: bool = parameter(BOOLEAN, "fly from the end to the beginning", False)
 
 
-class TrajectoryFlightNode(FlightPlanNode):
+class TrajectoryFlightNode(FlightPlanNode[TrajectoryFlightParameters]):
     """Take off, fly along the trajectory of a file from that point on, land."""
-
-    _parameters: TrajectoryFlightParameters
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(TrajectoryFlightParameters)
+        super().load_parameters(handle)
         asked = summary(self._parameters.pieces)
         scale = self._parameters.timescale
         handle.info(

@@ -1,7 +1,7 @@
 """ROS interface of a constant goal, and of one that a joystick moves."""
 
 from geometry_msgs.msg import PoseStamped
-from typing_extensions import override
+from typing_extensions import TypeVar, override
 
 from crazyflie_demo.joystick import PITCH, ROLL, THRUST, YAW
 from crazyflie_demo.node_parts import AXIS, GoalParameters, JoyAxes, JoyParameters, goal_message
@@ -46,14 +46,13 @@ class PublishPoseTeleopParameters(PublishPoseParameters, JoyParameters):
         )
 
 
-class PublishPoseNode(Node):
+G = TypeVar("G", bound=PublishPoseParameters, default=PublishPoseParameters)
+
+
+class PublishPoseNode(Node[G]):
     """Publish the same goal again and again."""
 
-    _parameters: PublishPoseParameters
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(PublishPoseParameters)
+    parameters_type = PublishPoseParameters
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -67,23 +66,14 @@ class PublishPoseNode(Node):
         self._publisher.publish(goal_message(stamp, frame, *self._goal))
 
 
-class PublishPoseTeleopNode(PublishPoseNode):
+class PublishPoseTeleopNode(PublishPoseNode[PublishPoseTeleopParameters]):
     """Publish a goal that moves as the sticks are tilted, and stays without a joystick."""
-
-    _parameters: PublishPoseTeleopParameters
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(PublishPoseTeleopParameters, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._moved = handle.time()
         self._axes = JoyAxes(handle, self._parameters.joy_topic)
         super().register_callbacks(handle)
-
-    def _reconfigure(self, parameters):
-        self._parameters = parameters
 
     @override
     def _on_timer(self):

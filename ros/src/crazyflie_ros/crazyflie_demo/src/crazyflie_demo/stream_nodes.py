@@ -230,12 +230,8 @@ class ConstThrustParameters(SetpointParameters):
     )
 
 
-class ConstThrustNode(Node):
+class ConstThrustNode(Node[ConstThrustParameters]):
     """Publish level setpoints with a constant thrust; zero thrust at the end."""
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(ConstThrustParameters, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -245,9 +241,6 @@ class ConstThrustNode(Node):
     @override
     def enter_safe_state(self) -> None:
         self._publisher.publish(Twist())
-
-    def _reconfigure(self, parameters):
-        self._parameters = parameters
 
     def _on_timer(self):
         self._publisher.publish(Twist(linear=Vector3(0.0, 0.0, self._parameters.thrust)))

@@ -1,7 +1,5 @@
 """ROS interfaces of flight by hand: sticks to cmd_vel, buttons to services."""
 
-from typing import ClassVar
-
 from geometry_msgs.msg import Twist, Vector3
 from sensor_msgs.msg import Joy
 from std_srvs.srv import Empty, EmptyRequest
@@ -69,23 +67,17 @@ class CmdVelTeleopNode(Node):
     silent, and the vehicle's watchdog does the rest.
     """
 
-    parameters_class: ClassVar[type[TeleopParameters]] = CmdVelTeleopParameters
+    parameters_type: type[TeleopParameters] = CmdVelTeleopParameters
+    _parameters: TeleopParameters
 
     def __init__(self) -> None:
         self._is_locked = True
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(self.parameters_class, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("cmd_vel", Twist)
         self._axes = JoyAxes(handle, self._parameters.joy_topic)
         handle.timer(1.0 / self._parameters.rate, self._on_timer)
-
-    def _reconfigure(self, parameters):
-        self._parameters = parameters
 
     def _on_timer(self):
         parameters = self._parameters
@@ -144,7 +136,7 @@ class QuadrotorTeleopParameters(TeleopParameters):
 class QuadrotorTeleopNode(CmdVelTeleopNode):
     """The same as `CmdVelTeleopNode`, by other parameters."""
 
-    parameters_class = QuadrotorTeleopParameters
+    parameters_type = QuadrotorTeleopParameters
 
 
 _HEADLIGHT_PARAMETER = "ring/headlightEnable"
@@ -163,7 +155,7 @@ class JoystickControllerParameters(JoyParameters):
     )
 
 
-class JoystickControllerNode(Node):
+class JoystickControllerNode(Node[JoystickControllerParameters]):
     """Land, take off, stop in an emergency, or switch the headlight when a button is pressed.
 
     Takeoff and landing are those of crazyflie_controller, if there is one.
@@ -171,10 +163,6 @@ class JoystickControllerNode(Node):
 
     def __init__(self) -> None:
         self._buttons: tuple[int, ...] = ()
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(JoystickControllerParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

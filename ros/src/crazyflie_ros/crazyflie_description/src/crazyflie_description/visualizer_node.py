@@ -84,7 +84,7 @@ class VisualizerParameters(Parameters):
     markers_topic: str = parameter(TOPIC, "where markers go", name="topics/markers")
 
 
-class VisualizerNode(Node):
+class VisualizerNode(Node[VisualizerParameters]):
     """Publish a vehicle's path and reference as markers.
 
     Every message contains all markers and the topic is latched, so that an RViz that is started
@@ -95,10 +95,6 @@ class VisualizerNode(Node):
         self._path = FlownPath(SPACING, CAPACITY)
         self._reference: LastValid[tuple[float, float, float]] = LastValid()
         self._shown_reference: tuple[float, float, float] | None = None
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(VisualizerParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

@@ -85,12 +85,12 @@ class DeckRangerParameters(RangerParameters):
                 )
 
 
-class DeckRangerNode(Node):
+class DeckRangerNode(Node[DeckRangerParameters]):
     """Publish the measurements of the sensors on a vehicle's deck."""
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(DeckRangerParameters)
+        super().load_parameters(handle)
         place = self._parameters.variables.index
         self._places = [place(sensor.log_variable) for sensor in self._parameters.sensors]
 
@@ -135,7 +135,7 @@ class SimulatedRangerParameters(RangerParameters):
     )
 
 
-class SimulatedRangerNode(Node):
+class SimulatedRangerNode(Node[SimulatedRangerParameters]):
     """Measure distances to the objects of a world from the vehicle's pose on /tf."""
 
     def __init__(self) -> None:
@@ -143,7 +143,7 @@ class SimulatedRangerNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(SimulatedRangerParameters, self._reconfigure)
+        super().load_parameters(handle)
         numbers = defaultdict(list)
         for number, sensor in enumerate(self._parameters.sensors):
             numbers[sensor.desired_frequency].append(number)
@@ -162,9 +162,6 @@ class SimulatedRangerNode(Node):
         self._lookup = handle.listen_to_poses()
         for period, (ranger, numbers) in self._groups.items():
             handle.timer(period, partial(self._on_timer, ranger, numbers))
-
-    def _reconfigure(self, parameters):
-        self._parameters = parameters
 
     def _on_timer(self, ranger, numbers):
         if not self._parameters.enabled:

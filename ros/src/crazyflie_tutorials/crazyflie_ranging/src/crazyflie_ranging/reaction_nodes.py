@@ -64,12 +64,8 @@ class FollowObjectParameters(SilenceParameters, ObjectFollower):
     cmd_vel_topic: str = parameter(TOPIC, "where velocities go", "cmd_vel", "topics/cmd_vel")
 
 
-class FollowObjectNode(Node):
+class FollowObjectNode(Node[FollowObjectParameters]):
     """Keep a distance to the object in front; stand still when the sensor is silent."""
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(FollowObjectParameters, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -83,9 +79,6 @@ class FollowObjectNode(Node):
     def enter_safe_state(self) -> None:
         """Stop the vehicle."""
         self._publisher.publish(Twist())
-
-    def _reconfigure(self, parameters):
-        self._parameters = parameters
 
     def _on_timer(self):
         front, left, right = self._ranges.readings()
@@ -123,16 +116,12 @@ class ObstacleStopParameters(SilenceParameters, ObstacleStop):
     )
 
 
-class ObstacleStopNode(Node):
+class ObstacleStopNode(Node[ObstacleStopParameters]):
     """Pass velocities on, limited so that the vehicle stops before obstacles."""
 
     def __init__(self) -> None:
         self._command: Velocity | None = None
         self._command_time = 0.0
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(ObstacleStopParameters, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -148,9 +137,6 @@ class ObstacleStopNode(Node):
         """Stop the vehicle."""
         self._command = None
         self._publisher.publish(Twist())
-
-    def _reconfigure(self, parameters):
-        self._parameters = parameters
 
     def _on_cmd_vel(self, message):
         linear, angular = message.linear, message.angular

@@ -110,7 +110,7 @@ class SpawnedVehicle:
     removing: "list[Future[RemoveVehicleResponse]]" = field(default_factory=list)
 
 
-class SpawnerNode(Node):
+class SpawnerNode(Node[SpawnerParameters]):
     """Start and end simulated vehicles, each in a namespace of its own, by service."""
 
     #: ``start_process(arguments of roslaunch)`` returns a `VehicleProcess`.
@@ -118,10 +118,6 @@ class SpawnerNode(Node):
 
     def __init__(self) -> None:
         self._vehicles: dict[str, SpawnedVehicle] = {}
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(SpawnerParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

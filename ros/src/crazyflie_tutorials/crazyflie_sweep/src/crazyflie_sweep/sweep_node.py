@@ -88,7 +88,7 @@ FLIGHT_LIMIT = 120.0  #: Timeout of takeoff and landing (s of the machine's cloc
 IDLE = (SweepReport.WAITING, SweepReport.DONE, SweepReport.FAILED)
 
 
-class SweepNode(Node):
+class SweepNode(Node[SweepParameters]):
     """Sweep an area in lanes, at velocities from a service; hover without a velocity."""
 
     def __init__(self) -> None:
@@ -104,10 +104,6 @@ class SweepNode(Node):
         self._hovering = 0.0
         self._tick_time = 0.0
         self._markers_are_old = True
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(SweepParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -336,12 +332,12 @@ class VelocityServerParameters(Parameters):
     )
 
 
-class VelocityServerNode(Node):
+class VelocityServerNode(Node[VelocityServerParameters]):
     """Answer calls for velocities."""
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(VelocityServerParameters)
+        super().load_parameters(handle)
         self._random = random.Random(self._parameters.seed)
 
     @override

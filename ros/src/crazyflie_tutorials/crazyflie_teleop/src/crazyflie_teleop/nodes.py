@@ -73,15 +73,11 @@ class JoyVelocityParameters(JoyVelocity):
     emergency_button: int = parameter(AXIS_NUMBER, "calls emergency", 1, "buttons/emergency")
 
 
-class JoyVelocityNode(Node):
+class JoyVelocityNode(Node[JoyVelocityParameters]):
     """Publish a velocity for every message of a joystick; without messages, publish nothing."""
 
     def __init__(self) -> None:
         self._pressed: set[int] = set()
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(JoyVelocityParameters, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -92,9 +88,6 @@ class JoyVelocityNode(Node):
     def enter_safe_state(self) -> None:
         """Stop the vehicle."""
         self._publisher.publish(Twist())
-
-    def _reconfigure(self, parameters):
-        self._parameters = parameters
 
     def _on_joy(self, message):
         if not all(map(math.isfinite, message.axes)):

@@ -47,7 +47,7 @@ class CameraNodeParameters(Parameters):
     )
 
 
-class CameraNode(Node):
+class CameraNode(Node[CameraNodeParameters]):
     """Publish the images of a camera on a vehicle in a world.
 
     The poses of the vehicle and of moving objects come from tf.
@@ -60,7 +60,7 @@ class CameraNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(CameraNodeParameters)
+        super().load_parameters(handle)
         camera = self._parameters.camera
         self._pinhole = Pinhole.with_fov(camera.width, camera.height, camera.fov)
         self._mount = mount = optical_pose(camera.mount)

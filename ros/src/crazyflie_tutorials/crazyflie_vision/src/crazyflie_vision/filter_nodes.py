@@ -1,11 +1,11 @@
 """Image in, image out: the ROS interfaces of the filters."""
 
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any
 
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
-from typing_extensions import override
+from typing_extensions import TypeVar, override
 
 from crazyflie_utils import NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TOPIC, Integer, Number
@@ -20,11 +20,13 @@ class FilterParameters(Parameters):
     result_topic: str = parameter(TOPIC, "resulting images", "~image", name="topics/result")
 
 
-class FilterNode(ImageNode):
-    """Base class: a filter has ``parameters_type``, and `apply`."""
+F = TypeVar("F", bound=FilterParameters, default=FilterParameters)
 
-    parameters_type: ClassVar[type[FilterParameters]] = FilterParameters
-    _parameters: FilterParameters
+
+class FilterNode(ImageNode[F]):
+    """Base class: a filter has parameters, and `apply`."""
+
+    parameters_type = FilterParameters
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -57,11 +59,8 @@ class ThresholdParameters(FilterParameters):
     )
 
 
-class ThresholdNode(FilterNode):
+class ThresholdNode(FilterNode[ThresholdParameters]):
     """Publish images in black and white."""
-
-    parameters_type = ThresholdParameters
-    _parameters: ThresholdParameters
 
     @override
     def apply(self, image: filters.Image) -> filters.Image:
@@ -92,11 +91,8 @@ class BlurParameters(FilterParameters):
     size: int = parameter(KERNEL, "size of the square that is averaged for a pixel", 9, live=True)
 
 
-class BlurNode(FilterNode):
+class BlurNode(FilterNode[BlurParameters]):
     """Publish smoother images."""
-
-    parameters_type = BlurParameters
-    _parameters: BlurParameters
 
     @override
     def apply(self, image: filters.Image) -> filters.Image:
@@ -121,11 +117,8 @@ class EdgesParameters(FilterParameters):
             yield f"low is {self.low:g}; expected <= high, {self.high:g}"
 
 
-class EdgesNode(FilterNode):
+class EdgesNode(FilterNode[EdgesParameters]):
     """Publish the edges of images."""
-
-    parameters_type = EdgesParameters
-    _parameters: EdgesParameters
 
     @override
     def apply(self, image: filters.Image) -> filters.Image:

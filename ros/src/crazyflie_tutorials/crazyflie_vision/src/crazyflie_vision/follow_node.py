@@ -31,7 +31,7 @@ class FollowParameters(TargetFollower):
     )
 
 
-class FollowNode(Node):
+class FollowNode(Node[FollowParameters]):
     """Publish the velocity that keeps a target in the middle and at a distance.
 
     Without a target the velocity is zero.
@@ -46,10 +46,6 @@ class FollowNode(Node):
         self._centre = (0.0, 0.0)
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(FollowParameters, self._reconfigure)
-
-    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._publisher = handle.publisher(parameters.cmd_vel_topic, Twist)
@@ -62,9 +58,6 @@ class FollowNode(Node):
         """Stop the vehicle."""
         self._seen_at = -math.inf
         self._publisher.publish(Twist())
-
-    def _reconfigure(self, parameters):
-        self._parameters = parameters
 
     def _on_info(self, message):
         focal_length, _, cx, _, _, cy, *_ = message.K

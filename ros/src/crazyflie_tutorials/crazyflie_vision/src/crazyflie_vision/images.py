@@ -1,6 +1,6 @@
 """Images between messages and OpenCV, and the base class of nodes that process them."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import cv2
 import numpy as np
@@ -8,9 +8,9 @@ from cv_bridge import CvBridge, CvBridgeError
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
-from typing_extensions import override
 
-from crazyflie_utils import Node, NodeHandle, Parameters
+from crazyflie_utils import Node, NodeHandle
+from crazyflie_utils.node import P
 from crazyflie_vision.camera import Pinhole
 
 COLOUR = "bgr8"
@@ -53,17 +53,8 @@ def camera_info(camera: Pinhole, header: Header) -> CameraInfo:
     return message
 
 
-class ImageNode(Node):
-    """Base class of nodes that process every image of a topic: has ``parameters_type``."""
-
-    parameters_type: ClassVar[type[Parameters]]
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(self.parameters_type, self._reconfigure)
-
-    def _reconfigure(self, parameters: Any) -> None:
-        self._parameters = parameters
+class ImageNode(Node[P]):
+    """Base class of nodes that process every image of a topic."""
 
     def watch(self, handle: NodeHandle, topic: str) -> None:
         """Call `on_image` for every image; log those that cannot be read."""

@@ -6,7 +6,7 @@ from geometry_msgs.msg import Point, PointStamped
 from numpy.typing import NDArray
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
-from typing_extensions import override
+from typing_extensions import TypeVar, override
 
 from crazyflie_utils import NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import TEXT, TOPIC, Integer, Number
@@ -26,13 +26,15 @@ class TrackerParameters(Parameters):
     )
 
 
-class TrackerNode(ImageNode):
-    """Base class: a tracker has ``parameters_type``, and `find`.
+T = TypeVar("T", bound=TrackerParameters, default=Any)
+
+
+class TrackerNode(ImageNode[T]):
+    """Base class: a tracker has parameters, and `find`.
 
     A target is published with the stamp of its image; without a target, nothing is published.
     """
 
-    _parameters: TrackerParameters
     needed_in_flight = True
 
     @override
@@ -63,11 +65,8 @@ class ColourTrackerParameters(ColourBounds, TrackerParameters):
     )
 
 
-class ColourTrackerNode(TrackerNode):
+class ColourTrackerNode(TrackerNode[ColourTrackerParameters]):
     """Publish the place of the largest object of a colour."""
-
-    parameters_type = ColourTrackerParameters
-    _parameters: ColourTrackerParameters
 
     @override
     def find(self, image: NDArray[Any]) -> Target | None:
@@ -89,11 +88,8 @@ class FaceDetectorParameters(TrackerParameters):
     )
 
 
-class FaceDetectorNode(TrackerNode):
+class FaceDetectorNode(TrackerNode[FaceDetectorParameters]):
     """Publish the place of the largest face."""
-
-    parameters_type = FaceDetectorParameters
-    _parameters: FaceDetectorParameters
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:

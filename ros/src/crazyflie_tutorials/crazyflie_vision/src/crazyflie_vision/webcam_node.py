@@ -37,7 +37,7 @@ class WebcamParameters(Parameters):
     )
 
 
-class WebcamNode(Node):
+class WebcamNode(Node[WebcamParameters]):
     """Publish the images of a webcam; end when it is disconnected."""
 
     needed_in_flight = True
@@ -47,7 +47,8 @@ class WebcamNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        each = self._parameters = handle.load(WebcamParameters)
+        super().load_parameters(handle)
+        each = self._parameters
         self._pinhole = Pinhole.with_fov(each.width, each.height, each.fov)
         try:
             self._source: FrameSource = open_source(each.device, each.width, each.height, each.rate)

@@ -1,18 +1,18 @@
 """ROS interfaces of flights by high-level commands: there and back, and along a trajectory."""
 
-from collections import deque
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from concurrent.futures import Future
+from typing import Any
 
-import genpy
+from genpy import Duration
 from geometry_msgs.msg import Point
 from typing_extensions import TypeVar, override
 
 from crazyflie_demo.trajectory_file import load, summary
 from crazyflie_driver import srv
-from crazyflie_driver.msg import TrajectoryPolynomialPiece
+from crazyflie_fleet.high_level_services import in_turn, to_message
 from crazyflie_model.polynomials import PolynomialPiece
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.server import ParameterWriter
+from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, METRES, File, Number
 
 #: Timeout of a service call, of the driver's connection before the first one, and of the master's
@@ -28,19 +28,7 @@ _LANDING = 1.5
 
 _HIGH_LEVEL = "commander/enHighLevel"
 
-
-class Step(NamedTuple):
-    """A call of a service in the node's namespace.
-
-    It starts a manoeuvre of a duration (s). The parameter (name in the node's namespace, value) is
-    set before the call.
-    """
-
-    service: str
-    service_type: type
-    request: genpy.Message
-    duration: float = 0.0
-    parameter: tuple[str, int] | None = None
+Calls = Iterator["Future[Any]"]  #: For `in_turn`.
 
 
 class FlightPlanParameters(Parameters):
@@ -53,122 +41,100 @@ class FlightPlanParameters(Parameters):
         2.0,
     )
 
-    @property
-    def landing_duration(self) -> float:
-        """Duration of the landing, s."""
-        return _LANDING * self.duration
-
 
 P = TypeVar("P", bound=FlightPlanParameters, default=Any)
 
 
 class FlightPlanNode(Node[P]):
-    """Take off, carry out the steps of a subclass, land; then end the process.
+    """Take off, make the calls of a subclass, land; then end the process.
 
-    If a step fails, and when the process is ended in flight, the vehicle is landed.
+    If a call fails, and when the process is ended in flight, the vehicle is landed.
     """
 
     def __init__(self) -> None:
         self._is_flying = False
 
-    def manoeuvres(self) -> list[Step]:
-        """Return the steps between takeoff and landing."""
+    def manoeuvres(self) -> Calls:
+        """Yield the calls between takeoff and landing; see `call`."""
         raise NotImplementedError
 
-    def preparations(self) -> list[Step]:
-        """Return the steps before the takeoff."""
-        return []
+    def preparations(self) -> Calls:
+        """Yield the calls before the takeoff."""
+        return iter(())
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
+        in_turn(self._calls()).add_done_callback(self._end)
+
+    def _calls(self):
         height, duration = self._parameters.height, self._parameters.duration
-        enable = srv.UpdateParamsRequest([_HIGH_LEVEL])
-        takeoff = srv.TakeoffRequest(height=height, duration=seconds(duration))
-        self._steps = deque(
-            [
-                # Answered when the driver has connected and read all parameters of the vehicle,
-                # which overwrites earlier values.
-                Step("update_params", srv.UpdateParams, srv.UpdateParamsRequest()),
-                Step("update_params", srv.UpdateParams, enable, parameter=(_HIGH_LEVEL, 1)),
-                *self.preparations(),
-                Step("takeoff", srv.Takeoff, takeoff, duration),
-                *self.manoeuvres(),
-                Step("land", srv.Land, self._landing(), self._parameters.landing_duration),
-                Step("stop", srv.Stop, srv.StopRequest()),
-            ]
-        )
-        self._writer = ParameterWriter(self._write, lambda text: handle.submit(self._end, text))
-        self._next()
+        # Answered when the driver has connected and read all parameters of the vehicle, which
+        # overwrites earlier values.
+        yield from self.call("update_params", srv.UpdateParams)
+        yield self._enable()
+        yield from self.call("update_params", srv.UpdateParams, params=[_HIGH_LEVEL])
+        yield from self.preparations()
+        length = Duration.from_sec(duration)
+        yield from self.call("takeoff", srv.Takeoff, duration, height=height, duration=length)
+        yield from self.manoeuvres()
+        yield from self._land()
+        yield from self.call("stop", srv.Stop)
+
+    def _land(self):
+        duration = _LANDING * self._parameters.duration
+        length = Duration.from_sec(duration)
+        return self.call("land", srv.Land, duration, height=0.0, duration=length)
 
     @override
     def enter_safe_state(self) -> None:
         if self._is_flying:
             self._is_flying = False
             self._handle.warn("landing")
-            self._handle.call_service("land", srv.Land, self._landing(), _LIMIT)
+            next(self._land())
 
-    def _landing(self):
-        return srv.LandRequest(height=0.0, duration=seconds(self._parameters.landing_duration))
+    def call(self, service: str, service_type: Any, length: float = 0.0, **request: Any) -> Calls:
+        """Yield the call of a service in the node's namespace, and the wait for its manoeuvre.
 
-    def _next(self):
-        step = self._steps[0]
-        self._handle.info(f"{step.service}, {step.duration:g} s")
-        if step.parameter is None:
-            self._call(step)
-            return
-        name, value = step.parameter
-        error = f"parameter {self._handle.resolve(name)} is not set within {_LIMIT:g} s"
-        self._timer = self._handle.timer(_LIMIT, lambda: self._end(error))
-        self._writer.set(name, value)
-
-    def _write(self, name, value):
-        # In the writer's thread: the master may be slow.
-        self._handle.set_param(name, value)
-        self._handle.submit(self._on_parameter_set)
-
-    def _on_parameter_set(self):
-        # After the limit no further steps are taken.
-        if self._steps:
-            self._timer.stop()
-            self._call(self._steps[0])
-
-    def _call(self, step):
+        The manoeuvre takes ``length`` (s); ``request`` are the fields of the request.
+        """
+        handle = self._handle
+        self._error = f"{handle.resolve(service)} failed:"
+        handle.info(f"{service}, {length:g} s")
         # A takeoff may have started although its call fails.
-        self._is_flying |= step.service == "takeoff"
-        answer = self._handle.call_service(step.service, step.service_type, step.request, _LIMIT)
-        answer.add_done_callback(self._on_answer)
+        self._is_flying |= service == "takeoff"
+        message = service_type._request_class(**request)
+        yield handle.call_service(service, service_type, message, _LIMIT)
+        self._is_flying &= service != "land"
+        if length > 0.0:
+            yield self._done_within(length + _PAUSE)
 
-    def _on_answer(self, done):
-        step = self._steps.popleft()
+    def _enable(self):
+        self._error = f"parameter {self._handle.resolve(_HIGH_LEVEL)} is not set"
+        done = self._done_within(_LIMIT, ServiceError(f"within {_LIMIT:g} s"))
+        # The master may be slow, or frozen.
+        is_set = self._handle.set_param_later(_HIGH_LEVEL, 1)
+        is_set.add_done_callback(lambda _: self._handle.submit(_settle, done, is_set.exception()))
+        return done
+
+    def _done_within(self, limit, error=None):
+        """Return a future that ends after a time (s), with an error if there is one."""
+        done: Future[None] = Future()
+        timer = self._handle.timer(limit, lambda: _settle(done, error))
+        done.add_done_callback(lambda _: timer.stop())
+        return done
+
+    def _end(self, done):
         error = done.exception()
-        if error is not None:
-            self._end(f"{self._handle.resolve(step.service)} failed: {error}")
-            return
-        if step.service == "land":
-            self._is_flying = False
-        if not self._steps:
-            self._end()
-        elif step.duration > 0.0:
-            self._timer = self._handle.timer(step.duration + _PAUSE, self._on_pause)
-        else:
-            self._next()
-
-    def _on_pause(self):
-        self._timer.stop()
-        self._next()
-
-    def _end(self, error=""):
-        self._steps.clear()
-        if error:
-            self._handle.error(error)
-        else:
+        if error is None:
             self._handle.info("done")
-        self._handle.end(1 if error else 0)
+        else:
+            self._handle.error(f"{self._error} {error}")
+        self._handle.end(0 if error is None else 1)
 
 
-def seconds(duration: float) -> genpy.Duration:
-    """Return a duration (s) as a message has it."""
-    return genpy.Duration.from_sec(duration)
+def _settle(done, error):
+    if not done.done():
+        done.set_exception(error) if error else done.set_result(None)
 
 
 class HighLevelFlightParameters(FlightPlanParameters):
@@ -181,15 +147,17 @@ class HighLevelFlightNode(FlightPlanNode[HighLevelFlightParameters]):
     """Take off, fly ahead and back, land."""
 
     @override
-    def manoeuvres(self) -> list[Step]:
-        return [self._go(self._parameters.distance), self._go(-self._parameters.distance)]
-
-    def _go(self, x):
+    def manoeuvres(self) -> Calls:
         duration = self._parameters.duration
-        request = srv.GoToRequest(
-            relative=True, goal=Point(x, 0.0, 0.0), duration=seconds(duration)
-        )
-        return Step("go_to", srv.GoTo, request, duration)
+        for x in (self._parameters.distance, -self._parameters.distance):
+            yield from self.call(
+                "go_to",
+                srv.GoTo,
+                duration,
+                relative=True,
+                goal=Point(x, 0.0, 0.0),
+                duration=Duration.from_sec(duration),
+            )
 
 
 class TrajectoryFlightParameters(FlightPlanParameters):
@@ -220,24 +188,18 @@ class TrajectoryFlightNode(FlightPlanNode[TrajectoryFlightParameters]):
         )
 
     @override
-    def preparations(self) -> list[Step]:
-        pieces = [
-            TrajectoryPolynomialPiece(*piece.axes, seconds(piece.duration))
-            for piece in self._parameters.pieces
-        ]
-        return [
-            Step(
-                "upload_trajectory",
-                srv.UploadTrajectory,
-                srv.UploadTrajectoryRequest(pieces=pieces),
-            )
-        ]
+    def preparations(self) -> Calls:
+        pieces = [to_message(piece) for piece in self._parameters.pieces]
+        return self.call("upload_trajectory", srv.UploadTrajectory, pieces=pieces)
 
     @override
-    def manoeuvres(self) -> list[Step]:
+    def manoeuvres(self) -> Calls:
         parameters = self._parameters
-        request = srv.StartTrajectoryRequest(
-            timescale=parameters.timescale, reversed=parameters.reversed, relative=True
+        return self.call(
+            "start_trajectory",
+            srv.StartTrajectory,
+            summary(parameters.pieces).duration * parameters.timescale,
+            timescale=parameters.timescale,
+            reversed=parameters.reversed,
+            relative=True,
         )
-        duration = summary(parameters.pieces).duration * parameters.timescale
-        return [Step("start_trajectory", srv.StartTrajectory, request, duration)]

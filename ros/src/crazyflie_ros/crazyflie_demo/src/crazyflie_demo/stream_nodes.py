@@ -11,7 +11,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from std_msgs.msg import Empty
 from typing_extensions import override
 
-from crazyflie_demo.flight_plan_nodes import TrajectoryFlightNode, seconds
+from crazyflie_demo.flight_plan_nodes import TrajectoryFlightNode
 from crazyflie_demo.node_parts import RATE, SetpointParameters
 from crazyflie_demo.trajectory_file import TrajectoryError
 from crazyflie_demo.uav_trajectory import Trajectory
@@ -63,7 +63,7 @@ class StreamNode(Node):
     def land(self) -> Future[Any]:
         """Request a landing by the high-level commander; return the response."""
         prefix = self._handle.resolve(self.topic).rpartition("/")[0]
-        request = LandRequest(height=0.0, duration=seconds(_LANDING))
+        request = LandRequest(height=0.0, duration=genpy.Duration.from_sec(_LANDING))
         return self._handle.call_service(f"{prefix}/land", Land, request, _LIMIT)
 
     @override

@@ -40,11 +40,12 @@ from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.log import LogBlock
 from crazyflie_model.angles import zyx_from_quaternion
-from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Parameters, ServiceError, parameter
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.parameters.command_line import parse_arguments
 from crazyflie_utils.parameters.types import BOOLEAN, FINITE, FRAME, Text
+from crazyflie_utils.vectors import stamped
 
 PREFIX = "/crazyflie"
 _RELAYED = "first_flight"  #: Frame that the LQR uses: the relayed poses, until they are hidden.
@@ -218,10 +219,8 @@ class LiveRig:
 
     def refer(self, x: float, y: float, z: float) -> None:
         """Publish a reference."""
-        message = PositionVelocityStateStamped()
-        message.header.stamp = self._handle.stamp()
-        message.state.x, message.state.y, message.state.z = x, y, z
-        self._reference.publish(message)
+        state, stamp = PositionVelocityState(x=x, y=y, z=z), self._handle.stamp()
+        self._reference.publish(stamped(PositionVelocityStateStamped, stamp, state=state))
 
     def land(self) -> None:
         """Land by the takeoff server."""

@@ -10,6 +10,7 @@ from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamp
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import METRES, SERVICE, TOPIC, ParameterType
 from crazyflie_utils.text import shown
+from crazyflie_utils.vectors import stamped
 
 Point = tuple[float, float, float]  #: x, y, z in m.
 
@@ -72,8 +73,7 @@ class MoveServerNode(Node[MoveServerParameters]):
 
     def _on_move(self, _):
         x, y, z = next(self._route)
-        reference = PositionVelocityStateStamped(state=PositionVelocityState(x=x, y=y, z=z))
-        reference.header.stamp = self._handle.stamp()
-        self._publisher.publish(reference)
+        state, stamp = PositionVelocityState(x=x, y=y, z=z), self._handle.stamp()
+        self._publisher.publish(stamped(PositionVelocityStateStamped, stamp, state=state))
         self._handle.info(f"on to ({x:g}, {y:g}, {z:g}) m")
         return EmptyResponse()

@@ -2,7 +2,6 @@
 
 import math
 
-from std_msgs.msg import Header
 from typing_extensions import override
 
 from crazyflie_identification import excitation
@@ -17,6 +16,7 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TOPIC, Number
+from crazyflie_utils.vectors import stamped
 
 SETTLED = 3.0  #: Time in flight after which the excitation begins, s.
 PERIOD = 0.05  #: Period of the references (s).
@@ -130,6 +130,5 @@ class ExcitationNode(Node[ExcitationParameters]):
             self._handle.info("excitation is over: land, and give the bag to identify")
 
     def _publish(self, position, velocity):
-        state = PositionVelocityState(*position, *velocity)
-        header = Header(0, self._handle.stamp(), "")
-        self._references.publish(PositionVelocityStateStamped(header, state))
+        state, stamp = PositionVelocityState(*position, *velocity), self._handle.stamp()
+        self._references.publish(stamped(PositionVelocityStateStamped, stamp, state=state))

@@ -13,7 +13,7 @@ from crazyflie_references.velocity_reference import LimitParameters, Velocity, V
 from crazyflie_utils import Node, NodeHandle, Parameters, flight_status, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
-from crazyflie_utils.vectors import is_finite
+from crazyflie_utils.vectors import is_finite, stamped
 
 
 class VelocityReferenceParameters(Parameters):
@@ -135,10 +135,7 @@ class VelocityReferenceNode(Node):
         pose = self._reference.pose
         if pose is None:
             return
-        x_dot, y_dot, z_dot = self._reference.velocity if velocity is None else velocity
-        message = PositionVelocityYawStateStamped()
-        message.header.stamp = self._handle.stamp()
-        message.state = PositionVelocityYawState(
-            pose.x, pose.y, pose.z, x_dot, y_dot, z_dot, pose.yaw
-        )
-        self._publisher.publish(message)
+        velocity = self._reference.velocity if velocity is None else velocity
+        state = PositionVelocityYawState(pose.x, pose.y, pose.z, *velocity, pose.yaw)
+        stamp = self._handle.stamp()
+        self._publisher.publish(stamped(PositionVelocityYawStateStamped, stamp, state=state))

@@ -10,6 +10,7 @@ from crazyflie_demo.joystick import EVENT, Joystick, JoystickState
 from crazyflie_demo.node_parts import JOY_LIMIT, REPEATED
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TEXT, Number
+from crazyflie_utils.vectors import stamped
 
 _POLL_PERIOD = 0.01  #: Time between two reads of the device, s.
 _OPEN_PERIOD = 1.0  #: Time between two attempts to open the device (s).
@@ -115,8 +116,8 @@ class JoyNode(Node):
 
     def _publish(self, state):
         self._published = state
-        message = Joy(axes=state[0], buttons=state[1])
-        message.header.stamp = self._handle.stamp()
-        if self._parameters.autorepeat_rate > 2.0 / JOY_LIMIT:
-            message.header.frame_id = REPEATED
-        self._publisher.publish(message)
+        is_repeated = self._parameters.autorepeat_rate > 2.0 / JOY_LIMIT
+        frame, (axes, buttons) = REPEATED if is_repeated else "", state
+        self._publisher.publish(
+            stamped(Joy, self._handle.stamp(), frame, axes=axes, buttons=buttons)
+        )

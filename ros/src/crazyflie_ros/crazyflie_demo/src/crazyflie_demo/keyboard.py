@@ -10,9 +10,8 @@ from typing import NamedTuple
 from crazyflie_demo import joystick
 from crazyflie_demo.joystick import PITCH, ROLL, THRUST, YAW
 
-FIRST_HOLD = (
-    0.6  #: Time for which a key is treated as held after its press (s): repetition begins late.
-)
+#: Time for which a key is treated as held after its press (s): repetition begins late.
+FIRST_HOLD = 0.6
 REPEAT_HOLD = 0.15  #: Time for which a key is treated as held after a repetition (s).
 
 _DEFLECTIONS = {

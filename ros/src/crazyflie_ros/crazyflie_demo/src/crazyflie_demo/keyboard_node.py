@@ -16,6 +16,7 @@ from crazyflie_demo.keyboard import HELP, Keyboard
 from crazyflie_demo.node_parts import REPEATED
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import Number
+from crazyflie_utils.vectors import stamped
 
 _PERIOD = 0.05  #: Time between two messages, s.
 
@@ -81,10 +82,8 @@ class KeyboardNode(Node):
         buttons = [0] * BUTTONS
         if self._presses:
             buttons[self._presses.popleft()] = 1
-        message = Joy(axes=self._keyboard.axes(now), buttons=buttons)
-        message.header.stamp = self._handle.stamp()
-        message.header.frame_id = REPEATED
-        self._publisher.publish(message)
+        stamp, axes = self._handle.stamp(), self._keyboard.axes(now)
+        self._publisher.publish(stamped(Joy, stamp, REPEATED, axes=axes, buttons=buttons))
 
     def _read(self):
         if not select.select([self._terminal], [], [], 0.0)[0]:

@@ -3,13 +3,14 @@
 import math
 
 from genpy import Time
-from geometry_msgs.msg import Point, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from sensor_msgs.msg import Joy
 
 from crazyflie_controller.pose_source import WorldFrameParameters
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_utils import NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TOPIC, Integer, Number
+from crazyflie_utils.vectors import stamped
 
 AXIS = Integer(0, 255)  #: Number of a joystick's axis.
 RATE = Number("Hz", above=0.0, maximum=500.0)  #: Rate of a publisher.
@@ -35,12 +36,8 @@ class GoalParameters(WorldFrameParameters):
 
 def goal_message(stamp: Time, frame: str, x: float, y: float, z: float, yaw: float) -> PoseStamped:
     """Return the message of a goal: position in m and heading in rad, in ``frame``."""
-    message = PoseStamped()
-    message.header.stamp = stamp
-    message.header.frame_id = frame
-    message.pose.position = Point(x, y, z)
-    message.pose.orientation = Quaternion(*quaternion_from_rpy(0.0, 0.0, yaw))
-    return message
+    pose = Pose(Point(x, y, z), Quaternion(*quaternion_from_rpy(0.0, 0.0, yaw)))
+    return stamped(PoseStamped, stamp, frame, pose=pose)
 
 
 #: Age at which the last message of a joystick that repeats its messages expires (s).

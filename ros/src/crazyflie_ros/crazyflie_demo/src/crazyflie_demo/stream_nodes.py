@@ -22,6 +22,7 @@ from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter, run_nodes
 from crazyflie_utils.parameters.types import METRES, TOPIC, Number
+from crazyflie_utils.vectors import stamped
 
 _LANDING = 2.0  #: Duration of the landing after an interrupted flight, s.
 _LIMIT = 15.0  #: Longest time of a service call, s.
@@ -160,9 +161,7 @@ class PositionFlightNode(StreamNode):
     @override
     def setpoint(self, time: float) -> Position:
         x, y, z = (float(np.interp(time, self._times, axis)) for axis in self._places.T)
-        message = Position(x=x, y=y, z=z, yaw=0.0)
-        message.header.frame_id = "world"
-        return message
+        return stamped(Position, genpy.Time(), "world", x=x, y=y, z=z, yaw=0.0)
 
     @override
     def finish(self) -> None:
@@ -205,13 +204,14 @@ class TrajectoryStreamNode(StreamNode):
         if time >= self.duration:
             # The command is repeated until the vehicle lands.
             goal = goal._replace(vel=_REST, acc=_REST, omega=_REST)
-        message = FullState(
+        return stamped(
+            FullState,
+            genpy.Time(),
+            "world",
             pose=Pose(Point(*goal.pos), Quaternion(*quaternion_from_rpy(0.0, 0.0, goal.yaw))),
             twist=Twist(Vector3(*goal.vel), Vector3(*goal.omega)),
             acc=Vector3(*goal.acc),
         )
-        message.header.frame_id = "world"
-        return message
 
     @override
     def finish(self) -> Future[Any]:

@@ -4,7 +4,6 @@ import math
 from collections import deque
 from collections.abc import Sequence
 
-import genpy
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from typing_extensions import override
@@ -157,9 +156,8 @@ class VisualizerNode(Node[VisualizerParameters]):
     def _marker(self, name, shape, colour):
         marker = Marker(ns=name, type=shape, color=colour)
         marker.header.frame_id = self._parameters.fixed_frame
-        # With time 0, RViz uses the latest transform, so that it draws markers with any fixed frame
-        # at once, even after simulated time was reset.
-        marker.header.stamp = genpy.Time()
+        # The stamp remains 0: RViz uses the latest transform, so that it draws markers with any
+        # fixed frame at once, even after simulated time was reset.
         marker.pose.orientation.w = 1.0
         marker.scale.x = _LINE_WIDTH
         return marker

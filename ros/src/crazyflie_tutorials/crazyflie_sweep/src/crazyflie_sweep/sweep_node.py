@@ -2,7 +2,6 @@
 
 import random
 
-import genpy
 import numpy as np
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
@@ -73,8 +72,7 @@ def markers(sweeper: Sweeper, frame: str) -> MarkerArray:
 def _marker(name, shape, colour, frame):
     marker = Marker(ns=name, type=shape, color=colour)
     marker.header.frame_id = frame
-    # With time 0, RViz uses the latest transform, even after simulated time was reset.
-    marker.header.stamp = genpy.Time()
+    # The stamp remains 0: RViz uses the latest transform, even after simulated time was reset.
     marker.pose.orientation.w = 1.0
     return marker
 

@@ -7,9 +7,7 @@ from sensor_msgs.msg import Joy
 from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
-from crazyflie_lqr.lqr_nodes import (
-    PositionVelocityYawStateLiftLqrNode,
-)
+from crazyflie_lqr.lqr_nodes import PositionVelocityYawStateLiftLqrNode
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_teleop.velocities import AXIS_NUMBER, JoyVelocity, circle_velocity
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter

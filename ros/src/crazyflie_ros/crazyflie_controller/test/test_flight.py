@@ -28,7 +28,7 @@ ABOVE = HeadingPose(0.0, 0.0, 1.0, 0.0)
 
 def flying(goal=ABOVE, **options):
     loop = standing(**options)
-    loop.flight.set_goal(goal)
+    loop.flight.goal = goal
     loop.flight.take_off()
     loop.run_until(lambda: loop.flight.state is State.AUTOMATIC, 10.0)
     return loop
@@ -86,7 +86,7 @@ def test_flies_to_the_goal_and_lands_softly(errors, pose_period):
 def test_a_steep_descent_stays_near_the_straight_line():
     loop = flying(HeadingPose(0.0, 0.0, 3.0, 0.0))
     loop.run(20.0)
-    loop.flight.set_goal(HeadingPose(0.3, 0.2, 0.6, 0.0))
+    loop.flight.goal = HeadingPose(0.3, 0.2, 0.6, 0.0)
     track = loop.run(5.0)
     assert track[:, 0].max() < 0.4
     assert track[:, 1].max() < 0.3
@@ -95,7 +95,7 @@ def test_a_steep_descent_stays_near_the_straight_line():
 def test_turns_round_and_goes_on_the_spot():
     loop = flying()
     loop.run(8.0)
-    loop.flight.set_goal(HeadingPose(1.0, 0.0, 1.0, -2.5))
+    loop.flight.goal = HeadingPose(1.0, 0.0, 1.0, -2.5)
     track = loop.run(6.0)
     # Its way turns into a curve, but not into a spiral.
     assert np.abs(track[:, 1]).max() < 0.3
@@ -270,7 +270,7 @@ def test_a_goal_during_a_landing_waits_for_the_next_takeoff():
     loop.run(5.0)
     loop.flight.land()
     loop.run(0.5)
-    loop.flight.set_goal(HeadingPose(2.0, 0.0, 2.0, 0.0))
+    loop.flight.goal = HeadingPose(2.0, 0.0, 2.0, 0.0)
     track = loop.run_until(lambda: loop.flight.state is State.IDLE, 8.0)
     assert np.abs(track[:, 0]).max() < 0.05
     loop.flight.take_off()

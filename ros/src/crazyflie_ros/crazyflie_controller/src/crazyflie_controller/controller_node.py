@@ -115,7 +115,7 @@ class ControllerNode(Node):
                 throttle=1.0,
             )
             return
-        self._flight.set_goal(pose(message.pose.position, q))
+        self._flight.goal = pose(message.pose.position, q)
 
     def _on_timer(self):
         before = self._flight.state

@@ -56,9 +56,9 @@ class GoToFlight:
 
     def __init__(self, controller: GoToController):
         self._controller = controller
-        self._state = State.IDLE
+        self.state = State.IDLE  #: After the last tick or command.
         self._warning: str | None = None
-        self._goal: HeadingPose | None = None
+        self.goal: HeadingPose | None = None  #: Of this flight, or of the next one.
         # Never used before the first pose.
         self._pose = self._hover = self._descent_start = HeadingPose(0.0, 0.0, 0.0, 0.0)
         self._stamp: float | None = None
@@ -71,24 +71,15 @@ class GoToFlight:
         self._descent_speed = DESCENT_SPEED
         self._touchdown_thrust = 0.0
 
-    @property
-    def state(self) -> State:
-        """The state after the last tick or command."""
-        return self._state
-
     def take_warning(self) -> str | None:
         """Return the warning of the last tick, once; or None."""
         warning, self._warning = self._warning, None
         return warning
 
-    def set_goal(self, goal: HeadingPose) -> None:
-        """Set the goal of this flight, or of the next one."""
-        self._goal = goal
-
     def take_off(self) -> None:
         """Start a takeoff; `RefusalError` if the vehicle is in flight, or without a new pose."""
-        if self._state is not State.IDLE:
-            raise RefusalError(f"the controller is {self._state.value}; land first")
+        if self.state is not State.IDLE:
+            raise RefusalError(f"the controller is {self.state.value}; land first")
         if self._is_pose_older_than(HOLD_LIMIT):
             raise RefusalError(f"there has been no new pose for {HOLD_LIMIT:g} s")
         self._ground = self._pose.z
@@ -96,17 +87,17 @@ class GoToFlight:
 
     def land(self) -> None:
         """Start a landing at the vehicle's position; `RefusalError` on the ground or in one."""
-        if self._state is State.TAKING_OFF:
+        if self.state is State.TAKING_OFF:
             self._touch_down()
-        elif self._state is State.AUTOMATIC:
+        elif self.state is State.AUTOMATIC:
             self._descent_start, self._descent_speed = self._pose, DESCENT_SPEED
             self._enter(State.LANDING)
         else:
-            raise RefusalError(f"the controller is {self._state.value}")
+            raise RefusalError(f"the controller is {self.state.value}")
 
     def land_within(self, limit: float) -> None:
         """Speed a descent up to end within a time (s); other states are not affected."""
-        if self._state is State.LANDING:
+        if self.state is State.LANDING:
             self._descent_start = self._descent_start._replace(z=self._pose.z)
             self._descent_speed = max(DESCENT_SPEED, (self._pose.z - self._ground) / limit)
             self._enter(State.LANDING)
@@ -121,7 +112,7 @@ class GoToFlight:
         """
         self._follow_clock(time)
         self._update_pose(stamp, pose)
-        self._setpoint = self._ACTIONS[self._state](self)
+        self._setpoint = self._ACTIONS[self.state](self)
         return self._setpoint
 
     # One action for each state.
@@ -143,7 +134,7 @@ class GoToFlight:
         return GoToSetpoint(thrust=thrust)
 
     def _go(self):
-        return self._fly_to(self._hover if self._goal is None else self._goal)
+        return self._fly_to(self._hover if self.goal is None else self.goal)
 
     def _land(self):
         elapsed = self._time - self._entered
@@ -194,7 +185,7 @@ class GoToFlight:
         self._enter(State.TOUCHING_DOWN)
 
     def _enter(self, state):
-        self._state = state
+        self.state = state
         self._entered = self._time
 
     # Poses and clock.

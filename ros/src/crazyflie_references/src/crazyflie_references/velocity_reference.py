@@ -122,8 +122,8 @@ class VelocityReference:
         return Velocity(
             scale * command.x,
             scale * command.y,
-            _clamp(command.z, limits.vertical),
-            _clamp(command.yaw_dot, limits.yaw_dot),
+            clamp(command.z, limits.vertical),
+            clamp(command.yaw_dot, limits.yaw_dot),
         )
 
     def _approach(self, target, dt):
@@ -133,9 +133,10 @@ class VelocityReference:
         change = math.hypot(dx, dy)
         part = min(1.0, most / change) if change > 0.0 else 1.0
         return Velocity(
-            v.x + part * dx, v.y + part * dy, v.z + _clamp(target.z - v.z, most), target.yaw_dot
+            v.x + part * dx, v.y + part * dy, v.z + clamp(target.z - v.z, most), target.yaw_dot
         )
 
 
-def _clamp(value, most):
+def clamp(value: float, most: float) -> float:
+    """Return a value limited to [-most, most]."""
     return min(max(value, -most), most)

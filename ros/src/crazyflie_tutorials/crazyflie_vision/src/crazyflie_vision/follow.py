@@ -2,7 +2,7 @@
 
 import math
 
-from crazyflie_references.velocity_reference import Velocity
+from crazyflie_references.velocity_reference import Velocity, clamp
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import Number
@@ -57,11 +57,7 @@ class TargetFollower(Parameters):
         right = (target.x - centre[0]) / focal_length
         down = (target.y - centre[1]) / focal_length
         return Velocity(
-            x=_limited(gains.forward * (depth - self.distance), limits.forward),
-            z=_limited(-gains.up * depth * down, limits.up),
-            yaw_dot=_limited(-gains.turn * math.atan(right), limits.turn),
+            x=clamp(gains.forward * (depth - self.distance), limits.forward),
+            z=clamp(-gains.up * depth * down, limits.up),
+            yaw_dot=clamp(-gains.turn * math.atan(right), limits.turn),
         )
-
-
-def _limited(value, limit):
-    return min(max(value, -limit), limit)

@@ -18,8 +18,8 @@ from crazyflie_teleop.nodes import (
     HeadingLiftLqrNode,
     JoyVelocityNode,
     TakeoffCallerNode,
+    circle_velocity,
 )
-from crazyflie_teleop.velocities import circle_velocity
 from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess, launch_files
 

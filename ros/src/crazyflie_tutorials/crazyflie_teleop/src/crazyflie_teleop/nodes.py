@@ -1,6 +1,7 @@
 """The ROS interfaces: circle and joystick to cmd_vel, a call of takeoff, and the controller."""
 
 import math
+from collections.abc import Sequence
 
 from geometry_msgs.msg import Twist, Vector3
 from sensor_msgs.msg import Joy
@@ -9,9 +10,20 @@ from typing_extensions import override
 
 from crazyflie_lqr.lqr_nodes import PositionVelocityYawStateLiftLqrNode
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
-from crazyflie_teleop.velocities import AXIS_NUMBER, JoyVelocity, circle_velocity
+from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, SERVICE, TIME_STEP, TOPIC, Number
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import BOOLEAN, SERVICE, TIME_STEP, TOPIC, Integer, Number
+
+
+def circle_velocity(radius: float, speed: float, clockwise: bool) -> Velocity:
+    """Return the velocity, in the heading frame, of a vehicle that looks along its circle.
+
+    The yaw rate is speed (m/s) over radius (m), negative for a turn that is clockwise as seen from
+    above.
+    """
+    yaw_dot = speed / radius
+    return Velocity(x=speed, yaw_dot=-yaw_dot if clockwise else yaw_dot)
 
 
 class CircleParameters(Parameters):
@@ -53,9 +65,31 @@ class CircleNode(Node):
 FLIGHT_LIMIT = 120.0  #: Timeout of takeoff and landing (s of the machine's clock).
 
 
-class JoyVelocityParameters(JoyVelocity):
+AXIS_NUMBER = Integer(0, 63)  #: Number of an axis or a button of sensor_msgs/Joy.
+
+
+class AxisParameters(Parameters):
+    """Numbers of axes, from 0, as on gamepads and crazyflie_demo's keyboard."""
+
+    forward: int = parameter(AXIS_NUMBER, "flies ahead", 4)
+    left: int = parameter(AXIS_NUMBER, "axis of the velocity to the left", 3)
+    up: int = parameter(AXIS_NUMBER, "rises", 1)
+    turn: int = parameter(AXIS_NUMBER, "axis of the yaw rate to the left", 0)
+
+
+class JoyVelocityParameters(Parameters):
     """Parameters of `JoyVelocityNode`."""
 
+    axes: AxisParameters = group(AxisParameters, "axes")
+    horizontal: float = parameter(
+        Number("m/s", above=0.0), "speed at full deflection", 0.5, "speed/horizontal", live=True
+    )
+    vertical: float = parameter(
+        Number("m/s", above=0.0), "speed at full deflection", 0.3, "speed/vertical", live=True
+    )
+    yaw_dot: float = parameter(
+        Number("rad/s", above=0.0), "yaw rate at full deflection", 1.0, "speed/yaw_dot", live=True
+    )
     joy_topic: str = parameter(TOPIC, "a joystick, or a keyboard", "joy", "topics/joy")
     cmd_vel_topic: str = parameter(TOPIC, "topic of the velocities", "cmd_vel", "topics/cmd_vel")
     takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
@@ -69,6 +103,20 @@ class JoyVelocityParameters(JoyVelocity):
     takeoff_button: int = parameter(AXIS_NUMBER, "calls takeoff", 2, "buttons/takeoff")
     land_button: int = parameter(AXIS_NUMBER, "calls land", 0, "buttons/land")
     emergency_button: int = parameter(AXIS_NUMBER, "calls emergency", 1, "buttons/emergency")
+
+    def velocity(self, deflections: Sequence[float]) -> Velocity:
+        """Return the velocity for deflections from -1 to 1; an axis that is missing is at 0."""
+
+        def deflection(axis):
+            value = deflections[axis] if axis < len(deflections) else 0.0
+            return min(max(value, -1.0), 1.0)
+
+        return Velocity(
+            self.horizontal * deflection(self.axes.forward),
+            self.horizontal * deflection(self.axes.left),
+            self.vertical * deflection(self.axes.up),
+            self.yaw_dot * deflection(self.axes.turn),
+        )
 
 
 class JoyVelocityNode(Node[JoyVelocityParameters]):
@@ -123,15 +171,12 @@ class TakeoffCallerParameters(Parameters):
     )
 
 
-class TakeoffCallerNode(Node):
+class TakeoffCallerNode(Node[TakeoffCallerParameters]):
     """Call takeoff once, as soon as the service is offered."""
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._service = handle.resolve(handle.load(TakeoffCallerParameters).service)
-
-    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
+        self._service = handle.resolve(self._parameters.service)
         self._timer = handle.timer(PERIOD, self._on_timer, steady=True)
 
     def _on_timer(self):

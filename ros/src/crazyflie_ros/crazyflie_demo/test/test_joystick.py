@@ -36,10 +36,10 @@ def test_left_and_up_are_positive_and_reach_one():
 
 @pytest.mark.parametrize("deadzone", [0.0, 0.05, 0.5])
 def test_the_deadzone_is_cut_out_without_a_step(deadzone):
-    joystick = Joystick(deadzone)
+    joystick = Joystick()
 
     def deflect(part):
-        return joystick.feed(axis(0, round(-32767 * part)))[0][0][0]
+        return joystick.feed(axis(0, round(-32767 * part)), deadzone)[0][0][0]
 
     assert deflect(deadzone * 0.99) == 0.0
     assert deflect(-deadzone * 0.99) == 0.0
@@ -76,10 +76,10 @@ events = st.one_of(
 @given(st.lists(events, min_size=1, max_size=20), st.lists(st.integers(0, 160), max_size=5))
 def test_it_does_not_matter_where_the_stream_is_cut(parts, cuts):
     data = b"".join(parts)
-    whole, pieces = Joystick(0.1), Joystick(0.1)
-    whole.feed(data)
+    whole, pieces = Joystick(), Joystick()
+    whole.feed(data, 0.1)
     edges = [0, *sorted(min(cut, len(data)) for cut in cuts), len(data)]
     for begin, end in zip(edges, edges[1:], strict=False):
-        pieces.feed(data[begin:end])
+        pieces.feed(data[begin:end], 0.1)
     assert pieces.state() == whole.state()
     assert all(-1.0 <= value <= 1.0 for value in whole.axes)

@@ -43,17 +43,17 @@ def deflected(**values):
     ],
 )
 def test_keys_move_axes(keys, axes):
-    keyboard = Keyboard(0.5)
-    assert keyboard.feed(keys, 10.0) == []
+    keyboard = Keyboard()
+    assert keyboard.feed(keys, 10.0, 0.5) == []
     assert keyboard.axes(10.0) == deflected(**axes)
 
 
 def test_keys_press_buttons():
-    assert Keyboard(0.5).feed("tlH ", 0.0) == [TAKEOFF, LAND, HEADLIGHT, EMERGENCY]
+    assert Keyboard().feed("tlH ", 0.0) == [TAKEOFF, LAND, HEADLIGHT, EMERGENCY]
 
 
 def test_an_arrow_may_come_in_pieces():
-    keyboard = Keyboard(1.0)
+    keyboard = Keyboard()
     for part in ("\x1b", "[", "A"):
         assert keyboard.axes(0.0) == REST
         keyboard.feed(part, 0.0)
@@ -61,21 +61,21 @@ def test_an_arrow_may_come_in_pieces():
 
 
 def test_escape_alone_eats_no_key():
-    assert Keyboard(1.0).feed("\x1b", 0.0) == []
-    keyboard = Keyboard(1.0)
+    assert Keyboard().feed("\x1b", 0.0) == []
+    keyboard = Keyboard()
     keyboard.feed("\x1b", 0.0)
     assert keyboard.feed("t", 1.0) == [TAKEOFF]
 
 
 def test_a_key_is_let_go_when_it_is_not_repeated():
-    keyboard = Keyboard(1.0)
+    keyboard = Keyboard()
     keyboard.feed("w", 0.0)
     assert keyboard.axes(FIRST_HOLD - 0.01) == deflected(thrust=1.0)
     assert keyboard.axes(FIRST_HOLD + 0.01) == REST
 
 
 def test_a_key_that_is_held_is_let_go_soon_after():
-    keyboard = Keyboard(1.0)
+    keyboard = Keyboard()
     time = 0.0
     keyboard.feed("w", time)
     for time in (0.5, 0.53, 0.56, 0.6, 0.7, 0.8):
@@ -87,14 +87,14 @@ def test_a_key_that_is_held_is_let_go_soon_after():
 
 @pytest.mark.parametrize("key", ["x", " "])
 def test_everything_can_be_let_go(key):
-    keyboard = Keyboard(1.0, lift_step=0.1)
+    keyboard = Keyboard(lift_step=0.1)
     keyboard.feed("wwa", 0.0)
     keyboard.feed(key, 0.1)
     assert keyboard.axes(0.1) == REST
 
 
 def test_thrust_can_go_in_steps_and_stay():
-    keyboard = Keyboard(1.0, lift_step=0.3)
+    keyboard = Keyboard(lift_step=0.3)
     levels = []
     for key in "wwwwsss s":
         keyboard.feed(key, 0.0)

@@ -12,10 +12,11 @@ from crazyflie_demo.waypoints import Waypoint, WaypointFollower, WaypointList
 A = Waypoint(0.0, 0.0, 1.0, 0.0, 2.0)
 B = Waypoint(1.0, 0.0, 1.0, 1.0, 0.0)
 C = Waypoint(1.0, 1.0, 1.0, 0.0, 1.0)
+TOLERANCES = (0.3, 0.2)
 
 
 def follower(*waypoints):
-    return WaypointFollower(list(waypoints), 0.3, 0.2)
+    return WaypointFollower(list(waypoints))
 
 
 @pytest.mark.parametrize(
@@ -53,39 +54,39 @@ def test_a_good_list():
 
 def test_goes_on_when_it_has_been_there_long_enough():
     path = follower(A, B, C)
-    path.update(0.0, (0.0, 0.0, 0.0), 0.0)
-    path.update(100.0, (0.0, 0.0, 0.69), 0.0)
+    path.update(0.0, (0.0, 0.0, 0.0), 0.0, TOLERANCES)
+    path.update(100.0, (0.0, 0.0, 0.69), 0.0, TOLERANCES)
     assert path.goal == A
-    path.update(101.0, (0.0, 0.0, 0.71), 0.0)
-    path.update(102.9, (0.0, 0.0, 1.0), 0.0)
+    path.update(101.0, (0.0, 0.0, 0.71), 0.0, TOLERANCES)
+    path.update(102.9, (0.0, 0.0, 1.0), 0.0, TOLERANCES)
     assert path.goal == A
-    path.update(103.0, (0.0, 0.0, 1.0), 0.0)
+    path.update(103.0, (0.0, 0.0, 1.0), 0.0, TOLERANCES)
     assert path.goal == B
 
 
 def test_the_seconds_pass_also_when_it_drifts():
     path = follower(A, B)
-    path.update(0.0, A[:3], 0.0)
-    path.update(2.0, (0.4, 0.0, 1.0), 0.0)
+    path.update(0.0, A[:3], 0.0, TOLERANCES)
+    path.update(2.0, (0.4, 0.0, 1.0), 0.0, TOLERANCES)
     assert path.goal == B
 
 
 def test_the_heading_counts_and_goes_round():
     path = follower(Waypoint(0.0, 0.0, 1.0, math.pi, 0.0), B)
-    path.update(0.0, (0.0, 0.0, 1.0), 0.0)
+    path.update(0.0, (0.0, 0.0, 1.0), 0.0, TOLERANCES)
     assert path.index == 0
-    path.update(1.0, (0.0, 0.0, 1.0), -math.pi + 0.1)
+    path.update(1.0, (0.0, 0.0, 1.0), -math.pi + 0.1, TOLERANCES)
     assert path.index == 1
 
 
 def test_the_last_one_stays():
     path = follower(B, C)
-    path.update(0.0, B[:3], 1.0)
-    path.update(1.0, C[:3], 0.0)
+    path.update(0.0, B[:3], 1.0, TOLERANCES)
+    path.update(1.0, C[:3], 0.0, TOLERANCES)
     assert (path.goal, path.is_finished) == (C, False)
-    path.update(2.0, C[:3], 0.0)
+    path.update(2.0, C[:3], 0.0, TOLERANCES)
     assert (path.goal, path.is_finished) == (C, True)
-    path.update(9.0, A[:3], 0.0)
+    path.update(9.0, A[:3], 0.0, TOLERANCES)
     assert (path.goal, path.is_finished) == (C, True)
 
 
@@ -100,7 +101,7 @@ def test_who_is_always_at_the_goal_ends_after_all_seconds(path):
     followed = follower(*path)
     time, step = 0.0, 0.1
     while not followed.is_finished:
-        followed.update(time, followed.goal[:3], followed.goal.yaw)
+        followed.update(time, followed.goal[:3], followed.goal.yaw, TOLERANCES)
         time += step
         # Each waypoint may take one step more than its seconds, and one to arrive.
         assert time <= sum(w.seconds for w in path) + 2.0 * step * len(path) + 1e-6

@@ -39,7 +39,7 @@ class JoyNodeParameters(Parameters):
     )
 
 
-class JoyNode(Node):
+class JoyNode(Node[JoyNodeParameters]):
     """Publish the state of a joystick.
 
     The device is reopened until that succeeds. When it is unplugged, one message has all axes and
@@ -47,13 +47,9 @@ class JoyNode(Node):
     """
 
     def __init__(self) -> None:
+        self._joystick = Joystick()
         self._file: int | None = None
         self._published: JoystickState | None = None
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(JoyNodeParameters, self._reconfigure)
-        self._joystick = Joystick(self._parameters.deadzone)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -69,9 +65,6 @@ class JoyNode(Node):
     def shutdown(self) -> None:
         if self._file is not None:
             os.close(self._file)
-
-    def _reconfigure(self, parameters):
-        self._joystick.deadzone = parameters.deadzone
 
     def _open(self):
         device = self._parameters.dev
@@ -97,7 +90,7 @@ class JoyNode(Node):
         except OSError as error:
             self._lose(self._file, error)
             return
-        for state in self._joystick.feed(data) if data else []:
+        for state in self._joystick.feed(data, self._parameters.deadzone) if data else []:
             self._publish(state)
 
     def _lose(self, file, error):

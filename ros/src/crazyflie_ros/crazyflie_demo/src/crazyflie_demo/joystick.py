@@ -23,13 +23,12 @@ class Joystick:
     are 0. A pressed button is 1.
     """
 
-    def __init__(self, deadzone: float = 0.0):
+    def __init__(self) -> None:
         self.axes: list[float] = []
         self.buttons: list[int] = []
-        self.deadzone = deadzone
         self._rest = b""
 
-    def feed(self, data: bytes) -> list[JoystickState]:
+    def feed(self, data: bytes, deadzone: float = 0.0) -> list[JoystickState]:
         """Return the states that follow from data of the device.
 
         There is one after every change of a button, so that no short press is lost, and the last
@@ -42,7 +41,7 @@ class Joystick:
         is_complete = True
         for _, value, event_type, number in EVENT.iter_unpack(data[:whole]):
             if event_type & ~INITIAL == AXIS:
-                _put(self.axes, number, self._deflection(value), 0.0)
+                _put(self.axes, number, _deflection(value, deadzone), 0.0)
             elif event_type & ~INITIAL == BUTTON:
                 _put(self.buttons, number, int(value != 0), 0)
             else:
@@ -63,11 +62,12 @@ class Joystick:
         """Return the state (axes, buttons), in new lists."""
         return list(self.axes), list(self.buttons)
 
-    def _deflection(self, value):
-        # In Linux, right and down are positive.
-        part = max(-1.0, min(1.0, -value / _FULL))
-        beyond = max(0.0, abs(part) - self.deadzone) / (1.0 - self.deadzone)
-        return beyond if part > 0.0 else -beyond if beyond else 0.0
+
+def _deflection(value, deadzone):
+    # In Linux, right and down are positive.
+    part = max(-1.0, min(1.0, -value / _FULL))
+    beyond = max(0.0, abs(part) - deadzone) / (1.0 - deadzone)
+    return beyond if part > 0.0 else -beyond if beyond else 0.0
 
 
 def _put(values, number, value, neutral):

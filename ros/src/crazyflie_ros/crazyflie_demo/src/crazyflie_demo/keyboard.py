@@ -49,19 +49,21 @@ class _Deflection(NamedTuple):
 class Keyboard:
     """Axes and buttons that keys move.
 
-    A key moves its axis to the deflection, up to 1. With a lift step of 0, so do w and s; otherwise
-    they change the thrust by this step, from 0 to 1, and it is kept.
+    A key moves its axis. With a lift step of 0, so do w and s; otherwise they change the thrust by
+    this step, from 0 to 1, and it is kept.
     """
 
-    def __init__(self, deflection: float, lift_step: float = 0.0):
-        self.deflection = deflection
+    def __init__(self, lift_step: float = 0.0):
         self._lift_step = lift_step
         self._thrust = 0.0
         self._held: dict[int, _Deflection] = {}
         self._rest = ""
 
-    def feed(self, text: str, time: float) -> list[int]:
-        """Return the buttons that were pressed by text that was typed until ``time`` (s)."""
+    def feed(self, text: str, time: float, deflection: float = 1.0) -> list[int]:
+        """Return the buttons that were pressed by text that was typed until ``time`` (s).
+
+        A key moves its axis to the deflection, up to 1.
+        """
         presses = []
         for key in self._keys(text):
             if key in _PRESSES:
@@ -70,7 +72,8 @@ class Keyboard:
                 self._held.clear()
                 self._thrust = 0.0
             if key in _DEFLECTIONS:
-                self._deflect(*_DEFLECTIONS[key], time)
+                axis, direction = _DEFLECTIONS[key]
+                self._deflect(axis, direction, direction * deflection, time)
         return presses
 
     def axes(self, time: float) -> list[float]:
@@ -83,12 +86,11 @@ class Keyboard:
             axes[THRUST] = self._thrust
         return axes
 
-    def _deflect(self, axis, direction, time):
+    def _deflect(self, axis, direction, value, time):
         if axis == THRUST and self._lift_step > 0.0:
             self._thrust = min(max(self._thrust + direction * self._lift_step, 0.0), 1.0)
             return
         before = self._held.get(axis)
-        value = direction * self.deflection
         if before is not None and time < before.until and before.value == value:
             until = max(time + REPEAT_HOLD, before.until)
         else:

@@ -35,7 +35,7 @@ class KeyboardParameters(Parameters):
     )
 
 
-class KeyboardNode(Node):
+class KeyboardNode(Node[KeyboardParameters]):
     """Publish the keys of the terminal as the axes and buttons of a joystick."""
 
     def __init__(self) -> None:
@@ -52,12 +52,8 @@ class KeyboardNode(Node):
         return super().initialize(handle)
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        parameters = handle.load(KeyboardParameters, self._reconfigure)
-        self._keyboard = Keyboard(parameters.deflection, parameters.lift_step)
-
-    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
+        self._keyboard = Keyboard(self._parameters.lift_step)
         self._publisher = handle.publisher("joy", Joy)
         # Real time, since hands do not follow simulated time.
         handle.timer(_PERIOD, self._on_timer, steady=True)
@@ -72,12 +68,9 @@ class KeyboardNode(Node):
         if self._settings is not None:
             termios.tcsetattr(self._terminal, termios.TCSADRAIN, self._settings)
 
-    def _reconfigure(self, parameters):
-        self._keyboard.deflection = parameters.deflection
-
     def _on_timer(self):
-        now = self._handle.time()
-        self._presses.extend(self._keyboard.feed(self._read(), now))
+        now, deflection = self._handle.time(), self._parameters.deflection
+        self._presses.extend(self._keyboard.feed(self._read(), now, deflection))
         # A press is reported in one message.
         buttons = [0] * BUTTONS
         if self._presses:

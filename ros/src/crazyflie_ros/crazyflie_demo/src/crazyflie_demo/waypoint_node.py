@@ -32,7 +32,7 @@ class WaypointParameters(GoalParameters, PoseParameters):
     )
 
 
-class DemoNode(Node):
+class DemoNode(Node[WaypointParameters]):
     """Publish waypoints as goals, one after the other; these are a square."""
 
     #: Default of the parameter ``waypoints``.
@@ -49,38 +49,27 @@ class DemoNode(Node):
         self._stamp: float | None = None
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(WaypointParameters, self._reconfigure)
-        self._follower = WaypointFollower(
-            self._parameters.waypoints or list(self.waypoints),
-            self._parameters.position_tolerance,
-            self._parameters.yaw_tolerance,
-        )
-
-    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
+        self._follower = WaypointFollower(self._parameters.waypoints or list(self.waypoints))
         self._publisher = handle.publisher("goal", PoseStamped)
         self._source = PoseSource(handle, self._parameters)
         handle.timer(1.0 / self._parameters.rate, self._on_timer)
 
-    def _reconfigure(self, parameters):
-        self._follower.position_tolerance = parameters.position_tolerance
-        self._follower.yaw_tolerance = parameters.yaw_tolerance
-
     def _on_timer(self):
-        follower = self._follower
+        follower, parameters = self._follower, self._parameters
         index, was_finished = follower.index, follower.is_finished
         stamp, pose = self._source.latest()
         if pose is not None and stamp != self._stamp:
             self._stamp = stamp
-            follower.update(self._handle.time(), pose[:3], pose.yaw)
+            tolerances = parameters.position_tolerance, parameters.yaw_tolerance
+            follower.update(self._handle.time(), pose[:3], pose.yaw, tolerances)
         if follower.index != index:
             self._handle.info(f"next is waypoint {follower.index}: {list(follower.goal)}")
         if follower.is_finished and not was_finished:
             self._handle.info("finished; the last waypoint remains the goal")
         x, y, z, yaw, _ = follower.goal
         self._publisher.publish(
-            goal_message(self._handle.stamp(), self._parameters.world_frame, x, y, z, yaw)
+            goal_message(self._handle.stamp(), parameters.world_frame, x, y, z, yaw)
         )
 
 

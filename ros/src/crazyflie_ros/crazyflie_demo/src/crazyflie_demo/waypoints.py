@@ -51,14 +51,11 @@ class WaypointList(ParameterType):
 class WaypointFollower:
     """The waypoint that is the goal.
 
-    A waypoint is reached within the tolerances (m and rad); after its seconds the next one is the
-    goal. The last one stays.
+    After the seconds of a waypoint that is reached, the next one is the goal. The last one stays.
     """
 
-    def __init__(self, waypoints: list[Waypoint], position_tolerance: float, yaw_tolerance: float):
+    def __init__(self, waypoints: list[Waypoint]):
         self._waypoints = waypoints
-        self.position_tolerance = position_tolerance
-        self.yaw_tolerance = yaw_tolerance
         self._reached: float | None = None
         self.index = 0
         self.is_finished = False
@@ -68,9 +65,20 @@ class WaypointFollower:
         """The present goal."""
         return self._waypoints[self.index]
 
-    def update(self, time: float, position: tuple[float, float, float], yaw: float) -> None:
-        """Advance to the next waypoint if it is due, at a time (s), position (m) and yaw (rad)."""
-        if self._reached is None and self._is_there(position, yaw):
+    def update(
+        self,
+        time: float,
+        position: tuple[float, float, float],
+        yaw: float,
+        tolerances: tuple[float, float],
+    ) -> None:
+        """Advance to the next waypoint if it is due, at a time (s), position (m) and yaw (rad).
+
+        A waypoint is reached within the tolerances of both (m and rad).
+        """
+        errors = math.dist(position, self.goal[:3]), abs(wrap_to_pi(yaw - self.goal.yaw))
+        is_there = all(error <= most for error, most in zip(errors, tolerances, strict=True))
+        if self._reached is None and is_there:
             self._reached = time
         if self._reached is None or time - self._reached < self.goal.seconds:
             return
@@ -79,8 +87,3 @@ class WaypointFollower:
             self._reached = None
         else:
             self.is_finished = True
-
-    def _is_there(self, position, yaw):
-        distance = math.dist(position, self.goal[:3])
-        turn = abs(wrap_to_pi(yaw - self.goal.yaw))
-        return distance <= self.position_tolerance and turn <= self.yaw_tolerance

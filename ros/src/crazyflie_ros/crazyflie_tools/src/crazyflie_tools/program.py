@@ -1,18 +1,39 @@
 """Common parts of all tools: arguments, a time limit, exit statuses, messages."""
 
 import argparse
-import math
 import os
 import sys
 import threading
 from collections.abc import Callable
+from typing import Any
 
 from crazyflie_link.address import DEFAULT_ADDRESS, Address
 from crazyflie_link.errors import AddressError, CrazyflieError
+from crazyflie_utils.parameters.types import POSITIVE
 
 FINE, FAILED = 0, 1  #: Exit statuses; argparse's own for wrong usage is 2.
 DEFAULT_URI = f"radio://0/80/2M/{DEFAULT_ADDRESS}"  #: Address of a new vehicle.
 LIMIT = 40.0  #: Timeout (s), longer than that of a connection.
+
+
+def argument(parse: Callable[[str], Any], expected: str = "") -> Callable[[str], Any]:
+    """Return the type of an argument, from a function that raises ValueError or `AddressError`.
+
+    The message says what was expected; by default it is that of the error.
+    """
+
+    def convert(text):
+        try:
+            return parse(text)
+        except (ValueError, AddressError) as error:
+            reason = f"{text!r}: expected {expected}" if expected else str(error)
+            raise argparse.ArgumentTypeError(reason) from None
+
+    return convert
+
+
+#: Type of a time, s.
+SECONDS = argument(lambda text: POSITIVE(float(text)), "a number of seconds above 0")
 
 
 def make_parser(
@@ -27,7 +48,7 @@ def make_parser(
     if has_uri:
         parser.add_argument(
             "--uri",
-            type=_address,
+            type=argument(Address.parse),
             default=DEFAULT_URI,
             help="address of the vehicle: radio://DONGLE/CHANNEL/RATE/ADDRESS or udp://HOST:PORT; "
             "by default %(default)s",
@@ -35,30 +56,12 @@ def make_parser(
     if has_timeout:
         parser.add_argument(
             "--timeout",
-            type=seconds,
+            type=SECONDS,
             default=LIMIT,
             metavar="SECONDS",
             help="time limit; by default %(default)g",
         )
     return parser
-
-
-def seconds(text: str) -> float:
-    """Return a number of seconds above 0; raise `argparse.ArgumentTypeError` for another text."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and value > 0.0):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a number of seconds above 0")
-    return value
-
-
-def _address(text):
-    try:
-        return Address.parse(text)
-    except AddressError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def run(name: str, work: Callable[[], None], limit: float | None, interrupted: int = FAILED) -> int:

@@ -3,7 +3,6 @@
 Modules that need cflib are imported when the arguments are valid, or where they depend on it.
 """
 
-import argparse
 import math
 import queue
 import time
@@ -12,8 +11,9 @@ import numpy as np
 
 import crazyflie_link
 from crazyflie_link.address import DEFAULT_ADDRESS, radio_address
-from crazyflie_link.errors import AddressError, NoAnswerError
-from crazyflie_tools.program import FINE, LIMIT, make_parser, run, seconds
+from crazyflie_link.errors import NoAnswerError
+from crazyflie_tools.program import FINE, LIMIT, SECONDS, argument, make_parser, run
+from crazyflie_utils.parameters.types import FINITE
 
 _CHECK_PERIOD = 0.1
 
@@ -29,7 +29,7 @@ def scan(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument(
         "--address",
-        type=_radio_address,
+        type=argument(lambda text: f"{radio_address(text):X}"),
         default=DEFAULT_ADDRESS,
         help="radio address to call; by default %(default)s",
     )
@@ -89,7 +89,10 @@ def set_param(arguments: list[str] | None = None) -> int:
     parser = make_parser("setParam", "Set a parameter of a vehicle, and print the confirmed value.")
     parser.add_argument("name", type=_name, metavar="GROUP.NAME", help="such as ring.effect")
     parser.add_argument(
-        "value", type=_number, metavar="VALUE", help="a number; one like -1e-3 only after --"
+        "value",
+        type=argument(_number, "a finite number"),
+        metavar="VALUE",
+        help="a number; one like -1e-3 only after --",
     )
     return _talk(parser, arguments, _set_param)
 
@@ -120,7 +123,7 @@ def console(arguments: list[str] | None = None) -> int:
     parser = make_parser("console", "Print the console of a vehicle's firmware.", has_timeout=False)
     parser.add_argument(
         "--duration",
-        type=seconds,
+        type=SECONDS,
         default=math.inf,
         metavar="SECONDS",
         help="time after which to end; by default at Ctrl-C",
@@ -155,13 +158,6 @@ def _talk(parser, arguments, work):
     return run(parser.prog, talk, options.timeout)
 
 
-def _radio_address(text):
-    try:
-        return f"{radio_address(text):X}"
-    except AddressError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-
-
 def _name(text):
     # GROUP/NAME is what the driver's update_params and ROS call it.
     return text.strip("/").replace("/", ".")
@@ -171,14 +167,7 @@ def _number(text):
     try:
         return int(text, 0)
     except ValueError:
-        pass
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a finite number")
-    return value
+        return FINITE(float(text))
 
 
 def _short(c_type):

@@ -9,7 +9,7 @@ from typing_extensions import override
 
 from crazyflie_controller.flight import GoToFlight, State
 from crazyflie_controller.go_to import GoToController, PidParameters
-from crazyflie_controller.pose_source import PoseParameters, PoseSource, pose
+from crazyflie_controller.pose_source import PoseParameters, PoseSource, heading_pose
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import Number
@@ -107,15 +107,16 @@ class ControllerNode(Node):
                 f"a goal names the frame {frame}; it is used as a goal in {world_frame}",
                 throttle=5.0,
             )
-        q = message.pose.orientation
-        if q.x == q.y == q.z == q.w == 0.0:
+        p, q = message.pose.position, message.pose.orientation
+        rotation = q.x, q.y, q.z, q.w
+        if not any(rotation):
             self._handle.warn(
                 "ignoring a goal whose orientation is (0, 0, 0, 0); expected a quaternion, "
                 "such as (0, 0, 0, 1)",
                 throttle=1.0,
             )
             return
-        self._flight.goal = pose(message.pose.position, q)
+        self._flight.goal = heading_pose((p.x, p.y, p.z), rotation)
 
     def _on_timer(self):
         before = self._flight.state

@@ -1,9 +1,7 @@
 """The pose of a vehicle from tf."""
 
-from geometry_msgs.msg import Point, Quaternion, Vector3
-
 from crazyflie_controller.go_to import HeadingPose
-from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_model.angles import Quaternion, Triple, rpy_from_quaternion
 from crazyflie_utils import NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.parameters.types import FRAME
 
@@ -26,7 +24,7 @@ class PoseSource:
     def __init__(self, handle: NodeHandle, parameters: PoseParameters):
         self._handle = handle
         self._parameters = parameters
-        self._lookup = handle.listen_to_transforms()
+        self._lookup = handle.listen_to_poses()
 
     def latest(self) -> tuple[float, HeadingPose] | tuple[None, None]:
         """Return stamp (s of ROS time) and latest pose in the world frame, or None twice."""
@@ -40,12 +38,9 @@ class PoseSource:
                 key="tf",
             )
             return None, None
-        transform = found.transform
-        return found.header.stamp.to_sec(), pose(transform.translation, transform.rotation)
+        return found.stamp * 1e-9, heading_pose(found.position, found.rotation)
 
 
-def pose(position: Point | Vector3, orientation: Quaternion) -> HeadingPose:
-    """Return the pose of a position and an orientation."""
-    q = orientation
-    yaw = rpy_from_quaternion(q.x, q.y, q.z, q.w)[2]
-    return HeadingPose(position.x, position.y, position.z, yaw)
+def heading_pose(position: Triple, rotation: Quaternion) -> HeadingPose:
+    """Return the pose of a position (m) and a rotation."""
+    return HeadingPose(*position, rpy_from_quaternion(*rotation)[2])

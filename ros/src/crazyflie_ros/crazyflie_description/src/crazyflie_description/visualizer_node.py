@@ -99,7 +99,7 @@ class VisualizerNode(Node[VisualizerParameters]):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._publisher = handle.publisher(parameters.markers_topic, MarkerArray, latch=True)
-        self._lookup = handle.listen_to_transforms()
+        self._lookup = handle.listen_to_poses()
         handle.subscribe(
             parameters.reference_topic,
             PositionVelocityYawStateStamped if parameters.has_yaw else PositionVelocityStateStamped,
@@ -125,15 +125,13 @@ class VisualizerNode(Node[VisualizerParameters]):
     def _extend_path(self):
         fixed, robot = self._parameters.fixed_frame, self._parameters.robot_frame
         try:
-            transform = self._lookup(fixed, robot)
+            pose = self._lookup(fixed, robot)
         except TransformError as error:
             self._handle.warn(
                 f"no transform {fixed} -> {robot}: {error}", throttle=5.0, key="no transform"
             )
             return False
-        position = transform.transform.translation
-        stamp = transform.header.stamp.to_sec()
-        return self._path.add(stamp, (position.x, position.y, position.z))
+        return self._path.add(pose.stamp * 1e-9, pose.position)
 
     def _markers(self):
         path = self._marker("path", Marker.LINE_STRIP, PATH_COLOUR)

@@ -89,13 +89,9 @@ class DeckRangerNode(Node[DeckRangerParameters]):
     """Publish the measurements of the sensors on a vehicle's deck."""
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        super().load_parameters(handle)
+    def register_callbacks(self, handle: NodeHandle) -> None:
         place = self._parameters.variables.index
         self._places = [place(sensor.log_variable) for sensor in self._parameters.sensors]
-
-    @override
-    def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = RangePublisher(handle, self._parameters)
         handle.subscribe(self._parameters.log_topic, GenericLogData, self._on_log)
 

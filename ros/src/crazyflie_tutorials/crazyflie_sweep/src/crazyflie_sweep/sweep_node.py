@@ -334,13 +334,9 @@ class VelocityServerNode(Node[VelocityServerParameters]):
     """Answer calls for velocities."""
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        super().load_parameters(handle)
-        self._random = random.Random(self._parameters.seed)
-
-    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
+        self._random = random.Random(parameters.seed)
         handle.advertise_service(parameters.random_service, Velocity, self._on_random)
         handle.advertise_service(parameters.oscillator_service, VelocityAt, self._on_oscillator)
 

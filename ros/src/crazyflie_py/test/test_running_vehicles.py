@@ -93,7 +93,7 @@ def test_a_parameter_of_the_real_firmware_is_kept_and_said_once(allcfs, caplog):
 @pytest.mark.parametrize("vehicle", [IdealVehicle, RosVehicle, SimulatedVehicle])
 def test_vehicles_of_missions_have_all_commands_of_scripts(vehicle):
     commands = {
-        "takeoff": "take_off",
+        "takeoff": "takeoff",
         "land": "land",
         "stop": "stop",
         "goTo": "go_to",

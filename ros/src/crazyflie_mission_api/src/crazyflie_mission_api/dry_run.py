@@ -91,7 +91,7 @@ class IdealVehicle(MissionVehicle):
         return not self.is_active
 
     @override
-    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
+    def takeoff(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
         if not self._may_plan("takeoff", group_mask):
             return done(None)
         if self.is_active:

@@ -111,7 +111,7 @@ class Commands(Protocol):
     to members of these groups.
     """
 
-    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
+    def takeoff(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
         """Climb straight up to a height (m) in about a duration (s), keeping the heading."""
 
     def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":

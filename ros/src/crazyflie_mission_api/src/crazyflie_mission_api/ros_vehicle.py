@@ -282,7 +282,7 @@ class ServiceCommands(Commands):
         self._emergency = emergency or f"{top}/emergency"
 
     @override
-    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
+    def takeoff(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
         return self.call("takeoff", srv.Takeoff, group_mask, height, seconds(duration))
 
     @override
@@ -359,7 +359,7 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
     # Commands.
 
     @override
-    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
+    def takeoff(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
         place = self.position()
         self._ground = 0.0 if place is None else place[2]
 
@@ -369,7 +369,7 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
                 yield self.call("update_params", srv.UpdateParams, [])
                 yield self._handle.set_param_later(f"{prefix(self.name)}/{_HIGH_LEVEL}", 1)
                 yield self.call("update_params", srv.UpdateParams, [_HIGH_LEVEL])
-            yield super(RosVehicle, self).take_off(height, duration, group_mask)
+            yield super(RosVehicle, self).takeoff(height, duration, group_mask)
 
         return in_turn(calls())
 

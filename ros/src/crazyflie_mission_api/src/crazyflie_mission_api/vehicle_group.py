@@ -60,10 +60,10 @@ class VehicleGroup(LandingGroup):
         # Stored first: vehicles that have begun to take off must be landed after any error.
         self._commanded.update({n: TimedTrajectory(c, self.time()) for n, c in climbs.items()})
 
-        def take_off(name):
-            return self._vehicles[name].take_off(height, duration(climbs[name]))
+        def begin(name):
+            return self._vehicles[name].takeoff(height, duration(climbs[name]))
 
-        failures = self._answers(take_off)
+        failures = self._answers(begin)
         for name, climb in climbs.items():
             # A takeoff server answers after some time, before the height is reached.
             self._commanded[name] = TimedTrajectory(climb, self.time())

@@ -43,6 +43,11 @@ def _number(value: Any) -> float:
     return float(value) if isinstance(value, numbers.Real) else math.nan
 
 
+def rate(value: Any) -> float:
+    """Return the rate (Hz) of ``timeHelper.sleepForRate``."""
+    return number("timeHelper.sleepForRate", "rateHz", value, 1e-3, 1e5)
+
+
 def byte(where: str, name: str, value: Any) -> int:
     """Return an integer from 0 to 255, as ids and masks are."""
     return integer(where, name, value, 0, 255)

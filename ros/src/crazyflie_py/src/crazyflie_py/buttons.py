@@ -11,7 +11,7 @@ import tty
 from collections.abc import Callable, Iterator, Sequence
 
 from crazyflie_demo.joystick import EVENT, Joystick
-from crazyflie_py.crazyflie import TimeHelper
+from crazyflie_py.swarm import TimeHelper
 
 _log = logging.getLogger(__name__)
 

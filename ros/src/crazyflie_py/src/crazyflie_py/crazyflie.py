@@ -1,4 +1,4 @@
-"""The vehicles and the clock as Crazyswarm's scripts see them: each vehicle, and all of them.
+"""The vehicles as Crazyswarm's scripts see them: each vehicle, and all of them.
 
 Names, arguments and defaults are Crazyswarm's. Angles are in rad unless a method says otherwise,
 lengths in m, times in s.
@@ -7,7 +7,7 @@ lengths in m, times in s.
 import functools
 import logging
 import operator
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -30,57 +30,13 @@ from crazyflie_mission_api.mission_vehicle import (
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_py import arguments as check
-from crazyflie_py.swarm import DEFAULT_COLOR, NullVisualizer, Order, Swarm, SwarmVehicle
+from crazyflie_py.swarm import DEFAULT_COLOR, Order, Swarm, SwarmVehicle, TimeHelper
 
 _log = logging.getLogger(__name__)
 
 __all__ = ["Crazyflie", "CrazyflieServer", "TimeHelper"]
 
 Array = NDArray[np.float64]
-
-
-class TimeHelper:
-    """The clock: of the simulation with --sim, otherwise ROS's.
-
-    Attributes
-    ----------
-    dt : float
-        Period of the simulation's steps, s; 0 without --sim.
-    visualizer : NullVisualizer
-        Visualizer of --sim; without --sim it does nothing.
-    crazyflies : sequence of Crazyflie
-    """
-
-    def __init__(self, swarm: Swarm, crazyflies: Sequence[object]):
-        self._swarm = swarm
-        self.visualizer: NullVisualizer = swarm.visualizer
-        self.crazyflies = crazyflies
-
-    @property
-    def dt(self) -> float:
-        """Period of the simulation's steps, s."""
-        return self._swarm.dt
-
-    def time(self) -> float:
-        """Return the time, s."""
-        return self._swarm.time()
-
-    def sleep(self, duration: float) -> None:
-        """Wait for a duration, s."""
-        self._swarm.sleep(check.number("timeHelper.sleep", "duration", duration))
-
-    def sleepForRate(self, rateHz: float) -> None:
-        """Wait, so that the calls of a loop are 1/rateHz apart."""
-        rate = check.number("timeHelper.sleepForRate", "rateHz", rateHz, 1e-3, 1e5)
-        self._swarm.sleep_for_rate(rate)
-
-    def isShutdown(self) -> bool:
-        """Return whether the script should end, as after Ctrl-C."""
-        return self._swarm.is_shutdown()
-
-    def nextPhase(self) -> None:
-        """Start the next file of --writecsv."""
-        self._swarm.next_phase()
 
 
 class ScriptCommands:
@@ -92,8 +48,8 @@ class ScriptCommands:
         self._vehicles = swarm.vehicles if vehicle is None else [vehicle]
         self._name = "allcfs" if vehicle is None else vehicle.name  # In messages.
 
-    def _command(self, name: str, send: Callable[[Any], Any], *facts: Any, **options: Any) -> None:
-        self._swarm.command(Order(name, send, *facts, **options), self._vehicle)
+    def _command(self, name: str, *arguments: Any, **facts: Any) -> None:
+        self._swarm.command(Order(name, arguments, **facts), self._vehicle)
 
     def _send(self, setpoint: Setpoint) -> None:
         for vehicle in self._vehicles:
@@ -102,7 +58,8 @@ class ScriptCommands:
     def _where(self, method: str) -> str:
         return f"{self._name}.{method}"
 
-    def _mask(self, where: str, mask: int) -> int:
+    def _mask(self, method: str, mask: int) -> int:
+        where = self._where(method)
         mask = check.byte(where, "groupMask", mask)
         groups = functools.reduce(operator.or_, (vehicle.groups for vehicle in self._vehicles))
         # A script may name any groups of one vehicle.
@@ -127,50 +84,39 @@ class ScriptCommands:
         groupMask : int
             0, or the groups of the command; see `Crazyflie.setGroupMask`.
         """
-        height, seconds, mask = self._climb("takeoff", targetHeight, duration, groupMask)
-        self._command(
-            "takeoff",
-            lambda vehicle: vehicle.take_off(height, seconds, mask),
-            mask,
-            flies=True,
-            goal=(np.nan, np.nan, height),
-            duration=seconds,
-        )
+        self._climb("takeoff", targetHeight, duration, groupMask, flies=True)
 
     def land(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
         """Fly straight down to a height and stop the motors there; see `takeoff`."""
-        height, seconds, mask = self._climb("land", targetHeight, duration, groupMask)
-        self._command(
-            "land", lambda vehicle: vehicle.land(height, seconds, mask), mask, duration=seconds
-        )
+        self._climb("land", targetHeight, duration, groupMask, flies=False)
 
-    def _climb(self, method, height, duration, mask):
-        where = self._where(method)
-        return (
-            check.number(where, "targetHeight", height),
-            check.number(where, "duration", duration, 0.0),
-            self._mask(where, mask),
+    def _climb(self, name, height, duration, mask, flies):
+        where = self._where(name)
+        height = check.number(where, "targetHeight", height)
+        seconds = check.number(where, "duration", duration, 0.0)
+        self._command(
+            name,
+            height,
+            seconds,
+            group_mask=self._mask(name, mask),
+            flies=flies,
+            goal=(np.nan, np.nan, height) if flies else None,
+            duration=seconds,
         )
 
     def stop(self, groupMask: int = 0) -> None:
         """Stop the motors: after a landing, as a vehicle in the air falls."""
-        mask = self._mask(self._where("stop"), groupMask)
-        self._command("stop", lambda vehicle: vehicle.stop(mask), mask)
+        self._command("stop", group_mask=self._mask("stop", groupMask))
 
     def _go_to(self, goal, yaw, duration, relative, mask):
         where = self._where("goTo")
         place, turn = check.triple(where, "goal", goal), check.number(where, "yaw", yaw)
         seconds = check.number(where, "duration", duration, 0.0)
-        mask = self._mask(where, mask)
+        mask = self._mask("goTo", mask)
         turn = self._vehicles[0].checked_yaw(turn)
         move = Move(place, turn, seconds, bool(relative))
-        self._command(
-            "go_to",
-            lambda vehicle: vehicle.go_to(move, mask),
-            mask,
-            flies=True,
-            goal=None if relative else place,
-        )
+        goal = None if relative else place
+        self._command("go_to", move, group_mask=mask, flies=True, goal=goal)
 
     def startTrajectory(
         self,
@@ -196,19 +142,14 @@ class ScriptCommands:
             See `Crazyflie.setGroupMask`.
         """
         where = self._where("startTrajectory")
-        mask = self._mask(where, groupMask)
+        mask = self._mask("startTrajectory", groupMask)
         flight = Playback(
             check.byte(where, "trajectoryId", trajectoryId),
             check.number(where, "timescale", timescale, 1e-3, 1e3),
             bool(reverse),
             bool(relative),
         )
-        self._command(
-            "start_trajectory",
-            lambda vehicle: vehicle.start_trajectory(flight, mask),
-            mask,
-            flies=True,
-        )
+        self._command("start_trajectory", flight, group_mask=mask, flies=True)
 
     def notifySetpointsStop(self, remainValidMillisecs: int = 100, groupMask: int = 0) -> None:
         """Return from setpoints (cmd...) to commands such as `land`.
@@ -222,20 +163,16 @@ class ScriptCommands:
         """
         where = self._where("notifySetpointsStop")
         remain = check.integer(where, "remainValidMillisecs", remainValidMillisecs, 0, 2**31 - 1)
-        mask = self._mask(where, groupMask)
-        self._command(
-            "notify_setpoints_stop",
-            lambda vehicle: vehicle.notify_setpoints_stop(remain, mask),
-            mask,
-        )
+        mask = self._mask("notifySetpointsStop", groupMask)
+        self._command("notify_setpoints_stop", remain, group_mask=mask)
 
     def emergency(self) -> None:
         """Stop the motors at once; commands have no effect until a restart."""
-        self._command("emergency", lambda vehicle: vehicle.emergency())
+        self._command("emergency")
 
     def arm(self, arm: bool = True) -> None:
         """Arm, or disarm."""
-        self._command("arm", lambda vehicle: vehicle.arm(bool(arm)))
+        self._command("arm", bool(arm))
 
     def setParam(self, name: str, value: float) -> None:
         """Set a firmware parameter, GROUP/NAME or GROUP.NAME."""
@@ -312,9 +249,7 @@ class Crazyflie(ScriptCommands):
             replace(piece, yaw=[*map(self._vehicle.checked_yaw, piece.yaw)])
             for piece in check.pieces(where, trajectory)
         ]
-        self._command(
-            "upload_trajectory", lambda vehicle: vehicle.upload_trajectory(number, offset, pieces)
-        )
+        self._command("upload_trajectory", number, offset, pieces)
 
     # State.
 
@@ -477,6 +412,7 @@ class CrazyflieServer(ScriptCommands):
         super().__init__(swarm)
         #: In the order of the fleet file.
         self.crazyflies = [Crazyflie(swarm, vehicle) for vehicle in swarm.vehicles]
+        swarm.crazyflies = self.crazyflies
         self.crazyfliesById = _Found({cf.id: cf for cf in self.crazyflies})
         self.crazyfliesByName = _Found({cf.name: cf for cf in self.crazyflies})
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from crazyflie_py import fleet
 from crazyflie_py.buttons import Input
-from crazyflie_py.crazyflie import CrazyflieServer, TimeHelper
-from crazyflie_py.swarm import Swarm
+from crazyflie_py.crazyflie import CrazyflieServer
+from crazyflie_py.swarm import Swarm, TimeHelper
 
 
 def build_argparser(
@@ -83,7 +83,7 @@ class Crazyswarm:
         swarm = _swarm(crazyflies_yaml, options)
         atexit.register(swarm.close)
         self.allcfs = CrazyflieServer(swarm)
-        self.timeHelper = TimeHelper(swarm, self.allcfs.crazyflies)
+        self.timeHelper: TimeHelper = swarm
         self.input = Input(self.timeHelper, options.sim)
 
 

@@ -16,6 +16,7 @@ from crazyflie_mission_api import Fleet, MissionError
 from crazyflie_mission_api.fleet import catch_signals
 from crazyflie_mission_api.mission_vehicle import never
 from crazyflie_mission_api.ros_vehicle import ALL_OF_FLEET, ServiceCommands, common_services
+from crazyflie_py import arguments as check
 from crazyflie_py import fleet as fleet_files
 from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.ros_connection import ScriptConnection, running_vehicles
@@ -40,7 +41,6 @@ class RosSwarm(Swarm):
     is given. Without a master or vehicles, the script ends with the reason and status 1.
     """
 
-    dt = 0.0
     vehicles: Sequence[ScriptVehicle]
 
     def __init__(
@@ -150,23 +150,21 @@ class RosSwarm(Swarm):
 
     @override
     def sleep(self, duration: float) -> None:
+        duration = check.number("timeHelper.sleep", "duration", duration)
         clock = self._connection.fleet.clock
         clock.wait_until(never, clock.time() + duration)
 
     @override
-    def sleep_for_rate(self, rate: float) -> None:
+    def sleepForRate(self, rateHz: float) -> None:
+        rate = check.rate(rateHz)
         now = self.time()
         wake = max(self._rates.get(rate, now) + 1.0 / rate, now)
         self.sleep(wake - now)
         self._rates[rate] = wake
 
     @override
-    def is_shutdown(self) -> bool:
+    def isShutdown(self) -> bool:
         return self._process.exit_status is not None
-
-    @override
-    def next_phase(self) -> None:
-        pass
 
     # End.
 

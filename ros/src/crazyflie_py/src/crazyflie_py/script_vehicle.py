@@ -23,7 +23,7 @@ from crazyflie_msgs.msg import FlightStatus, VehicleStatus
 from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.ros_connection import ScriptConnection
 from crazyflie_py.simulated_parameters import SimulatedParameters
-from crazyflie_py.swarm import Order, ParameterStore, ScriptState
+from crazyflie_py.swarm import STATUS_FIELDS, Order, ParameterStore, ScriptState
 from crazyflie_utils import ParameterError
 
 _STATE_TIMEOUT = 10.0  #: Timeout of a pose (s of the vehicles' time).
@@ -291,15 +291,11 @@ class ScriptVehicle:
             is_flying = self.vehicle.flight_status.state not in _NOT_FLYING
             ready = VehicleStatus.CAN_BE_ARMED | VehicleStatus.ARMED | VehicleStatus.CAN_FLY
             supervisor, battery = ready | is_flying * VehicleStatus.FLYING, math.nan
-        names = ("num_rx_broadcast", "num_tx_broadcast", "num_rx_unicast", "num_tx_unicast")
         return {
             "id": self.name,
             "timestamp_sec": status.header.stamp.secs,
             "timestamp_nsec": status.header.stamp.nsecs,
             "supervisor": supervisor,
             "battery": battery,
-            "pm_state": getattr(status, "pm_state", 0),
-            "rssi": status.rssi,
-            "latency_unicast": round(1e3 * status.latency) if status.latency > 0.0 else 0,
-            **{name: getattr(status, name, 0) for name in names},
+            **{name: getattr(status, name) for name in STATUS_FIELDS},
         }

@@ -28,7 +28,7 @@ from crazyflie_model.polynomials import Goal
 from crazyflie_model.units import GRAVITY
 from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.simulated_parameters import SimulatedParameters
-from crazyflie_py.swarm import ScriptState
+from crazyflie_py.swarm import STATUS_FIELDS, ScriptState
 from crazyflie_py.util import clamp_norm
 
 Array = NDArray[np.float64]
@@ -189,17 +189,13 @@ class SimulatedVehicle(IdealVehicle):
         seconds = math.floor(self._time())
         # Bits as supervisor.info of the firmware has them.
         bits = 0b1001 | self._armed << 1 | self.is_flying << 4 | self._locked << 6
-        counts = ("num_rx_broadcast", "num_tx_broadcast", "num_rx_unicast", "num_tx_unicast")
         return {
             "id": self.name,
             "timestamp_sec": seconds,
             "timestamp_nsec": int((self._time() - seconds) * 1e9),
             "supervisor": bits,
             "battery": 4.2,
-            "pm_state": 0,
-            "rssi": 0,
-            "latency_unicast": 0,
-            **dict.fromkeys(counts, 0),
+            **dict.fromkeys(STATUS_FIELDS, 0),
         }
 
     def next_motion(self, dt: float) -> SimulatedMotion:

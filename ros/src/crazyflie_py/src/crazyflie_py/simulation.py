@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from crazyflie_fleet.fleet_config import close_pairs
+from crazyflie_py import arguments as check
 from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.simulated_vehicle import SimulatedVehicle
 from crazyflie_py.swarm import Order, Swarm
@@ -55,6 +56,7 @@ class Simulation(Swarm):
         return self._steps * self.dt
 
     def sleep(self, duration: float) -> None:
+        duration = check.number("timeHelper.sleep", "duration", duration)
         # Time passes in whole steps; the remainder of a sleep is added to the next one.
         total = max(0.0, duration) + self._residual
         steps = math.floor(total / self.dt + _ROUNDING)
@@ -62,11 +64,8 @@ class Simulation(Swarm):
         for _ in range(steps):
             self._step()
 
-    def sleep_for_rate(self, rate: float) -> None:
-        self.sleep(1.0 / rate)
-
-    def is_shutdown(self) -> bool:
-        return False
+    def sleepForRate(self, rateHz: float) -> None:
+        self.sleep(1.0 / check.rate(rateHz))
 
     def _step(self):
         time = self.time()
@@ -105,7 +104,7 @@ class Simulation(Swarm):
 
     # The ends.
 
-    def next_phase(self) -> None:
+    def nextPhase(self) -> None:
         self._write_phase()
         self._phase += 1
 

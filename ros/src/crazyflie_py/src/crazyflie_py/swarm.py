@@ -2,11 +2,11 @@
 
 `crazyflie_py.crazyflie` checks arguments. Commands are those of the vehicles of missions, see
 `crazyflie_mission_api.mission_vehicle`; two swarms pass them on: `crazyflie_py.simulation` (--sim)
-and `crazyflie_py.ros_swarm`.
+and `crazyflie_py.ros_swarm`. A swarm is the scripts' clock, too.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from crazyflie_mission_api.mission_vehicle import Setpoint
@@ -16,6 +16,17 @@ from crazyflie_py.fleet import FleetVehicle
 
 #: Colour in which Crazyswarm draws vehicles: red, green and blue, 0 to 1.
 DEFAULT_COLOR = (0.5, 0.5, 1.0)
+
+#: Keys of crazyswarm2's status that are fields of crazyflie_msgs/VehicleStatus; 0 with --sim.
+STATUS_FIELDS = (
+    "pm_state",
+    "rssi",
+    "latency_unicast",
+    "num_rx_broadcast",
+    "num_tx_broadcast",
+    "num_rx_unicast",
+    "num_tx_unicast",
+)
 
 
 class ScriptState(NamedTuple):
@@ -33,13 +44,18 @@ class ScriptState(NamedTuple):
 class Order(NamedTuple):
     """A command of a script, with the data that a swarm checks and records before it sends it."""
 
-    name: str  #: Name of the service, for errors: "go_to".
-    send: Callable[[Any], Any]  #: Calls the method of a `MissionVehicle` or of `Commands`.
+    name: str  #: Name of the method of a `MissionVehicle`, and of the service: "go_to".
+    arguments: Sequence[Any] = ()  #: Arguments of the method before the mask.
     group_mask: int = 0
     flies: bool = False  #: Whether a flight may begin, which the end of the script has to end.
     #: Goal of the command, if it must be in the fence (m); NaN: unchanged.
     goal: Triple | None = None
     duration: float = -math.inf  #: Duration of its takeoff or landing (s).
+
+    def send(self, commands: Any) -> Any:
+        """Call the method of a `MissionVehicle` or of `Commands`; return its result."""
+        groups = {"group_mask": self.group_mask} if self.group_mask else {}
+        return getattr(commands, self.name)(*self.arguments, **groups)
 
 
 class ParameterStore(Protocol):
@@ -104,30 +120,38 @@ class SwarmVehicle(Protocol):
         """Return the status with the keys of crazyswarm2's Crazyflie.get_status."""
 
 
-class Swarm(Protocol):
-    """All vehicles and the clock."""
+class TimeHelper(Protocol):
+    """``timeHelper``, the clock: of the simulation with --sim, otherwise ROS's."""
 
-    dt: float  #: Period of the clock's steps, s; of the real clock 0.
-    vehicles: Sequence[SwarmVehicle]  #: At least one vehicle; ids and names are different.
+    dt: float = 0.0  #: Period of the simulation's steps, s; 0 without --sim.
     visualizer: NullVisualizer  #: That of --sim; otherwise one that draws nothing.
-
-    def command(self, order: Order, vehicle: Any) -> None:
-        """Send a command to a vehicle, or to all (None); returns when it is accepted."""
+    crazyflies: Sequence[Any] = ()  #: Those of `CrazyflieServer`.
 
     def time(self) -> float:
         """Return the time, s."""
 
     def sleep(self, duration: float) -> None:
-        """Return after a duration (s) of the vehicles' time."""
+        """Wait for a duration (s) of the vehicles' time."""
 
-    def sleep_for_rate(self, rate: float) -> None:
-        """Sleep until 1/rate (s) after the return of the last call with this rate (Hz)."""
+    def sleepForRate(self, rateHz: float) -> None:
+        """Wait, so that the calls of a loop are 1/rateHz apart."""
 
-    def is_shutdown(self) -> bool:
-        """Return whether the script should end."""
+    def isShutdown(self) -> bool:
+        """Return whether the script should end, as after Ctrl-C."""
+        return False
 
-    def next_phase(self) -> None:
-        """Begin the next file of a record, if there is one."""
+    def nextPhase(self) -> None:
+        """Start the next file of --writecsv."""
+        return
+
+
+class Swarm(TimeHelper, Protocol):
+    """All vehicles and the clock."""
+
+    vehicles: Sequence[SwarmVehicle]  #: At least one vehicle; ids and names are different.
+
+    def command(self, order: Order, vehicle: Any) -> None:
+        """Send a command to a vehicle, or to all (None); returns when it is accepted."""
 
     def close(self) -> None:
         """Land and release the vehicles; called once at the end, also after an exception."""

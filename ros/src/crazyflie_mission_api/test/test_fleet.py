@@ -9,6 +9,7 @@ from std_msgs.msg import String
 
 from crazyflie_driver.srv import StartTrajectory, StartTrajectoryResponse
 from crazyflie_mission_api import Bounds, Fleet, MissionError, plan
+from crazyflie_mission_api.ros_vehicle import flown_vehicles
 
 NAMES = ["cf1", "cf2"]
 
@@ -234,6 +235,20 @@ def test_all_vehicles_of_a_driver_start_by_its_service_for_all(process):
         fleet["cf1"].follow(path, relative=True)
         assert vehicles[0].called()[-1] == "start_trajectory"
         assert len(requests) == 1
+
+
+def test_vehicles_of_a_graph_are_found_by_their_services():
+    services = {
+        **dict.fromkeys(["/cf1/go_to", "/cf1/takeoff", "/cf1/upload_trajectory"], "/driver"),
+        **dict.fromkeys(["/cf2/high_level/go_to", "/cf2/high_level/takeoff"], "/cf2/high_level"),
+        "/cf2/high_level/upload_trajectory": "/cf2/high_level",
+        # One without a namespace.
+        **dict.fromkeys(["/high_level/go_to", "/high_level/takeoff"], "/high_level"),
+        "/high_level/upload_trajectory": "/high_level",
+        "/all/high_level/go_to": "/fleet/services",
+        "/driver/all/go_to": "/driver",
+    }
+    assert flown_vehicles(services) == {"cf1": "/driver", "cf2": "", "/": ""}
 
 
 def test_a_fence_counts(process, controlled, driven):

@@ -31,6 +31,7 @@ from crazyflie_mission_api.ros_vehicle import (
     RosVehicleState,
     SynchronizedStart,
     common_services,
+    flown_vehicles,
     prefix,
 )
 from crazyflie_mission_api.trajectories import TimedTrajectory
@@ -259,7 +260,7 @@ class Fleet(VehicleGroup):
 
     def _place_of_other(self, name):
         if name not in self._others:
-            how = _how_seen(self._handle, name, self._handle.service_nodes())
+            how = _how_seen(self._handle, name, flown_vehicles(self._handle.service_nodes()))
             self._others[name] = RosVehicleState(name, self._handle, *how)
             if buffer := _buffer(self._handle, name):
                 self._buffers[name] = buffer
@@ -315,8 +316,10 @@ def _connect(process, handle, names, timeout):
     synchronized_start = SynchronizedStart(handle)
     while missing:
         services = handle.service_nodes()
+        drivers = flown_vehicles(services)
         for name in list(missing):
-            vehicle = _vehicle(process, handle, name, services, synchronized_start)
+            how = _how_seen(handle, name, drivers)
+            vehicle = _vehicle(process, handle, name, services, synchronized_start, how)
             if vehicle is not None:
                 found[name] = vehicle
                 missing.remove(name)
@@ -339,22 +342,22 @@ def _connect(process, handle, names, timeout):
     return [found[name] for name in names]
 
 
-def _how_seen(handle, name, services):
+def _how_seen(handle, name, drivers):
     """Return the arguments of `RosVehicleState` for a vehicle: uses_driver, frames, has_yaw."""
     top = prefix(name)
-    if f"{top}/high_level/go_to" in services:
+    driver = drivers.get(name)
+    if driver == "":
         has_yaw = handle.get_param(f"{top}/high_level/reference/yaw", BOOLEAN, False)
         return False, _frames(handle, f"{top}/high_level"), has_yaw
-    driver = services.get(f"{top}/upload_trajectory")
-    if driver is not None and services.get(f"{top}/takeoff") == driver:
+    if driver is not None:
         return True, (handle.get_param(f"{driver}/frames/fixed", FRAME, "world"), name), True
     return False, None, topic_types(handle).get(f"{top}/ref") == _YAW_STATE
 
 
-def _vehicle(process, handle, name, services, synchronized_start):
+def _vehicle(process, handle, name, services, synchronized_start, how):
     top = prefix(name)
     commander = f"{top}/high_level"
-    uses_driver, frames, has_yaw = _how_seen(handle, name, services)
+    uses_driver, frames, has_yaw = how
     if uses_driver:
         return RosVehicle(name, handle, top, None, frames)
     if f"{commander}/go_to" not in services:

@@ -252,25 +252,37 @@ class BroadcastStart:
             forward(call(), answer)
 
 
+def flown_vehicles(services: Mapping[str, str]) -> dict[str, str]:
+    """Return the vehicles with services for high-level commands: name to the driver's node.
+
+    It is empty for a vehicle of a `HighLevelNode`. ``services`` are the names of all, to the nodes
+    that offer them.
+    """
+    found = {}
+    for service, node in services.items():
+        top, _, last = service.rpartition("/")
+        above, _, own = top.rpartition("/")
+        if own == HIGH_LEVEL and last == "go_to":
+            found[above] = ""
+        elif own != HIGH_LEVEL and last == "upload_trajectory":
+            if services.get(f"{top}/takeoff") == node:
+                found.setdefault(top, node)
+    return {top.strip("/") or "/": node for top, node in found.items() if top != "/all"}
+
+
 def common_services(services: Mapping[str, str], names: Collection[str]) -> str | None:
     """Return the namespace of services for exactly these vehicles, if there is one.
 
-    ``services`` are the names of all, to the nodes that offer them.
+    ``services`` are as for `flown_vehicles`.
     """
-    fleet = {s.split("/")[1] for s in services if s.endswith(f"/{HIGH_LEVEL}/go_to")} - {"all"}
-    if fleet:
-        is_there = f"/all/{HIGH_LEVEL}/go_to" in services and fleet == {*names}
-        return ALL_OF_FLEET if is_there else None
-    drivers = {
-        s.rpartition("/")[0].strip("/"): node
-        for s, node in services.items()
-        if s.endswith("/upload_trajectory")
-    }
-    nodes = {*drivers.values()}
-    if {*drivers} == {*names} and len(nodes) == 1:
-        top = f"{nodes.pop()}/all"
-        return top if f"{top}/go_to" in services else None
-    return None
+    nodes = flown_vehicles(services)
+    if "" in nodes.values():
+        nodes = {name: node for name, node in nodes.items() if not node}
+    if {*nodes} != {*names} or len({*nodes.values()}) > 1:
+        return None
+    (node,) = {*nodes.values()}
+    top = f"{node}/all" if node else ALL_OF_FLEET
+    return top if f"{top}/go_to" in services else None
 
 
 class ServiceCommands(Commands):

@@ -4,6 +4,7 @@ import argparse
 import math
 import re
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,20 +13,28 @@ from std_msgs.msg import String
 from typing_extensions import override
 
 from crazyflie_fleet.high_level_services import HIGH_LEVEL
+from crazyflie_fleet.vehicle_nodes import PLACE
 from crazyflie_mission_api import Fleet, MissionError
 from crazyflie_mission_api.fleet import catch_signals
 from crazyflie_mission_api.mission_vehicle import never
-from crazyflie_mission_api.ros_vehicle import ALL_OF_FLEET, ServiceCommands, common_services
+from crazyflie_mission_api.ros_vehicle import (
+    ALL_OF_FLEET,
+    ServiceCommands,
+    common_services,
+    flown_vehicles,
+)
 from crazyflie_py import arguments as check
 from crazyflie_py import fleet as fleet_files
 from crazyflie_py.fleet import FleetVehicle
-from crazyflie_py.ros_connection import ScriptConnection, running_vehicles
-from crazyflie_py.script_vehicle import ScriptVehicle
+from crazyflie_py.script_vehicle import ScriptConnection, ScriptVehicle
 from crazyflie_py.separation_watch import SeparationWatch
 from crazyflie_py.swarm import NullVisualizer, Order, Swarm
+from crazyflie_utils import NodeHandle
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.node import Process
+from crazyflie_utils.parameters.types import Integer
 
+_SEARCH_LIMIT = 5.0  #: Timeout of the search for vehicles (s of the machine's clock).
 _FIND_LIMIT = 10.0  #: Timeout of the search for the vehicles of a file (s, machine's clock).
 _WATCH_PERIOD = 0.05  #: Period of the checks of distances, as in a fleet (s).
 _LANDING_LIMIT = 15.0  #: Timeout of landings that the script has begun, at its end (s).
@@ -194,6 +203,34 @@ class RosSwarm(Swarm):
                 fleet.adopt(each.name)
         # The vehicles land as after an error, whatever their distances.
         fleet.__exit__(RuntimeError, None, None)
+
+
+def running_vehicles(handle: NodeHandle) -> list[str]:
+    """Return the names of the running vehicles: in the order of their fleet file, then by number.
+
+    Raises
+    ------
+    MissionError
+        No vehicle is running.
+    """
+    end = time.monotonic() + _SEARCH_LIMIT
+    while time.monotonic() < end:
+        if names := flown_vehicles(handle.service_nodes()).keys() - {"/"}:
+            places = {
+                name: handle.get_param(f"/{name}/{PLACE}", Integer(0, 1000), 1000) for name in names
+            }
+            return sorted(names, key=lambda name: (places[name], _number_key(name)))
+        time.sleep(0.1)
+    raise MissionError(
+        f"no vehicle is running: for {_SEARCH_LIMIT:g} s there was no service "
+        f"/NAME/{HIGH_LEVEL}/go_to "
+        "or /NAME/upload_trajectory; expected, for example, roslaunch crazyflie_examples "
+        "sw_swarm.launch, or a vehicle of crazyflie_driver; or the option --sim"
+    )
+
+
+def _number_key(name):
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 
 def ids_of(names: list[str]) -> list[int]:

@@ -1,12 +1,15 @@
 """A running vehicle of a script: checks of its commands, its parameters and its state."""
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from typing import Any
 
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import FirmwareNumber
 from crazyflie_fleet.separation import LOOK_AHEAD
+from crazyflie_mission_api import Fleet
 from crazyflie_mission_api.mission_vehicle import (
     AttitudeSetpoint,
     MotorsOffSetpoint,
@@ -21,11 +24,11 @@ from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.limits import LEVEL_AGE
 from crazyflie_msgs.msg import FlightStatus, VehicleStatus
 from crazyflie_py.fleet import FleetVehicle
-from crazyflie_py.ros_connection import ScriptConnection
 from crazyflie_py.simulated_parameters import SimulatedParameters
 from crazyflie_py.swarm import STATUS_FIELDS, Order, ParameterStore, ScriptState
-from crazyflie_utils import ParameterError
+from crazyflie_utils import NodeHandle, ParameterError
 
+_ANSWER_LIMIT = 15.0  #: Timeout of the answer to a command (s of the machine's clock).
 _STATE_TIMEOUT = 10.0  #: Timeout of a pose (s of the vehicles' time).
 _HOLD_DURATION = 0.8  #: Time in which a held vehicle stops (s).
 _VELOCITY_SPAN = 0.2  #: Longest time between the two poses of a velocity (s).
@@ -57,6 +60,46 @@ def avoidance_parameters(settings: AvoidanceSettings) -> dict[str, float]:
         values[f"colAv.bboxMin{axis}"] = max(low, -_FIRMWARE_INFINITY)
         values[f"colAv.bboxMax{axis}"] = min(high, _FIRMWARE_INFINITY)
     return values
+
+
+class CommandRefusedError(RuntimeError):
+    """A vehicle refuses a command, or has not answered; the text names it and the reason."""
+
+
+class ScriptConnection:
+    """Handle and fleet that all vehicles of a script share."""
+
+    def __init__(self, handle: NodeHandle, fleet: Fleet, is_unchecked: bool):
+        self.handle = handle
+        self.fleet = fleet
+        self.is_unchecked = is_unchecked  #: Whether refusals are only warnings.
+        self.said: set[str] = set()  #: See `SimulatedParameters`.
+
+    def refuse(self, text: str) -> None:
+        """Raise `CommandRefusedError`; with --unchecked warn."""
+        if not self.is_unchecked:
+            raise CommandRefusedError(f"{text}; with --unchecked this is a warning")
+        self.handle.warn(text)
+
+    def finish(
+        self,
+        what: str,
+        calls: Mapping[str, "Future[Any]"],
+        has_begun: Callable[[str], bool] = lambda name: False,
+    ) -> None:
+        """Wait for the answers of calls, by name of the vehicle, or until each has begun."""
+        end = time.monotonic() + _ANSWER_LIMIT
+
+        def waiting():
+            return [name for name, call in calls.items() if not call.done() and not has_begun(name)]
+
+        self.fleet.clock.wait_until(lambda: not waiting() or time.monotonic() > end, math.inf)
+        failures = {name: f"no answer for {_ANSWER_LIMIT:g} s" for name in waiting()}
+        for name, call in calls.items():
+            if call.done() and call.exception() is not None:
+                failures[name] = str(call.exception())
+        if failures:
+            self.refuse("; ".join(f"{name}: {what}: {text}" for name, text in failures.items()))
 
 
 class FirmwareParameters:

@@ -7,8 +7,7 @@ import numpy as np
 
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
 from crazyflie_mission_api.ros_vehicle import TimedPose, velocity_between
-from crazyflie_py.ros_connection import ScriptConnection
-from crazyflie_py.script_vehicle import ScriptVehicle
+from crazyflie_py.script_vehicle import ScriptConnection, ScriptVehicle
 
 _SHORTEST_SPAN = 0.02  #: Least time between two poses for a velocity (s).
 _LONGEST_SPAN = 0.3  #: Age of the first pose above which it is not used for a velocity (s).

@@ -115,6 +115,12 @@ def status(process, name, refusal):
     process.publish(f"/{name}/in_flight_flight_status", message)
 
 
+def test_a_group_takes_off_whatever_the_others_would_do(swarm):
+    status(swarm.process, "cf2", "the battery has 3.0 V")
+    swarm.call("/all/high_level/takeoff", srv.TakeoffRequest(ODD, 0.6, seconds(2.0)))
+    assert swarm.heights() == pytest.approx([0.6, 0.0, 0.6], abs=0.05)
+
+
 def test_a_fleet_that_has_just_started_takes_off_as_soon_as_all_would(swarm):
     late = "states on state are 0.6 s old when they come"
     status(swarm.process, "cf2", late)

@@ -104,7 +104,7 @@ class FleetServicesNode(Node):
     # Takeoffs.
 
     def _on_takeoff(self, service, service_type, request):
-        if getattr(request, "group_mask", 0):
+        if getattr(request, "groupMask", 0):
             # Only the nodes of the vehicles know their groups.
             return self._call_all(service, service_type, request)
         takeoff = _Call(service, service_type, request)

@@ -18,18 +18,19 @@ from typing_extensions import override
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import BUFFER
 from crazyflie_fleet.high_level_node import HighLevelNode
+from crazyflie_fleet.high_level_services import START_TOPIC
 from crazyflie_fleet.mission_watch import MISSION_PERIOD, MISSION_TOPIC, Claim, MissionWatch
 from crazyflie_mission_api import observer
 from crazyflie_mission_api.dry_run import dry_run
 from crazyflie_mission_api.group_state import Obstacle, Rules
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
-from crazyflie_mission_api.mission_vehicle import Clock
+from crazyflie_mission_api.mission_vehicle import Clock, Playback, done
 from crazyflie_mission_api.ros_vehicle import (
     ALL_OF_FLEET,
-    BroadcastStart,
+    JointStart,
     RosVehicle,
     RosVehicleState,
-    SynchronizedStart,
+    ServiceCommands,
     common_services,
     flown_vehicles,
     prefix,
@@ -313,13 +314,12 @@ def _connect(process, handle, names, timeout):
     end = time.monotonic() + timeout
     missing = list(names)
     found = {}
-    synchronized_start = SynchronizedStart(handle)
     while missing:
         services = handle.service_nodes()
         drivers = flown_vehicles(services)
         for name in list(missing):
             how = _how_seen(handle, name, drivers)
-            vehicle = _vehicle(process, handle, name, services, synchronized_start, how)
+            vehicle = _vehicle(process, handle, name, services, how)
             if vehicle is not None:
                 found[name] = vehicle
                 missing.remove(name)
@@ -334,12 +334,29 @@ def _connect(process, handle, names, timeout):
             )
         if missing:
             time.sleep(_POLL)
-    top = common_services(services, names)
-    if top is not None and top != ALL_OF_FLEET:
-        broadcast = BroadcastStart(handle, top, names)
-        for vehicle in found.values():
-            vehicle.broadcast = broadcast
-    return [found[name] for name in names]
+    vehicles = [found[name] for name in names]
+    _start_together(handle, vehicles, common_services(services, names))
+    return vehicles
+
+
+def _start_together(handle, vehicles, top):
+    """Give vehicles what starts them together; ``top`` is as from `common_services`."""
+    publisher = handle.publisher(START_TOPIC, String)
+
+    def publish(starting):
+        publisher.publish(String(" ".join(vehicle.top for vehicle in starting)))
+        return [done(None) for _ in starting]
+
+    def broadcast(starting):
+        # All vehicles of a driver; fewer are called one by one.
+        if len(starting) == len(vehicles):
+            return [ServiceCommands(handle, top).start_trajectory(Playback(0))] * len(vehicles)
+        return [vehicle.start_trajectory(Playback(0)) for vehicle in starting]
+
+    by_driver = None if top in (None, ALL_OF_FLEET) else JointStart(handle, broadcast)
+    by_message = JointStart(handle, publish)
+    for vehicle in vehicles:
+        vehicle.joint_start = by_driver if vehicle.uses_driver else by_message
 
 
 def _how_seen(handle, name, drivers):
@@ -354,19 +371,19 @@ def _how_seen(handle, name, drivers):
     return False, None, topic_types(handle).get(f"{top}/ref") == _YAW_STATE
 
 
-def _vehicle(process, handle, name, services, synchronized_start, how):
+def _vehicle(process, handle, name, services, how):
     top = prefix(name)
     commander = f"{top}/high_level"
-    uses_driver, frames, has_yaw = how
+    uses_driver, _, has_yaw = how
     if uses_driver:
-        return RosVehicle(name, handle, top, None, frames)
+        return RosVehicle(name, handle, top, *how)
     if f"{commander}/go_to" not in services:
         if not {f"{top}/takeoff", f"{top}/land"} <= services.keys():
             return None
         handle.set_param(f"{commander}/reference/yaw", has_yaw)
         if not HighLevelNode().initialize(process.handle(commander)):
             raise MissionError(f"{commander} could not be started; its reason is in the log")
-    return RosVehicle(name, handle, commander, synchronized_start, frames, has_yaw)
+    return RosVehicle(name, handle, commander, *how)
 
 
 def _frames(handle, commander):

@@ -1,21 +1,19 @@
 """Vehicles of a mission by ROS services and topics."""
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
 from typing import Any, NamedTuple
 
 import genpy
 from geometry_msgs.msg import Point, PoseStamped
-from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyRequest, SetBool
 from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_fleet.high_level_services import (
     HIGH_LEVEL,
-    START_TOPIC,
     heading,
     in_turn,
     to_message,
@@ -48,7 +46,7 @@ _LANDED_HEIGHT = 0.1  #: Largest height above the start of a vehicle that has la
 #: States of the takeoff server after the flight.
 _ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
 
-_STEP = 0.02  #: Time within which starts of vehicles are combined in one message (s).
+_STEP = 0.02  #: Time within which starts of vehicles are combined (s).
 ALL_OF_FLEET = f"/all/{HIGH_LEVEL}"  #: Namespace of a fleet's services for all.
 CALL_TIMEOUT = 60.0  #: Timeout of a service (s of the machine's clock).
 _SETTLING_TIME = 0.5  #: Time after the planned end of a landing until the vehicle is down (s).
@@ -200,56 +198,33 @@ def prefix(name: str) -> str:
     return "" if name == "/" else f"/{name}"
 
 
-class SynchronizedStart:
-    """Publishes the names of the nodes that are to start."""
+class JointStart:
+    """Starts the uploaded trajectories 0 of vehicles that are to start within `_STEP` together.
 
-    def __init__(self, handle: NodeHandle):
-        self._handle = handle
-        self._publisher = handle.publisher(START_TOPIC, String)
-        self._names: list[str] = []
-        handle.timer(_STEP, self._on_timer)
-
-    def start(self, node: str) -> None:
-        """Make a `HighLevelNode` start its uploaded trajectory 0."""
-        self._handle.submit(lambda: self._names.append(node))
-
-    def _on_timer(self):
-        if self._names:
-            names, self._names = self._names, []
-            self._publisher.publish(String(" ".join(names)))
-
-
-class BroadcastStart:
-    """Starts the uploaded trajectory 0 of all vehicles of a driver by its service for all.
-
-    If fewer vehicles are to start within `_STEP`, they are called one by one.
+    ``start(vehicles)`` starts vehicles; it returns the future of the answer of each.
     """
 
-    def __init__(self, handle: NodeHandle, top: str, names: Collection[str]):
+    def __init__(
+        self,
+        handle: NodeHandle,
+        start: Callable[[Sequence["RosVehicle"]], "Iterable[Future[Any]]"],
+    ):
         self._handle = handle
-        self._service = f"{top}/start_trajectory"
-        self._names = {*names}
-        self._calls: dict[str, tuple[Callable[[], Future[Any]], Future[Any]]] = {}
+        self._start = start
+        self._waiting: dict[RosVehicle, Future[Any]] = {}
         handle.timer(_STEP, self._on_timer)
 
-    def start(self, name: str, call: Callable[[], "Future[Any]"]) -> "Future[Any]":
-        """Start a vehicle, alone by ``call()``; return the future of the answer."""
+    def start(self, vehicle: "RosVehicle") -> "Future[Any]":
+        """Start a vehicle with others; return the future of its answer."""
         answer: Future[Any] = Future()
-        self._handle.submit(lambda: self._calls.update({name: (call, answer)}))
+        self._handle.submit(lambda: self._waiting.update({vehicle: answer}))
         return answer
 
     def _on_timer(self):
-        calls, self._calls = self._calls, {}
-        if calls.keys() == self._names:
-            request = srv.StartTrajectoryRequest(0, 0, 1.0, False, False)
-            common = self._handle.call_service(
-                self._service, srv.StartTrajectory, request, CALL_TIMEOUT
-            )
-            for _, answer in calls.values():
-                forward(common, answer)
-            return
-        for call, answer in calls.values():
-            forward(call(), answer)
+        if self._waiting:
+            waiting, self._waiting = self._waiting, {}
+            for call, answer in zip(self._start([*waiting]), waiting.values(), strict=True):
+                forward(call, answer)
 
 
 def flown_vehicles(services: Mapping[str, str]) -> dict[str, str]:
@@ -332,29 +307,22 @@ class ServiceCommands(Commands):
 
 
 class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
-    """A vehicle by the services of the driver, or by those of `HighLevelNode`.
-
-    They are below ``top``. Vehicles that a controller flies, and not the driver, have a
-    ``synchronized_start``. The attribute ``broadcast`` starts those of the driver together, if it
-    is not None.
-    """
+    """A vehicle by the services of the driver, or by those of `HighLevelNode`, below ``top``."""
 
     def __init__(
         self,
         name: str,
         handle: NodeHandle,
         top: str,
-        synchronized_start: SynchronizedStart | None = None,
-        frames: tuple[str, str] | None = None,
-        has_yaw: bool = True,
+        uses_driver: bool,
+        frames: tuple[str, str] | None,
+        has_yaw: bool,
     ):
-        uses_driver = synchronized_start is None
         RosVehicleState.__init__(self, name, handle, uses_driver, frames, has_yaw)
         ServiceCommands.__init__(self, handle, top)
         self.bounds = fence(handle, prefix(name))
         self.start_skew = START_SKEW if uses_driver else 0.0
-        self._synchronized_start = synchronized_start
-        self.broadcast: BroadcastStart | None = None
+        self.joint_start: JointStart | None = None  #: Starts it together with others.
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
         self._setpoints = SetpointPublishers(handle, top)
@@ -415,16 +383,10 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
     def start(self) -> "Future[Any]":
         if self._prepared is not None and self._stream is not None:
             return self._stream.start(self._prepared)
-        if self._synchronized_start is not None:
-            self._synchronized_start.start(self.top)
-            return done(None)
-        return self._hand_over(self._start_with_others)
-
-    def _start_with_others(self):
-        def start():
-            return self.start_trajectory(Playback(0))
-
-        return start() if self.broadcast is None else self.broadcast.start(self.name, start)
+        joint = self.joint_start
+        if joint is not None:
+            return self._hand_over(lambda: joint.start(self))
+        return self._hand_over(lambda: self.start_trajectory(Playback(0)))
 
     @override
     def upload_trajectory(

@@ -146,6 +146,21 @@ class GroupState:
     def _timed(self, name, pieces, begin):
         return TimedTrajectory(pieces, begin, self._vehicles[name].start_skew)
 
+    def _places(self) -> dict[str, Triple]:
+        """Return the positions of all vehicles: name to m."""
+        places: dict[str, Triple] = {}
+        for name, vehicle in self._all_vehicles.items():
+            measured = vehicle.position()
+            if name in self._commanded:
+                # Commanded positions were checked; a vehicle away from its commanded position has
+                # the measured one.
+                places[name] = commanded = self._commanded[name].goal(self.time()).position
+                if measured is None or math.dist(measured, commanded) <= self.rules.tolerance:
+                    continue
+            if measured is not None:
+                places[name] = measured
+        return places
+
     def _check_apart(self, changed):
         """Check trajectories together with those of all other vehicles.
 

@@ -2,16 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from typing_extensions import override
 
 from crazyflie_fleet.landing import LandingSide, Place, Situation, land_in_rounds
-from crazyflie_mission_api.group_state import GroupState, raise_failures
+from crazyflie_mission_api.group_state import GroupState
 from crazyflie_mission_api.limits import EVERYWHERE
 from crazyflie_mission_api.mission_vehicle import Move, never
-from crazyflie_mission_api.observer import command
 from crazyflie_mission_api.trajectories import TimedTrajectory, check_with_skew, straight
 
 _DESCENT_SPEED = 0.3  #: Mean speed of landings (m/s).
@@ -24,94 +22,22 @@ _STOP_AHEAD, _STOP_DURATION = 1.0, 2.0
 _PERIOD = 0.05  #: Period of the checks of vehicles that land (s).
 
 
-class LandingGroup(GroupState):
-    """Vehicles that land; see `crazyflie_fleet.landing`."""
+def land_all(group: GroupState, is_checked: bool) -> dict[str, str]:
+    """Land the vehicles of a group that fly; return why some have not landed: name to reason.
 
-    @command
-    def land(self) -> None:
-        """Land, and wait until all vehicles are on the ground with their motors off.
-
-        Vehicles land where they are, those below before those above them. Where another is beneath
-        a vehicle, on the ground or in flight outside the group, it flies to the nearest free place
-        first.
-
-        Raises
-        ------
-        MissionError
-            Two vehicles would come too near, or some cannot land; the text names them.
-        """
-        raise_failures("land", self._land_all(is_checked=True))
-
-    def __exit__(self, kind: type[BaseException] | None, error: Any, traceback: Any) -> None:
-        """Land the vehicles that still fly, also after an error."""
-        try:
-            if self.flying and kind is None:
-                self.land()
-        finally:
-            if self.flying:
-                raise_failures("land", self._land_all(is_checked=False))
-
-    def _land_all(self, is_checked: bool) -> dict[str, str]:
-        """Land; return why some vehicles have not: name to reason.
-
-        Without a check vehicles land even if two come too near.
-        """
-        self._stop_moving(is_checked)
-        side = _Landing(self, is_checked)
-        for _ in land_in_rounds(side):
-            self.clock.wait_until(never, self.time() + _PERIOD)
-        return side.failures
-
-    def _stop_moving(self, is_checked):
-        now = self.time()
-        stops = {}
-        for name in self.flying:
-            trajectory = self._commanded[name]
-            if trajectory.end > now:
-                goal = trajectory.goal(now + _STOP_AHEAD)
-                stops[name] = (goal.position, goal.yaw)
-        if stops:
-            self._move(stops, _STOP_DURATION, is_checked)
-            self.clock.wait_until(never, now + _STOP_DURATION)
-
-    def _places(self) -> dict[str, Place]:
-        """Return the positions of all vehicles: name to m."""
-        places: dict[str, Place] = {}
-        for name, vehicle in self._all_vehicles.items():
-            measured = vehicle.position()
-            if name in self._commanded:
-                # Commanded positions were checked; a vehicle away from its commanded position has
-                # the measured one.
-                places[name] = commanded = self._commanded[name].goal(self.time()).position
-                if measured is None or math.dist(measured, commanded) <= self.rules.tolerance:
-                    continue
-            if measured is not None:
-                places[name] = measured
-        return places
-
-    def _move(self, poses, duration, is_checked):
-        """Command positions (m) and yaws (rad); return the refusals, name to reason."""
-        places, now = self._places(), self.time()
-        moves = {
-            name: self._timed(name, straight(places[name], goal, yaw, yaw, duration), now)
-            for name, (goal, yaw) in poses.items()
-        }
-        if is_checked:
-            check_with_skew({**self._commanded, **moves}, now, self._check_apart)
-
-        def go_to(name):
-            goal, yaw = poses[name]
-            return self._vehicles[name].go_to(Move(goal, yaw, duration))
-
-        failures = self._answers(go_to, poses)
-        self._commanded.update({n: move for n, move in moves.items() if n not in failures})
-        return failures
+    Without a check vehicles land even if two come too near. See `crazyflie_fleet.landing`.
+    """
+    landing = _Landing(group, is_checked)
+    landing.stop_moving()
+    for _ in land_in_rounds(landing):
+        group.clock.wait_until(never, group.time() + _PERIOD)
+    return landing.failures
 
 
 class _Landing(LandingSide):
     """The landing of the vehicles of a group."""
 
-    def __init__(self, group: LandingGroup, is_checked: bool):
+    def __init__(self, group: GroupState, is_checked: bool):
         self.failures: dict[str, str] = {}  #: Name to reason.
         self.arrival_timeout = group.rules.arrival_timeout
         self._group = group
@@ -119,6 +45,38 @@ class _Landing(LandingSide):
         # Vehicles that were commanded to land, and the planned end of their landing (s).
         self._descending: list[str] = []
         self._end = 0.0
+
+    def stop_moving(self) -> None:
+        """Stop the vehicles that move, and wait."""
+        group, now = self._group, self.time()
+        stops = {}
+        for name in group.flying:
+            trajectory = group._commanded[name]
+            if trajectory.end > now:
+                goal = trajectory.goal(now + _STOP_AHEAD)
+                stops[name] = (goal.position, goal.yaw)
+        if stops:
+            self._move(stops, _STOP_DURATION)
+            group.clock.wait_until(never, now + _STOP_DURATION)
+
+    def _move(self, poses, duration):
+        """Command positions (m) and yaws (rad); return the refusals, name to reason."""
+        group, now = self._group, self.time()
+        places = group._places()
+        moves = {
+            name: group._timed(name, straight(places[name], goal, yaw, yaw, duration), now)
+            for name, (goal, yaw) in poses.items()
+        }
+        if self._is_checked:
+            check_with_skew({**group._commanded, **moves}, now, group._check_apart)
+
+        def go_to(name):
+            goal, yaw = poses[name]
+            return group._vehicles[name].go_to(Move(goal, yaw, duration))
+
+        failures = group._answers(go_to, poses)
+        group._commanded.update({n: move for n, move in moves.items() if n not in failures})
+        return failures
 
     @override
     def time(self) -> float:
@@ -179,7 +137,7 @@ class _Landing(LandingSide):
         moves = (straight(places[name], goal) for name, goal in goals.items())
         duration = max(1.0, *map(group._shortest_duration, moves))
         poses = {name: (goal, yaws[name]) for name, goal in goals.items()}
-        self.failures |= group._move(poses, duration, self._is_checked)
+        self.failures |= self._move(poses, duration)
         return self.time() + duration
 
     @override

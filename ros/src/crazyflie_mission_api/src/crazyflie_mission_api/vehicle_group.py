@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from crazyflie_mission_api import formations, trajectories
-from crazyflie_mission_api.group_state import raise_failures, text
-from crazyflie_mission_api.landing import LandingGroup
+from crazyflie_mission_api.group_state import GroupState, raise_failures, text
+from crazyflie_mission_api.landing import land_all
 from crazyflie_mission_api.limits import Array, MissionError, number, point
 from crazyflie_mission_api.mission_vehicle import Move
 from crazyflie_mission_api.observer import command
@@ -27,7 +28,7 @@ _MIN_CLIMB = 0.1  #: Least height of a takeoff above the start (m).
 _CLIMB_STEP = 0.1  #: Difference of the heights of a climb at which distances are checked (m).
 
 
-class VehicleGroup(LandingGroup):
+class VehicleGroup(GroupState):
     """Vehicles that fly a mission; each command is for all of them.
 
     ``group["cf1"]`` and ``group["cf1", "cf2"]`` are subgroups, with the same commands. A command
@@ -194,6 +195,30 @@ class VehicleGroup(LandingGroup):
         chosen = formations.assign(starts, np.array(goals))
         self.go_to(chosen, duration=duration, wait=wait)
         return chosen
+
+    @command
+    def land(self) -> None:
+        """Land, and wait until all vehicles are on the ground with their motors off.
+
+        Vehicles land where they are, those below before those above them. Where another is beneath
+        a vehicle, on the ground or in flight outside the group, it flies to the nearest free place
+        first.
+
+        Raises
+        ------
+        MissionError
+            Two vehicles would come too near, or some cannot land; the text names them.
+        """
+        raise_failures("land", land_all(self, is_checked=True))
+
+    def __exit__(self, kind: type[BaseException] | None, error: Any, traceback: Any) -> None:
+        """Land the vehicles that still fly, also after an error."""
+        try:
+            if self.flying and kind is None:
+                self.land()
+        finally:
+            if self.flying:
+                raise_failures("land", land_all(self, is_checked=False))
 
     # Common parts of commands.
 

@@ -178,7 +178,7 @@ class Lander(LandingSide):
         return bool(self._calls) or not (is_late or bool((speeds < _SLOW).all()))
 
     @override
-    def situation(self, names: Sequence[str]) -> Situation:
+    def situation(self) -> Situation:
         positions = self._states.positions
         known = np.flatnonzero(np.isfinite(positions).all(axis=1))
         everyone = [self._states.names[number] for number in known]
@@ -186,7 +186,6 @@ class Lander(LandingSide):
         return (
             everyone,
             positions[known],
-            np.array([name in names for name in everyone]),
             # A vehicle that descends is treated as one on the ground.
             np.array([not self._is_up(name) for name in everyone]),
             self._limits[np.ix_(known, known)],

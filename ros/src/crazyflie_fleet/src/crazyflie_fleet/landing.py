@@ -27,8 +27,8 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Place = tuple[float, float, float]  #: x, y, z (m).
 
-#: Names of the vehicles whose positions are known, and the arguments of `next_round`.
-Situation = tuple[Sequence[str], Array, Flags, Flags, Array, Array, Array]
+#: Names of the vehicles whose positions are known, and the arguments of `next_round` but ``lands``.
+Situation = tuple[Sequence[str], Array, Flags, Array, Array, Array]
 
 SIDE_SPEED = 0.5  #: Mean speed at which vehicles fly to free places (m/s).
 MAX_DETOUR = 3.0  #: Largest move along x and y of a vehicle that descends already (m).
@@ -66,8 +66,8 @@ class LandingSide(Protocol):
     def is_busy(self) -> bool:
         """Return whether vehicles descend, or are too fast for a round."""
 
-    def situation(self, names: Sequence[str]) -> Situation:
-        """Return the positions of all vehicles, of which ``names`` are to land."""
+    def situation(self) -> Situation:
+        """Return the positions of all vehicles."""
 
     def distance(self, name: str, goal: Place) -> float:
         """Return the distance of a vehicle from a goal (m), m; infinite if it is not known."""
@@ -89,10 +89,11 @@ def land_in_rounds(side: LandingSide) -> Iterator[None]:
             yield
         if not (left := side.left()):
             return
-        situation = side.situation(left)
+        situation = side.situation()
         names, places = situation[:2]
+        lands = np.array([name in left for name in names])
         goals, aside = {}, {}
-        for k, (x, y) in next_round(*situation[1:]).items():
+        for k, (x, y) in next_round(places, lands, *situation[2:]).items():
             goal = goals[names[k]] = (x, y, float(places[k, 2]))
             if (x, y) != _pair(places[k]):
                 aside[names[k]] = goal

@@ -12,6 +12,8 @@ from crazyflie_fleet.fleet_config import DOWNWASH, close_pairs
 LOOK_AHEAD = 0.5
 #: Distance at which held vehicles are released, over the sum of their buffers.
 RELEASE_RATIO = 1.1
+#: Factors of positions before distances are calculated.
+SCALE = np.array([1.0, 1.0, 1.0 / DOWNWASH])
 
 
 class ClosePair(NamedTuple):
@@ -37,7 +39,6 @@ class Separation:
 
     def __init__(self, buffers: Sequence[float]):
         self._buffers = np.array(buffers, dtype=float)
-        self._scale = np.array([1.0, 1.0, 1.0 / DOWNWASH])
         self._held = np.zeros(len(self._buffers), dtype=bool)
 
     def update(
@@ -63,9 +64,9 @@ class Separation:
         pairs = []
         for a, b in sorted(numbers):
             i, j = int(known[a]), int(known[b])
-            between = (positions[j] - positions[i]) * self._scale
-            held[i] |= bool((goals[i] - positions[i]) * self._scale @ between > 0.0)
-            held[j] |= bool((goals[j] - positions[j]) * self._scale @ between < 0.0)
+            between = (positions[j] - positions[i]) * SCALE
+            held[i] |= bool((goals[i] - positions[i]) * SCALE @ between > 0.0)
+            held[j] |= bool((goals[j] - positions[j]) * SCALE @ between < 0.0)
             limit = float(self._buffers[i] + self._buffers[j])
             pairs.append(ClosePair(i, j, float(np.linalg.norm(between)), limit))
         self._held = held

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from crazyflie_mission_api.limits import SCALE, Array
+from crazyflie_fleet.separation import SCALE
+from crazyflie_mission_api.limits import Array
 
 Point = tuple[float, float, float]
 

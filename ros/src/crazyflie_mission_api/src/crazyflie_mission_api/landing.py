@@ -104,7 +104,7 @@ class _Landing(LandingSide):
         return bool(self._descending)
 
     @override
-    def situation(self, names: Sequence[str]) -> Situation:
+    def situation(self) -> Situation:
         group = self._group
         obstacles = group.obstacles()
         places = group._places()
@@ -118,7 +118,6 @@ class _Landing(LandingSide):
         return (
             known,
             np.array([*places.values()]),
-            np.array([name in names for name in known]),
             np.array([name not in in_flight for name in known]),
             group.rules.clearance.limits(known),
             np.array([fence.lower[:2] for fence in fences]),

@@ -8,15 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import pdist
 
-from crazyflie_fleet.fleet_config import DOWNWASH
-from crazyflie_fleet.separation import LOOK_AHEAD, RELEASE_RATIO, Separation
+from crazyflie_fleet.separation import LOOK_AHEAD, RELEASE_RATIO, SCALE, Separation
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 
 Array = NDArray[np.float64]
-
-#: Factors of positions before distances are calculated.
-SCALE = np.array([1.0, 1.0, 1.0 / DOWNWASH])
 
 
 class MissionError(Exception):

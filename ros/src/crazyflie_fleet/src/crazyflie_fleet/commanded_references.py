@@ -115,7 +115,7 @@ class CommandedReferences:
         A move that is held stands still at its beginning, which may be nearer to the other vehicle
         than this one is: whether it may go on depends on where it ends.
         """
-        if self._is_move and self._is_held():
+        if self._is_move and self._present_hold() is not None:
             time = math.inf
         goal = self.follower.goal(self._handle.time() + time)
         return goal.position if goal is not None and self._is_moving else None
@@ -137,10 +137,10 @@ class CommandedReferences:
 
     def _command(self, follower, command, arguments):
         present = self.present()
-        if self._vehicle is not None and self._vehicle.held_at is not None:
+        if (place := self._present_hold()) is not None:
             # Its present reference is there, at rest, and not at its goal.
             follower.forget()
-            present = at_rest(self._vehicle.held_at, present.yaw)
+            present = at_rest(place, present.yaw)
         try:
             command(follower, self._handle.time(), present, *arguments)
         except RefusalError as reason:
@@ -219,7 +219,7 @@ class CommandedReferences:
         last = self._setpoint_time
         if last is not None and not 0.0 <= now - last < LEVEL_AGE:
             self.end_setpoints()
-        place = None if self._vehicle is None else self._vehicle.held_at
+        place = self._present_hold()
         if self._is_move and place is not None and place is not self._held_at:
             # In the middle of the move, its speed would pull the vehicle towards the other one.
             self._held_at = place
@@ -240,8 +240,9 @@ class CommandedReferences:
         self._state = Goal((s.x, s.y, s.z), velocity, (0.0,) * 3, yaw, 0.0)
         self._state_time = self._handle.time()
 
-    def _is_held(self):
-        return self._vehicle is not None and self._vehicle.held_at is not None
+    def _present_hold(self):
+        """Return the place where the vehicle is held, m; None if it is not."""
+        return None if self._vehicle is None else self._vehicle.held_at
 
     def _measured(self):
         """Return the present state of the vehicle; None if it is not known."""

@@ -59,6 +59,7 @@ class IdealVehicle(MissionVehicle):
         self.trajectory = TimedTrajectory.hover(position, yaw)  #: The plan, also after its end.
         self._time = time
         self._flies = False
+        self.is_armed = True
         self.groups = 0  #: Mask of the groups that it belongs to.
         # The trajectory memory, and the place in it of each trajectory.
         self._memory: dict[int, PolynomialPiece] = {}
@@ -186,6 +187,7 @@ class IdealVehicle(MissionVehicle):
 
     @override
     def arm(self, arm: bool) -> "Future[Any]":
+        self.is_armed = arm
         return done(None)
 
     @override

@@ -16,13 +16,10 @@ class MissionObserver:
 
     #: Whether fleets refuse every command, and `Fleet.fly` only makes its dry run.
     dry_runs_only = False
-    command = ""  #: The command that is carried out; its parts are not reported.
+    is_busy = False  #: Whether a command is carried out; its parts are not reported.
 
     def begin(self, command: str, vehicles: list[str], time: float) -> None:
         """Process the beginning of a command to vehicles, at their time (s)."""
-
-    def end(self, command: str, vehicles: list[str], time: float) -> None:
-        """Process the end or failure of a command."""
 
     def step(self, group: Any) -> None:
         """Process a time step of a dry run; ``group`` is its `DryRun`."""
@@ -40,21 +37,19 @@ of_process = MissionObserver()  #: The observer of each `Fleet` that is made fro
 
 
 def command(method: _Method) -> _Method:
-    """Wrap a method so that the observer of its group is called before and after it."""
-    name = method.__name__
+    """Wrap a method so that the observer of its group is called before it."""
 
     @functools.wraps(method)
     def observed(group: Any, *arguments: Any, **options: Any) -> Any:
         observer = group.observer
         observer.check()
-        if observer.command:
+        if observer.is_busy:
             return method(group, *arguments, **options)
-        observer.command = name
+        observer.is_busy = True
         try:
-            observer.begin(name, group.names, group.time())
+            observer.begin(method.__name__, group.names, group.time())
             return method(group, *arguments, **options)
         finally:
-            observer.command = ""
-            observer.end(name, group.names, group.time())
+            observer.is_busy = False
 
     return cast(_Method, observed)

@@ -98,7 +98,6 @@ class SimulatedVehicle(IdealVehicle):
         self._sent = 0.0
         self._expiry = math.inf
         self._locked = False
-        self._armed = True
 
     # Commands.
 
@@ -132,11 +131,6 @@ class SimulatedVehicle(IdealVehicle):
         self._warn(f"{self.name}.emergency: the vehicle ignores all further commands")
         self._stop_motors("emergency")
         self._locked = True
-        return done(None)
-
-    @override
-    def arm(self, arm: bool) -> "Future[Any]":
-        self._armed = arm
         return done(None)
 
     @override
@@ -188,7 +182,7 @@ class SimulatedVehicle(IdealVehicle):
         """Return the status with the keys of crazyswarm2's Crazyflie.get_status."""
         seconds = math.floor(self._time())
         # Bits as supervisor.info of the firmware has them.
-        bits = 0b1001 | self._armed << 1 | self.is_flying << 4 | self._locked << 6
+        bits = 0b1001 | self.is_armed << 1 | self.is_flying << 4 | self._locked << 6
         return {
             "id": self.name,
             "timestamp_sec": seconds,

@@ -11,6 +11,7 @@ from scipy.spatial.distance import pdist
 from crazyflie_fleet.separation import LOOK_AHEAD, RELEASE_RATIO, SCALE, Separation
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
+from crazyflie_utils.parameters.types import Number
 
 Array = NDArray[np.float64]
 
@@ -122,14 +123,11 @@ def number(value: float, what: str, minimum: float = -math.inf, above: float = -
     ------
     MissionError
     """
-    if isinstance(value, int | float | np.floating | np.integer) and not isinstance(value, bool):
-        as_float = float(value)
-        if math.isfinite(as_float) and as_float >= minimum and as_float > above:
-            return as_float
-    bound = "" if minimum == -math.inf else f" >= {minimum:g}"
-    if above > -math.inf:
-        bound += f" > {above:g}"
-    raise MissionError(f"{what} is {value!r}; expected a finite number{bound}")
+    kind = Number(above=above, minimum=minimum)
+    try:
+        return kind(value.item() if isinstance(value, np.generic) else value)
+    except ValueError:
+        raise MissionError(f"{what} is {value!r}; expected {kind}") from None
 
 
 @dataclass(frozen=True)

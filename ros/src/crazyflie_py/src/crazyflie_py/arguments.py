@@ -13,6 +13,7 @@ import numpy as np
 
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
+from crazyflie_utils.parameters.types import Integer, Number, ParameterType
 from crazyflie_utils.text import shown
 
 
@@ -20,27 +21,21 @@ def number(
     where: str, name: str, value: Any, low: float = -math.inf, high: float = math.inf
 ) -> float:
     """Return a finite number from ``low`` to ``high``."""
-    found = _number(value)
-    if math.isfinite(found) and low <= found <= high:
-        return found
-    limits = [f">= {low:g}" if low > -math.inf else "", f"<= {high:g}" if high < math.inf else ""]
-    expected = " and ".join(filter(None, limits))
-    raise _error(where, name, value, f"a finite number {expected}".strip())
+    return float(_checked(where, name, value, Number(minimum=low, maximum=high)))
 
 
 def integer(where: str, name: str, value: Any, low: int, high: int) -> int:
     """Return an integer from ``low`` to ``high``."""
-    found = _number(value)
-    if found.is_integer() and low <= found <= high:
-        return int(found)
-    raise _error(where, name, value, f"an integer from {low} to {high}")
+    return int(_checked(where, name, value, Integer(low, high)))
 
 
-def _number(value: Any) -> float:
-    """Return a number, also one in an array of size 1, as a float; NaN for anything else."""
-    if isinstance(value, np.ndarray) and value.size == 1:
-        value = value.item()
-    return float(value) if isinstance(value, numbers.Real) else math.nan
+def _checked(where: str, name: str, value: Any, kind: ParameterType) -> Any:
+    """Return a number of a type, also one in an array of size 1."""
+    plain = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
+    try:
+        return kind(float(plain) if isinstance(plain, numbers.Real) else plain)
+    except ValueError:
+        raise _error(where, name, value, str(kind)) from None
 
 
 def rate(value: Any) -> float:

@@ -42,7 +42,7 @@ class _Call:
     service_type: Any
     request: Any
     answer: "Future[Any]" = field(default_factory=Future)
-    waited: float = 0.0  # Time that the call has waited (s).
+    begin: float = 0.0  # Age of the node at the call (s).
 
 
 class FleetServicesNode(Node):
@@ -107,7 +107,7 @@ class FleetServicesNode(Node):
         if getattr(request, "groupMask", 0):
             # Only the nodes of the vehicles know their groups.
             return self._call_all(service, service_type, request)
-        takeoff = _Call(service, service_type, request)
+        takeoff = _Call(service, service_type, request, begin=self._age)
         if not self._begin(takeoff):
             waiting = self._takeoff_refusals()
             self._handle.info(
@@ -118,11 +118,7 @@ class FleetServicesNode(Node):
 
     def _on_timer(self):
         self._age += _PERIOD
-        takeoffs, self._takeoffs = self._takeoffs, []
-        for takeoff in takeoffs:
-            takeoff.waited += _PERIOD
-            if not self._begin(takeoff):
-                self._takeoffs.append(takeoff)
+        self._takeoffs = [each for each in self._takeoffs if not self._begin(each)]
 
     def _takeoff_refusals(self):
         """Return why vehicles that do not fly yet refuse to take off: name to reason."""
@@ -136,7 +132,7 @@ class FleetServicesNode(Node):
     def _begin(self, takeoff):
         """Take off, or refuse; return False if the call is to wait."""
         if refusals := self._takeoff_refusals():
-            if takeoff.waited < TAKEOFF_WAIT and self._age < START_LIMIT:
+            if self._age < min(takeoff.begin + TAKEOFF_WAIT, START_LIMIT):
                 return False
             text = f"no vehicle takes off: {self._text(refusals)}"
             takeoff.answer.set_exception(ServiceError(text))

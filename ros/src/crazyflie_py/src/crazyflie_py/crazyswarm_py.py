@@ -101,9 +101,7 @@ def _swarm(crazyflies_yaml: str | Path | None, options: argparse.Namespace) -> S
     if options.sim:
         from crazyflie_py.simulation import Simulation
 
-        vehicles = fleet.load(crazyflies_yaml)
-        names = fleet.chosen([vehicle.name for vehicle in vehicles])
-        return Simulation([each for each in vehicles if each.name in names], options)
+        return Simulation(fleet.load(crazyflies_yaml), options)
     # Imported here, so that scripts with --sim need neither ROS nor the time to import it.
     from crazyflie_py.ros_swarm import RosSwarm
 

@@ -38,7 +38,7 @@ class FleetVehicle(NamedTuple):
 
 
 def load(crazyflies_yaml: str | Path | None) -> list[FleetVehicle]:
-    """Return the vehicles of a file, or of a text in YAML.
+    """Return the `chosen` vehicles of a file, or of a text in YAML.
 
     Without either they are those of the usual file, or else those of the examples.
 
@@ -64,9 +64,10 @@ def load(crazyflies_yaml: str | Path | None) -> list[FleetVehicle]:
     ids = [vehicle.id for vehicle in vehicles]
     for vehicle_id in ids:
         if ids.count(vehicle_id) > 1:
-            names = ", ".join(v.name for v in vehicles if v.id == vehicle_id)
-            raise ValueError(f"{names} have the same id, {vehicle_id}; expected different ids")
-    return vehicles
+            same = ", ".join(v.name for v in vehicles if v.id == vehicle_id)
+            raise ValueError(f"{same} have the same id, {vehicle_id}; expected different ids")
+    names = chosen([vehicle.name for vehicle in vehicles])
+    return [vehicle for vehicle in vehicles if vehicle.name in names]
 
 
 def chosen(names: Sequence[str]) -> list[str]:

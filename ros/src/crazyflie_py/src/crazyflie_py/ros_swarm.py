@@ -68,9 +68,10 @@ class RosSwarm(Swarm):
         self._process = process
         handle = process.handle("/crazyswarm")
         try:
-            names = [v.name for v in vehicles] if vehicles else running_vehicles(handle)
-            names = fleet_files.chosen(names)
-            vehicles = vehicles and [each for each in vehicles if each.name in names]
+            if vehicles is None:
+                names = fleet_files.chosen(running_vehicles(handle))
+            else:
+                names = [vehicle.name for vehicle in vehicles]
             fleet = Fleet(names, startup_timeout=_FIND_LIMIT, process=process)
         except (MissionError, ValueError) as error:
             self._end()

@@ -20,6 +20,7 @@ from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.vectors import to_tuple
 
 _COLOUR = ColorRGBA(0.95, 0.55, 0.05, 0.8)
 _WIDTH = 0.01  #: Width of the line (m).
@@ -234,10 +235,9 @@ class CommandedReferences:
             self._set_timer()
 
     def _on_state(self, message):
-        s = message.state
-        yaw = s.yaw if self._parameters.has_yaw else 0.0
-        velocity = (s.x_dot, s.y_dot, s.z_dot)
-        self._state = Goal((s.x, s.y, s.z), velocity, (0.0,) * 3, yaw, 0.0)
+        x, y, z, vx, vy, vz, yaw = to_tuple(message.state)
+        yaw = yaw if self._parameters.has_yaw else 0.0
+        self._state = Goal((x, y, z), (vx, vy, vz), (0.0,) * 3, yaw, 0.0)
         self._state_time = self._handle.time()
 
     def _present_hold(self):

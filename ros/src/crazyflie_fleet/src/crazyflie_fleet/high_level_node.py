@@ -29,6 +29,7 @@ from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.timers import Timer
+from crazyflie_utils.vectors import to_tuple
 
 CLIMB_SPEED = 0.7  #: Largest mean speed of a takeoff (m/s).
 
@@ -282,8 +283,7 @@ class HighLevelNode(Node):
                 f"yaw is {request.yaw:g} rad, and the controller keeps the heading 0; expected 0"
             )
         yaw = None if math.isnan(request.yaw) else request.yaw
-        goal = (request.goal.x, request.goal.y, request.goal.z)
-        return goal, yaw, request.duration.to_sec(), request.relative
+        return to_tuple(request.goal), yaw, request.duration.to_sec(), request.relative
 
     def _on_upload(self, request):
         turns = any(any(piece.poly_yaw) for piece in request.pieces)
@@ -345,7 +345,7 @@ class HighLevelNode(Node):
         self._take(goal, (*goal.position, *goal.velocity), goal.yaw)
 
     def _on_velocity_setpoint(self, message):
-        velocity = (message.vel.x, message.vel.y, message.vel.z)
+        velocity: Any = to_tuple(message.vel)
         self._take(Velocity(velocity, self._yaw_rate(message.yawRate)), velocity, message.yawRate)
 
     def _on_hover_setpoint(self, message):

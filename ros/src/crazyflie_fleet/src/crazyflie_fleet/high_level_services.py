@@ -20,6 +20,7 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_utils import NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, SERVICE, TIME_STEP, TOPIC
+from crazyflie_utils.vectors import to_tuple
 
 
 def to_message(piece: PolynomialPiece) -> TrajectoryPolynomialPiece:
@@ -63,19 +64,10 @@ def setpoint_goal(message: FullState | Position) -> Goal[float]:
     """Return the goal of a setpoint of position."""
     if isinstance(message, Position):
         return at_rest((message.x, message.y, message.z), math.radians(message.yaw))
-    p, v, a, q = (
-        message.pose.position,
-        message.twist.linear,
-        message.acc,
-        message.pose.orientation,
-    )
-    return Goal(
-        (p.x, p.y, p.z),
-        (v.x, v.y, v.z),
-        (a.x, a.y, a.z),
-        heading(q.x, q.y, q.z, q.w),
-        message.twist.angular.z,
-    )
+    pose, twist = message.pose, message.twist
+    motion = map(to_tuple, (pose.position, twist.linear, message.acc))
+    goal: Any = (*motion, heading(*to_tuple(pose.orientation)), twist.angular.z)
+    return Goal(*goal)
 
 
 #: Namespace, below a vehicle's name, of the node; below /all of the same services for all.

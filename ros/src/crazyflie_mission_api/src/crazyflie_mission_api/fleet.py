@@ -62,8 +62,8 @@ class RosClock(Clock):
     def __init__(self, handle: NodeHandle, has_ended: Callable[[], bool]):
         self._handle = handle
         self._has_ended = has_ended
-        self._tick = threading.Condition()
-        handle.timer(0.02, self._wake)
+        self._tick = threading.Event()
+        handle.timer(0.02, self._tick.set)
 
     @override
     def time(self) -> float:
@@ -79,13 +79,9 @@ class RosClock(Clock):
                 last, moved_at = now, time.monotonic()
             elif time.monotonic() - moved_at > _FROZEN:
                 raise MissionError(f"no /clock for {_FROZEN:g} s; is the simulation running?")
-            with self._tick:
-                self._tick.wait(0.1)
+            self._tick.wait(0.1)
+            self._tick.clear()
         return done
-
-    def _wake(self):
-        with self._tick:
-            self._tick.notify_all()
 
 
 class Fleet(VehicleGroup):

@@ -48,7 +48,7 @@ class _Takeoff:
     is_followed: bool = False
 
 
-class HighLevelNode(Node):
+class HighLevelNode(Node[HighLevelParameters]):
     """Flies a vehicle by high-level commands: publishes references for its controller.
 
     In its own namespace it offers the services of the driver for a real vehicle, so that the same
@@ -66,10 +66,6 @@ class HighLevelNode(Node):
         self._takeoff: _Takeoff | None = None
         self._next: tuple[Any, ...] | None = None  # A command received in a takeoff, for its end.
         self._landings: list[Future[Any]] = []
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(HighLevelParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

@@ -322,7 +322,7 @@ class TrackedVehicle:
         return self._heading
 
 
-class ReferencesNode(Node):
+class ReferencesNode(Node[ReferencesParameters]):
     """Passes on the references of vehicles, unless they lead one too near to another.
 
     ``vehicles`` are flown in this process and keep apart from ``others``, flown elsewhere, too.
@@ -353,10 +353,6 @@ class ReferencesNode(Node):
             for number, vehicle in enumerate(vehicles)
         ]
         self._published_held = ""
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(ReferencesParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

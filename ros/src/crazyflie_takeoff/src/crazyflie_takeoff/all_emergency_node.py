@@ -24,15 +24,11 @@ class AllEmergencyParameters(Parameters):
     service: str = parameter(SERVICE, "stops all vehicles", "/all/emergency", "srv/all_emergency")
 
 
-class AllEmergencyNode(Node):
+class AllEmergencyNode(Node[AllEmergencyParameters]):
     """Turn a call into messages to all filters, repeated for those that are just starting."""
 
     def __init__(self) -> None:
         self._left = 0
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(AllEmergencyParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

@@ -68,15 +68,11 @@ class WorldNodeParameters(Parameters):
     time_step: float = parameter(TIME_STEP, "period of the poses", 0.02)
 
 
-class WorldNode(Node):
+class WorldNode(Node[WorldNodeParameters]):
     """Show a world in RViz; move objects with a path, on /tf and as poses."""
 
     def __init__(self) -> None:
         self._begin: float | None = None
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(WorldNodeParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

@@ -18,15 +18,11 @@ def command_again(handle: NodeHandle, package: str, executable: str) -> str:
     return f"rosrun {package} {executable}{below} __name:={name}"
 
 
-class CrazyflieAddNode(Node):
+class CrazyflieAddNode(Node[CrazyflieAddParameters]):
     """Ask for a vehicle; the process exits with status 1 if that fails."""
 
     def __init__(self) -> None:
         self._answer: Future[object] | None = None
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(CrazyflieAddParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

@@ -116,7 +116,7 @@ class Channel:
                 yield vehicle.crazyflie.link()
 
 
-class CrazyflieServerNode(Node):
+class CrazyflieServerNode(Node[CrazyflieServerParameters]):
     """Connect to vehicles side by side, and serve each until it is removed.
 
     A service for all vehicles, ``~all/NAME``, is offered for each high-level command. All checks
@@ -134,10 +134,6 @@ class CrazyflieServerNode(Node):
         self._channels: dict[str, Channel] = {}
         self._in_flight = False
         self._is_shutting_down = False
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(CrazyflieServerParameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

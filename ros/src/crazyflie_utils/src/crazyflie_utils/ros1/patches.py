@@ -6,12 +6,8 @@ they are. If a target is not the code for which a patch was written, or the envi
 CRAZYFLIE_ROSPY_PATCHES ("all", "none" or names such as "send_at_once,connect_once") disables the
 patch, rospy's own code runs, and one line is logged.
 
-The figures are those of
-
-    python3 ros/src/crazyflie_utils/bench/costs.py
-    ./run bench cpu start simulated
-
-with CRAZYFLIE_ROSPY_PATCHES set or not; see the README for how they were measured.
+The figures of single messages and topics were measured in November 2026; those of flights are of
+``./run bench cpu start simulated``. Each is with CRAZYFLIE_ROSPY_PATCHES set or not.
 """
 
 import contextlib

@@ -6,7 +6,7 @@ subscribers and of messages per second:
 
     python3 -m crazyflie_utils.testing.hostile_publisher TOPIC TYPE RATE [CONTENT]
 
-CONTENT is the message in YAML, where "now" is a stamp, or its number of transforms.
+CONTENT is the message in YAML, or its number of transforms.
 """
 
 import contextlib
@@ -148,8 +148,7 @@ def _flood(topic, type_name, rate, content="{}"):
         if content.isdigit():
             return frame(crowd(int(content)))
         message = message_type()
-        now = genpy.Time.from_sec(time.time())
-        genpy.message.fill_message_args(message, [yaml.safe_load(content)], {"now": now})
+        genpy.message.fill_message_args(message, [yaml.safe_load(content)])
         return frame(message)
 
     sent, data = 0, prepare()
@@ -158,7 +157,7 @@ def _flood(topic, type_name, rate, content="{}"):
         start = time.monotonic()
         while not select.select([sys.stdin], [], [], 0.0)[0]:
             due = round((time.monotonic() - start) * rate)
-            if rate <= 1000.0 or due // 1000 != sent // 1000:
+            if due // 1000 != sent // 1000:
                 data = prepare()
             publisher.send(data * (due - sent))
             sent = due

@@ -29,8 +29,7 @@ from plots import (
 )
 
 from crazyflie_dev.bench_flights import call, wait_for_service
-from crazyflie_dev.render_rviz import background_of, crop_to_scene
-from crazyflie_dev.virtual_display import screenshot, virtual_display
+from crazyflie_dev.render_rviz import background_of, crop_to_scene, screenshot, virtual_display
 from crazyflie_reports.flight_operator import FlightOperator
 from crazyflie_reports.flight_record import FlightRecord
 from crazyflie_utils.main import begin

@@ -8,12 +8,14 @@ import pytest
 
 from crazyflie_dev.render_demo import HEIGHT, WIDTH, animation, projected, timed
 from crazyflie_dev.render_rviz import (
+    DisplayError,
     background_of,
     crop_to_scene,
     material_of,
     pixels_of,
+    screenshot,
+    virtual_display,
 )
-from crazyflie_dev.virtual_display import DisplayError, screenshot, virtual_display
 
 BACKGROUND = (10, 20, 30)
 ORANGE = (1.0, 0.35, 0.05)

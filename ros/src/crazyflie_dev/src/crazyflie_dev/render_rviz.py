@@ -1,13 +1,16 @@
 """Draws the picture of the README: RViz on a virtual display, during a hover."""
 
 import argparse
+import contextlib
 import math
 import os
+import shutil
+import subprocess
 import sys
 import tempfile
 import time
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -16,14 +19,15 @@ import rospkg
 import yaml
 from matplotlib import image
 from numpy.typing import ArrayLike, NDArray
+from PIL import ImageGrab
 
 from crazyflie_description.visualizer_node import PATH_COLOUR, REFERENCE_COLOUR
 from crazyflie_dev.demo import HOVER
-from crazyflie_dev.virtual_display import DisplayError, screenshot, virtual_display
 from crazyflie_reports.flight_operator import FlightError, FlightOperator
 from crazyflie_reports.flight_record import HOVER_TOLERANCE
 from crazyflie_utils.main import begin
 from crazyflie_utils.testing.launching import roslaunch
+from crazyflie_utils.testing.programs import running
 
 #: Width and height in pixels of the screen, and of RViz's window in its configuration.
 SCREEN = (1400, 900)
@@ -34,6 +38,41 @@ _DRAW_LIMIT = 90.0
 _FEWEST_PIXELS = 60
 _SMALLEST_SHARE = 0.5
 _LOG_LINES = 40
+
+
+class DisplayError(Exception):
+    """There is no display, or no picture; the text says why."""
+
+
+@contextlib.contextmanager
+def virtual_display(width: int, height: int) -> Iterator[str]:
+    """Run Xvfb with a size in pixels on a display that is free; yield the display's name.
+
+    `DisplayError`: Xvfb is not installed or does not start.
+    """
+    if shutil.which("Xvfb") is None:
+        raise DisplayError("Xvfb is not installed (Debian package xvfb)")
+    command = ["Xvfb", "-displayfd", "1", "-screen", "0", f"{width}x{height}x24"]
+    command += ["-nocursor", "-nolisten", "tcp"]
+    with running(*command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        # Xvfb writes the number of its display when it is ready.
+        with server.stdout as output:
+            number = output.readline().strip()
+        if not number:
+            raise DisplayError("Xvfb ended at once; what it printed says why")
+        yield f":{number}"
+
+
+def screenshot(display: str) -> NDArray[np.uint8]:
+    """Return what is on a display, such as ":7", now: shape (height, width, 3), uint8.
+
+    `DisplayError`: the display cannot be reached.
+    """
+    try:
+        return np.asarray(ImageGrab.grab(xdisplay=display).convert("RGB"))
+    except OSError as error:
+        raise DisplayError(f"no picture of display {display}: {error}") from None
 
 
 def pixels_of(picture: NDArray[np.uint8], colour: ArrayLike) -> int:

@@ -6,16 +6,16 @@ Usage: screenshot.py [FOLDER]
 
 import io
 import itertools
-import os
 import socket
-import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
 from PIL import Image
 
-from crazyflie_utils.testing.programs import free_port
+from crazyflie_utils.testing.launching import roslaunch
+from crazyflie_utils.testing.programs import free_port, running
 
 HERE = Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "test"))
@@ -97,20 +97,15 @@ def draw(port: int, folder: Path) -> None:
 def main() -> None:
     """Launch the example with the page, draw, and end it."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else IMAGES
-    port, master = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_STREAM)
-    environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{master}"}
-    launch = ["roslaunch", "-p", str(master)]
-    commands = (
-        [*launch, "crazyflie_examples", "sw_swarm.launch", "n:=3", "rviz:=false"],
-        [*launch, "--wait", "crazyflie_dashboard", "dashboard.launch", f"port:={port}"],
-    )
-    started = [subprocess.Popen(command, env=environment) for command in commands]
-    try:
+    port = free_port(socket.SOCK_STREAM)
+    swarm = ["crazyflie_examples", "sw_swarm.launch", "n:=3", "rviz:=false"]
+    page = ("roslaunch", "crazyflie_dashboard", "dashboard.launch", f"port:={port}")
+    with (
+        tempfile.TemporaryDirectory() as logs,
+        roslaunch(swarm, Path(logs) / "swarm.log"),
+        running(*page),
+    ):
         draw(port, folder)
-    finally:
-        for process in reversed(started):
-            process.terminate()
-            process.wait(30)
 
 
 if __name__ == "__main__":

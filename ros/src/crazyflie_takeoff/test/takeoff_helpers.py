@@ -204,11 +204,11 @@ class Network(FakeGraph):
         """Return that all topics are listened to, as by rosbag."""
         return True
 
-    def send(self, name, topic, message, latch):
-        """Send a message of a process, and remember it."""
+    def publish(self, topic, message, caller=""):
+        """Publish a message of a process, and remember it."""
         self._times[topic].append(self.time)
-        self._said[topic].append((name, message))
-        super().send(name, topic, message, latch)
+        self._said[topic].append((caller, message))
+        super().publish(topic, message, caller)
 
     def on(self, topic, since=0.0):
         """Return what was said on a topic after a moment, as (time, message)."""

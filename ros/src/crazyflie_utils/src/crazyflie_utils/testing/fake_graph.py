@@ -47,7 +47,6 @@ class FakeGraph:
         self._parameters = parameters
         self._processes: dict[str, _GraphProcess] = {}
         self._listeners: dict[str, list[Deliver]] = {}
-        self._latched: dict[tuple[str, str], Any] = {}
 
     # The processes.
 
@@ -61,8 +60,6 @@ class FakeGraph:
     def kill(self, name: str) -> None:
         """Kill a process as SIGKILL does: it sends nothing more."""
         del self._processes[name]
-        for publication in [each for each in self._latched if each[0] == name]:
-            del self._latched[publication]
 
     def interrupt(self, name: str) -> None:
         """Ask a process to prepare its end, as SIGINT and ``rosnode kill`` do; it continues."""
@@ -105,8 +102,18 @@ class FakeGraph:
             process.clock.wall_offset = self._wall_offset
 
     def publish(self, topic: str, message: genpy.Message, caller: str = "") -> None:
-        """Publish from outside, as the node ``caller``."""
-        self._route(caller, topic, message)
+        """Publish as a process, or as the node ``caller`` outside of them."""
+        for listener in self._listeners.get(topic, ()):
+            listener(message)
+        # As in rospy, the messages of a connection share one.
+        header = self._headers.setdefault((caller, topic), {"callerid": caller, "topic": topic})
+        fault = self.faults.get(topic)
+        for arriving in [message] if fault is None else fault(message):
+            arriving._connection_header = header
+            for name, process in list(self._processes.items()):
+                if name != caller and (name, topic) not in self.unheard:
+                    for deliver in tuple(process.transport.subscribers.get(topic, ())):
+                        process.receive(deliver, arriving)
 
     def listen(self, topic: str, callback: Deliver) -> None:
         """Call ``callback(message)`` with each message published on a topic, without its faults."""
@@ -167,29 +174,10 @@ class FakeGraph:
     def latched(self, topic: str, excluding: str) -> list[Any]:
         """Return messages that processes other than ``excluding`` have latched on a topic."""
         return [
-            message
-            for (name, latched_topic), message in self._latched.items()
-            if latched_topic == topic and name != excluding
+            process.transport.latched[topic]
+            for name, process in self._processes.items()
+            if name != excluding and topic in process.transport.latched
         ]
-
-    def send(self, name: str, topic: str, message: genpy.Message, latch: bool) -> None:
-        """Send a message of process ``name`` to all others."""
-        if latch:
-            self._latched[name, topic] = message
-        self._route(name, topic, message)
-
-    def _route(self, sender, topic, message):
-        for listener in self._listeners.get(topic, ()):
-            listener(message)
-        # As in rospy, the messages of a connection share one.
-        header = self._headers.setdefault((sender, topic), {"callerid": sender, "topic": topic})
-        fault = self.faults.get(topic)
-        for arriving in [message] if fault is None else fault(message):
-            arriving._connection_header = header
-            for name, process in list(self._processes.items()):
-                if name != sender and (name, topic) not in self.unheard:
-                    for deliver in tuple(process.transport.subscribers.get(topic, ())):
-                        process.receive(deliver, arriving)
 
 
 class _GraphProcess(FakeProcess):
@@ -240,7 +228,9 @@ class _Publication(ExternalPublisher):
 
     def publish(self, *messages: genpy.Message) -> None:
         for message in messages:
-            self._transport.graph.send(self._transport.name, self._topic, message, self._latch)
+            if self._latch:
+                self._transport.latched[self._topic] = message
+            self._transport.graph.publish(self._topic, message, self._transport.name)
 
     def close(self) -> None:
         self._transport.advertised.remove(self._topic)
@@ -256,6 +246,7 @@ class _GraphTransport(FakeTransport):
         self.name = name
         self.graph = graph
         self.advertised: list[str] = []
+        self.latched: dict[str, Any] = {}  #: Message that is latched on each topic.
 
     def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
         self.advertised.append(topic)

@@ -60,7 +60,7 @@ def test_standard_topics_need_four_log_blocks(logging):
 def test_stamps_of_the_vehicle_s_time_go_on_when_its_24_bits_are_full(server):
     vehicle = server.make_vehicle()
     # 0.7 s before its clock wraps, after 4.66 h.
-    vehicle.clock_ahead_ms = (1 << 24) - 700 - int(time.monotonic() * 1000)
+    vehicle.flight.clock_ahead_ms = (1 << 24) - 700 - int(time.monotonic() * 1000)
     server.add(vehicle.uri, use_ros_time=False, enable_logging=True, enable_logging_imu=True)
     full = (1 << 24) / 1000.0
 

@@ -3,7 +3,7 @@
 import errno
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import NamedTuple
@@ -253,9 +253,9 @@ class _Block:
 class LogPort:
     """Sends the values of requested variables periodically."""
 
-    def __init__(self, firmware: Firmware):
+    def __init__(self, firmware: Firmware, variables: Sequence[LogVariable]):
         self._firmware = firmware
-        self._variables = log_variables()
+        self._variables = variables
         entries = [(v.group, v.name, LOG_CODES[v.number_type]) for v in self._variables]
         self.table = Table(entries, bytes([MAX_BLOCKS, MAX_VARIABLES]))
         self._blocks: dict[int, _Block] = {}

@@ -7,11 +7,11 @@
 
 import contextlib
 import math
-import socket
 import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 from crazyflie_model.supervisor import SupervisorState
@@ -22,9 +22,10 @@ from crazyflie_virtual.firmware.planner import ACTIVE, TrajectoryState
 from crazyflie_virtual.firmware.setpoints import PRIORITY_CRTP
 from crazyflie_virtual.firmware.states import DISABLED
 from crazyflie_virtual.firmware.supervisor import LANDED_AFTER, State
+from crazyflie_virtual.log import LogPort, LogVariable
 from crazyflie_virtual.memory import TRAJECTORY, Memory, MemoryPort
 from crazyflie_virtual.ports import HANDLERS
-from crazyflie_virtual.server import VehicleServer
+from crazyflie_virtual.server import Server, VehicleServer, open_socket
 from crazyflie_virtual.settings import VehicleSettings, switches
 from crazyflie_virtual.toc import LOG_TYPES, PARAMETER_TYPES, Table
 
@@ -44,10 +45,11 @@ READ_ONLY, EXTENDED = 0x40, 0x10
 
 _OTHER_MEMORY = 0x18  #: Type of the memory that precedes that of trajectories.
 
-_LOG_CODES = {each.format: code for code, each in LOG_TYPES.items()}
+_LOG_TYPES = {each.format: each for each in LOG_TYPES.values()}
 _PARAMETER_CODES = {each.format: code for code, each in PARAMETER_TYPES.items()}
 
 _EMERGENCY_STOP = 0x03
+_RESET_LOGS = (Port.LOG, 1, b"\x05")
 _NULL_PACKET = (15, 3)  #: Port and channel of the packet by which vehicles are searched.
 
 #: Ports and channels on which the firmware answers. Others are those of the fake vehicle.
@@ -72,6 +74,8 @@ class FakeFlight(Firmware):
         settings: dict[str, Any] = {"protocol": protocol, "sensor_noise": False}
         self._settings = VehicleSettings(**settings)
         self._clock = clock
+        #: Time by which the clock of log data, which is real, is ahead of this machine's (ms).
+        self.clock_ahead_ms = 0
         self.restart()
 
     def restart(self) -> None:
@@ -88,6 +92,11 @@ class FakeFlight(Firmware):
         if self._pinned is not None:
             is_active = SupervisorState.HIGH_LEVEL_ACTIVE in self._pinned
             self.planner.state = TrajectoryState.FLYING if is_active else TrajectoryState.IDLE
+
+    @property
+    def milliseconds(self) -> int:
+        """Time of log data, ms."""
+        return int(time.monotonic() * 1000.0) + self.clock_ahead_ms
 
     @property
     def motors_run(self) -> bool:
@@ -134,7 +143,7 @@ class FakeFlight(Firmware):
             self.supervisor.state = State.FLYING if is_flying else State.READY_TO_FLY
 
 
-class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
+class FakeVehicle(Server, contextlib.AbstractContextManager["FakeVehicle"]):
     """A vehicle on a UDP port of this machine, by default any free one.
 
     Log variables are "group.name" -> (struct format of the type, value), parameters "group.name" ->
@@ -166,23 +175,18 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         self.lose: Callable[[int], bool] = lambda count: False
         #: A packet that begins like this stops the vehicle, before it is read, until `resume`.
         self.stalls_at: tuple[int, int, bytes] | None = None
-        #: Time by which the clock of its log data is ahead of this machine's (ms).
-        self.clock_ahead_ms = 0
         self._resumed = threading.Event()
         self._is_frozen = False
         self._thawed = threading.Event()
         self._changed = threading.Condition()
         self._replies = 0
-        self._blocks: dict[int, list[str]] = {}
-        self._started: dict[int, tuple[float, float]] = {}
+        self.forget_logs()
         self._peer: tuple[str, int] | None = None
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.bind(("127.0.0.1", port))
+        self._socket = open_socket("127.0.0.1", port)
         self._socket.settimeout(0.01)
         self.port = self._socket.getsockname()[1]
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="fake-vehicle", daemon=True)
-        self._thread.start()
+        super().__init__(self.uri, self._socket)
+        self.start()
 
     @property
     def is_frozen(self) -> bool:
@@ -215,10 +219,8 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
 
     def close(self) -> None:
         """Close the port: the vehicle is gone."""
-        self._stopped.set()
         self.resume()
-        self._thread.join(timeout=2.0)
-        self._socket.close()
+        self.stop()
 
     def send(self, port: int, channel: int, data: bytes) -> None:
         """Send a packet without being asked."""
@@ -247,35 +249,36 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         assert len(found) >= count, f"{len(found)} of {count} packets on {port}/{channel}"
         return found
 
-    def _run(self):
-        while not self._stopped.is_set():
-            self._send_logs()
-            try:
-                datagram, peer = self._socket.recvfrom(64)
-            except OSError:
-                # Nothing has come, or nothing listens to what was sent.
-                continue
-            if datagram == _THAW:
-                self._is_frozen = False
-                self._thawed.set()
-                continue
-            packet = decode(datagram)
-            if self._is_frozen or packet is None:
-                continue
-            if self.stalls_at is not None and _begins(packet, self.stalls_at):
-                self._resumed.wait(_THAW_LIMIT)
-            is_for_all = is_broadcast(datagram)
-            if is_for_all and not self.hears_broadcasts:
-                continue
-            if not is_for_all:
-                self._peer = peer
-            with self._changed:
-                self.received.append(packet)
-                if is_for_all:
-                    self.broadcasts.append(packet)
-                self._changed.notify_all()
-            if not any(_begins(packet, each) for each in self.deaf):
-                self._reply(*packet)
+    def serve(self) -> None:
+        """Send the log data that are due; process one datagram if one comes within 0.01 s."""
+        for each in self._logs.collect():
+            self.send(*each)
+        try:
+            datagram, peer = self._socket.recvfrom(64)
+        except OSError:
+            # Nothing has come, or nothing listens to what was sent.
+            return
+        if datagram == _THAW:
+            self._is_frozen = False
+            self._thawed.set()
+            return
+        packet = decode(datagram)
+        if self._is_frozen or packet is None:
+            return
+        if self.stalls_at is not None and _begins(packet, self.stalls_at):
+            self._resumed.wait(_THAW_LIMIT)
+        is_for_all = is_broadcast(datagram)
+        if is_for_all and not self.hears_broadcasts:
+            return
+        if not is_for_all:
+            self._peer = peer
+        with self._changed:
+            self.received.append(packet)
+            if is_for_all:
+                self.broadcasts.append(packet)
+            self._changed.notify_all()
+        if not any(_begins(packet, each) for each in self.deaf):
+            self._reply(*packet)
 
     def _reply(self, port, channel, data):
         if (port, channel) == _NULL_PACKET:
@@ -295,49 +298,26 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
     def _answer(self, port, channel, data):
         if (port, channel) in _FIRMWARE_CHANNELS:
             return HANDLERS[port](self.flight, channel, data)
+        if port == Port.LOG:
+            if (port, channel, data[:1]) == _RESET_LOGS:
+                self.forget_logs()
+            return self._logs.handle(channel, data)
         if port == Port.MEMORY:
             return self._memory(channel, data)
         method = getattr(self, f"_on_{port}_{channel}", None)
         return None if method is None else method(data)
 
-    # Log.
-
-    def _on_5_0(self, data):
-        codes = {name: _LOG_CODES[form] for name, (form, _) in self.log.items()}
-        return _table(codes, b"\x10\x80").answer(data)
-
-    def _on_5_1(self, data):
-        command, block = data[0], data[1] if len(data) > 1 else 0
-        if command == 5:
-            self._blocks, self._started = {}, {}
-        elif command in (6, 7):
-            names = list(self.log)
-            wanted = [
-                names[struct.unpack_from("<H", data, i + 1)[0]] for i in range(2, len(data), 3)
-            ]
-            self._blocks[block] = (self._blocks.get(block, []) if command == 7 else []) + wanted
-        elif command == 3:
-            self._started[block] = (data[2] * 0.01, time.monotonic())
-        elif command in (2, 4):
-            self._started.pop(block, None)
-        return bytes([command, block, 0])
-
     def forget_logs(self) -> None:
         """Send no log data any more, as after a restart between two pings."""
-        self._started = {}
+        variables = [
+            LogVariable(group, variable, _LOG_TYPES[form], partial(self._value, name))
+            for name, (form, _) in self.log.items()
+            for group, variable in [name.split(".")]
+        ]
+        self._logs = LogPort(self.flight, variables)
 
-    def _send_logs(self):
-        now, started = time.monotonic(), self._started
-        for block, (period, due) in list(started.items()):
-            if now < due:
-                continue
-            started[block] = (period, max(due + period, now))
-            form = "<" + "".join(self.log[name][0] for name in self._blocks[block])
-            values = {name: value for name, (_, value) in self.log.items()}
-            values["supervisor.info"] = int(self.flight.state)
-            packed = struct.pack(form, *(values[name] for name in self._blocks[block]))
-            stamp = (int(now * 1000) + self.clock_ahead_ms & 0xFFFFFF).to_bytes(3, "little")
-            self.send(5, 2, bytes([block]) + stamp + packed)
+    def _value(self, name, flight):
+        return int(flight.state) if name == "supervisor.info" else self.log[name][1]
 
     def _memory(self, channel, data):
         # The first one is never read.
@@ -347,11 +327,12 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
     # Parameters.
 
     def _on_2_0(self, data):
-        codes = {
-            name: _PARAMETER_CODES[form] | flags
+        entries = [
+            (group, parameter, _PARAMETER_CODES[form] | flags)
             for name, (form, _, flags) in self.parameters.items()
-        }
-        return _table(codes).answer(data)
+            for group, parameter in [name.split(".")]
+        ]
+        return Table(entries).answer(data)
 
     def _on_2_1(self, data):
         code, value, _ = list(self.parameters.values())[struct.unpack("<H", data)[0]]
@@ -381,7 +362,3 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
 
 def _begins(received, beginning):
     return received[:2] == beginning[:2] and received[2].startswith(beginning[2])
-
-
-def _table(codes, limits=b""):
-    return Table([(*name.split("."), code) for name, code in codes.items()], limits)

@@ -12,7 +12,7 @@ from crazyflie_virtual.body import LOW_CHARGE, OFF, STEP, Battery, Physics
 from crazyflie_virtual.crtp import FirmwareAssertionError, Packet, Port
 from crazyflie_virtual.firmware.decks import lighthouse_pages
 from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
-from crazyflie_virtual.log import LogPort
+from crazyflie_virtual.log import LogPort, log_variables
 from crazyflie_virtual.memory import LighthouseMemory, Memory, MemoryPort
 from crazyflie_virtual.parameters import ParameterPort
 from crazyflie_virtual.settings import VehicleSettings, switches
@@ -44,7 +44,7 @@ class Board:
         failure: str = "",
     ):
         firmware = self.firmware = Firmware(physics, faults, settings, failure)
-        self._log = LogPort(firmware)
+        self._log = LogPort(firmware, log_variables())
         lighthouse = firmware.deck.memory = LighthouseMemory(storage.lighthouse)
         memories = [
             storage.eeprom,

@@ -140,7 +140,7 @@ def add_radios(monkeypatch):
         for name in ("0", "1"):
             # A dongle speaks to its own vehicles, and its broadcasts reach all.
             ids = [int(uri[-2:], 16) + 0x80 * (uri.split("/")[2] != name) for uri in uris]
-            dongles.append(Dongle({(30, i): v for i, v in zip(ids, vehicles, strict=True)}))
+            dongles.append(Dongle({(30, i): v.port for i, v in zip(ids, vehicles, strict=True)}))
         monkeypatch.setattr(crazyradio, "_find_devices", lambda serial=None: dongles)
         for number, (uri, vehicle) in enumerate(zip(uris, vehicles, strict=True), start=1):
             server.add(uri, f"cf{number}")

@@ -6,9 +6,9 @@ import pytest
 import usb
 from cflib.crtp.radiodriver import RadioManager
 from cflib.drivers import crazyradio
+from usb_bus import PLACES, Bus
 
 from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.testing import PLACES, Bus
 from crazyflie_utils.testing.fixtures import own_cache  # noqa: F401
 from crazyflie_virtual.testing import EXTENDED, READ_ONLY, FakeVehicle
 
@@ -130,7 +130,6 @@ def states():
 def bus(monkeypatch):
     vehicles = {place: FakeVehicle() for place in PLACES}
     bus = Bus(vehicles)
-    bus.vehicles = vehicles
     bus.plug_in()
     monkeypatch.setattr(crazyradio, "_find_devices", bus.devices)
     monkeypatch.setattr(usb.util, "dispose_resources", lambda device: None)

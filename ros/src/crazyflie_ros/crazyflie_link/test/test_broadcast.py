@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from cflib.utils.encoding import decompress_quaternion
+from usb_bus import PLACES
 
 from crazyflie_link import cflib_internals
 from crazyflie_link.address import Address
@@ -14,7 +15,6 @@ from crazyflie_link.cflib_internals import packet
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.localization import PackedPoses, pack
 from crazyflie_link.supervisor import BROADCAST_STOP
-from crazyflie_link.testing import PLACES
 from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import FakeVehicle
 

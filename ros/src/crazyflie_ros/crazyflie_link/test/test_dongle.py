@@ -5,10 +5,10 @@ import threading
 import time
 
 import pytest
+from usb_bus import PLACES
 
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import NoDongleError
-from crazyflie_link.testing import PLACES
 from crazyflie_utils.testing.programs import LIMIT, wait_until
 
 # The thread of cflib that ends is what these tests are about.

@@ -4,7 +4,6 @@ import socket
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
 
 import usb
 from cflib.crazyflie.mem import LighthouseBsCalibration, LighthouseBsGeometry
@@ -18,27 +17,19 @@ Place = tuple[int, int]  #: Channel, and last byte of the address, of a vehicle.
 NULL = 0xF3
 LINK_BITS = 3 << 2
 
-#: Ports of the vehicles of `crazyflie_link`'s own tests.
-PLACES: tuple[Place, ...] = ((10, 0xE7), (20, 0xE7), (30, 0x01), (30, 0x02))
-
-
-class Vehicle(Protocol):
-    """A vehicle on a UDP port of this machine."""
-
-    port: int
-
 
 class Dongle:
-    """A USB device that passes packets on to vehicles, by channel and last byte of the address.
+    """A USB device that passes packets on to vehicles, by their places.
 
+    ``ports`` are their UDP ports of this machine.
     As the real one it gives no answer, and sends to all of the channel, if acknowledgements are
     off and the address is that of broadcasts.
     """
 
     bcdDevice = 0x0053  # noqa: N815
 
-    def __init__(self, vehicles: Mapping[Place, Vehicle]):
-        self._peers = {place: vehicle.port for place, vehicle in vehicles.items()}
+    def __init__(self, ports: Mapping[Place, int]):
+        self._peers = ports
         self._sockets: dict[Place, socket.socket] = {}
         self._channel, self._acknowledges = 2, True
         self._address: tuple[int, ...] = (0xE7,) * 5
@@ -113,29 +104,6 @@ class Dongle:
     def _check(self):
         if self.is_broken:
             raise usb.USBError("No such device (it may have been disconnected)", errno=19)
-
-
-class Bus:
-    """A USB bus with one socket for a dongle."""
-
-    def __init__(self, vehicles: Mapping[Place, Vehicle]):
-        self._vehicles = vehicles
-        self.dongle: Dongle | None = None
-        self.failed_attempts = 0
-
-    def plug_in(self) -> None:
-        """Plug in a new dongle."""
-        self.dongle = Dongle(self._vehicles)
-
-    def break_it(self) -> None:
-        """Break the dongle, which answers no request any more and stays plugged in."""
-        assert self.dongle is not None
-        self.dongle.is_broken = True
-
-    def devices(self, serial: str | None = None) -> list[Dongle]:
-        """Return the dongle, as cflib looks for devices."""
-        self.failed_attempts += self.dongle is None
-        return [self.dongle] if self.dongle is not None else []
 
 
 def write_lighthouse_file(path: Path, *numbers: int, system_type: int = 2) -> str:

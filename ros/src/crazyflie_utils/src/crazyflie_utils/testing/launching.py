@@ -6,7 +6,6 @@ import re
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -30,41 +29,35 @@ def complaints(log: Path) -> list[str]:
     return [line for line in lines if _COMPLAINT.search(line)]
 
 
-@contextlib.contextmanager
-def roslaunch(arguments: list[str], log: Path) -> Iterator[subprocess.Popen[Any]]:
+def roslaunch(
+    arguments: list[str], log: Path
+) -> contextlib.AbstractContextManager[subprocess.Popen[Any]]:
     """Run roslaunch on a master of its own for the time of a with block.
 
     The arguments are package, launch file and its arguments; the log receives what roslaunch and
     the nodes print. `LaunchError` if roslaunch ends before there is a master.
     """
-    port = _set_master()
-    command = ["roslaunch", "-p", port, *arguments]
+    return _with_master(log, "roslaunch", *arguments)
+
+
+def master(log: Path) -> contextlib.AbstractContextManager[subprocess.Popen[Any]]:
+    """Run only a master for the time of a with block; its output goes to a log."""
+    return _with_master(log, "rosmaster", "--core")
+
+
+@contextlib.contextmanager
+def _with_master(log, program, *arguments):
+    """Run a program with a master on a free port, also that of this process."""
+    port = free_port(socket.SOCK_STREAM)
+    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
+    os.environ["ROS_IP"] = "127.0.0.1"
+    command = (program, "-p", port, *arguments)
     with (
         log.open("w") as output,
         running(*command, stdout=output, stderr=subprocess.STDOUT) as process,
     ):
         _wait_for_master(process, log)
         yield process
-
-
-@contextlib.contextmanager
-def master(log: Path) -> Iterator[None]:
-    """Run only a master for the time of a with block; its output goes to a log."""
-    command = ["rosmaster", "--core", "-p", _set_master()]
-    with (
-        log.open("w") as output,
-        running(*command, stdout=output, stderr=subprocess.STDOUT) as process,
-    ):
-        _wait_for_master(process, log)
-        yield
-
-
-def _set_master():
-    """Set a free port for the master of this process and of those it starts; return the port."""
-    port = free_port(socket.SOCK_STREAM)
-    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
-    os.environ["ROS_IP"] = "127.0.0.1"
-    return port
 
 
 def _wait_for_master(process, log):

@@ -7,6 +7,7 @@ from contextlib import suppress
 from typing import Any
 
 import genpy
+from rosmaster.paramserver import ParamDictionary
 from typing_extensions import override
 
 from crazyflie_utils.refusal import ServiceError
@@ -76,14 +77,11 @@ class FakeTransport(Transport):
         """Return an entry of ``parameters``, or those below a namespace."""
         if name in self.parameters:
             return self.parameters[name]
-        below = {
-            key.removeprefix(f"{name}/"): value
-            for key, value in self.parameters.items()
-            if key.startswith(f"{name}/")
-        }
-        if not below:
-            raise KeyError(name)
-        return _tree(below)
+        below = ParamDictionary(None)
+        for key, value in self.parameters.items():
+            if key.startswith(f"{name}/"):
+                below.set_param(key, value)
+        return below.get_param(name)
 
     def set_param(self, name: str, value: Any) -> None:
         """Set an entry of ``parameters``; a dictionary is a namespace, as with ROS."""
@@ -185,14 +183,3 @@ def copy_outcome(answer: Future[Any], reply: Future[Any]) -> None:
         reply.set_result(answer.result())
     else:
         reply.set_exception(answer.exception())
-
-
-def _tree(leaves):
-    tree: dict[str, Any] = {}
-    for name, value in leaves.items():
-        *folders, leaf = name.split("/")
-        branch = tree
-        for folder in folders:
-            branch = branch.setdefault(folder, {})
-        branch[leaf] = value
-    return tree

@@ -163,7 +163,6 @@ class FakeVehicle(Server, contextlib.AbstractContextManager["FakeVehicle"]):
         self.flight = FakeFlight(protocol, clock)
         self.log = log if log is not None else {"pm.vbat": ("f", 3.9)}
         self.parameters = parameters if parameters is not None else {"ring.effect": ("B", 1, 0)}
-        self.protocol = protocol
         self.received: list[tuple[int, int, bytes]] = []  #: All packets, oldest first.
         self.broadcasts: list[tuple[int, int, bytes]] = []  #: Those that came as a broadcast.
         self.hears_broadcasts = True  #: Whether broadcasts arrive.
@@ -350,7 +349,7 @@ class FakeVehicle(Server, contextlib.AbstractContextManager["FakeVehicle"]):
     # Supervisor.
 
     def _on_9_0(self, data):
-        if self.protocol < SUPERVISOR_PROTOCOL:
+        if self.flight.protocol < SUPERVISOR_PROTOCOL:
             return None
         return bytes([0x80 | data[0]]) + struct.pack("<H", self.flight.state)
 

@@ -12,12 +12,7 @@ import genpy
 
 from crazyflie_utils.node import Node
 from crazyflie_utils.testing.fake_process import FakeProcess, pass_time
-from crazyflie_utils.testing.fake_transport import (
-    FakeSubscriber,
-    FakeTransport,
-    copy_outcome,
-    refuse,
-)
+from crazyflie_utils.testing.fake_transport import FakeTransport, copy_outcome, refuse
 from crazyflie_utils.topics import ExternalPublisher, ExternalSubscriber
 
 Deliver = Callable[[Any], None]
@@ -259,13 +254,13 @@ class _GraphTransport(FakeTransport):
         deliver: Deliver,
         may_wait: Callable[[], bool] = lambda: False,
     ) -> ExternalSubscriber:
-        subscribers = self.subscribers.setdefault(topic, [])
-        subscribers.append(deliver)
+        subscription = super().subscribe(topic, message_type, deliver)
         for message in self.graph.latched(topic, self.name):
             deliver(message)
-        return FakeSubscriber(
-            lambda: self.graph.publishes(topic, self.name), lambda: subscribers.remove(deliver)
-        )
+        return subscription
+
+    def is_published(self, topic: str) -> bool:
+        return self.graph.publishes(topic, self.name)
 
     def find_service(self, name: str) -> Callable[[Any], Future[Any]]:
         return self.graph.find_service(name)

@@ -8,7 +8,6 @@ from typing import Any
 
 import genpy
 from rosmaster.paramserver import ParamDictionary
-from typing_extensions import override
 
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.timers import SteadyTimers
@@ -32,20 +31,17 @@ class _Record(ExternalPublisher):
         pass
 
 
-class FakeSubscriber(ExternalSubscriber):
-    """A subscription whose queries and end are functions."""
+class _Subscription(ExternalSubscriber):
+    def __init__(self, transport: "FakeTransport", topic: str, deliver: Callable[[Any], None]):
+        self._transport = transport
+        self._topic = topic
+        self._deliver = deliver
 
-    def __init__(self, is_published: Callable[[], bool], close: Callable[[], None]):
-        self._is_published = is_published
-        self._close = close
-
-    @override
     def has_publishers(self) -> bool:
-        return self._is_published()
+        return self._transport.is_published(self._topic)
 
-    @override
     def close(self) -> None:
-        self._close()
+        self._transport.subscribers[self._topic].remove(self._deliver)
 
 
 class FakeTransport(Transport):
@@ -103,11 +99,12 @@ class FakeTransport(Transport):
         may_wait: Callable[[], bool] = lambda: False,
     ) -> ExternalSubscriber:
         """Keep ``deliver`` for `FakeProcess.publish`."""
-        subscribers = self.subscribers.setdefault(topic, [])
-        subscribers.append(deliver)
-        return FakeSubscriber(
-            lambda: topic not in self.unpublished, lambda: subscribers.remove(deliver)
-        )
+        self.subscribers.setdefault(topic, []).append(deliver)
+        return _Subscription(self, topic, deliver)
+
+    def is_published(self, topic: str) -> bool:
+        """Return whether another process publishes a topic."""
+        return topic not in self.unpublished
 
     def advertise_service(
         self,

@@ -152,27 +152,20 @@ class FakeGraph:
 
     def publishes(self, topic: str, excluding: str) -> bool:
         """Return whether another process than ``excluding`` publishes a topic."""
-        return any(
-            topic in process.transport.advertised
-            for name, process in self._processes.items()
-            if name != excluding
-        )
+        return any(topic in each.advertised for each in self._others(excluding))
 
     def subscribes(self, topic: str, excluding: str) -> bool:
         """Return whether anyone but ``excluding`` receives a topic."""
-        return topic in self._listeners or any(
-            process.transport.subscribers.get(topic)
-            for name, process in self._processes.items()
-            if name != excluding
-        )
+        others = self._others(excluding)
+        return topic in self._listeners or any(each.subscribers.get(topic) for each in others)
 
     def latched(self, topic: str, excluding: str) -> list[Any]:
         """Return messages that processes other than ``excluding`` have latched on a topic."""
-        return [
-            process.transport.latched[topic]
-            for name, process in self._processes.items()
-            if name != excluding and topic in process.transport.latched
-        ]
+        others = self._others(excluding)
+        return [each.latched[topic] for each in others if topic in each.latched]
+
+    def _others(self, name):
+        return [each.transport for each in self._processes.values() if each.name != name]
 
 
 class _GraphProcess(FakeProcess):

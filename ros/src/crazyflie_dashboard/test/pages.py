@@ -38,7 +38,7 @@ def wait_for(condition, what):
 
 
 @contextlib.contextmanager
-def chromium(*arguments, scale=1.0):
+def chromium(scale=1.0):
     """Yield a headless Chromium that draws in software, ``scale`` pixels for each of CSS."""
     options = webdriver.ChromeOptions()
     options.binary_location = "/usr/bin/chromium"
@@ -46,7 +46,6 @@ def chromium(*arguments, scale=1.0):
         *("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"),
         *("--enable-unsafe-swiftshader", "--window-size=1100,800"),
         f"--force-device-scale-factor={scale}",
-        *arguments,
     ):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})

@@ -22,7 +22,7 @@ from crazyflie_batch import (
     quadrotor,
     simulate,
 )
-from crazyflie_batch.flight import Plan, turn, yaw_from_quaternion
+from crazyflie_batch.flight import Plan, yaw_from_quaternion
 from crazyflie_batch.symbols import Condition, Emitter, Symbol
 from crazyflie_model.angles import quaternion_from_rpy, rpy_from_quaternion
 from crazyflie_model.dynamics import NearHover
@@ -157,7 +157,3 @@ def test_what_is_not_known_is_refused():
 def test_yaw_is_that_of_the_nodes(roll, pitch, yaw):
     quaternion = quaternion_from_rpy(roll, pitch, yaw)
     assert yaw_from_quaternion(quaternion) == pytest.approx(rpy_from_quaternion(*quaternion)[2])
-
-
-def test_a_turn_of_nothing_is_none():
-    assert turn([0.0, 0.0, 0.6, 0.8], [0.0, 0.0, 0.0]) == [0.0, 0.0, 0.6, 0.8]

@@ -15,6 +15,7 @@ from crazyflie_model.angles import (
     rotate_back,
     rotate_by_yaw,
     rpy_from_quaternion,
+    turned,
     wrap_to_pi,
     zyx_from_quaternion,
 )
@@ -158,3 +159,14 @@ def test_the_firmware_s_pitch_ends_at_a_quarter_turn_in_spite_of_rounding(sense)
     half = 0.7071067811865476
     _, pitch, _ = zyx_from_quaternion((0.0, sense * half, 0.0, half))
     assert pitch == pytest.approx(sense * math.pi / 2.0)
+
+
+@given(ANGLE, PITCH, ANGLE, st.tuples(*[st.floats(-2.0, 2.0)] * 3))
+def test_a_turn_by_a_rotation_vector_is_scipys(roll, pitch, yaw, rotation):
+    quaternion = quaternion_from_rpy(roll, pitch, yaw)
+    expected = Rotation.from_quat(quaternion) * Rotation.from_rotvec(rotation)
+    assert same_rotation(turned(quaternion, rotation), expected.as_quat())
+
+
+def test_a_turn_of_nothing_is_none():
+    assert turned([0.0, 0.0, 0.6, 0.8], [0.0, 0.0, 0.0]) == (0.0, 0.0, 0.6, 0.8)

@@ -17,6 +17,7 @@ from typing import Any
 from crazyflie_batch.estimators import Estimator
 from crazyflie_lqr import linear_feedback
 from crazyflie_model import inner_loops
+from crazyflie_model.angles import turned
 from crazyflie_model.dynamics import STEP, Dynamics, watchdog_control
 from crazyflie_model.elementwise import Number, Vector, functions, where
 
@@ -34,26 +35,6 @@ def yaw_from_quaternion(quaternion: Sequence[Number]) -> Number:
     r11 = 1.0 - s * (x * x + z * z)
     is_singular = f.hypot(r00, r01) < _SMALLEST_COSINE
     return where(is_singular, f.atan2(r10, r11), f.atan2(-r01, r00))
-
-
-def turn(quaternion: Sequence[Number], rotation: Sequence[Number]) -> Vector[Number]:
-    """Return the quaternion after a rotation vector (rad) in the body frame.
-
-    The error of an attitude in `crazyflie_simulator.vehicle`.
-    """
-    x, y, z, w = quaternion
-    p, q, r = rotation
-    f = functions(p)
-    angle = f.sqrt(p * p + q * q + r * r)
-    some = where(angle > 0.0, angle, 1.0)
-    factor = where(angle > 0.0, f.sin(some / 2.0) / some, 0.5)
-    a, b, c, d = factor * p, factor * q, factor * r, f.cos(angle / 2.0)
-    return [
-        w * a + x * d + y * c - z * b,
-        w * b - x * c + y * d + z * a,
-        w * c + x * b - y * a + z * d,
-        w * d - x * a - y * b - z * c,
-    ]
 
 
 #: Random numbers of a tick: noise of position (3) and attitude (3), of standard deviation 1; and
@@ -159,9 +140,9 @@ def measure(
     position_noise, attitude_noise = parameters["noise"]
     (dropout,) = parameters["dropout"]
     measured = [a + position_noise * b for a, b in zip(position, noise[:3], strict=True)]
-    turned = turn(attitude, [attitude_noise * part for part in noise[3:6]])
+    rotation = turned(attitude, [attitude_noise * part for part in noise[3:6]])
     is_lost = noise[6] < dropout
-    return [*measured, yaw_from_quaternion(turned), where(is_lost, 0.0, 1.0)]
+    return [*measured, yaw_from_quaternion(rotation), where(is_lost, 0.0, 1.0)]
 
 
 def run_controller(

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from crazyflie_model.elementwise import Number, clip, functions
+from crazyflie_model.elementwise import Number, clip, functions, where
 
 Triple = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -125,3 +125,26 @@ def rotate_back(
     """Return a vector given in the fixed frame in the body frame; inverse of `rotate`."""
     x, y, z, w = quaternion
     return rotate((-x, -y, -z, w), vector)
+
+
+def product(p: Sequence[Number], q: Sequence[Number]) -> tuple[Number, Number, Number, Number]:
+    """Return the product of two quaternions: the rotation q, then p."""
+    (a, b, c, d), (x, y, z, w) = p, q
+    return (
+        d * x + a * w + b * z - c * y,
+        d * y + b * w + c * x - a * z,
+        d * z + c * w + a * y - b * x,
+        d * w - a * x - b * y - c * z,
+    )
+
+
+def turned(
+    quaternion: Sequence[Number], rotation: Sequence[Number]
+) -> tuple[Number, Number, Number, Number]:
+    """Return a quaternion after a rotation vector (3 components, rad) in the body frame."""
+    p, q, r = rotation
+    f = functions(p)
+    angle = f.sqrt(p * p + q * q + r * r)
+    some = where(angle > 0.0, angle, 1.0)
+    factor = where(angle > 0.0, f.sin(some / 2.0) / some, 0.5)
+    return product(quaternion, (factor * p, factor * q, factor * r, f.cos(angle / 2.0)))

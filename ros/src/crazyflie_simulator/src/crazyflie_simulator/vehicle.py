@@ -11,7 +11,7 @@ import numpy as np
 from numpy.random import Generator, default_rng
 from numpy.typing import NDArray
 
-from crazyflie_model.angles import Quaternion, Triple
+from crazyflie_model.angles import Quaternion, Triple, turned
 from crazyflie_model.dynamics import STEP, Dynamics, watchdog_control
 from crazyflie_model.elementwise import Vector
 
@@ -204,7 +204,8 @@ class MotionCapture:
             x, y, z = (a + b for a, b in zip(position, error, strict=True))
             position = (x, y, z)
         if self.attitude_noise > 0.0:
-            quaternion = _turn(quaternion, self._random.normal(0.0, self.attitude_noise, 3))
+            error = self._random.normal(0.0, self.attitude_noise, 3).tolist()
+            quaternion = turned(quaternion, error)
         self._in_transit.append((time, position, quaternion))
 
     def arrivals(self, time: float) -> list[Pose]:
@@ -213,18 +214,3 @@ class MotionCapture:
         while self._in_transit and self._in_transit[0][0] + self.latency <= time + 1e-9:
             arrived.append(self._in_transit.popleft())
         return arrived
-
-
-def _turn(quaternion: Quaternion, rotation: NDArray[np.float64]) -> Quaternion:
-    # The quaternion's product with that of a rotation vector in the body frame.
-    x, y, z, w = quaternion
-    angle = math.hypot(*rotation)
-    factor = math.sin(angle / 2.0) / angle if angle > 0.0 else 0.5
-    a, b, c = (factor * float(part) for part in rotation)
-    d = math.cos(angle / 2.0)
-    return (
-        w * a + x * d + y * c - z * b,
-        w * b - x * c + y * d + z * a,
-        w * c + x * b - y * a + z * d,
-        w * d - x * a - y * b - z * c,
-    )

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from crazyflie_model import angles
 from crazyflie_model.angles import Quaternion
 
 _BITS = 9
@@ -23,13 +24,7 @@ def product(p: Quaternion, q: Quaternion) -> Quaternion:
 
     The rotation by twice (a, b, c), small, rad, is (a, b, c, 1).
     """
-    (a, b, c, d), (x, y, z, w) = p, q
-    return normalized(
-        d * x + a * w + b * z - c * y,
-        d * y + b * w + c * x - a * z,
-        d * z + c * w + a * y - b * x,
-        d * w - a * x - b * y - c * z,
-    )
+    return normalized(*angles.product(p, q))
 
 
 def from_matrix(rotation: npt.NDArray[np.float64]) -> Quaternion:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import override
 
@@ -83,65 +82,41 @@ class Kalman(Estimator):
     @classmethod
     @override
     def start(cls, position: Vector[Any], parameters: Sequence[Any]) -> Vector[Any]:
-        return _begin(position, [0.0] * 3, parameters[0])
+        estimator = _Filter(*parameters)
+        estimator.start(position)
+        return estimator.memory
 
     @classmethod
     @override
     def update(
         cls, memory: Vector[Any], dt: Any, position: Vector[Any], parameters: Sequence[Any]
     ) -> tuple[Vector[Any], Vector[Any], Vector[Any]]:
-        noise, walk = parameters
-        speeds = [(a - b) / dt for a, b in zip(position, memory[:3], strict=True)]
-        restarted = _begin(position, speeds, noise)
-        state, covariance = _predict(memory[:9], memory[9:], dt, walk * walk)
-        state, covariance = _correct(state, covariance, position, noise * noise)
-        is_late = dt > motion.MEMORY
-        memory = [where(is_late, a, b) for a, b in zip(restarted, state + covariance, strict=True)]
+        estimator = _Filter(*parameters)
+        estimator.memory = memory
+        estimator.step(dt, position)
+        memory = estimator.memory
         return memory, memory[:3], memory[3:6]
 
 
-def _first_variances():
-    """Return the variances of rate and acceleration in a filter that has seen one sample."""
-    filter_ = motion.ConstantAccelerationFilter(1.0, 1.0)
-    filter_.start([0.0])
-    return np.diag(filter_.covariance)[1:].tolist()
+class _Filter(motion.ConstantAccelerationFilter):
+    """The filter for floats or a batch, whose memory is a list of components."""
 
+    @property
+    def memory(self) -> Vector[Any]:
+        return [*self._value, *self._rate, *self.acceleration, *self._covariance]
 
-_RATE_VARIANCE, _ACCELERATION_VARIANCE = _first_variances()
+    @memory.setter
+    def memory(self, memory: Vector[Any]) -> None:
+        self._value, self._rate, self.acceleration = memory[:3], memory[3:6], memory[6:9]
+        self._covariance = tuple(memory[9:])
 
-
-def _begin(position, velocity, noise):
-    """Return the memory of a filter that knows next to nothing about rate and acceleration."""
-    covariance = [noise * noise, 0.0, 0.0, _RATE_VARIANCE, 0.0, _ACCELERATION_VARIANCE]
-    return [*position, *velocity, 0.0, 0.0, 0.0, *covariance]
-
-
-def _predict(state, covariance, dt, walk):
-    """Return state and covariance ``dt`` later; F P F' + Q written out."""
-    dt2, dt3 = dt**2, dt**3
-    half = dt2 / 2.0
-    p, v, a = state[:3], state[3:6], state[6:9]
-    p = [p[axis] + dt * v[axis] + half * a[axis] for axis in range(3)]
-    v = [v[axis] + dt * a[axis] for axis in range(3)]
-    pp, pv, pa, vv, va, aa = covariance
-    # F P, as far as it is needed.
-    fp_p, fp_v, fp_a = pp + dt * pv + half * pa, pv + dt * vv + half * va, pa + dt * va + half * aa
-    fv_v, fv_a = vv + dt * va, va + dt * aa
-    return [*p, *v, *a], [
-        fp_p + dt * fp_v + half * fp_a + walk * (dt3 * dt2 / 20.0),
-        fp_v + dt * fp_a + walk * (dt2 * dt2 / 8.0),
-        fp_a + walk * (dt3 / 6.0),
-        fv_v + dt * fv_a + walk * (dt3 / 3.0),
-        fv_a + walk * half,
-        aa + walk * dt,
-    ]
-
-
-def _correct(state, covariance, position, noise_variance):
-    pp, pv, pa, vv, va, aa = covariance
-    gains = [part / (pp + noise_variance) for part in (pp, pv, pa)]
-    innovation = [position[axis] - state[axis] for axis in range(3)]
-    state = [state[i] + gains[i // 3] * innovation[i % 3] for i in range(9)]
-    g, h, k = gains
-    covariance = [pp - g * pp, pv - g * pv, pa - g * pa, vv - h * pv, va - h * pa, aa - k * pa]
-    return state, covariance
+    @override
+    def step(self, dt: Any, value: Any, acceleration: Any = None) -> Any:
+        before = self.memory
+        self._begin(value, [(a - b) / dt for a, b in zip(value, self._value, strict=True)])
+        restarted, self.memory = self.memory, before
+        self._predict(dt)
+        self._correct(value)
+        is_late = dt > motion.MEMORY
+        self.memory = [where(is_late, a, b) for a, b in zip(restarted, self.memory, strict=True)]
+        return self._value, self._rate

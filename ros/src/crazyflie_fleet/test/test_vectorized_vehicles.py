@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from crazyflie_fleet.vectorized_simulator_node import batch_control, is_memoryless
+from crazyflie_fleet.vectorized_simulator_node import batch_control
 from crazyflie_fleet.vectorized_vehicles import VectorizedVehicles
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_model.dynamics import Coupled7D, NearHover
@@ -89,8 +89,15 @@ def test_controls(rows):
     assert batch_control(K, U_REF, x, x_ref) == pytest.approx(np.array(alone), abs=1e-9)
 
 
-def test_a_controller_that_climbs_is_known():
-    assert is_memoryless(K, U_REF)
-    soft = K.copy()
-    soft[3, 5] = -1.0
-    assert not is_memoryless(soft, U_REF)
+@pytest.mark.parametrize(("damping", "climbs"), [(K[3, 5], False), (-1.0, True)])
+def test_a_controller_that_climbs_is_known(damping, climbs):
+    gains = K.copy()
+    gains[3, 5] = damping
+    controller = IntegralStateFeedback(gains, U_REF, 6)
+    assert controller.height_overshoots is climbs
+    controller.take_off()
+    x, x_ref = np.zeros((1, 7)), np.zeros((1, 7))
+    x_ref[0, 2] = 1e-3
+    together = batch_control(gains, U_REF, x, x_ref)[0]
+    alone = controller.control(x[0], x_ref[0], 0.0)
+    assert np.allclose(alone, together, rtol=0.0, atol=1e-12) is not climbs

@@ -36,9 +36,10 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_simulator.simulator_node import MAX_CATCH_UP, RealTimeWatch
+from crazyflie_simulator.simulator_node import MAX_CATCH_UP, ClockParameters, RealTimeWatch
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, Number
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import FRAME, TIME_STEP, Number
 from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import to_tuple
@@ -99,34 +100,13 @@ def batch_control(
     return join(limited(linear_control(K.tolist(), u_ref.tolist(), error)))
 
 
-def is_memoryless(K: NDArray[np.float64], u_ref: NDArray[np.float64]) -> bool:
-    """Return whether the controller with these gains, and no integrator, is `batch_control`.
-
-    It is not if it commands a climb in place of a step of the reference.
-    """
-    controller = IntegralStateFeedback(K, u_ref, YAW)
-    controller.take_off()
-    low, high = np.zeros(7), np.zeros(7)
-    high[2] = 1e-3
-    alone = controller.control(low, high, 0.0)
-    return np.allclose(alone, batch_control(K, u_ref, low[None], high[None])[0], rtol=0, atol=1e-12)
-
-
 class VectorizedSimulatorParameters(Parameters):
     """Parameters of `VectorizedSimulatorNode`, named as those of the nodes that it replaces."""
 
     time_step: float = parameter(
         TIME_STEP, "period of poses, states and controls", name="simulator/time_step"
     )
-    publishes_clock: bool = parameter(
-        BOOLEAN, "whether to be the source of simulated time", False, "simulator/clock/publish"
-    )
-    real_time_factor: float = parameter(
-        Number(minimum=0.0),
-        "how fast simulated time passes at most; 0 is as fast as possible",
-        1.0,
-        "simulator/clock/real_time_factor",
-    )
+    clock: ClockParameters = group(ClockParameters, "simulator/clock")
     fixed_frame: str = parameter(FRAME, "tf frame of the world", "world", "frames/fixed")
     K: NDArray[np.float64] = parameter(
         MatrixFile(4, 7), "gain file, 4 rows of 7 numbers", name="lqr_controller/K_file"
@@ -167,7 +147,7 @@ class VectorizedSimulatorNode(Node):
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(VectorizedSimulatorParameters)
         self._K, self._u_ref = np.array(self._parameters.K), np.array(self._parameters.u_ref)
-        if not is_memoryless(self._K, self._u_ref):
+        if IntegralStateFeedback(self._K, self._u_ref, YAW).height_overshoots:
             raise ParameterError(
                 f"{handle.name}: the gains' height loop overshoots, so that each vehicle needs a "
                 "controller of its own; fly it with together:=false"
@@ -181,13 +161,12 @@ class VectorizedSimulatorNode(Node):
         self._batch = VectorizedVehicles(MODELS[self._model](), places, self._start)
         self._broadcast = handle.broadcast_poses(self._broadcast_poses)
         self._all_states = handle.publisher("~" + ALL_STATES, Float64MultiArray)
-        if parameters.publishes_clock:
+        if parameters.clock.publish:
             self._set_clock = handle.clock_publisher()
         for number, vehicle in enumerate(self._vehicles):
             self._register_vehicle(handle, number, f"/{vehicle.name}/")
-        if parameters.publishes_clock:
-            factor = parameters.real_time_factor
-            period = parameters.time_step / factor if factor > 0.0 else 0.0
+        if parameters.clock.publish:
+            period = parameters.clock.period(parameters.time_step)
             handle.timer(period, self._on_clock_timer, steady=True)
         else:
             self._watch = RealTimeWatch(handle)

@@ -326,7 +326,7 @@ class IntegralStateFeedback(LinearFeedback):
         self.reset_integrator()
         self.enable_integrator()
         limit = self._climb_limit()
-        self._climb = Climb(limit) if limit > 0.0 or self._height_overshoots() else None
+        self._climb = Climb(limit) if limit > 0.0 or self.height_overshoots else None
         self._thrust = self._u_ref[THRUST]
 
     @override
@@ -361,14 +361,16 @@ class IntegralStateFeedback(LinearFeedback):
             self._climb.set_limit(self._climb_limit())
         self._thrust = previous._thrust
 
-    def _climb_limit(self):
-        """Return the largest disturbance that the integrator can compensate, m/s^2."""
-        return abs(self._integrator_k[2]) * self._integrator_limit[2]
-
-    def _height_overshoots(self):
+    @property
+    def height_overshoots(self) -> bool:
+        """Whether the height loop is damped too little for a step; then take-offs are a `Climb`."""
         # The height loop is s^2 + k_d s + k_p, apart from delays.
         k_p, k_d = -self._rows[THRUST][2], -self._rows[THRUST][5]
         return k_p > 0.0 and k_d < 2.0 * _LEAST_DAMPING * math.sqrt(k_p)
+
+    def _climb_limit(self):
+        """Return the largest disturbance that the integrator can compensate, m/s^2."""
+        return abs(self._integrator_k[2]) * self._integrator_limit[2]
 
     def _time_since_last(self, time):
         dt = 0.0 if self._time is None else time - self._time

@@ -86,6 +86,23 @@ class MotionCaptureParameters(Parameters):
     )
 
 
+class ClockParameters(Parameters):
+    """Whether a simulator makes simulated time, and how fast."""
+
+    publish: bool = parameter(
+        BOOLEAN, "whether to be the source of simulated time; needs `/use_sim_time`", False
+    )
+    real_time_factor: float = parameter(
+        Number(minimum=0.0),
+        "largest speed of simulated time, over real time; 0 is as fast as possible",
+        1.0,
+    )
+
+    def period(self, time_step: float) -> float:
+        """Return the shortest time, s, for a time step of simulated time (s)."""
+        return time_step / self.real_time_factor if self.real_time_factor > 0.0 else 0.0
+
+
 class SimulatorParameters(Parameters):
     """Parameters of every `SimulatorNode`."""
 
@@ -96,18 +113,7 @@ class SimulatorParameters(Parameters):
     fixed_frame: str = parameter(FRAME, "tf frame of the world", name="frames/fixed")
     robot_frame: str = parameter(FRAME, "tf frame of the vehicle", name="frames/robot")
     control_topic: str = parameter(TOPIC, "where controls come from", name="topics/control")
-    publishes_clock: bool = parameter(
-        BOOLEAN,
-        "whether to be the source of simulated time; needs `/use_sim_time`",
-        False,
-        name="clock/publish",
-    )
-    real_time_factor: float = parameter(
-        Number(minimum=0.0),
-        "largest speed of simulated time, over real time; 0 is as fast as possible",
-        1.0,
-        name="clock/real_time_factor",
-    )
+    clock: ClockParameters = group(ClockParameters, "clock")
     mocap: MotionCaptureParameters = group(MotionCaptureParameters, "mocap")
     seed: int = parameter(
         Integer(0, 2**32 - 1),
@@ -148,7 +154,8 @@ class SimulatorNode(Node):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         parameters = handle.load(self.parameters_type, self.reconfigure)
-        if parameters.publishes_clock and not handle.uses_sim_time:
+        self._publishes_clock = parameters.clock.publish
+        if self._publishes_clock and not handle.uses_sim_time:
             raise ParameterError(
                 f"parameter {handle.resolve('~clock/publish')} is true, but /use_sim_time is "
                 "not; expected both, so that nodes use /clock"
@@ -171,15 +178,14 @@ class SimulatorNode(Node):
             self._dynamics, position, self._start, self.max_tilt, self.delay
         )
         self._broadcast = handle.broadcast_poses(lambda: self._catch_up(handle.time()))
-        if parameters.publishes_clock:
+        if self._publishes_clock:
             self._set_clock = handle.clock_publisher()
         handle.advertise_service("~reset", Empty, self._on_reset)
         handle.subscribe(
             parameters.control_topic, ControlStamped, self._on_control, finite="control"
         )
-        if parameters.publishes_clock:
-            factor = parameters.real_time_factor
-            period = parameters.time_step / factor if factor > 0.0 else 0.0
+        if self._publishes_clock:
+            period = parameters.clock.period(parameters.time_step)
             handle.timer(period, self._on_clock_timer, steady=True)
         else:
             self._watch = RealTimeWatch(handle)
@@ -192,7 +198,7 @@ class SimulatorNode(Node):
         self._catch_up(now)
         # Without a clock of its own, the vehicle must catch up completely, so that the
         # control takes effect now and not at the last tick.
-        if not self._parameters.publishes_clock:
+        if not self._publishes_clock:
             self._advance_to(now)
         self._vehicle.command(to_tuple(message.control))
 
@@ -210,7 +216,7 @@ class SimulatorNode(Node):
 
     def _catch_up(self, now):
         """Advance to the clock, which is at ``now`` (s); broadcast all poses with consumers."""
-        if self._parameters.publishes_clock:
+        if self._publishes_clock:
             if self._ticks != self._broadcast_ticks:
                 self._broadcast_ticks = self._ticks
                 self._advance_to(self._tick_time(self._ticks))
@@ -274,7 +280,7 @@ class SimulatorNode(Node):
 
     def _ticks_to_next_event(self):
         parameters = self._parameters
-        if parameters.real_time_factor > 0.0:
+        if parameters.clock.real_time_factor > 0.0:
             return 1
         wait = self._handle.next_event() - self._tick_time(self._ticks)
         # A new consumer receives poses soon.

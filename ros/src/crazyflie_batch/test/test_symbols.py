@@ -99,7 +99,7 @@ def test_threads_that_need_the_same_program_compile_it_once(monkeypatch):
                 begun.wait(0.2)
 
     monkeypatch.setattr(program, "MachineCode", Slow)
-    plan = Plan(NearHover, (), math.inf, FiniteDifferences, 10)
+    plan = Plan(NearHover, (), math.inf, FiniteDifferences, 10, {})
     program.clear()
     try:
         with ThreadPoolExecutor(4) as executor:

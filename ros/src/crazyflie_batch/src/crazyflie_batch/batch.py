@@ -66,8 +66,7 @@ def fly(batch: Batch, record: bool, threads: int) -> Flights:
     start = plan.initial_memory(list(batch.x))
     groups = _groups(batch.n, lanes)
     memory = _grouped([part for row in start.values() for part in row], groups, batch.n)
-    values = [batch.parameters[name] for name in plan.parameter_dims()]
-    parameters = _grouped(np.concatenate(values), groups, batch.n)
+    parameters = _grouped(np.concatenate([*batch.parameters.values()]), groups, batch.n)
     rows = batch.ticks if record else 0
     records = np.empty((len(memory), rows, *memory.shape[1:]))
     slots = int(batch.parameters["delay"].max()) + 1

@@ -10,7 +10,7 @@ Memory and parameters of a vehicle are dictionaries of names to lists of compone
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
@@ -72,6 +72,8 @@ class Plan:
     max_tilt: float
     estimator: type[Estimator]
     steps: int  #: Steps of the model in a tick, a multiple of `SAMPLE_STEPS`.
+    #: Numbers that differ between vehicles: name to number of rows.
+    parameter_dims: Mapping[str, int] = field(compare=False)
 
     @property
     def period(self) -> float:
@@ -84,22 +86,6 @@ class Plan:
         start = self.initial_memory([0.0] * x_dim)
         return {name: len(part) for name, part in start.items()}
 
-    def parameter_dims(self) -> dict[str, int]:
-        """Return the numbers that differ between vehicles: name to number of rows."""
-        return {
-            "model": len(self.model_parameters),
-            "estimator": len(fields(self.estimator)),
-            "K": linear_feedback.X_DIM * linear_feedback.U_DIM,
-            "u_ref": linear_feedback.U_DIM,
-            "integrator_k": 3,
-            "integrator_limit": 3,
-            "goal": linear_feedback.X_DIM,
-            "noise": 2,
-            "delay": 1,
-            "dropout": 1,
-            "settled": 1,
-        }
-
     def model(self, parameters: Components) -> Dynamics:
         """Return the model of one vehicle."""
         return self.make_model(**dict(zip(self.model_parameters, parameters["model"], strict=True)))
@@ -107,6 +93,7 @@ class Plan:
     def initial_memory(self, x: Vector[Any]) -> Components:
         """Return the memory of a flight that begins at a state of the model."""
         return {
+            "tick": [0.0],
             "x": x,
             "u": [0.0] * linear_feedback.U_DIM,
             "age": [0.0],
@@ -146,14 +133,16 @@ def measure(
 
 
 def run_controller(
-    plan: Plan, memory: Components, parameters: Components, pose: Vector[Any], tick: Any
+    plan: Plan, memory: Components, parameters: Components, pose: Vector[Any]
 ) -> Components:
     """Return the memory after estimator and controller have processed a pose, if one has arrived.
 
-    The pose has `POSE_DIM` components and was measured at ``tick``.
+    The pose has `POSE_DIM` components and was measured before the vehicle's delay. The tick ends.
     """
     *position, yaw, has_arrived = pose
     (stamp,), (control_stamp,) = memory["stamp"], memory["control_stamp"]
+    (now,), (delay,) = memory["tick"], parameters["delay"]
+    tick = now - delay
     has_arrived = has_arrived > 0.0
     is_second = has_arrived & (stamp >= 0.0)
 
@@ -180,6 +169,7 @@ def run_controller(
         )
     ]
     u = linear_feedback.limited(linear_feedback.with_integrals(linear, integral, k))
+    memory = {**memory, "tick": [now + 1.0]}
     first = _choose(has_arrived, {"estimator": begun, "stamp": [tick]}, memory)
     return _choose(
         is_second,
@@ -209,10 +199,10 @@ def step(plan: Plan, memory: Components, parameters: Components, count: int) -> 
     return _choose(is_tilted, {"has_crashed": [1.0]}, memory)
 
 
-def update_metrics(plan: Plan, memory: Components, parameters: Components, tick: Any) -> Components:
+def update_metrics(plan: Plan, memory: Components, parameters: Components) -> Components:
     """Return the memory with the metrics as they are after this tick; see `METRICS`."""
     largest, squares, upright, fastest = memory["metrics"]
-    (settled,) = parameters["settled"]
+    (tick,), (settled,) = memory["tick"], parameters["settled"]
     x, goal = memory["x"], parameters["goal"]
     root = functions(x[0]).sqrt
     squared = sum((x[axis] - goal[axis]) ** 2 for axis in range(3))

@@ -71,39 +71,37 @@ def _load(library: str) -> bool:
     return True
 
 
-class _Writer:
+class _Writer(Emitter):
     """Writes the function ``fly`` into a module."""
 
     def __init__(self, plan: Plan, module: ir.Module, lanes: int, vector_functions: bool):
         pointer = ir.PointerType(ir.VectorType(DOUBLE, lanes))
         type_ = ir.FunctionType(ir.VoidType(), [pointer] * 5 + [_INTEGER] * 3)
         self._function = ir.Function(module, type_, "fly")
-        self._builder = ir.IRBuilder(self._function.append_basic_block())
-        self._emitter = Emitter(self._builder, lanes, vector_functions)
+        builder = ir.IRBuilder(self._function.append_basic_block())
+        super().__init__(builder, lanes, vector_functions)
         self._plan = plan
-        self._lanes = lanes
 
     def write(self) -> None:
-        builder, plan = self._builder, self._plan
+        builder, plan = self.builder, self._plan
         memory, parameters, transit, noise_samples, record, ticks, slots, row = self._function.args
         dims = plan.memory_dims()
         with self._loop(ticks) as tick:
-            values = self._load(parameters, plan.parameter_dims())
+            values = self._load(parameters, plan.parameter_dims)
             state = self._load(memory, dims)
-            now = self._number(tick)
             row_of_tick = builder.gep(noise_samples, [self._times(tick, flight.NOISE_DIM)])
             noise = self._load(row_of_tick, {"noise": flight.NOISE_DIM})["noise"]
-            state = flight.update_metrics(plan, state, values, now)
+            state = flight.update_metrics(plan, state, values)
             pose = flight.measure(plan, state, values, noise)
             self._send(transit, pose, tick, slots)
             (delay,) = values["delay"]
             arrived = self._receive(transit, delay, tick, slots)
-            state = flight.run_controller(plan, state, values, arrived, now - delay)
+            state = flight.run_controller(plan, state, values, arrived)
             self._store(memory, dims, state)
-            offset = builder.sdiv(builder.mul(tick, row), self._integer(self._lanes))
+            offset = builder.sdiv(builder.mul(tick, row), self._integer(self.lanes))
             self._store(builder.gep(record, [offset]), dims, state)
             with self._loop(self._integer(plan.steps // flight.SAMPLE_STEPS)):
-                values = self._load(parameters, plan.parameter_dims())
+                values = self._load(parameters, plan.parameter_dims)
                 state = self._load(memory, dims)
                 for count in range(flight.SAMPLE_STEPS):
                     state = flight.step(plan, state, values, count)
@@ -111,35 +109,33 @@ class _Writer:
         builder.ret_void()
 
     def _send(self, transit, pose, tick, slots):
-        slot = self._builder.srem(tick, slots)
-        place = self._builder.gep(transit, [self._times(slot, flight.POSE_DIM)])
+        slot = self.builder.srem(tick, slots)
+        place = self.builder.gep(transit, [self._times(slot, flight.POSE_DIM)])
         self._store(place, {"pose": flight.POSE_DIM}, {"pose": pose})
 
     def _receive(self, transit, delay, tick, slots):
         """Return the pose that was sent ``delay`` ticks ago; delays of lanes differ."""
-        builder = self._builder
+        builder = self.builder
         numbers = builder.bitcast(transit, ir.PointerType(DOUBLE))
-        delays = builder.fptosi(delay.value, ir.VectorType(_INTEGER, self._lanes))
-        undefined = ir.Constant(self._emitter.type, ir.Undefined)
-        pose = [undefined] * flight.POSE_DIM
-        for lane in range(self._lanes):
-            index = ir.Constant(ir.IntType(32), lane)
-            sent = builder.sub(builder.add(tick, slots), builder.extract_element(delays, index))
-            slot = self._times(builder.srem(sent, slots), flight.POSE_DIM * self._lanes)
-            for part in range(flight.POSE_DIM):
-                offset = builder.add(slot, self._integer(part * self._lanes + lane))
-                number = builder.load(builder.gep(numbers, [offset]))
-                pose[part] = builder.insert_element(pose[part], number, index)
-        return [Symbol(self._emitter, value) for value in pose]
+        delays = builder.fptosi(delay.value, ir.VectorType(_INTEGER, self.lanes))
+        sent = [builder.sub(builder.add(tick, slots), each) for each in self.numbers(delays)]
+        size = flight.POSE_DIM * self.lanes
+        places = [self._times(builder.srem(each, slots), size) for each in sent]
+        pose = []
+        for part in range(0, size, self.lanes):
+            offsets = [builder.add(each, self._integer(part + i)) for i, each in enumerate(places)]
+            values = [builder.load(builder.gep(numbers, [offset])) for offset in offsets]
+            pose.append(Symbol(self, self.vector(values)))
+        return pose
 
     def _load(self, pointer: ir.Value, dims: Mapping[str, int]) -> Components:
         rows = range(sum(dims.values()))
-        load = self._builder.load
-        symbols = [Symbol(self._emitter, self._aligned(load, pointer, row)) for row in rows]
+        load = self.builder.load
+        symbols = [Symbol(self, self._aligned(load, pointer, row)) for row in rows]
         return flight.components(symbols, dims)
 
     def _aligned(self, action, pointer, index, *value):
-        place = self._builder.gep(pointer, [self._integer(index)])
+        place = self.builder.gep(pointer, [self._integer(index)])
         return action(*value, place, align=_BYTES)
 
     def _store(self, pointer, dims, components):
@@ -147,22 +143,12 @@ class _Writer:
         for name, dim in dims.items():
             assert len(components[name]) == dim, name
             for part in components[name]:
-                value = self._emitter.value(part)
-                self._aligned(self._builder.store, pointer, index, value)
+                value = self.value(part)
+                self._aligned(self.builder.store, pointer, index, value)
                 index += 1
 
-    def _number(self, integer):
-        """Return the symbol of an integer."""
-        builder = self._builder
-        number = builder.sitofp(integer, DOUBLE)
-        vector = ir.Constant(self._emitter.type, ir.Undefined)
-        for lane in range(self._lanes):
-            index = ir.Constant(ir.IntType(32), lane)
-            vector = builder.insert_element(vector, number, index)
-        return Symbol(self._emitter, vector)
-
     def _times(self, integer, factor):
-        return self._builder.mul(integer, self._integer(factor))
+        return self.builder.mul(integer, self._integer(factor))
 
     @staticmethod
     def _integer(value: Any) -> Any:
@@ -171,7 +157,7 @@ class _Writer:
     @contextmanager
     def _loop(self, count: ir.Value) -> Iterator[ir.Value]:
         """Write a loop around the instructions of the with block; the value is its index."""
-        builder = self._builder
+        builder = self.builder
         before = builder.block
         body = builder.append_basic_block()
         builder.branch(body)

@@ -68,18 +68,18 @@ class ArrayProgram:
         1.
         """
         plan, dims = self._plan, self._plan.memory_dims()
-        values = flight.components(parameters, plan.parameter_dims())
+        values = flight.components(parameters, plan.parameter_dims)
         state = flight.components(memory.copy(), dims)
         delay, lanes = values["delay"][0], np.arange(self.lanes)
         transit = np.zeros((slots, flight.POSE_DIM, self.lanes))
         # States may overflow, and the branch that `where` does not choose may divide by zero.
         with naming_the_formula(), np.errstate(all="ignore"):
             for tick, noise in enumerate(noise_samples):
-                state = flight.update_metrics(plan, state, values, tick)
+                state = flight.update_metrics(plan, state, values)
                 transit[tick % slots] = flight.measure(plan, state, values, [*noise])
                 sent = (tick + slots - delay.astype(int)) % slots
                 arrived = [*transit[sent, :, lanes].T]
-                state = flight.run_controller(plan, state, values, arrived, tick - delay)
+                state = flight.run_controller(plan, state, values, arrived)
                 _store(record[tick % len(record)], state, dims)
                 for count in range(plan.steps):
                     state = flight.step(plan, state, values, count % flight.SAMPLE_STEPS)

@@ -176,11 +176,10 @@ def simulate(
     if errors := time_errors(duration, period, settle_time):
         raise ValueError("; ".join(errors))
     steps, ticks = round(period / STEP), round(duration / period)
-    plan = Plan(model.make, tuple(model.parameters), model.max_tilt, type(estimator), steps)
     noise = {name: getattr(measurement, name) for name in ("position_noise", "attitude_noise")}
     # A longer delay makes no difference: the pose arrives after the end.
     latency = np.asarray(measurement.latency, dtype=float)
-    delay = np.ceil((latency - 1e-9) / plan.period).clip(0.0, ticks)
+    delay = np.ceil((latency - 1e-9) / (steps * STEP)).clip(0.0, ticks)
     parameters = {
         "model": stacked_columns(model.parameters, n),
         "estimator": stacked_columns(vars(estimator), n),
@@ -194,6 +193,8 @@ def simulate(
         "dropout": columns("dropout", measurement.dropout, (), n),
         "settled": columns("settle_time", math.ceil(settle_time / period - _ROUNDING), (), n),
     }
+    dims = {name: len(rows) for name, rows in parameters.items()}
+    plan = Plan(model.make, tuple(model.parameters), model.max_tilt, type(estimator), steps, dims)
     positions = columns("x0", x0, (3,), n)
     batch = Batch(plan, parameters, _initial_states(model, positions), ticks, seed, first)
     return fly(batch, record, threads or len(os.sched_getaffinity(0)))

@@ -16,6 +16,7 @@ from llvmlite import ir
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 DOUBLE = ir.DoubleType()
+_INDEX = ir.IntType(32)  #: Type of a lane's number.
 
 #: Number of lanes -> prefix of the names of the C library's vector functions (x86-64 vector
 #: function ABI), with AVX-512, AVX2 and SSE.
@@ -86,15 +87,20 @@ class Emitter:
             name = f"_ZGV{_VECTOR_LETTERS[self.lanes]}N{self.lanes}{parameters}_{name}"
             callee = self._declare(name, self.type, len(values))
             return Symbol(self, self.builder.call(callee, values))
-        return Symbol(self, self._lane_by_lane(self._declare(name, DOUBLE, len(values)), values))
+        callee = self._declare(name, DOUBLE, len(values))
+        lanes = zip(*map(self.numbers, values), strict=True)
+        return Symbol(self, self.vector([self.builder.call(callee, lane) for lane in lanes]))
 
-    def _lane_by_lane(self, function, values):
+    def numbers(self, vector: ir.Value) -> list[ir.Value]:
+        """Return the number of each lane of a vector."""
+        indices = (ir.Constant(_INDEX, lane) for lane in range(self.lanes))
+        return [self.builder.extract_element(vector, index) for index in indices]
+
+    def vector(self, numbers: Sequence[ir.Value]) -> ir.Value:
+        """Return the vector of a number for each lane; inverse of `numbers`."""
         result = ir.Constant(self.type, ir.Undefined)
-        for lane in range(self.lanes):
-            index = ir.Constant(ir.IntType(32), lane)
-            numbers = [self.builder.extract_element(value, index) for value in values]
-            number = self.builder.call(function, numbers)
-            result = self.builder.insert_element(result, number, index)
+        for lane, number in enumerate(numbers):
+            result = self.builder.insert_element(result, number, ir.Constant(_INDEX, lane))
         return result
 
     def _declare(self, name, type_, count):

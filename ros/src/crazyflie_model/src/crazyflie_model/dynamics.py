@@ -76,6 +76,7 @@ class Dynamics(ABC):
 
     x_dim: int
     u_dim: int = 4
+    has_exact_steps = False  #: Whether a formula gives the state after many steps.
 
     @abstractmethod
     def initial_state(self, position: Sequence[Number]) -> Vector[Number]:
@@ -100,11 +101,6 @@ class Dynamics(ABC):
         """Return the state one `STEP` later; ``count`` steps have been done since the start."""
         return self.apply_ground_contact(rk4_step(self.rates, count * STEP, x, u, STEP))
 
-    @property
-    def has_exact_steps(self) -> bool:
-        """Whether a formula gives the state after many steps."""
-        return False
-
     def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """Return the state ``n`` `STEP` later: the same as ``n`` times `step`.
 
@@ -126,6 +122,10 @@ class SevenDimensional(Dynamics):
     """Common base of the models with this state."""
 
     x_dim = 7
+
+    def __init_subclass__(cls) -> None:
+        # A model that is derived from one with a formula may have other rates.
+        cls.has_exact_steps = "_flight" in vars(cls)
 
     def initial_state(self, position: Sequence[Number]) -> Vector[Number]:
         """See `Dynamics.initial_state`; yaw is 0."""
@@ -236,11 +236,6 @@ class NearHover(SevenDimensional):
             yaw_dot,
         ]
 
-    @property
-    def has_exact_steps(self) -> bool:
-        """Whether the model is not a derived one, which may have other rates."""
-        return type(self) is NearHover
-
     def _flight(self, x, u):
         *_, ax, ay, az, yaw_dot = self.rates(0.0, x, u)
         return lambda duration, x: _accelerate(duration, x, [ax, ay, az], duration * yaw_dot)
@@ -252,11 +247,6 @@ class Coupled7D(SevenDimensional):
     def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.rates` and `coupled_acceleration`; the yaw rate is commanded."""
         return x[3:6] + coupled_acceleration(u, x[6]) + [u[2]]
-
-    @property
-    def has_exact_steps(self) -> bool:
-        """Whether the model is not a derived one, which may have other rates."""
-        return type(self) is Coupled7D
 
     def _flight(self, x, u):
         yaw_dot = u[2]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import control
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
+from scipy.signal import cont2discrete
 
 from crazyflie_lqr.models import LinearModel
 
@@ -177,12 +177,8 @@ def sampled(
 
 
 def _held(model, duration):
-    # The exponential of [[A, B], [0, 0]] holds both blocks (Van Loan, 1978).
-    x_dim, u_dim = model.x_dim, model.u_dim
-    block = np.zeros((x_dim + u_dim,) * 2)
-    block[:x_dim] = np.hstack([model.A, model.B])
-    step = expm(block * duration)
-    return step[:x_dim, :x_dim], step[:x_dim, x_dim:]
+    # A and B stand for the outputs, too, which are not used.
+    return cont2discrete((model.A, model.B, model.A, model.B), duration)[:2]
 
 
 def _padded(weights, n):

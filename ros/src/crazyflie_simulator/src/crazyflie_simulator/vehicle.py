@@ -6,6 +6,7 @@ import functools
 import math
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator, default_rng
@@ -156,33 +157,24 @@ def _floats(vector: Sequence[float]) -> Vector[float]:
 Pose = tuple[float, Triple, Quaternion]
 
 
+@dataclass(eq=False)
 class MotionCapture:
-    """Measured poses: with noise, latency and dropouts.
+    """Measured poses: with noise, latency and dropouts; all of them may be changed at any time."""
 
-    All attributes may be changed at any time. The same ``seed`` gives the same errors to the same
-    poses.
-    """
+    #: Standard deviation of the position along each axis (m).
+    position_noise: float = 0.0
+    #: Standard deviation of the rotation about each axis of the body (rad).
+    attitude_noise: float = 0.0
+    latency: float = 0.0  #: Time from a measurement to its arrival (s).
+    dropout: float = 0.0  #: Probability in [0, 1] that a pose is lost.
+    seed: int | Sequence[int] = 0  #: The same one gives the same errors to the same poses.
 
-    def __init__(
-        self,
-        position_noise: float = 0.0,
-        attitude_noise: float = 0.0,
-        latency: float = 0.0,
-        dropout: float = 0.0,
-        seed: int | Sequence[int] = 0,
-    ):
-        #: Standard deviation of the position along each axis (m). Standard deviation of the
-        #: rotation about each axis of the body (rad).
-        self.position_noise = position_noise
-        self.attitude_noise = attitude_noise
-        self.latency = latency  #: Time from a measurement to its arrival (s).
-        self.dropout = dropout  #: Probability in [0, 1] that a pose is lost.
-        self._seed = seed
+    def __post_init__(self) -> None:
         self._in_transit: deque[Pose] = deque()
 
     @functools.cached_property
     def _random(self) -> Generator:
-        return default_rng(self._seed)
+        return default_rng(self.seed)
 
     @property
     def is_perfect(self) -> bool:

@@ -23,13 +23,13 @@ class OtherFlightsError(Exception):
 
 
 @lru_cache(maxsize=1)
-def code_version(module: str = "crazyflie_batch.monte_carlo") -> str:
-    """Return a hash of the source of a module, and of all that it imports of `FLOWN_PACKAGES`.
+def code_version() -> str:
+    """Return a hash of the source of `monte_carlo` and of all that it imports; see `sources`.
 
     The hash includes numpy's version, since random numbers may differ between versions.
     """
     digest = hashlib.sha256(np.__version__.encode())
-    for name, source in sorted(sources(module).items()):
+    for name, source in sorted(sources("crazyflie_batch.monte_carlo").items()):
         digest.update(f"\0{name}\0".encode())
         digest.update(source)
     return digest.hexdigest()

@@ -96,13 +96,11 @@ class Usage:
     poll_delay: float
 
 
-def usage(load: Load, channel: RadioChannel, duration: float = 1.0) -> Usage:
-    """Send a load on a channel for a duration (s); frames have priority over single packets."""
-    frames = [i / load.pose_rate for i in range(round(duration * load.pose_rate))]
-    polls = [
-        (i / (load.polls * load.vehicles), i % load.vehicles)
-        for i in range(round(duration * load.polls * load.vehicles))
-    ]
+def usage(load: Load, channel: RadioChannel) -> Usage:
+    """Send a load on a channel for 1 s; frames have priority over single packets."""
+    frames = [i / load.pose_rate for i in range(round(load.pose_rate))]
+    rate = load.polls * load.vehicles
+    polls = [(i / rate, i % load.vehicles) for i in range(round(rate))]
     frame_delay = poll_delay = 0.0
     while frames or polls:
         now = max(channel.free, min(frames[:1] + [due for due, _ in polls[:1]]))
@@ -114,7 +112,7 @@ def usage(load: Load, channel: RadioChannel, duration: float = 1.0) -> Usage:
         else:
             due, vehicle = polls.pop(0)
             poll_delay = max(poll_delay, channel.unicast(now, vehicle, *load.poll_size) - due)
-    return Usage(channel.busy / duration, frame_delay, poll_delay)
+    return Usage(channel.busy, frame_delay, poll_delay)
 
 
 SPACING = 1.0  #: Distance between two vehicles (m).

@@ -16,7 +16,6 @@ from typing import Any
 
 from crazyflie_batch.estimators import Estimator
 from crazyflie_lqr import linear_feedback
-from crazyflie_model import inner_loops
 from crazyflie_model.angles import turned
 from crazyflie_model.dynamics import STEP, Dynamics, watchdog_control
 from crazyflie_model.elementwise import Number, Vector, functions, where
@@ -41,8 +40,6 @@ def yaw_from_quaternion(quaternion: Sequence[Number]) -> Number:
 #: one in [0, 1), by which a pose is lost.
 NOISE_DIM = 7
 
-#: Steps of the model from one sample of the inner loops to the next.
-SAMPLE_STEPS = round(inner_loops.PERIOD / STEP)
 POSE_DIM = 5  #: Components of a delayed pose: position (3), yaw, and 1 for one that is not lost.
 
 #: Metrics of a flight: largest distance from the goal, m, and sum of the squared
@@ -71,7 +68,7 @@ class Plan:
     #: A vehicle that is tilted more than this, rad, has crashed, and its motors stop.
     max_tilt: float
     estimator: type[Estimator]
-    steps: int  #: Steps of the model in a tick, a multiple of `SAMPLE_STEPS`.
+    steps: int  #: Steps of the model in a tick, a multiple of `STEPS_PER_SAMPLE`.
     #: Numbers that differ between vehicles: name to number of rows.
     parameter_dims: Mapping[str, int] = field(compare=False)
 
@@ -97,7 +94,6 @@ class Plan:
             "x": x,
             "u": [0.0] * linear_feedback.U_DIM,
             "age": [0.0],
-            "is_commanded": [0.0],
             "has_crashed": [0.0],
             "estimator": [0.0] * self.estimator.memory_dim,
             "stamp": [-1.0],
@@ -180,7 +176,6 @@ def run_controller(
             "u": u,
             "control_stamp": [tick],
             "age": [0.0],
-            "is_commanded": [1.0],
         },
         first,
     )
@@ -190,9 +185,9 @@ def step(plan: Plan, memory: Components, parameters: Components, count: int) -> 
     """Return the memory one `STEP` later; ``count`` is that of the steps since a sample."""
     model = plan.model(parameters)
     x = model.step(count, memory["x"], effective_control(memory))
-    (age,), (is_commanded,) = memory["age"], memory["is_commanded"]
-    flown = {"x": x, "age": [age + 1.0]}
-    memory = _choose(is_commanded > 0.0, flown, memory)
+    (age,), (control_stamp,) = memory["age"], memory["control_stamp"]
+    # A vehicle stays put until its first control.
+    memory = _choose(control_stamp >= 0.0, {"x": x, "age": [age + 1.0]}, memory)
     if math.isinf(plan.max_tilt):
         return memory
     is_tilted = _upright(model, memory) < math.cos(plan.max_tilt)

@@ -11,6 +11,7 @@ from llvmlite import binding, ir
 from crazyflie_batch import flight
 from crazyflie_batch.flight import Components, Plan
 from crazyflie_batch.symbols import DOUBLE, Emitter, Symbol
+from crazyflie_model.stabilized_quadrotor import STEPS_PER_SAMPLE
 
 _INTEGER = ir.IntType(64)
 _BYTES = 8  #: Size of a number.
@@ -100,10 +101,10 @@ class _Writer(Emitter):
             self._store(memory, dims, state)
             offset = builder.sdiv(builder.mul(tick, row), self._integer(self.lanes))
             self._store(builder.gep(record, [offset]), dims, state)
-            with self._loop(self._integer(plan.steps // flight.SAMPLE_STEPS)):
+            with self._loop(self._integer(plan.steps // STEPS_PER_SAMPLE)):
                 values = self._load(parameters, plan.parameter_dims)
                 state = self._load(memory, dims)
-                for count in range(flight.SAMPLE_STEPS):
+                for count in range(STEPS_PER_SAMPLE):
                     state = flight.step(plan, state, values, count)
                 self._store(memory, dims, state)
         builder.ret_void()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from crazyflie_batch import flight
 from crazyflie_batch.flight import Plan
+from crazyflie_model.stabilized_quadrotor import STEPS_PER_SAMPLE
 
 #: Modules in which an unsupported formula raises its error.
 _CALCULATES = ("crazyflie_batch.symbols", "crazyflie_model.elementwise", "numpy")
@@ -82,7 +83,7 @@ class ArrayProgram:
                 state = flight.run_controller(plan, state, values, arrived)
                 _store(record[tick % len(record)], state, dims)
                 for count in range(plan.steps):
-                    state = flight.step(plan, state, values, count % flight.SAMPLE_STEPS)
+                    state = flight.step(plan, state, values, count % STEPS_PER_SAMPLE)
         _store(memory, state, dims)
 
 

@@ -198,16 +198,6 @@ class GroundGuess:
         return z > self._lowest + LIFTED or time - self._moved_at < LIFTOFF_TIMEOUT
 
 
-__all__ = [
-    "PITCH",
-    "ROLL",
-    "THRUST",
-    "YAW_DOT",
-    "IntegralStateFeedback",
-    "LinearFeedback",
-    "heading_error",
-]
-
 _LEAST_DAMPING = 0.7  #: A height loop with this damping ratio overshoots a step by 5 %.
 #: A state or a control; for so few numbers, plain floats are several times quicker than arrays.
 Components = Sequence[float]

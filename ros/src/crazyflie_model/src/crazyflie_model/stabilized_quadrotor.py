@@ -143,7 +143,7 @@ class Airframe:
         return [where(on_ground, after, before) for after, before in zip(standing, x, strict=True)]
 
 
-_STEPS_PER_SAMPLE = round(inner_loops.PERIOD / STEP)
+STEPS_PER_SAMPLE = round(inner_loops.PERIOD / STEP)  #: Steps between two of the inner loops.
 
 
 def still_air(t: float) -> Triple:
@@ -201,7 +201,7 @@ class StabilizedQuadrotor(Dynamics):
     @override
     def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         body, memory, commands = x[:BODY_DIM], x[BODY_DIM:-4], x[-4:]
-        if count % _STEPS_PER_SAMPLE == 0:
+        if count % STEPS_PER_SAMPLE == 0:
             memory, commands = self._sample(body, memory, u)
         t = count * STEP
         body = self.airframe.step(t, body, commands, self._wind(t), STEP)

@@ -25,7 +25,7 @@ from crazyflie_utils.parameters.types import (
 from crazyflie_utils.vectors import to_tuple
 
 LATENESS = 0.1
-"""Delay above which a tick is late (s): poses of the time before are left out."""
+"""Delay above which a tick is late, and age beyond which poses are left out then (s)."""
 
 LATE_TICKS, WINDOW = 5, 10.0
 """Number of late ticks, and period (s), that are reported."""
@@ -58,8 +58,6 @@ class RealTimeWatch:
 
 #: Longest time that is integrated at once (s); a longer one, after a jump of the clock, is skipped.
 MAX_CATCH_UP = 1.0
-#: Age up to which poses are broadcast late after the machine was busy (s).
-MAX_LATENESS = 0.1
 IDLE_PERIOD = 0.1  #: Period at which a simulator without pose consumers checks for them (s).
 
 
@@ -229,7 +227,7 @@ class SimulatorNode(Node):
         """Broadcast the poses of all time steps until now, s, with their own stamps."""
         step = self._parameters.time_step
         due = math.floor((now - self._start) / step + 1e-6)
-        missed = min(due - self._ticks, math.ceil(MAX_LATENESS / step))
+        missed = min(due - self._ticks, math.ceil(LATENESS / step))
         if missed > 1 and (self._is_idle or self._has_no_consumers()):
             missed = 1
         for tick in range(due - missed + 1, due + 1):

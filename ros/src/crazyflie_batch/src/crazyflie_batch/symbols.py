@@ -45,8 +45,6 @@ _COMPARISONS = {
 }
 _LOGIC = {np.bitwise_and: "and_", np.bitwise_or: "or_", np.invert: "not_"}
 
-_MUST_NOT_BRANCH = "a formula of a batch must not branch; it chooses with where() or clip()"
-
 
 class Emitter:
     """Writes instructions for vectors of ``lanes`` numbers into an LLVM function.
@@ -110,21 +108,23 @@ class Emitter:
         return ir.Function(module, ir.FunctionType(type_, [type_] * count), name)
 
 
-class Condition(NDArrayOperatorsMixin):
-    """A condition that is true for some of the lanes."""
-
+class _Traced(NDArrayOperatorsMixin):
     def __init__(self, emitter: Emitter, value: ir.Value):
         self.value = value
         self._emitter = emitter
+
+    def __bool__(self) -> bool:
+        raise TypeError("a formula of a batch must not branch; it chooses with where() or clip()")
+
+
+class Condition(_Traced):
+    """A condition that is true for some of the lanes."""
 
     def _of(self, other):
         # A condition without symbols is a bool.
         if isinstance(other, Condition):
             return other.value
         return ir.Constant(self.value.type, [bool(other)] * self.value.type.count)
-
-    def __bool__(self) -> bool:
-        raise TypeError(_MUST_NOT_BRANCH)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
         """Support ``&``, ``|`` and ``~``."""
@@ -142,12 +142,8 @@ class Condition(NDArrayOperatorsMixin):
         return Symbol(self._emitter, self._emitter.builder.select(self.value, *values))
 
 
-class Symbol(NDArrayOperatorsMixin):
+class Symbol(_Traced):
     """A number whose value is known when the program runs; see the module."""
-
-    def __init__(self, emitter: Emitter, value: ir.Value):
-        self.value = value
-        self._emitter = emitter
 
     def __pow__(self, exponent: Any) -> "Symbol":
         try:
@@ -161,9 +157,6 @@ class Symbol(NDArrayOperatorsMixin):
         for _ in range(count):
             power = power * self
         return 1.0 / power if exponent < 0 else power
-
-    def __bool__(self) -> bool:
-        raise TypeError(_MUST_NOT_BRANCH)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
         """Support operators, ``numpy.sin`` and other functions."""

@@ -14,7 +14,7 @@ from crazyflie_model.angles import (
     zyx_from_quaternion,
 )
 from crazyflie_model.dynamics import rk4_step
-from crazyflie_model.elementwise import Vector
+from crazyflie_model.elementwise import Vector, clip
 from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
 from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.quadrotor import CRAZYFLIE, QuadrotorParameters
@@ -379,13 +379,13 @@ class Sensors:
         start = self._next
         self._next = start + 6 if start + 12 <= _NOISE_SAMPLES else (start + 6) % 7
         n = self._noise[start : start + 6]
-        self.gyro_x = _clip(math.degrees(rates[0]) + _GYRO_NOISE * n[0], _GYRO_RANGE)
-        self.gyro_y = _clip(math.degrees(rates[1]) + _GYRO_NOISE * n[1], _GYRO_RANGE)
-        self.gyro_z = _clip(math.degrees(rates[2]) + _GYRO_NOISE * n[2], _GYRO_RANGE)
+        self.gyro_x = clip(math.degrees(rates[0]) + _GYRO_NOISE * n[0], -_GYRO_RANGE, _GYRO_RANGE)
+        self.gyro_y = clip(math.degrees(rates[1]) + _GYRO_NOISE * n[1], -_GYRO_RANGE, _GYRO_RANGE)
+        self.gyro_z = clip(math.degrees(rates[2]) + _GYRO_NOISE * n[2], -_GYRO_RANGE, _GYRO_RANGE)
         limit, sigma = _ACCELEROMETER_RANGE, _ACCELEROMETER_NOISE
-        self.acc_x = _clip(specific_force[0] / GRAVITY + sigma * n[3], limit)
-        self.acc_y = _clip(specific_force[1] / GRAVITY + sigma * n[4], limit)
-        self.acc_z = _clip(specific_force[2] / GRAVITY + sigma * n[5], limit)
+        self.acc_x = clip(specific_force[0] / GRAVITY + sigma * n[3], -limit, limit)
+        self.acc_y = clip(specific_force[1] / GRAVITY + sigma * n[4], -limit, limit)
+        self.acc_z = clip(specific_force[2] / GRAVITY + sigma * n[5], -limit, limit)
 
     def sample_slow(self, height: float, quaternion: Quaternion) -> None:
         """Measure pressure and magnetic field at a height (m) and an attitude (x, y, z, w)."""
@@ -393,7 +393,3 @@ class Sensors:
         self.asl = height + _BAROMETER_NOISE * self._noise[self._next]
         # International standard atmosphere.
         self.pressure = _SEA_LEVEL_PRESSURE * (1.0 - 2.25577e-5 * self.asl) ** 5.25588
-
-
-def _clip(value, limit):
-    return -limit if value < -limit else limit if value > limit else value

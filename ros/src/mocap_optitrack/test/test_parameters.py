@@ -3,7 +3,7 @@
 import pytest
 
 from mocap_optitrack.bodies import RigidBody, RigidBodyDictionary, RigidBodyParameters
-from mocap_optitrack.parameters import IpAddress, StreamVersion
+from mocap_optitrack.parameters import ADDRESS, GROUP, STREAM_VERSION
 
 ROBOT = {
     "pose": "Robot_1/pose",
@@ -94,30 +94,30 @@ def test_bad_bodies_are_refused(value, reason):
 
 @pytest.mark.parametrize("value", ["192.168.1.20", "127.0.0.1"])
 def test_addresses(value):
-    assert IpAddress()(value) == value
+    assert ADDRESS(value) == value
     with pytest.raises(ValueError):
-        IpAddress(multicast=True)(value)
+        GROUP(value)
 
 
 @pytest.mark.parametrize("value", ["224.0.0.1", "239.255.42.99"])
 def test_addresses_of_groups(value):
-    assert IpAddress(multicast=True)(value) == value
+    assert GROUP(value) == value
     with pytest.raises(ValueError):
-        IpAddress()(value)
+        ADDRESS(value)
 
 
 @pytest.mark.parametrize("value", ["", "motive", "300.1.1.1", 5, None])
 def test_what_is_no_address(value):
     with pytest.raises(ValueError):
-        IpAddress()(value)
+        ADDRESS(value)
 
 
 @pytest.mark.parametrize("value", ["3.1", 3.1, "3.1.0.0", [3, 1, 0, 0], [3, 1]])
 def test_stream_versions(value):
-    assert StreamVersion()(value) == "3.1"
+    assert STREAM_VERSION(value) == "3.1"
 
 
 @pytest.mark.parametrize("value", ["", "new", 3, True, [3], [1, 9], "3.x", "4.1.0.0.0"])
 def test_what_is_no_stream_version(value):
     with pytest.raises(ValueError):
-        StreamVersion()(value)
+        STREAM_VERSION(value)

@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,26 +9,26 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
-from typing_extensions import override
 
 from crazyflie_driver.positioning import MOCAP, SOURCES
 from crazyflie_link.address import EXPECTED, Address
 from crazyflie_link.errors import AddressError
 from crazyflie_model.quadrotor import TYPES
-from crazyflie_utils import ParameterError, Parameters, parameter
+from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FINITE,
     FRAME,
     POSITION,
     TEXT,
+    Converted,
     Integer,
     ListOf,
     Number,
-    ParameterType,
     Text,
+    matching,
 )
-from crazyflie_utils.parameters.vehicle_model import load
+from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 from crazyflie_utils.text import number_from_text
 
 #: Help of settings that are read and only reported in a remark.
@@ -55,37 +54,11 @@ DEFAULT_TOPICS = {
 }
 
 
-class VehicleName(ParameterType):
-    """Name of a vehicle's namespace and frame; /all/takeoff is a service for all vehicles."""
-
-    label = "string"
-
-    @override
-    def __call__(self, value: Any) -> str:
-        if not isinstance(value, str) or not re.fullmatch("(?!all$)[A-Za-z][A-Za-z0-9_]*", value):
-            raise ValueError
-        return value
-
-    @override
-    def __str__(self) -> str:
-        return "letters, digits and underscores, the first a letter, and not 'all'"
-
-
-class VehicleUri(ParameterType):
-    """A vehicle's address for `crazyflie_link`; crazyswarm2's ``*`` stands for any dongle."""
-
-    label = "string"
-
-    @override
-    def __call__(self, value: Any) -> str:
-        if not isinstance(value, str):
-            raise ValueError
-        vehicle_key(value)
-        return value
-
-    @override
-    def __str__(self) -> str:
-        return EXPECTED
+#: Name of a vehicle's namespace and frame; /all/takeoff is a service for all vehicles.
+VEHICLE_NAME = matching(
+    "(?!all$)[A-Za-z][A-Za-z0-9_]*",
+    "letters, digits and underscores, the first a letter, and not 'all'",
+)
 
 
 def vehicle_key(uri: str) -> str:
@@ -96,66 +69,56 @@ def vehicle_key(uri: str) -> str:
         raise ValueError from None
 
 
-class StartPosition(ParameterType):
-    """Position of a vehicle before takeoff: x, y, z in m, z not below the ground."""
-
-    label, unit, range = POSITION.label, POSITION.unit, "z >= 0"
-
-    @override
-    def __call__(self, value: Any) -> tuple[float, float, float]:
-        x, y, z = POSITION(value)
-        if z < 0.0:
-            raise ValueError(f"z is {z:g}, below the ground")
-        return x, y, z
-
-    @override
-    def __str__(self) -> str:
-        return f"{POSITION}, z at least 0"
+def _uri(value):
+    vehicle_key(TEXT(value))
+    return value
 
 
-class FirmwareNumber(ParameterType):
-    """The value of a firmware parameter; 1e-3, which is a text in YAML, is a number here."""
+#: A vehicle's address for `crazyflie_link`; crazyswarm2's ``*`` stands for any dongle.
+_URI = Converted(_uri, EXPECTED)
 
-    label = "float"
 
-    @override
-    def __call__(self, value: Any) -> int | float:
-        if isinstance(value, str):
-            value = number_from_text(value)
-        if isinstance(value, bool):
-            return int(value)
-        FINITE(value)
-        return value
+def _start_position(value):
+    x, y, z = POSITION(value)
+    if z < 0.0:
+        raise ValueError(f"z is {z:g}, below the ground")
+    return x, y, z
 
-    @override
-    def __str__(self) -> str:
-        return "a finite number"
 
+#: Position of a vehicle before takeoff: x, y, z in m.
+_START_POSITION = Converted(
+    _start_position, f"{POSITION}, z at least 0", POSITION.label, POSITION.unit, "z >= 0"
+)
+
+
+def _firmware_number(value):
+    if isinstance(value, str):
+        value = number_from_text(value)
+    if isinstance(value, bool):
+        return int(value)
+    FINITE(value)
+    return value
+
+
+#: The value of a firmware parameter; 1e-3, which is a text in YAML, is a number here.
+FIRMWARE_NUMBER = Converted(_firmware_number, "a finite number", "float")
 
 #: Dynamics in simulation; on hardware they are the default type of vehicle.
 DYNAMICS = ("near_hover", "coupled_7d", "quadrotor")
 
 
-class FleetModel(ParameterType):
-    """Dynamics in simulation, a type of vehicle, or a model file."""
+def _model(value):
+    # A model file is read when its folder is known.
+    is_known = value in DYNAMICS or TEXT(value).endswith((".yaml", ".yml"))
+    return value if is_known else VEHICLE_MODEL(value)
 
-    label = "string"
-    range = ", ".join(f"`{name}`" for name in (*DYNAMICS, *TYPES)) + ", or a file"
 
-    @override
-    def __call__(self, value: Any) -> str:
-        if not isinstance(value, str):
-            raise ValueError
-        if value not in DYNAMICS and not value.endswith((".yaml", ".yml")):
-            try:
-                load(value)
-            except ParameterError as error:
-                raise ValueError(str(error)) from None
-        return value
-
-    @override
-    def __str__(self) -> str:
-        return f"one of {', '.join((*DYNAMICS, *TYPES))}, or a model file"
+_MODELS = (*DYNAMICS, *TYPES)
+_MODEL = Converted(
+    _model,
+    f"one of {', '.join(_MODELS)}, or a model file",
+    range=", ".join(f"`{name}`" for name in _MODELS) + ", or a file",
+)
 
 
 class LogTopicSettings(Parameters):
@@ -177,7 +140,7 @@ class Settings(Parameters):
     """Settings of a vehicle, which override those of its type, which override those of ``all``."""
 
     model: str = parameter(
-        FleetModel(),
+        _MODEL,
         "dynamics in simulation; or a type of vehicle or a model file, relative to this file, for "
         "simulation (as a quadrotor), hardware and gains",
         "coupled_7d",
@@ -271,11 +234,9 @@ class PartialSettings(Settings):
     """Settings in one place, of a vehicle, its type or ``all``, before they are merged."""
 
     enabled: bool = parameter(BOOLEAN, "whether the vehicle takes part", True)
-    uri: str | None = parameter(
-        VehicleUri(), "address of the vehicle; not needed in simulation", None
-    )
+    uri: str | None = parameter(_URI, "address of the vehicle; not needed in simulation", None)
     position: tuple[float, float, float] | None = parameter(
-        StartPosition(), "position of the vehicle before takeoff", None, "initial_position"
+        _START_POSITION, "position of the vehicle before takeoff", None, "initial_position"
     )
     type: str | None = parameter(TEXT, "of `robot_types`", None)
 
@@ -284,7 +245,7 @@ class RobotSettings(PartialSettings):
     """Settings of one vehicle below ``robots``."""
 
     position: tuple[float, float, float] = parameter(
-        StartPosition(), "position of the vehicle before takeoff", name="initial_position"
+        _START_POSITION, "position of the vehicle before takeoff", name="initial_position"
     )
 
 

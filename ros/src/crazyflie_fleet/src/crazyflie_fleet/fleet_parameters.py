@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-from typing_extensions import override
-
 from crazyflie_driver.positioning import SOURCES
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import FleetConfig
@@ -14,29 +12,21 @@ from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FRAME,
     TEXT,
+    Converted,
     Integer,
     Number,
-    ParameterType,
     Text,
 )
 
 
-class NodeParameters(ParameterType):
-    """Parameters of other nodes, which check them themselves."""
+def _node_parameters(value):
+    if not isinstance(value, dict) or not all(isinstance(each, dict) for each in value.values()):
+        raise ValueError
+    return value
 
-    label = "dictionary"
 
-    @override
-    def __call__(self, value: Any) -> Mapping[str, Any]:
-        if not isinstance(value, dict) or not all(
-            isinstance(each, dict) for each in value.values()
-        ):
-            raise ValueError
-        return value
-
-    def __str__(self) -> str:
-        """Return what is expected."""
-        return "a dictionary of dictionaries"
+#: Parameters of other nodes, which check them themselves.
+NODE_PARAMETERS = Converted(_node_parameters, "a dictionary of dictionaries", "dictionary")
 
 
 class FleetParameters(Parameters):
@@ -120,10 +110,10 @@ class FlyParameters(FleetParameters):
         "together",
     )
     common: Mapping[str, Any] = parameter(
-        NodeParameters(), "parameters of every vehicle's nodes, node by node", name="nodes"
+        NODE_PARAMETERS, "parameters of every vehicle's nodes, node by node", name="nodes"
     )
     by_model: Mapping[str, Any] | None = parameter(
-        NodeParameters(),
+        NODE_PARAMETERS,
         "parameters of vehicles of one model, which override `vehicle`",
         None,
         "models",

@@ -12,18 +12,18 @@ import yaml
 from crazyflie_fleet.fleet_config import (
     DEFAULT_TOPICS,
     DYNAMICS,
+    FIRMWARE_NUMBER,
     LOCAL,
+    VEHICLE_NAME,
     WITHOUT_EFFECT,
     BroadcastSettings,
     DefaultTopicSettings,
-    FirmwareNumber,
     FleetConfig,
     LogTopicSettings,
     MachineSettings,
     PartialSettings,
     RobotSettings,
     VehicleConfig,
-    VehicleName,
     close_pairs,
     vehicle_key,
 )
@@ -40,7 +40,6 @@ _SIMILAR = 0.8
 _TOP = ("robots", "robot_types", "all", "machines", "fileversion")
 _FIRMWARE = ("firmware_params", "firmware_logging")
 _LOGGING = ("enabled", "default_topics", "custom_topics")
-_FIRMWARE_NUMBER, _VEHICLE_NAME = FirmwareNumber(), VehicleName()
 _WITHOUT_EFFECT = [
     declaration.name
     for declaration in RobotSettings.declarations()
@@ -134,7 +133,7 @@ class FleetParser:
             self._check(common, "broadcasts")
         broadcasts = self._broadcasts(common)
         for name, entry in robots.items():
-            self._check_type(_VEHICLE_NAME, name, entry)
+            self._check_type(VEHICLE_NAME, name, entry)
             self._check(entry)
             self._check_choice(entry, "type", types)
         for entry in (*robots.values(), *types.values(), *([common] if common else [])):
@@ -300,7 +299,7 @@ class FleetParser:
     def _firmware(self, entry):
         parts = entry.entries()
         params = {
-            f"{group}.{key}": self._check_type(_FIRMWARE_NUMBER, value.value, value)
+            f"{group}.{key}": self._check_type(FIRMWARE_NUMBER, value.value, value)
             for group, inner in _entries(parts, "firmware_params").items()
             for key, value in inner.entries().items()
         }
@@ -325,7 +324,7 @@ class FleetParser:
         custom = {}
         for key, inner in _entries(parts, "custom_topics").items():
             topic = self._read(inner, LogTopicSettings)
-            self._check_type(_VEHICLE_NAME, key, inner)
+            self._check_type(VEHICLE_NAME, key, inner)
             if topic is not None:
                 custom[key] = topic
         enabled = "enabled" not in parts or self._check_type(

@@ -7,7 +7,7 @@ from typing import Any
 from crazyflie_driver.positioning import MOCAP
 from crazyflie_fleet.crazyswarm2_files import load_motion_capture, load_server
 from crazyflie_fleet.fleet_config import FleetConfig
-from crazyflie_fleet.fleet_parameters import FleetParameters, NodeParameters
+from crazyflie_fleet.fleet_parameters import NODE_PARAMETERS, FleetParameters
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import Text
 from mocap_optitrack.mocap_node import MocapNode
@@ -114,7 +114,7 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
         given |= load_server(config.server).motion_capture
     for key, value in given.items():
         handle.set_param(f"{handle.name}/{key}", value)
-    fleet, kind = config.fleet(), NodeParameters()
+    fleet, kind = config.fleet(), NODE_PARAMETERS
     dynamics = handle.get_param("~dynamics_configurations", kind, {})
     markers = handle.get_param("~marker_configurations", kind, {})
     _check_names(fleet, "dynamics", "mocap_dynamics", dynamics)

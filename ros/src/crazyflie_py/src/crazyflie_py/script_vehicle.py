@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from crazyflie_driver import srv
-from crazyflie_fleet.fleet_config import FirmwareNumber
+from crazyflie_fleet.fleet_config import FIRMWARE_NUMBER
 from crazyflie_fleet.separation import LOOK_AHEAD
 from crazyflie_mission_api import Fleet
 from crazyflie_mission_api.mission_vehicle import (
@@ -124,7 +124,7 @@ class FirmwareParameters:
         """Return a value; ValueError for an unknown name."""
         path = f"/{self.name}/{name.replace('.', '/')}"
         try:
-            value: float = self._connection.handle.get_param(path, FirmwareNumber())
+            value: float = self._connection.handle.get_param(path, FIRMWARE_NUMBER)
         except ParameterError:
             raise ValueError(
                 f"{self.name}: the firmware has no parameter {name}, since the driver has not "

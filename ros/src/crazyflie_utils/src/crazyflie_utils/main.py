@@ -19,7 +19,7 @@ from crazyflie_utils.context import Flights
 from crazyflie_utils.handle import NodeHandle
 from crazyflie_utils.node import Node, Process, initialization_failure
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, GraphName, ParameterType
+from crazyflie_utils.parameters.types import BOOLEAN, TOPIC, ParameterType
 from crazyflie_utils.program import load, missing_module
 from crazyflie_utils.ros1.master_watch import MasterWatch, namesake
 from crazyflie_utils.ros1.transport import RosTransport
@@ -79,7 +79,7 @@ class NodeClasses(ParameterType):
     def __call__(self, value: Any) -> dict[str, type[Node]]:
         if not isinstance(value, dict) or not value:
             raise ValueError
-        return {GraphName()(name): _node_class(path) for name, path in _flatten(value).items()}
+        return {TOPIC(name): _node_class(path) for name, path in _flatten(value).items()}
 
     def __str__(self) -> str:
         return 'a dictionary of node name: "package.module:Class"'

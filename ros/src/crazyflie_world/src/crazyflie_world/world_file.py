@@ -1,11 +1,10 @@
 """Worlds in YAML files."""
 
 import os
-import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path as FilePath
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from typing_extensions import override
 
@@ -17,10 +16,10 @@ from crazyflie_utils.parameters.types import (
     METRES,
     POSITION,
     TEXT,
-    File,
     ListOf,
     Number,
-    ParameterType,
+    matching,
+    path_of,
 )
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_utils.text import shortened, shown
@@ -41,26 +40,15 @@ from crazyflie_world.world import FLOOR, Floor, World
 _LENGTH = Number("m", above=0.0)
 _ANGLE = Number("rad")
 _PLACE = ListOf(METRES, 2)
-
-
-class _Name(ParameterType):
-    label = "string"
-
-    @override
-    def __call__(self, value: Any) -> str:
-        if not isinstance(value, str) or not re.fullmatch(r"[A-Za-z]\w*", value, re.ASCII):
-            raise ValueError
-        return value
-
-    @override
-    def __str__(self) -> str:
-        return "a name of letters, digits and underscores that begins with a letter"
+_NAME = matching(
+    r"[A-Za-z]\w*", "a name of letters, digits and underscores that begins with a letter"
+)
 
 
 class _ObjectParameters(Parameters):
     """Parameters of all objects but walls."""
 
-    name: str = parameter(_Name(), "unique name")
+    name: str = parameter(_NAME, "unique name")
     colour: tuple[float, float, float] = parameter(COLOUR, "red, green, blue", (0.5, 0.5, 0.5))
     centre: tuple[float, float, float] | None = parameter(
         POSITION, "centre of an object that does not move", None
@@ -106,7 +94,7 @@ class BallParameters(_ObjectParameters):
 class WallParameters(Parameters):
     """A wall that stands on the floor."""
 
-    name: str = parameter(_Name(), "unique name")
+    name: str = parameter(_NAME, "unique name")
     colour: tuple[float, float, float] = parameter(COLOUR, "red, green, blue", WALL_COLOUR)
     start: tuple[float, float] = parameter(_PLACE, "begin, x and y", name="from")
     end: tuple[float, float] = parameter(_PLACE, "end, x and y", name="to")
@@ -168,7 +156,7 @@ def load(path: str | FilePath) -> World:
     return World(settings.frame, settings.floor, tuple(objects))
 
 
-WORLD_FILE = File(load, "a world file")
+WORLD_FILE = path_of(load, "a world file")
 
 
 def _object(entry: Entry) -> Shape:

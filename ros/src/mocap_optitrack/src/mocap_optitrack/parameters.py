@@ -2,7 +2,7 @@
 
 import ipaddress
 from collections.abc import Iterator
-from dataclasses import dataclass
+from functools import partial
 
 from typing_extensions import override
 
@@ -11,10 +11,10 @@ from crazyflie_utils.parameters.types import (
     DURATION,
     TEXT,
     TIME_STEP,
+    Converted,
     Integer,
     ListOf,
     Number,
-    ParameterType,
     Text,
 )
 from mocap_optitrack.bodies import (
@@ -33,51 +33,37 @@ NATNET = "natnet"  #: Backend of OptiTrack; the others are `library_source.SYSTE
 _PORT = Integer(1, 65535)
 
 
-@dataclass(frozen=True)
-class IpAddress(ParameterType):
-    """An IPv4 address; with ``multicast``, that of a group."""
-
-    multicast: bool = False
-    label = "string"
-
-    @property
-    def range(self) -> str:  # type: ignore[override]
-        """The addresses of groups."""
-        return "224.0.0.0 to 239.255.255.255" if self.multicast else ""
-
-    @override
-    def __call__(self, value: object) -> str:
-        if not isinstance(value, str):
-            raise ValueError
-        address = ipaddress.IPv4Address(value)
-        if address.is_multicast != self.multicast:
-            raise ValueError
-        return value
-
-    def __str__(self) -> str:
-        if self.multicast:
-            return f"a multicast address, {self.range}"
-        return "an IP address such as 192.168.1.20"
+def _ip_address(value, is_group=False):
+    address = ipaddress.IPv4Address(TEXT(value))
+    if address.is_multicast != is_group:
+        raise ValueError
+    return value
 
 
-class StreamVersion(ParameterType):
-    """Version of a NatNet stream, as text such as "3.1"."""
+ADDRESS = Converted(_ip_address, "an IP address such as 192.168.1.20")
+_GROUPS = "224.0.0.0 to 239.255.255.255"
+GROUP = Converted(
+    partial(_ip_address, is_group=True), f"a multicast address, {_GROUPS}", range=_GROUPS
+)
 
-    label = "string, float or list"
-    range = ">= 2.0"
 
-    @override
-    def __call__(self, value: object) -> str:
-        parts = value if isinstance(value, list) else str(value).split(".")
-        if isinstance(value, bool) or not 2 <= len(parts) <= 4:
-            raise ValueError
-        major, minor = (int(part) for part in parts[:2])
-        if major < 2 or minor < 0:
-            raise ValueError
-        return f"{major}.{minor}"
+def _stream_version(value):
+    parts = value if isinstance(value, list) else str(value).split(".")
+    if isinstance(value, bool) or not 2 <= len(parts) <= 4:
+        raise ValueError
+    major, minor = (int(part) for part in parts[:2])
+    if major < 2 or minor < 0:
+        raise ValueError
+    return f"{major}.{minor}"
 
-    def __str__(self) -> str:
-        return "a NatNet version from 2.0 on, such as 3.1 or [3, 1, 0, 0]"
+
+#: Version of a NatNet stream, as text such as "3.1".
+STREAM_VERSION = Converted(
+    _stream_version,
+    "a NatNet version from 2.0 on, such as 3.1 or [3, 1, 0, 0]",
+    "string, float or list",
+    range=">= 2.0",
+)
 
 
 class NatNetParameters(Parameters):
@@ -90,13 +76,13 @@ class NatNetParameters(Parameters):
         None,
     )
     local_address: str | None = parameter(
-        IpAddress(),
+        ADDRESS,
         "natnet: address of this machine in the cameras' network, the only one on which "
         "datagrams are received. Without it, that of the interface that leads to the server",
         None,
     )
     multicast_address: str | None = parameter(
-        IpAddress(multicast=True),
+        GROUP,
         "natnet: group to which frames are sent, unless the server names one",
         None,
     )
@@ -105,7 +91,7 @@ class NatNetParameters(Parameters):
         _PORT, "natnet: UDP port of the group, unless the server names one", 1511
     )
     version: str | None = parameter(
-        StreamVersion(),
+        STREAM_VERSION,
         "natnet: version of the stream, such as 3.1 or [3, 1, 0, 0]. With it, and a group, frames "
         "are taken from the group even if no server answers",
         None,

@@ -13,7 +13,7 @@ from crazyflie_driver import srv
 from crazyflie_fleet.high_level_services import in_turn, to_message
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, METRES, File, Number
+from crazyflie_utils.parameters.types import BOOLEAN, METRES, Number, path_of
 
 #: Timeout of a service call, of the driver's connection before the first one, and of the master's
 #: answer (s).
@@ -164,7 +164,7 @@ class TrajectoryFlightParameters(FlightPlanParameters):
     """Parameters of `TrajectoryFlightNode`."""
 
     pieces: list[PolynomialPiece] = parameter(
-        File(load, "a CSV file with a trajectory"), "CSV file of the trajectory", name="file"
+        path_of(load, "a CSV file with a trajectory"), "CSV file of the trajectory", name="file"
     )
     timescale: float = parameter(
         Number(above=0.0, maximum=100.0),

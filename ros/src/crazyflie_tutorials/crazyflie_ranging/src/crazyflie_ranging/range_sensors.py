@@ -12,7 +12,7 @@ from typing_extensions import override
 from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
 from crazyflie_utils import ParameterError, Parameters, parameter
 from crazyflie_utils.parameters import yaml_file
-from crazyflie_utils.parameters.types import FRAME, POSITION, TOPIC, File, Integer, Number, Text
+from crazyflie_utils.parameters.types import FRAME, POSITION, TOPIC, Integer, Number, Text, path_of
 from crazyflie_utils.text import shown
 from crazyflie_world.world import World
 
@@ -108,7 +108,7 @@ def load(path: str | Path) -> tuple[RangeSensor, ...]:
     return tuple(sensors)
 
 
-SENSOR_FILE = File(load, "a sensor file")
+SENSOR_FILE = path_of(load, "a sensor file")
 
 
 _GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))

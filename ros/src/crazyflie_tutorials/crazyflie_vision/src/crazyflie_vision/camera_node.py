@@ -16,7 +16,7 @@ from crazyflie_utils import (
     TransformError,
     parameter,
 )
-from crazyflie_utils.parameters.types import FRAME, TOPIC, File
+from crazyflie_utils.parameters.types import FRAME, TOPIC, path_of
 from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_vision.camera import CameraParameters, Pinhole, PixelNoise, Pose, load, optical_pose
 from crazyflie_vision.images import camera_info, to_message
@@ -33,7 +33,7 @@ class CameraNodeParameters(Parameters):
 
     world: World = parameter(WORLD_FILE, "world that the camera sees, a YAML file")
     camera: CameraParameters = parameter(
-        File(load, "a camera's YAML file"), "the camera, a YAML file"
+        path_of(load, "a camera's YAML file"), "the camera, a YAML file"
     )
     vehicle_frame: str = parameter(
         FRAME, "frame on which the camera is mounted", "crazyflie", name="frames/vehicle"

@@ -1,6 +1,7 @@
 """Types of parameters: the allowed values, and their description (``str(type)``)."""
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -134,38 +135,56 @@ class Text(ParameterType):
 
 
 @dataclass(frozen=True)
-class GraphName(ParameterType):
-    """The name of a topic or a service."""
+class Converted(ParameterType):
+    """What ``convert(raw value)`` returns; it raises as `ParameterType.__call__`."""
 
-    label = "string"
+    convert: Callable[[Any], Any]
+    expected: str  #: Description for messages, such as "a world file".
+    label: str = "string"
+    unit: str = ""
+    range: str = ""
 
     @override
-    def __call__(self, value: Any) -> str:
-        # Imported here, since programs without ROS have no such names.
-        from rosgraph.names import is_legal_name
+    def __call__(self, value: Any) -> Any:
+        return self.convert(value)
 
-        if not isinstance(value, str) or not value or not is_legal_name(value):
+    def __str__(self) -> str:
+        return self.expected
+
+
+def matching(pattern: str, expected: str) -> Converted:
+    """Return the type of a string that matches a regular expression, in ASCII, as a whole."""
+
+    def convert(value: Any) -> str:
+        if not isinstance(value, str) or not re.fullmatch(pattern, value, re.ASCII):
             raise ValueError
         return value
 
-    def __str__(self) -> str:
-        return "the name of a topic or service, such as /state"
+    return Converted(convert, expected)
 
 
-@dataclass(frozen=True)
-class FrameName(ParameterType):
-    """The name of a tf frame; a leading slash, as tf 1 wrote it, is dropped."""
+def path_of(load: Callable[[str], Any], content: str) -> Converted:
+    """Return the type of a file's path; its value is that of ``load(path)``, which may raise.
 
-    label = "string"
+    The content is for messages, such as "a world file".
+    """
+    return Converted(lambda path: load(TEXT(path)), f"the path of {content}")
 
-    @override
-    def __call__(self, value: Any) -> str:
-        if not isinstance(value, str) or not value.strip("/ "):
-            raise ValueError
-        return value.lstrip("/")
 
-    def __str__(self) -> str:
-        return "the name of a tf frame, such as world"
+def _graph_name(value):
+    # Imported here, since programs without ROS have no such names.
+    from rosgraph.names import is_legal_name
+
+    if not isinstance(value, str) or not value or not is_legal_name(value):
+        raise ValueError
+    return value
+
+
+def _frame_name(value):
+    # A leading slash is tf 1's.
+    if not isinstance(value, str) or not value.strip("/ "):
+        raise ValueError
+    return value.lstrip("/")
 
 
 @dataclass(frozen=True)
@@ -201,22 +220,6 @@ class ListOf(ParameterType):
         return f"{count}, each entry {self.entry}"
 
 
-@dataclass(frozen=True)
-class File(ParameterType):
-    """The path of a file; its value is the result of ``load(path)``, which raises on errors."""
-
-    load: Callable[[str], Any]
-    content: str  #: Description for messages, such as "a world file".
-    label = "string"
-
-    @override
-    def __call__(self, value: Any) -> Any:
-        return self.load(TEXT(value))
-
-    def __str__(self) -> str:
-        return f"the path of {self.content}"
-
-
 FINITE = Number()
 POSITIVE = Number(above=0.0)
 DURATION = Number(unit="s", minimum=0.0)
@@ -225,7 +228,6 @@ TIME_STEP = Number(unit="s", minimum=1e-4)
 METRES = Number(unit="m")
 BOOLEAN = Boolean()
 TEXT = Text()
-TOPIC = GraphName()
-SERVICE = GraphName()
-FRAME = FrameName()
+TOPIC = SERVICE = Converted(_graph_name, "the name of a topic or service, such as /state")
+FRAME = Converted(_frame_name, "the name of a tf frame, such as world")
 POSITION = ListOf(METRES, 3)

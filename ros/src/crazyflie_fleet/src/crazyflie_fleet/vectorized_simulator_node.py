@@ -18,7 +18,7 @@ from crazyflie_fleet.vehicle_nodes import (
     SAFE_REFERENCE,
     STATE,
 )
-from crazyflie_lqr.gain_file import MatrixFile, VectorFile
+from crazyflie_lqr.gain_file import CONTROL_FILE, MatrixFile
 from crazyflie_lqr.linear_feedback import (
     IntegralStateFeedback,
     heading_error,
@@ -112,7 +112,7 @@ class VectorizedSimulatorParameters(Parameters):
         MatrixFile(4, 7), "gain file, 4 rows of 7 numbers", name="lqr_controller/K_file"
     )
     u_ref: NDArray[np.float64] = parameter(
-        VectorFile(4), "control at the reference", name="lqr_controller/u_ref_file"
+        CONTROL_FILE, "control at the reference", name="lqr_controller/u_ref_file"
     )
     max_jump: float = parameter(
         Number("m", above=0.0),

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 
-from crazyflie_utils.parameters.types import TEXT, ParameterType
+from crazyflie_utils.parameters.types import TEXT, Converted, ParameterType
 from crazyflie_utils.text import number_from_text, shortened, shown
 
 
@@ -24,34 +24,31 @@ class GainFileError(ValueError):
 
 def load_matrix(path: str, rows: int, columns: int) -> NDArray[np.float64]:
     """Return the matrix of finite numbers in a file, shape (rows, columns), or `GainFileError`."""
-    expected = f"expected {rows} rows of {columns} numbers"
-    matrix: list[list[float]] = []
-    for number, row in _rows(path, expected):
-        if len(row) != columns:
-            raise GainFileError(f"{path}, line {number}: {_count(row)}, {expected}")
-        if len(matrix) == rows:
-            raise GainFileError(f"{path}, line {number}: row {rows + 1}, {expected}")
-        matrix.append(row)
-    if len(matrix) != rows:
-        last = number if matrix else 0
-        raise GainFileError(f"{path}: ends after {len(matrix)} rows (line {last}), {expected}")
-    return np.array(matrix)
+    return _load(path, [(rows, columns)], f"expected {rows} rows of {columns} numbers", "row")
 
 
 def load_vector(path: str, length: int) -> NDArray[np.float64]:
     """Return the vector in a file, shape (length,): one row or one column; see `load_matrix`."""
     expected = f"expected {length} numbers in one row or one column"
-    vector: list[float] = []
-    width = 0
+    return _load(path, [(1, length), (length, 1)], expected, "number").ravel()
+
+
+def _load(path, shapes, expected, unit):
+    most = max(rows for rows, _ in shapes)
+    matrix: list[list[float]] = []
     for number, row in _rows(path, expected):
-        width = width or len(row)
-        vector += row
-        if len(row) != width or width not in (1, length) or len(vector) > length:
-            raise GainFileError(f"{path}, line {number}: {_count(row)}, {expected}")
-    if len(vector) != length:
-        last = number if vector else 0
-        raise GainFileError(f"{path}: ends after {_count(vector)} (line {last}), {expected}")
-    return np.array(vector)
+        shapes = [shape for shape in shapes if shape[0] > len(matrix) and shape[1] == len(row)]
+        matrix.append(row)
+        if not shapes:
+            what = _count(len(row), "number")
+            if len(matrix) > most:
+                what = f"row {len(matrix)} of {what}"
+            raise GainFileError(f"{path}, line {number}: {what}, {expected}")
+    if all(rows > len(matrix) for rows, _ in shapes):
+        last = number if matrix else 0
+        what = _count(len(matrix), unit)
+        raise GainFileError(f"{path}: ends after {what} (line {last}), {expected}")
+    return np.array(matrix)
 
 
 def save_matrix(path: str, matrix: ArrayLike, comment: str = "") -> None:
@@ -80,19 +77,12 @@ class MatrixFile(ParameterType):
         return f"the path of a text file with {self.rows} rows of {self.columns} numbers"
 
 
-@dataclass(frozen=True)
-class VectorFile(ParameterType):
-    """The path of a gain file; the value is its vector, of this length."""
-
-    length: int
-    label = "path"
-
-    @override
-    def __call__(self, value: Any) -> NDArray[np.float64]:
-        return load_vector(TEXT(value), self.length)
-
-    def __str__(self) -> str:
-        return f"the path of a text file with {self.length} numbers in one row or one column"
+#: The path of a gain file; the value is its vector, a control.
+CONTROL_FILE = Converted(
+    lambda path: load_vector(TEXT(path), 4),
+    "the path of a text file with 4 numbers in one row or one column",
+    "path",
+)
 
 
 def _rows(path, expected):
@@ -127,5 +117,5 @@ def _number(token, where, expected):
     return value
 
 
-def _count(row):
-    return "1 number" if len(row) == 1 else f"{len(row)} numbers"
+def _count(count, unit):
+    return f"{count} {unit}" if count == 1 else f"{count} {unit}s"

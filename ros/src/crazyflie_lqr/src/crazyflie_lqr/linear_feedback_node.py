@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
-from crazyflie_lqr.gain_file import MatrixFile, VectorFile
+from crazyflie_lqr.gain_file import CONTROL_FILE, MatrixFile
 from crazyflie_lqr.linear_feedback import GroundGuess, LinearFeedback, at_rest
 from crazyflie_lqr.reference import GuardedReference, StateAge
 from crazyflie_model.limits import MAX_SPEED
@@ -57,7 +57,7 @@ class LinearFeedbackParameters(Parameters):
         live=True,
     )
     u_ref: NDArray[np.float64] = parameter(
-        VectorFile(4),
+        CONTROL_FILE,
         "control at the reference, `u_dim` numbers in one row or one column",
         name="u_ref_file",
         live=True,

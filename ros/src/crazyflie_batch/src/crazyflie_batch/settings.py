@@ -15,11 +15,10 @@ from crazyflie_lqr.gain_file import GainFileError, load_matrix
 from crazyflie_model.limits import CRASH_TILT
 from crazyflie_state_estimator import motion
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameters.declaration import Declaration
 from crazyflie_utils.parameters.types import DURATION, METRES, TEXT, Integer, Number, Text
 from crazyflie_utils.parameters.types import FINITE as ANY
 from crazyflie_utils.parameters.yaml_file import Entry, load
-from crazyflie_utils.text import shortened, shown
+from crazyflie_utils.text import shortened
 
 MODELS = ("near_hover", "coupled_7d", "quadrotor")
 ESTIMATORS = ("finite_difference", "kalman")
@@ -215,15 +214,8 @@ def _sweep(entry: Entry, name: str) -> Sweep:
     elements = content.elements()
     if kind != VALUES and len(elements) != 2 or not elements:
         raise content.error(f"has {len(elements)} entries; expected {_EXPECTED}")
-    numbers = [_number(element, declaration) for element in elements]
+    numbers = [element.checked(declaration.type) for element in elements]
     if kind == UNIFORM and numbers[0] >= numbers[1]:
         raise content.error(f"is {numbers}; expected the lower number first")
     number: Any = declaration.type
     return Sweep(name, number.unit, kind, tuple(numbers), number.minimum, number.maximum)
-
-
-def _number(entry: Entry, declaration: Declaration) -> float:
-    try:
-        return declaration.type(entry.value)
-    except ValueError:
-        raise entry.error(f"is {shown(entry.value)}; expected {declaration.type}") from None

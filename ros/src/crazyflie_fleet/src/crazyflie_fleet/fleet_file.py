@@ -68,11 +68,11 @@ def converted(vehicles: Entry, types: Entry | None) -> Entry:
 
 
 def _robot(entry, has_types):
-    number = _number(entry["id"], _ID)
+    number = entry["id"].checked(_ID)
     parts = {key: value.node for key, value in entry.entries().items()}
     place = parts.pop("id")
     if "channel" in parts:
-        channel = _number(entry["channel"], _CHANNEL)
+        channel = entry["channel"].checked(_CHANNEL)
         parts["uri"] = _text(f"radio://0/{channel}/2M/E7E7E7E7{number:02X}", place)
         del parts["channel"]
     if not has_types:
@@ -106,13 +106,6 @@ def _points(types, configuration):
     """Return the number of points of a marker configuration; 0 without one."""
     points = entry_at(types, f"markerConfigurations/{configuration}/points")
     return 0 if points is None else len(points.entries())
-
-
-def _number(entry: Entry, expected: Integer) -> int:
-    try:
-        return expected(entry.value)
-    except ValueError:
-        raise entry.error(f"is {entry.value!r}; expected {expected}") from None
 
 
 def _mapping(parts: Mapping[str, yaml.Node], place: yaml.Node) -> yaml.MappingNode:

@@ -18,6 +18,7 @@ from crazyflie_utils.parameters.types import (
     TEXT,
     ListOf,
     Number,
+    Text,
     matching,
     path_of,
 )
@@ -160,7 +161,7 @@ WORLD_FILE = path_of(load, "a world file")
 
 
 def _object(entry: Entry) -> Shape:
-    kind = _type(entry, (*OBJECTS, WALL))
+    kind = entry["type"].checked(Text((*OBJECTS, WALL)))
     if kind == WALL:
         return entry.read(WallParameters, extra_keys=("type",)).shape()
     path = _path(entry["path"]) if "path" in entry else None
@@ -184,11 +185,4 @@ def _with_picture(shape: Shape, entry: Entry) -> Shape:
 
 
 def _path(entry: Entry) -> Path:
-    return entry.read(PATHS[_type(entry, tuple(PATHS))], extra_keys=("type",))
-
-
-def _type(entry: Entry, choices: tuple[str, ...]) -> str:
-    kind = entry["type"]
-    if kind.value not in choices:
-        raise kind.error(f"is {shown(kind.value)}; expected one of {', '.join(choices)}")
-    return kind.value
+    return entry.read(PATHS[entry["type"].checked(Text(tuple(PATHS)))], extra_keys=("type",))

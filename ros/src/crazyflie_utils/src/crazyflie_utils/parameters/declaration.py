@@ -12,8 +12,7 @@ import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Self, dataclass_transform
 
-from crazyflie_utils.parameters.types import ParameterType
-from crazyflie_utils.text import shown
+from crazyflie_utils.parameters.types import ParameterType, checked
 
 REQUIRED = dataclasses.MISSING  #: Default of a parameter that must be set.
 
@@ -142,24 +141,18 @@ def read_parameter(
     declaration: Declaration, get: Callable[[str], Any], full_name: Callable[[str], str] = str
 ) -> Any:
     """Return one parameter, checked; see `Parameters.read`."""
-    expected = declaration.type
     try:
         raw = get(declaration.name)
     except KeyError:
         if declaration.default is not REQUIRED:
             return declaration.default
         raise ParameterError(
-            f"parameter {full_name(declaration.name)} is not set; expected {expected}"
+            f"parameter {full_name(declaration.name)} is not set; expected {declaration.type}"
         ) from None
     try:
-        return expected(raw)
-    except (ValueError, TypeError, OverflowError) as error:
-        # The texts of TypeError and OverflowError are Python's own, about something that is not a
-        # number.
-        reason = f" ({error})" if isinstance(error, ValueError) and str(error) else ""
-        raise ParameterError(
-            f"parameter {full_name(declaration.name)} is {shown(raw)}; expected {expected}{reason}"
-        ) from None
+        return checked(declaration.type, raw)
+    except ValueError as error:
+        raise ParameterError(f"parameter {full_name(declaration.name)} {error}") from None
 
 
 def _read_field(declaration, get, full_name):

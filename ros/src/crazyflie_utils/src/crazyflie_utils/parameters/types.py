@@ -8,6 +8,8 @@ from typing import Any
 
 from typing_extensions import override
 
+from crazyflie_utils.text import shown
+
 
 class ParameterType:
     """Base class of parameter types."""
@@ -22,6 +24,17 @@ class ParameterType:
         Raises ValueError if it is invalid; with a reason if ``str(type)`` does not contain it.
         """
         raise NotImplementedError
+
+
+def checked(expected: ParameterType, raw: Any) -> Any:
+    """Return the value of a raw one; ValueError says what it is, and what was expected."""
+    try:
+        return expected(raw)
+    except (ValueError, TypeError, OverflowError) as error:
+        # The texts of TypeError and OverflowError are Python's own, about something that is not a
+        # number.
+        reason = f" ({error})" if isinstance(error, ValueError) and str(error) else ""
+        raise ValueError(f"is {shown(raw)}; expected {expected}{reason}") from None
 
 
 @dataclass(frozen=True)

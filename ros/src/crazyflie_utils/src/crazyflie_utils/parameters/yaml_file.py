@@ -16,34 +16,13 @@ import yaml
 from typing_extensions import override
 
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters
+from crazyflie_utils.parameters.types import ParameterType, checked
 from crazyflie_utils.text import shortened, shown
 from crazyflie_utils.text_file import TextFileError, read_text
 
 MAX_SIZE = 1_000_000  #: Largest file (bytes): three times that of a thousand vehicles.
 MAX_DEPTH = 50  #: Largest number of nested lists and mappings.
 MAX_NODES = 50_000  #: Largest number of values and keys, with aliases expanded.
-
-
-def compose(text: str, name: str) -> yaml.Node | None:
-    """Return the node of a YAML text; None for one without content. ``name`` is its file's.
-
-    Raises `TextFileError` if it is not YAML, exceeds the limits above, or has an alias within the
-    node to which the alias refers.
-    """
-    try:
-        loader = _Loader(text, name)
-    except yaml.reader.ReaderError as error:
-        line = text.count("\n", 0, error.position) + 1
-        reason = f"is not valid YAML: it has the character U+{error.character:04X}"
-        raise TextFileError(reason, line) from None
-    try:
-        return loader.get_single_node()
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        problem = shortened(error.problem or str(error))
-        raise TextFileError(f"is not valid YAML: {problem}", mark and mark.line + 1) from None
-    finally:
-        loader.dispose()
 
 
 class _Loader(yaml.SafeLoader):
@@ -60,7 +39,7 @@ class _Loader(yaml.SafeLoader):
         before = self._count
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise _parse_error(f"is nested too deeply; expected at most {MAX_DEPTH} levels", event)
+            raise self._error(event, f"is nested too deeply; expected at most {MAX_DEPTH} levels")
         node = super().compose_node(parent, index)
         self._depth -= 1
         if not isinstance(event, yaml.AliasEvent):
@@ -69,17 +48,16 @@ class _Loader(yaml.SafeLoader):
         elif id(node) in self._sizes:
             self._count += self._sizes[id(node)]
         else:
-            raise _parse_error(
-                f"has the alias *{shortened(event.anchor)} within the node to which it refers",
+            raise self._error(
                 event,
+                f"has the alias *{shortened(event.anchor)} within the node to which it refers",
             )
         if self._count > MAX_NODES:
-            raise _parse_error(f"has too many values; expected at most {MAX_NODES}", event)
+            raise self._error(event, f"has too many values; expected at most {MAX_NODES}")
         return node
 
-
-def _parse_error(reason, event):
-    return TextFileError(reason, event.start_mark.line + 1)
+    def _error(self, event, reason):
+        return _error(self.name, event.start_mark.line + 1, reason)
 
 
 P = TypeVar("P", bound=Parameters)
@@ -88,22 +66,30 @@ P = TypeVar("P", bound=Parameters)
 def load(path: str | Path) -> "Entry":
     """Return the content of a file, which is a mapping.
 
-    `ParameterError`: it cannot be read, is not a YAML mapping, has a key twice, or exceeds the
-    limits of a file of settings, see `compose`.
+    `ParameterError`: it cannot be read, is not a YAML mapping, has a key twice, exceeds the limits
+    above, or has an alias within the node to which the alias refers.
     """
     try:
         text = read_text(path, MAX_SIZE)
     except TextFileError as error:
-        raise _refusal(path, error) from None
+        raise _error(path, error.line, error) from None
     return parse(text, path)
 
 
 def parse(text: str, name: str | Path) -> "Entry":
     """Return the content of a text, which is a mapping; ``name`` is for errors. See `load`."""
     try:
-        node = compose(text, str(name))
-    except TextFileError as error:
-        raise _refusal(name, error) from None
+        loader = _Loader(text, str(name))
+        node = loader.get_single_node()
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        reason = f"is not valid YAML: it has the character U+{error.character:04X}"
+        raise _error(name, line, reason) from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        problem = shortened(error.problem or str(error))
+        raise _error(name, mark and mark.line + 1, f"is not valid YAML: {problem}") from None
+    loader.dispose()
     if node is None:
         raise ParameterError(f"{name}: is empty; expected a mapping")
     entry = Entry("", node)
@@ -111,9 +97,9 @@ def parse(text: str, name: str | Path) -> "Entry":
     return entry
 
 
-def _refusal(name, error):
-    where = shortened(str(name)) if error.line is None else f"{name}:{error.line}"
-    return ParameterError(f"{where}: {error}")
+def _error(name, line, reason):
+    where = shortened(str(name)) if line is None else f"{name}:{line}"
+    return ParameterError(f"{where}: {reason}")
 
 
 @dataclass(frozen=True)
@@ -148,6 +134,13 @@ class Entry:
     def error(self, text: str) -> ParameterError:
         """Return an error about the entry: file, line and name, then the text."""
         return ParameterError(f"{self.file}:{self.line}: {self._title()} {text}")
+
+    def checked(self, expected: ParameterType) -> Any:
+        """Return the value of a type; the error says what it is, and what was expected."""
+        try:
+            return checked(expected, self.value)
+        except ValueError as error:
+            raise self.error(str(error)) from None
 
     def entries(self) -> dict[str, "Entry"]:
         """Return the entries of a mapping by key; keys must be different strings."""

@@ -10,6 +10,7 @@ from crazyflie_fleet.fleet_config import SINGLE_MARKER, FleetConfig, RobotSettin
 from crazyflie_fleet.fleet_parser import FleetParser, close_vehicles, entry_at
 from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters import yaml_file
+from crazyflie_utils.parameters.declaration import Complaints
 from crazyflie_utils.parameters.types import Integer
 from crazyflie_utils.parameters.yaml_file import Entry
 
@@ -44,18 +45,15 @@ def converted(vehicles: Entry, types: Entry | None) -> Entry:
         A vehicle has no id, or that of another one.
     """
     robots: dict[str, yaml.Node] = {}
-    errors: list[str] = []
+    errors = Complaints()
     for entry in vehicles[VEHICLES].elements():
-        try:
+        with errors:
             name, node = _robot(entry, types is not None)
             if name in robots:
                 line = robots[name].start_mark.line + 1
                 raise entry["id"].error(f"is also that of {name} in line {line}; expected another")
             robots[name] = node
-        except ParameterError as error:
-            errors += error.complaints
-    if errors:
-        raise ParameterError(*errors)
+    errors.raise_any()
     top = vehicles.node
     parts = {key: entry.node for key, entry in vehicles.entries().items() if key != VEHICLES}
     parts["robots"] = _mapping(robots, vehicles[VEHICLES].node)

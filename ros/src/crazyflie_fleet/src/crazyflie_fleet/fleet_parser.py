@@ -3,7 +3,6 @@
 import dataclasses
 import difflib
 from collections.abc import Iterable, Sequence
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -29,6 +28,7 @@ from crazyflie_fleet.fleet_config import (
 )
 from crazyflie_model.quadrotor import TYPES
 from crazyflie_utils import ParameterError
+from crazyflie_utils.parameters.declaration import Complaints
 from crazyflie_utils.parameters.types import BOOLEAN, ParameterType
 from crazyflie_utils.parameters.vehicle_model import load
 from crazyflie_utils.parameters.yaml_file import Entry
@@ -108,7 +108,7 @@ class FleetParser:
     def __init__(self, top: Entry):
         self._top = top
         self._parts = top.entries()
-        self._errors: list[str] = []
+        self._errors = Complaints()
         self.remarks = Remarks()
 
     def fleet(self) -> FleetConfig:
@@ -138,13 +138,13 @@ class FleetParser:
             self._check_choice(entry, "type", types)
         for entry in (*robots.values(), *types.values(), *([common] if common else [])):
             self._check_choice(entry, "machine", (LOCAL, *machines))
-        self._raise_errors()
+        self._errors.raise_any()
         # Combinations of settings are checked for each vehicle.
         vehicles = [self._vehicle(name, entry, types, common) for name, entry in robots.items()]
-        self._raise_errors()
+        self._errors.raise_any()
         enabled = [vehicle for vehicle in vehicles if vehicle.settings.enabled]
         self._check_apart(enabled, robots)
-        self._raise_errors()
+        self._errors.raise_any()
         disabled = [vehicle.name for vehicle in vehicles if not vehicle.settings.enabled]
         if not enabled:
             raise self._parts["robots"].error("has no enabled vehicle; expected at least one")
@@ -158,24 +158,13 @@ class FleetParser:
     def _error(self, entry, text):
         self._errors += entry.error(text).complaints
 
-    def _raise_errors(self):
-        if self._errors:
-            raise ParameterError(*dict.fromkeys(self._errors))
-
     def _read(self, entry, settings, *extra_keys):
         def on_unknown(unknown, known):
-            with self._collecting():
+            with self._errors:
                 self.remarks.unknown(unknown, known)
 
-        with self._collecting():
+        with self._errors:
             return entry.read(settings, extra_keys, on_unknown)
-
-    @contextmanager
-    def _collecting(self):
-        try:
-            yield
-        except ParameterError as error:
-            self._errors += error.complaints
 
     def _check(self, entry, *extra_keys):
         if self._read(entry, PartialSettings, *_FIRMWARE, *extra_keys) is None:
@@ -183,7 +172,7 @@ class FleetParser:
         for key in _WITHOUT_EFFECT:
             if (idle := entry_at(entry, key)) is not None:
                 self.remarks.idle(idle, key)
-        with self._collecting():
+        with self._errors:
             self._firmware(entry)
 
     def _broadcasts(self, common):
@@ -200,7 +189,7 @@ class FleetParser:
     def _check_keys(self, entries, known):
         for key, entry in entries.items():
             if key not in known:
-                with self._collecting():
+                with self._errors:
                     self.remarks.unknown(entry, known)
 
     def _check_type(self, expected: ParameterType, value: Any, entry: Entry) -> Any:
@@ -275,9 +264,8 @@ class FleetParser:
         try:
             load(path)
         except ParameterError as error:
-            self._errors += [
-                merged["model"].error(str(each)).complaints[0] for each in error.complaints
-            ]
+            for each in error.complaints:
+                self._error(merged["model"], each)
         return dataclasses.replace(settings, model=path)
 
     def _check_voltages(self, merged, settings):

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 from typing_extensions import override
 
-from crazyflie_utils import ParameterError, Parameters, parameter
+from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters import yaml_file
-from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.declaration import Complaints, group
 from crazyflie_utils.parameters.types import (
     FRAME,
     METRES,
@@ -140,20 +140,17 @@ def load(path: str | FilePath) -> World:
     settings = file.read(WorldParameters, extra_keys=("objects",))
     entries = file["objects"].elements() if "objects" in file else []
     objects: list[Shape] = []
-    complaints: list[str] = []
+    complaints = Complaints()
     lines = {FLOOR: "the floor", settings.frame: "the frame"}
     for entry in entries:
-        try:
+        with complaints:
             made = _object(entry)
             name = entry["name"]
             if made.name in lines:
                 raise name.error(f"is {shown(made.name)}, which is the name of {lines[made.name]}")
             lines[made.name] = f"the object in line {name.line}"
             objects.append(made)
-        except ParameterError as error:
-            complaints += error.complaints
-    if complaints:
-        raise ParameterError(*complaints)
+    complaints.raise_any()
     return World(settings.frame, settings.floor, tuple(objects))
 
 

@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 from typing_extensions import override
 
 from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
-from crazyflie_utils import ParameterError, Parameters, parameter
+from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters import yaml_file
+from crazyflie_utils.parameters.declaration import Complaints
 from crazyflie_utils.parameters.types import FRAME, POSITION, TOPIC, Integer, Number, Text, path_of
 from crazyflie_utils.text import shown
 from crazyflie_world.world import World
@@ -85,13 +86,13 @@ def load(path: str | Path) -> tuple[RangeSensor, ...]:
     """
     file = yaml_file.load(path)
     sensors: list[RangeSensor] = []
-    complaints: list[str] = []
+    complaints = Complaints()
     lines: dict[str, dict[str, int]] = {"name": {}, "frame_id": {}}
     for key, entry in file.entries().items():
         if key != "sensors":
             complaints += entry.error("is not known; expected sensors").complaints
     for entry in file["sensors"].elements():
-        try:
+        with complaints:
             sensors.append(entry.read(RangeSensor))
             for key, taken in lines.items():
                 value = entry[key]
@@ -99,12 +100,9 @@ def load(path: str | Path) -> tuple[RangeSensor, ...]:
                     text = f"is {shown(value.value)}, which is there in line {taken[value.value]}"
                     raise value.error(text)
                 taken[value.value] = value.line
-        except ParameterError as error:
-            complaints += error.complaints
     if not sensors and not complaints:
         complaints += file["sensors"].error("is empty; expected at least one sensor").complaints
-    if complaints:
-        raise ParameterError(*complaints)
+    complaints.raise_any()
     return tuple(sensors)
 
 

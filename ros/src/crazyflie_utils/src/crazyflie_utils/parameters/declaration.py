@@ -27,6 +27,23 @@ class ParameterError(Exception):
         self.complaints = complaints
 
 
+class Complaints(list[str]):
+    """Collects error texts: those of each `ParameterError` in ``with complaints:``, which ends."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, _: object, error: BaseException | None, trace: object) -> bool:
+        if isinstance(error, ParameterError):
+            self += error.complaints
+        return isinstance(error, ParameterError)
+
+    def raise_any(self) -> None:
+        """Raise `ParameterError` with all texts, if there are any."""
+        if self:
+            raise ParameterError(*dict.fromkeys(self))
+
+
 @dataclasses.dataclass(frozen=True)
 class Declaration:
     """The declaration of a parameter."""
@@ -95,17 +112,13 @@ class Parameters:
         is its name in messages. `ParameterError` lists everything that is missing or invalid.
         """
         values: dict[str, Any] = {}
-        complaints: list[str] = []
+        complaints = Complaints()
         for field, declaration in cls._fields():
-            try:
+            with complaints:
                 values[field] = _read_field(declaration, get, full_name)
-            except ParameterError as error:
-                complaints += error.complaints
-        if not complaints:
-            parameters = cls(**values)
-            complaints += parameters.complaints()
-        if complaints:
-            raise ParameterError(*complaints)
+        complaints.raise_any()
+        parameters = cls(**values)
+        Complaints(parameters.complaints()).raise_any()
         return parameters
 
     @classmethod
@@ -115,17 +128,14 @@ class Parameters:
         Raises `ParameterError`, see `read`; also for names that are not declared.
         """
         known = {declaration.name for declaration in cls.declarations()}
-        unknown = [
+        complaints = Complaints(
             f"{prefix}{name} is no parameter; expected one of {', '.join(sorted(known))}"
             for name in values
             if name not in known
-        ]
-        try:
+        )
+        with complaints:
             parameters = cls.read(values.__getitem__, lambda name: prefix + name)
-        except ParameterError as error:
-            raise ParameterError(*unknown, *error.complaints) from None
-        if unknown:
-            raise ParameterError(*unknown)
+        complaints.raise_any()
         return parameters
 
     @classmethod

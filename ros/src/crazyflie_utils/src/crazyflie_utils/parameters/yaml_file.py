@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import yaml
 from typing_extensions import override
 
-from crazyflie_utils.parameters.declaration import ParameterError, Parameters
+from crazyflie_utils.parameters.declaration import Complaints, ParameterError, Parameters
 from crazyflie_utils.parameters.types import ParameterType, checked
 from crazyflie_utils.text import shortened, shown
 from crazyflie_utils.text_file import TextFileError, read_text
@@ -188,7 +188,7 @@ class Entry:
         """
         names = {declaration.name for declaration in parameters.declarations()}
         known: dict[str, Entry] = {}
-        complaints: list[str] = []
+        complaints = Complaints()
         for path, entry in self._leaves(names):
             if path in names:
                 known[path] = entry
@@ -208,8 +208,7 @@ class Entry:
             result = parameters.read(lambda name: known[name].value, place)
         except ParameterError as error:
             complaints += [self._with_place(text) for text in error.complaints]
-        if complaints:
-            raise ParameterError(*complaints)
+        complaints.raise_any()
         return result
 
     def _leaves(self, names: set[str], prefix: str = "") -> Iterator[tuple[str, "Entry"]]:

@@ -46,7 +46,7 @@ def test_vehicles_with_one_marker_get_their_position_and_tell_their_heading(told
 
 
 def test_others_are_rigid_bodies_unless_they_are_configured(told):
-    frames = {body.key: body.parameters.child_frame_id for body in told.rigid_bodies.bodies}
+    frames = {body.key: body.parameters.child_frame_id for body in told.rigid_bodies}
     assert frames == {"cf2": "cf2", "7": "cf3"}
 
 

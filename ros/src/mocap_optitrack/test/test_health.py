@@ -2,11 +2,11 @@
 
 import pytest
 
-from mocap_optitrack.bodies import RigidBodyDictionary
+from mocap_optitrack.bodies import RIGID_BODIES
 from mocap_optitrack.frames import SeenBody
 from mocap_optitrack.health import ERROR, OK, WARN, FrameEvent, Health
 
-BODIES = RigidBodyDictionary()({"1": {"pose": "one"}, "cf7": {"pose": "seven"}}).bodies
+BODIES = RIGID_BODIES({"1": {"pose": "one"}, "cf7": {"pose": "seven"}})
 ONE, SEVEN = BODIES
 
 

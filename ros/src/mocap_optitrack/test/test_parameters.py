@@ -2,8 +2,8 @@
 
 import pytest
 
-from mocap_optitrack.bodies import RigidBody, RigidBodyDictionary, RigidBodyParameters
-from mocap_optitrack.parameters import ADDRESS, GROUP, STREAM_VERSION
+from mocap_optitrack.bodies import RIGID_BODIES, RigidBody, RigidBodyParameters
+from mocap_optitrack.parameters import ADDRESS, GROUP, STREAM_VERSION, MocapParameters
 
 ROBOT = {
     "pose": "Robot_1/pose",
@@ -14,7 +14,7 @@ ROBOT = {
 
 
 def bodies(value):
-    return RigidBodyDictionary()(value).bodies
+    return RIGID_BODIES(value)
 
 
 def test_a_body_by_its_number():
@@ -39,13 +39,14 @@ def test_a_number_without_quotes_is_a_number_too():
 
 def test_entries_without_a_meaning_are_named():
     value = {"1": {**ROBOT, "odom": "Robot_1/Odom", "tf": "tf"}}
-    assert RigidBodyDictionary()(value).unknown == ["rigid_bodies/1/odom", "rigid_bodies/1/tf"]
+    parameters = MocapParameters.from_mapping({"rigid_bodies": value})
+    assert parameters.unknown == ["rigid_bodies/1/odom", "rigid_bodies/1/tf"]
 
 
 def test_all_that_is_wrong_is_named_at_once():
     value = {"1": {"pose": 3, "pose2d": 4}, "2": None, "a": {"pose": "p"}, "b": {"pose": "p"}}
     with pytest.raises(ValueError) as error:
-        RigidBodyDictionary()(value)
+        RIGID_BODIES(value)
     for reason in ("1/pose is 3", "1/pose2d is 4", "2 is None", "a and b share topic 'p'"):
         assert reason in str(error.value)
 
@@ -62,7 +63,7 @@ def test_all_that_is_wrong_is_named_at_once():
 )
 def test_what_is_long_is_cut_in_messages(value):
     with pytest.raises(ValueError) as error:
-        RigidBodyDictionary()(value)
+        RIGID_BODIES(value)
     assert 0 < len(str(error.value)) < 500
 
 
@@ -88,7 +89,7 @@ def test_what_is_long_is_cut_in_messages(value):
 )
 def test_bad_bodies_are_refused(value, reason):
     with pytest.raises(ValueError) as error:
-        RigidBodyDictionary()(value)
+        RIGID_BODIES(value)
     assert reason in str(error.value)
 
 

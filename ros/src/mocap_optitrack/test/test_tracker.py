@@ -6,15 +6,15 @@ from itertools import pairwise
 
 import pytest
 
-from mocap_optitrack.bodies import RigidBodyDictionary
+from mocap_optitrack.bodies import RIGID_BODIES
 from mocap_optitrack.frames import Frame, SeenBody
 from mocap_optitrack.health import Health
 from mocap_optitrack.tracker import Tracker
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-BODIES = RigidBodyDictionary()(
+BODIES = RIGID_BODIES(
     {"1": {"pose": "one"}, "cf7": {"pose": "seven"}, "3": {"name": "My Drone", "pose": "drone"}}
-).bodies
+)
 
 
 def tracker(up_axis="z", stale_after=0.2, health=None):

@@ -4,20 +4,21 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 from typing_extensions import override
 
 from crazyflie_model.angles import Triple
-from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
+from crazyflie_utils.parameters.declaration import Complaints, Parameters, parameter
 from crazyflie_utils.parameters.types import (
     FRAME,
     POSITION,
     TEXT,
     TOPIC,
+    Converted,
     ListOf,
     Number,
-    ParameterType,
 )
 from crazyflie_utils.text import shortened, shown
 from mocap_optitrack.marker_motion import MotionLimits
@@ -51,7 +52,12 @@ class Body:
 
     key: str  #: Its entry in the dictionary.
     parameters: OutputParameters  #: Its topics and frames.
+    unknown: tuple[str, ...] = ()  #: Names in its entry that are no parameters.
     kind: ClassVar = "rigid body"  #: What it is, in messages.
+    dictionary: ClassVar = "rigid_bodies"  #: Where its entry is.
+    parameters_type: ClassVar[type[OutputParameters]]
+    #: Parameters of which it has at least one.
+    outputs: ClassVar[tuple[str, ...]] = ("pose", "pose2d", "child_frame_id")
 
     @property
     def name(self) -> str | None:
@@ -74,6 +80,7 @@ class RigidBody(Body):
     """A rigid body; its key is its number in the stream, or its name."""
 
     parameters: RigidBodyParameters
+    parameters_type = RigidBodyParameters
 
     @property
     @override
@@ -81,14 +88,6 @@ class RigidBody(Body):
         if self.parameters.name is None and not self.key.isdecimal():
             return self.key
         return self.parameters.name
-
-
-@dataclass(frozen=True)
-class Bodies:
-    """The bodies of one dictionary that are to be published."""
-
-    bodies: list[Body]  #: The bodies; at least one.
-    unknown: list[str]  #: Unknown entries, such as "rigid_bodies/1/odom".
 
 
 class SingleMarkerParameters(OutputParameters):
@@ -136,6 +135,9 @@ class SingleMarker(Body):
 
     parameters: SingleMarkerParameters
     kind = "single marker"
+    dictionary = "single_markers"
+    parameters_type = SingleMarkerParameters
+    outputs = ("position", *Body.outputs)
 
     @property
     def vehicle(self) -> MarkerVehicle:
@@ -146,84 +148,55 @@ class SingleMarker(Body):
         return MarkerVehicle(self.key, (x, y, z), limits)
 
 
-class RigidBodyDictionary(ParameterType):
-    """The dictionary ``rigid_bodies``; a refusal names all errors."""
-
-    label = "dictionary"
-    key = "rigid_bodies"  #: The dictionary's name.
-    #: entry_type, body_type: Types of an entry's parameters, and of its body.
-    entry_type: type[OutputParameters] = RigidBodyParameters
-    body_type: type[Body] = RigidBody
-    #: Parameters of which an entry has at least one.
-    outputs: tuple[str, ...] = ("pose", "pose2d", "child_frame_id")
-
-    @override
-    def __call__(self, value: object) -> Bodies:
-        if not isinstance(value, dict) or not value:
-            raise ValueError
-        known = {declaration.name for declaration in self.entry_type.declarations()}
-        bodies, unknown, complaints = [], [], []
-        for key, entry in value.items():
-            label = shortened(str(key))
-            if not isinstance(entry, dict):
-                complaints.append(f"{label} is {shown(entry)}; expected a dictionary")
-                continue
-            unknown += [
-                f"{self.key}/{label}/{shortened(str(name))}" for name in entry if name not in known
-            ]
+def _bodies(body_type, value):
+    if not isinstance(value, dict) or not value:
+        raise ValueError
+    entry_type = body_type.parameters_type
+    known = {declaration.name for declaration in entry_type.declarations()}
+    bodies, complaints = [], Complaints()
+    for key, entry in value.items():
+        label = shortened(str(key))
+        if not isinstance(entry, dict):
+            complaints.append(f"{label} is {shown(entry)}; expected a dictionary")
+            continue
+        unknown = tuple(shortened(str(name)) for name in entry if name not in known)
+        with complaints:
             values = {name: entry[name] for name in entry if name in known}
-            try:
-                parameters = self.entry_type.from_mapping(values, f"{label}/")
-            except ParameterError as error:
-                complaints += error.complaints
-                continue
-            bodies.append(self.body_type(str(key), parameters))
-            if not any(getattr(parameters, name) for name in self.outputs):
-                complaints.append(f"{label} has neither {' nor '.join(self.outputs)}")
-        complaints += shared_outputs(bodies)
-        complaints += _shared("name", [(b, b.name) for b in bodies])
-        if complaints:
-            raise ValueError("; ".join(complaints))
-        return Bodies(bodies, unknown)
-
-    def __str__(self) -> str:
-        return (
-            "a dictionary of number or name of a body: {pose, pose2d, child_frame_id, "
-            "parent_frame_id}"
-        )
+            parameters = entry_type.from_mapping(values, f"{label}/")
+            bodies.append(body_type(str(key), parameters, unknown))
+            if not any(getattr(parameters, name) for name in body_type.outputs):
+                complaints.append(f"{label} has neither {' nor '.join(body_type.outputs)}")
+    complaints += shared_outputs(bodies)
+    complaints += _shared("name", [(b, b.name) for b in bodies])
+    complaints += _too_near([body for body in bodies if isinstance(body, SingleMarker)])
+    if complaints:
+        raise ValueError("; ".join(complaints))
+    return bodies
 
 
-class SingleMarkerDictionary(RigidBodyDictionary):
-    """The dictionary ``single_markers``."""
+def _too_near(markers):
+    for first, second in itertools.combinations(markers, 2):
+        distance = math.dist(*(each.parameters.initial_position for each in (first, second)))
+        if distance < SEPARATION:
+            yield (
+                f"{second.key}/initial_position is {distance:.3g} m from that of {first.key}; "
+                f"expected at least {SEPARATION:g} m, since markers are distinguished by their "
+                "places"
+            )
 
-    key = "single_markers"
-    entry_type = SingleMarkerParameters
-    body_type = SingleMarker
-    outputs = ("position", *RigidBodyDictionary.outputs)
 
-    @override
-    def __call__(self, value: object) -> Bodies:
-        markers = super().__call__(value)
-        complaints = []
-        singles = [marker for marker in markers.bodies if isinstance(marker, SingleMarker)]
-        for first, second in itertools.combinations(singles, 2):
-            a, b = (marker.parameters.initial_position for marker in (first, second))
-            if math.dist(a, b) < SEPARATION:
-                complaints.append(
-                    f"{second.key}/initial_position is {math.dist(a, b):.3g} m from that of "
-                    f"{first.key}; expected at least {SEPARATION:g} m, since markers are "
-                    "distinguished by their places"
-                )
-        if complaints:
-            raise ValueError("; ".join(complaints))
-        return markers
-
-    @override
-    def __str__(self) -> str:
-        return (
-            "a dictionary of name of a vehicle: {initial_position, position, heading, "
-            "child_frame_id, parent_frame_id}"
-        )
+#: The dictionaries ``rigid_bodies`` and ``single_markers``; a refusal names all errors.
+RIGID_BODIES = Converted(
+    partial(_bodies, RigidBody),
+    "a dictionary of number or name of a body: {pose, pose2d, child_frame_id, parent_frame_id}",
+    "dictionary",
+)
+SINGLE_MARKERS = Converted(
+    partial(_bodies, SingleMarker),
+    "a dictionary of name of a vehicle: {initial_position, position, heading, child_frame_id, "
+    "parent_frame_id}",
+    "dictionary",
+)
 
 
 def shared_outputs(bodies: Sequence[Body]) -> Iterator[str]:

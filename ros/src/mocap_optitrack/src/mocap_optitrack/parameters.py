@@ -17,12 +17,12 @@ from crazyflie_utils.parameters.types import (
     Number,
     Text,
 )
+from crazyflie_utils.text import shortened
 from mocap_optitrack.bodies import (
-    Bodies,
+    RIGID_BODIES,
+    SINGLE_MARKERS,
     Body,
-    RigidBodyDictionary,
     SingleMarker,
-    SingleMarkerDictionary,
     shared_outputs,
 )
 from mocap_optitrack.frames import UP_AXES
@@ -112,13 +112,13 @@ class LibraryParameters(Parameters):
 class MocapParameters(Parameters):
     """Parameters of `MocapNode`."""
 
-    rigid_bodies: Bodies | None = parameter(
-        RigidBodyDictionary(),
+    rigid_bodies: list[Body] | None = parameter(
+        RIGID_BODIES,
         "the bodies to publish, see below; required without `single_markers`",
         None,
     )
-    single_markers: Bodies | None = parameter(
-        SingleMarkerDictionary(),
+    single_markers: list[Body] | None = parameter(
+        SINGLE_MARKERS,
         "the vehicles with one marker each, see [Single markers](#single-markers)",
         None,
     )
@@ -149,7 +149,7 @@ class MocapParameters(Parameters):
     @property
     def bodies(self) -> list[Body]:
         """All published bodies."""
-        return [body for group in self._groups for body in group.bodies]
+        return [*(self.rigid_bodies or ()), *(self.single_markers or ())]
 
     @property
     def markers(self) -> list[SingleMarker]:
@@ -158,12 +158,12 @@ class MocapParameters(Parameters):
 
     @property
     def unknown(self) -> list[str]:
-        """Unknown entries."""
-        return [name for group in self._groups for name in group.unknown]
-
-    @property
-    def _groups(self):
-        return [group for group in (self.rigid_bodies, self.single_markers) if group is not None]
+        """Unknown entries, such as "rigid_bodies/1/odom"."""
+        return [
+            f"{body.dictionary}/{shortened(body.key)}/{name}"
+            for body in self.bodies
+            for name in body.unknown
+        ]
 
     @override
     def complaints(self) -> Iterator[str]:

@@ -7,7 +7,7 @@ parallel planes (Kay and Kajiya, Ray Tracing Complex Scenes, 1986).
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Self
 
@@ -16,9 +16,22 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, FINITE, POSITION, TIME_STEP, ListOf, Number
+from crazyflie_utils.parameters.types import (
+    BOOLEAN,
+    FINITE,
+    POSITION,
+    TEXT,
+    TIME_STEP,
+    ListOf,
+    Number,
+    matching,
+)
 
 Position = tuple[float, float, float]  #: x, y, z in m.
+LENGTH = Number("m", above=0.0)
+NAME = matching(
+    r"[A-Za-z]\w*", "a name of letters, digits and underscores that begins with a letter"
+)
 
 
 class Path(Parameters):
@@ -33,7 +46,7 @@ class Circle(Path):
     """A horizontal circle at constant speed."""
 
     centre: Position = parameter(POSITION, "of the circle")
-    radius: float = parameter(Number("m", above=0.0), "of the circle")
+    radius: float = parameter(LENGTH, "of the circle")
     period: float = parameter(TIME_STEP, "duration of one round")
     phase: float = parameter(Number("rad"), "angle of the begin, from the x axis", 0.0)
     clockwise: bool = parameter(BOOLEAN, "direction, as seen from above", False)
@@ -88,14 +101,14 @@ Interval = tuple[NDArray[np.float64], NDArray[np.float64]]
 WALL_COLOUR = (0.85, 0.85, 0.8)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Shape:
-    """Attributes of all solid shapes."""
+class Shape(Parameters):
+    """Attributes of all solid shapes; as declared in a world file."""
 
     #: Unique name in a world; that of the tf frame of a moving object.
-    name: str
-    centre: Position  #: x, y, z in the world's frame, m.
-    colour: Colour = (0.5, 0.5, 0.5)
+    name: str = parameter(NAME, "unique name")
+    #: x, y, z in the world's frame, m.
+    centre: Position = parameter(POSITION, "centre of an object that does not move", None)
+    colour: Colour = parameter(COLOUR, "red, green, blue", default=(0.5, 0.5, 0.5))
     path: Path | None = None  #: Path of the centre; None for a fixed shape.
 
     @property
@@ -121,14 +134,15 @@ class Shape:
         return self if self.path is None else self.moved_to(self.path.position(time))
 
 
-@dataclass(frozen=True, kw_only=True)
 class Box(Shape):
     """A box that stands upright."""
 
-    extent: Position  #: Along its own x, y and z, m.
-    yaw: float = 0.0  #: Rotation about the vertical (rad).
-    #: File of the picture on its front, the side that looks along its own x; empty for none.
-    picture: str = ""
+    extent: Position = parameter(ListOf(LENGTH, 3), "size along its own x, y and z", name="size")
+    yaw: float = parameter(Number("rad"), "rotation about the vertical", default=0.0)
+    #: Empty for none.
+    picture: str = parameter(
+        TEXT, "file of a picture on its front, which looks along its own x", default=""
+    )
 
     @property
     def size(self) -> Position:
@@ -144,12 +158,11 @@ class Box(Shape):
         )
 
 
-@dataclass(frozen=True, kw_only=True)
 class Cylinder(Shape):
     """A cylinder that stands upright; lengths in m."""
 
-    radius: float
-    height: float
+    radius: float = parameter(LENGTH, "of the cylinder")
+    height: float = parameter(LENGTH, "of the cylinder")
 
     @property
     def size(self) -> Position:
@@ -165,11 +178,10 @@ class Cylinder(Shape):
         )
 
 
-@dataclass(frozen=True, kw_only=True)
 class Ball(Shape):
     """A ball; its radius in m."""
 
-    radius: float
+    radius: float = parameter(LENGTH, "radius of the ball")
 
     @property
     def size(self) -> Position:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameters.types import ListOf, Number, Text
-from crazyflie_world.shapes import COLOUR, Box, Colour, Position, Shape, cast
+from crazyflie_utils.parameters.types import ListOf, Text
+from crazyflie_world.shapes import COLOUR, LENGTH, Box, Colour, Position, Shape, cast
 
 FLOOR = "floor"  #: Name of the floor among the solids.
 TEXTURES = ("plain", "checkers", "speckles")  #: Textures of floors.
@@ -18,7 +18,7 @@ TEXTURES = ("plain", "checkers", "speckles")  #: Textures of floors.
 class Floor(Parameters):
     """The floor: the plane z = 0, with its middle in the origin; as in a world file."""
 
-    size: tuple[float, float] = parameter(ListOf(Number("m", above=0.0), 2), "size along x and y")
+    size: tuple[float, float] = parameter(ListOf(LENGTH, 2), "size along x and y")
     texture: str = parameter(Text(TEXTURES), "texture for cameras", "plain")
     colour: Colour = parameter(COLOUR, "red, green, blue", (0.6, 0.6, 0.6))
 

@@ -4,7 +4,6 @@ import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path as FilePath
-from typing import ClassVar
 
 from typing_extensions import override
 
@@ -14,18 +13,16 @@ from crazyflie_utils.parameters.declaration import Complaints, group
 from crazyflie_utils.parameters.types import (
     FRAME,
     METRES,
-    POSITION,
-    TEXT,
     ListOf,
-    Number,
     Text,
-    matching,
     path_of,
 )
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_utils.text import shortened, shown
 from crazyflie_world.shapes import (
     COLOUR,
+    LENGTH,
+    NAME,
     WALL_COLOUR,
     Ball,
     Box,
@@ -38,69 +35,18 @@ from crazyflie_world.shapes import (
 )
 from crazyflie_world.world import FLOOR, Floor, World
 
-_LENGTH = Number("m", above=0.0)
-_ANGLE = Number("rad")
 _PLACE = ListOf(METRES, 2)
-_NAME = matching(
-    r"[A-Za-z]\w*", "a name of letters, digits and underscores that begins with a letter"
-)
-
-
-class _ObjectParameters(Parameters):
-    """Parameters of all objects but walls."""
-
-    name: str = parameter(_NAME, "unique name")
-    colour: tuple[float, float, float] = parameter(COLOUR, "red, green, blue", (0.5, 0.5, 0.5))
-    centre: tuple[float, float, float] | None = parameter(
-        POSITION, "centre of an object that does not move", None
-    )
-
-    #: Class of the shape, whose arguments are these parameters and a path.
-    shape_type: ClassVar[type[Shape]]
-
-    def shape(self, path: Path | None) -> Shape:
-        """Return the shape, at the beginning of its path if any."""
-        centre = self.centre if path is None else path.position(0.0)
-        return self.shape_type(**{**vars(self), "centre": centre, "path": path})
-
-
-class BoxParameters(_ObjectParameters):
-    """A box."""
-
-    shape_type = Box
-    extent: tuple[float, float, float] = parameter(
-        ListOf(_LENGTH, 3), "size along its own x, y and z", name="size"
-    )
-    yaw: float = parameter(_ANGLE, "rotation about the vertical", 0.0)
-    picture: str = parameter(
-        TEXT, "file of a picture on its front, which looks along its own x", ""
-    )
-
-
-class CylinderParameters(_ObjectParameters):
-    """An upright cylinder."""
-
-    shape_type = Cylinder
-    radius: float = parameter(_LENGTH, "of the cylinder")
-    height: float = parameter(_LENGTH, "of the cylinder")
-
-
-class BallParameters(_ObjectParameters):
-    """A ball."""
-
-    shape_type = Ball
-    radius: float = parameter(_LENGTH, "radius of the ball")
 
 
 class WallParameters(Parameters):
     """A wall that stands on the floor."""
 
-    name: str = parameter(_NAME, "unique name")
+    name: str = parameter(NAME, "unique name")
     colour: tuple[float, float, float] = parameter(COLOUR, "red, green, blue", WALL_COLOUR)
     start: tuple[float, float] = parameter(_PLACE, "begin, x and y", name="from")
     end: tuple[float, float] = parameter(_PLACE, "end, x and y", name="to")
-    height: float = parameter(_LENGTH, "height above the floor", 2.5)
-    thickness: float = parameter(_LENGTH, "thickness, half to each side", 0.1)
+    height: float = parameter(LENGTH, "height above the floor", 2.5)
+    thickness: float = parameter(LENGTH, "thickness, half to each side", 0.1)
 
     @override
     def complaints(self) -> Iterator[str]:
@@ -120,11 +66,7 @@ class WorldParameters(Parameters):
 
 
 #: Objects that may move, by their type.
-OBJECTS: dict[str, type[_ObjectParameters]] = {
-    "box": BoxParameters,
-    "cylinder": CylinderParameters,
-    "ball": BallParameters,
-}
+OBJECTS: dict[str, type[Shape]] = {"box": Box, "cylinder": Cylinder, "ball": Ball}
 
 WALL = "wall"
 
@@ -162,10 +104,12 @@ def _object(entry: Entry) -> Shape:
     if kind == WALL:
         return entry.read(WallParameters, extra_keys=("type",)).shape()
     path = _path(entry["path"]) if "path" in entry else None
-    parameters = entry.read(OBJECTS[kind], extra_keys=("type", "path"))
-    if (parameters.centre is None) == (path is None):
+    shape = entry.read(OBJECTS[kind], extra_keys=("type", "path"))
+    if ("centre" in entry) == (path is not None):
         raise entry.error("has both a centre and a path, or neither; expected one of them")
-    return _with_picture(parameters.shape(path), entry)
+    if path is not None:
+        shape = replace(shape, path=path).at(0.0)
+    return _with_picture(shape, entry)
 
 
 def _with_picture(shape: Shape, entry: Entry) -> Shape:

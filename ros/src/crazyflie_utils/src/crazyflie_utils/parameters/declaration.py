@@ -84,7 +84,8 @@ def group(type: "type[Parameters]", prefix: str) -> Any:  # noqa: A002
 class Parameters:
     """Base class of declarations; an object of a subclass has checked values.
 
-    A subclass is a frozen dataclass whose arguments are given by name.
+    A subclass is a frozen dataclass whose arguments are given by name. A field that is not declared
+    is no parameter: it has a default, and is set by `dataclasses.replace`.
     """
 
     def __init_subclass__(cls) -> None:
@@ -141,7 +142,9 @@ class Parameters:
     @classmethod
     def _fields(cls) -> Iterator[tuple[str, Declaration | _Group]]:
         for field in dataclasses.fields(cls):  # type: ignore[arg-type]
-            declaration = field.metadata[_KEY]
+            declaration = field.metadata.get(_KEY)
+            if declaration is None:
+                continue
             if isinstance(declaration, Declaration) and not declaration.name:
                 declaration = dataclasses.replace(declaration, name=field.name)
             yield field.name, declaration

@@ -58,7 +58,7 @@ def test_names_and_addresses_follow_from_ids(load):
 
 def test_types_are_those_of_the_file_beside_it(load):
     fleet = load()
-    first, second = (fleet[name].settings for name in ("cf1", "cf26"))
+    first, second = (fleet[name] for name in ("cf1", "cf26"))
     assert (first.voltage_warning, first.voltage_critical) == (3.8, 3.7)
     assert fleet["cf1"].firmware_params == {"ctrlMel.kp_xy": 0.4}
     assert (first.mocap_marker, first.mocap_tracking) == ("0", "vendor")

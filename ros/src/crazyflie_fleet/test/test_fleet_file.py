@@ -71,7 +71,7 @@ def test_the_nearest_one_counts(load):
     assert [vehicle.buffer for vehicle in fleet.vehicles] == [0.1, 0.4]
     assert fleet["cf1"].firmware_params == {"a.x": 1, "a.y": 1, "a.z": 1}
     assert fleet["cf2"].firmware_params == {"a.x": 3, "a.y": 2, "a.z": 1}
-    assert fleet["cf2"].settings.hover_height == 2.0
+    assert fleet["cf2"].hover_height == 2.0
 
 
 def remarks_of(load, text):
@@ -117,7 +117,7 @@ def test_voltages_act_if_they_are_said_to(load, act, limits):
     text = f"all: {{battery: {{voltage_warning: 3.8, voltage_critical: 3.7{act}}}}}\n"
     vehicle = load(TWO + text)["cf1"]
     assert vehicle.battery_limits == limits
-    assert vehicle.settings.voltage_warning == 3.8
+    assert vehicle.voltage_warning == 3.8
 
 
 def test_what_a_type_and_all_say_counts_for_their_vehicles(load):
@@ -273,7 +273,7 @@ def test_what_is_inherited_is_wrong_once(load):
 )
 def test_voltages_are_compared_as_they_count_together(load, types):
     fleet = load(TWO + "    battery: {voltage_critical: 3.4}\n" + types)
-    settings = fleet["cf2"].settings
+    settings = fleet["cf2"]
     assert (settings.voltage_warning, settings.voltage_critical) == (3.6, 3.4)
 
 
@@ -339,7 +339,7 @@ def test_a_model_file_is_relative_to_the_fleet_file(tmp_path):
     )
     file.write_text(text)
     fleet = fleet_file.load(file)
-    found = [(v.settings.dynamics, v.settings.vehicle_model) for v in fleet.vehicles]
+    found = [(v.dynamics, v.vehicle_model) for v in fleet.vehicles]
     heavy = str(tmp_path / "heavy.yaml")
     assert found == [("quadrotor", heavy), ("quadrotor", "cf21plus"), ("coupled_7d", "cf21")]
     tree = parameters(fleet["a"], {}, {"lqr_controller": {"K_file": "K_manual.txt"}})

@@ -99,7 +99,7 @@ def test_which_vehicles_have_one_marker(tmp_path):
         "tracking: librigidbodytracker",
     )
     fleet = fleet_file.load(write(tmp_path / "fleet.yaml", robots))
-    marked = [v.name for v in fleet.vehicles if v.settings.has_single_marker]
+    marked = [v.name for v in fleet.vehicles if v.has_single_marker]
     assert marked == ["cf1", "cf3"]
 
 

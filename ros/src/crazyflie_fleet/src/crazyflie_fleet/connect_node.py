@@ -35,7 +35,7 @@ class BatteryReportNode(Node):
     """Logs that the battery of a vehicle is below a voltage of the fleet file."""
 
     def __init__(self, vehicles: Iterable[VehicleConfig]):
-        self._vehicles = [each for each in vehicles if not each.settings.voltages_act]
+        self._vehicles = [each for each in vehicles if not each.voltages_act]
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -47,9 +47,9 @@ class BatteryReportNode(Node):
             handle.subscribe(f"/{vehicle.name}/battery", Float32, partial(self._report, vehicle))
 
     def _report(self, vehicle, message):
-        settings, voltage = vehicle.settings, message.data
+        voltage = message.data
         for name in ("voltage_critical", "voltage_warning"):
-            limit = getattr(settings, name)
+            limit = getattr(vehicle, name)
             if voltage < limit:
                 self._handle.warn(
                     f"{vehicle.name}: the battery has {voltage:.2f} V; {name} of the fleet file is "
@@ -75,7 +75,7 @@ def connection(vehicle: VehicleConfig) -> VehicleParameters:
         {
             "uri": vehicle.uri,
             "tf_prefix": vehicle.name,
-            "positioning": vehicle.settings.positioning,
+            "positioning": vehicle.positioning,
             **switches,
             "genericLogTopics": [*topics],
             "genericLogTopicFrequencies": [round(1000.0 / t.frequency) for t in topics.values()],
@@ -125,7 +125,7 @@ class FleetConnectNode(Node):
         self._lighthouse_files = {
             vehicle.name: _lighthouse_file(parameters.file, vehicle)
             for vehicle in self._vehicles
-            if vehicle.settings.lighthouse
+            if vehicle.lighthouse
         }
         self._connections = {vehicle.name: connection(vehicle) for vehicle in self._vehicles}
 
@@ -148,10 +148,10 @@ class FleetConnectNode(Node):
             service = f"/{name}/write_lighthouse"
             yield handle.call_service(service, WriteLighthouse, request, TIMEOUT)
         params = dict(vehicle.firmware_params)
-        if vehicle.settings.has_single_marker:
+        if vehicle.has_single_marker:
             # Only the Kalman filter uses external positions, and estimates the yaw from them.
             params.setdefault("stabilizer.estimator", 2)
-        if vehicle.settings.positioning == FLOW:
+        if vehicle.positioning == FLOW:
             # The deck measures no position: the estimate begins at the vehicle's start point.
             x, y, z = vehicle.position
             start = {"kalman.initialX": x, "kalman.initialY": y, "kalman.initialZ": z}
@@ -182,10 +182,10 @@ class FleetConnectNode(Node):
 
 
 def _lighthouse_file(fleet_file: str, vehicle: VehicleConfig) -> str:
-    file = Path(fleet_file).resolve().parent / vehicle.settings.lighthouse
+    file = Path(fleet_file).resolve().parent / vehicle.lighthouse
     if not file.is_file():
         raise ParameterError(
-            f"{fleet_file}: lighthouse of {vehicle.name} is {vehicle.settings.lighthouse!r}, and "
+            f"{fleet_file}: lighthouse of {vehicle.name} is {vehicle.lighthouse!r}, and "
             f"there is no file {file}; expected one, relative to the fleet file"
         )
     return str(file)

@@ -137,7 +137,7 @@ class DefaultTopicSettings(Parameters):
 
 
 class Settings(Parameters):
-    """Settings of a vehicle, which override those of its type, which override those of ``all``."""
+    """Settings in one place, of a vehicle, its type or ``all``; each overrides the next."""
 
     model: str = parameter(
         _MODEL,
@@ -184,7 +184,7 @@ class Settings(Parameters):
         BOOLEAN, "the two voltages decide about takeoffs and landings", False, "battery/act"
     )
     mocap_enabled: bool = parameter(BOOLEAN, WITHOUT_EFFECT, True, "motion_capture/enabled")
-    mocap_frame: str | None = parameter(
+    own_mocap_frame: str | None = parameter(
         FRAME, "motion capture's frame; by default the vehicle's name", None, "motion_capture/frame"
     )
     mocap_tracking: str = parameter(
@@ -209,6 +209,12 @@ class Settings(Parameters):
     )
     big_quad: bool = parameter(BOOLEAN, WITHOUT_EFFECT, False)
     reference_frame: str = parameter(TEXT, WITHOUT_EFFECT, "world")
+    enabled: bool = parameter(BOOLEAN, "whether the vehicle takes part", True)
+    uri: str | None = parameter(_URI, "address of the vehicle; not needed in simulation", None)
+    position: tuple[float, float, float] | None = parameter(
+        _START_POSITION, "position of the vehicle before takeoff", None, "initial_position"
+    )
+    type: str | None = parameter(TEXT, "of `robot_types`", None)
 
     @property
     def dynamics(self) -> str:
@@ -228,25 +234,6 @@ class Settings(Parameters):
         if self.mocap_tracking == "librigidbodytracker":
             return self.mocap_marker in _SINGLE_MARKERS
         return self.mocap_tracking == SINGLE_MARKER
-
-
-class PartialSettings(Settings):
-    """Settings in one place, of a vehicle, its type or ``all``, before they are merged."""
-
-    enabled: bool = parameter(BOOLEAN, "whether the vehicle takes part", True)
-    uri: str | None = parameter(_URI, "address of the vehicle; not needed in simulation", None)
-    position: tuple[float, float, float] | None = parameter(
-        _START_POSITION, "position of the vehicle before takeoff", None, "initial_position"
-    )
-    type: str | None = parameter(TEXT, "of `robot_types`", None)
-
-
-class RobotSettings(PartialSettings):
-    """Settings of one vehicle below ``robots``."""
-
-    position: tuple[float, float, float] = parameter(
-        _START_POSITION, "position of the vehicle before takeoff", name="initial_position"
-    )
 
 
 class BroadcastSettings(Parameters):
@@ -279,47 +266,36 @@ DOWNWASH = 2.0
 BUFFER = "buffer"
 
 
-@dataclass(frozen=True)
-class VehicleConfig:
-    """One vehicle."""
+class VehicleConfig(Settings):
+    """One vehicle: its settings, merged from the vehicle, its type and ``all``."""
 
-    name: str  # Its namespace and its tf frame.
-    position: tuple[float, float, float]  # Position before takeoff (m, fixed frame).
-    # Settings merged from the vehicle, its type and ``all``. Firmware parameters, "group.name" to
-    # value, written after each connection.
-    settings: RobotSettings
+    position: tuple[float, float, float] = parameter(
+        _START_POSITION, "position of the vehicle before takeoff", name="initial_position"
+    )
+    name: str = ""  # Its namespace and its tf frame.
+    # Firmware parameters, "group.name" to value, written after each connection.
     firmware_params: Mapping[str, float] = dataclasses.field(default_factory=dict)
     default_topics: tuple[str, ...] = ("battery",)  # Standard topics that the driver publishes.
     # Topics of firmware variables, by their names below the vehicle's namespace.
     log_topics: Mapping[str, LogTopicSettings] = dataclasses.field(default_factory=dict)
 
     @property
-    def uri(self) -> str | None:
-        """Its address, if it has one."""
-        return self.settings.uri
-
-    @property
-    def buffer(self) -> float:
-        """Radius of its collision ellipsoid, m; `DOWNWASH` times as high."""
-        return self.settings.buffer
-
-    @property
     def hover_point(self) -> tuple[float, float, float]:
         """Position x, y, z at the end of a takeoff, m."""
         x, y, z = self.position
-        return x, y, z + self.settings.hover_height
+        return x, y, z + self.hover_height
 
     @property
     def mocap_frame(self) -> str:
         """Name of its tf frame from motion capture, or of its own estimate."""
-        if self.settings.positioning != MOCAP:
+        if self.positioning != MOCAP:
             return f"{self.name}/estimate"
-        return self.settings.mocap_frame or self.name
+        return self.own_mocap_frame or self.name
 
     @property
     def battery_limits(self) -> tuple[float, float]:
         """Voltages below which a takeoff is refused, and below which the vehicle is landed, V."""
-        own = self.settings if self.settings.voltages_act else RobotSettings
+        own = self if self.voltages_act else VehicleConfig
         return own.voltage_warning, own.voltage_critical
 
 
@@ -352,7 +328,7 @@ class FleetConfig:
 
     def _with_settings(self, changes: Iterable[Mapping[str, Any]]) -> "FleetConfig":
         vehicles = tuple(
-            dataclasses.replace(v, settings=dataclasses.replace(v.settings, **change))
+            dataclasses.replace(v, **change)
             for v, change in zip(self.vehicles, changes, strict=False)
         )
         return dataclasses.replace(self, vehicles=vehicles)

@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import yaml
 
-from crazyflie_fleet.fleet_config import SINGLE_MARKER, FleetConfig, RobotSettings, VehicleConfig
+from crazyflie_fleet.fleet_config import SINGLE_MARKER, FleetConfig, VehicleConfig
 from crazyflie_fleet.fleet_parser import FleetParser, close_vehicles, entry_at
 from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters import yaml_file
@@ -175,10 +176,10 @@ def grid(n: int, spacing: float = 1.0) -> FleetConfig:
     for k in range(n):
         row, column = divmod(k, columns)
         position = (row - middle[0]) * spacing, (column - middle[1]) * spacing, 0.0
-        settings = RobotSettings.from_mapping(
+        vehicle = VehicleConfig.from_mapping(
             {"initial_position": position, "uri": f"udp://127.0.0.1:{FIRST_PORT + k}"}
         )
-        vehicles.append(VehicleConfig(f"cf{k + 1}", position, settings))
+        vehicles.append(replace(vehicle, name=f"cf{k + 1}"))
     for _, _, distance, limit in close_vehicles(vehicles):
         raise ParameterError(
             f"the spacing of the grid is {distance:g} m; expected at least {limit:g} m, the "

@@ -90,7 +90,7 @@ class FleetParameters(Parameters):
         """
         if self.machine == "*":
             return fleet.names
-        names = tuple(v.name for v in fleet.vehicles if v.settings.machine == self.machine)
+        names = tuple(v.name for v in fleet.vehicles if v.machine == self.machine)
         if not names:
             raise ParameterError(
                 f"no vehicle of {self.file} is flown by the machine {self.machine!r}"

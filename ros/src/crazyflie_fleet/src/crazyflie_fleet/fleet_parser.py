@@ -20,8 +20,7 @@ from crazyflie_fleet.fleet_config import (
     FleetConfig,
     LogTopicSettings,
     MachineSettings,
-    PartialSettings,
-    RobotSettings,
+    Settings,
     VehicleConfig,
     close_pairs,
     vehicle_key,
@@ -42,7 +41,7 @@ _FIRMWARE = ("firmware_params", "firmware_logging")
 _LOGGING = ("enabled", "default_topics", "custom_topics")
 _WITHOUT_EFFECT = [
     declaration.name
-    for declaration in RobotSettings.declarations()
+    for declaration in VehicleConfig.declarations()
     if declaration.help == WITHOUT_EFFECT
 ]
 
@@ -142,10 +141,10 @@ class FleetParser:
         # Combinations of settings are checked for each vehicle.
         vehicles = [self._vehicle(name, entry, types, common) for name, entry in robots.items()]
         self._errors.raise_any()
-        enabled = [vehicle for vehicle in vehicles if vehicle.settings.enabled]
+        enabled = [vehicle for vehicle in vehicles if vehicle.enabled]
         self._check_apart(enabled, robots)
         self._errors.raise_any()
-        disabled = [vehicle.name for vehicle in vehicles if not vehicle.settings.enabled]
+        disabled = [vehicle.name for vehicle in vehicles if not vehicle.enabled]
         if not enabled:
             raise self._parts["robots"].error("has no enabled vehicle; expected at least one")
         unplaced = self._unplaced(enabled)
@@ -167,7 +166,7 @@ class FleetParser:
             return entry.read(settings, extra_keys, on_unknown)
 
     def _check(self, entry, *extra_keys):
-        if self._read(entry, PartialSettings, *_FIRMWARE, *extra_keys) is None:
+        if self._read(entry, Settings, *_FIRMWARE, *extra_keys) is None:
             return
         for key in _WITHOUT_EFFECT:
             if (idle := entry_at(entry, key)) is not None:
@@ -249,24 +248,32 @@ class FleetParser:
         layers = [common, types.get(robot["type"].value) if "type" in robot else None, robot]
         node = _merged([layer.node for layer in layers if layer is not None])
         merged = Entry(robot.name, node)
-        settings = self._read(merged, RobotSettings, *_FIRMWARE, "broadcasts")
-        if settings is None:
+        vehicle = self._read(merged, VehicleConfig, *_FIRMWARE, "broadcasts")
+        if vehicle is None:
             return None
-        self._check_voltages(merged, settings)
-        settings = self._with_model_path(merged, settings)
-        return VehicleConfig(name, settings.position, settings, *self._firmware(merged))
+        self._check_voltages(merged, vehicle)
+        model = self._model(merged, vehicle.model)
+        params, default_topics, log_topics = self._firmware(merged)
+        return dataclasses.replace(
+            vehicle,
+            name=name,
+            model=model,
+            firmware_params=params,
+            default_topics=default_topics,
+            log_topics=log_topics,
+        )
 
-    def _with_model_path(self, merged, settings):
-        """Return the settings with the path of a model file, which is relative to this one."""
-        if settings.model in DYNAMICS or settings.model in TYPES:
-            return settings
-        path = str((self._top.file.parent / settings.model).resolve())
+    def _model(self, merged, model):
+        """Return a model; the path of a model file is relative to this one."""
+        if model in DYNAMICS or model in TYPES:
+            return model
+        path = str((self._top.file.parent / model).resolve())
         try:
             load(path)
         except ParameterError as error:
             for each in error.complaints:
                 self._error(merged["model"], each)
-        return dataclasses.replace(settings, model=path)
+        return path
 
     def _check_voltages(self, merged, settings):
         # Only here is it known whether each comes from the robot, its type or ``all``.

@@ -57,7 +57,7 @@ class _NodeFactory:
         vehicles = tuple(fleet[name] for name in config.own_names(fleet))
         others = tuple(each for each in fleet.vehicles if each not in vehicles)
         for model in MODELS if config.is_simulated and config.is_vectorized else ():
-            of_model = tuple(each for each in vehicles if each.settings.dynamics == model)
+            of_model = tuple(each for each in vehicles if each.dynamics == model)
             if of_model:
                 vectorized[self._add_vectorized(model, of_model)] = of_model
         self._unplaced = {name for pair in fleet.unplaced for name in pair}
@@ -117,13 +117,13 @@ class _NodeFactory:
 
     def _add_vehicle(self, vehicle: VehicleConfig) -> None:
         classes = node_classes(vehicle, self._config.is_simulated)
-        if f"{self._handle.name}/{vehicle.settings.dynamics}" in self.nodes:
+        if f"{self._handle.name}/{vehicle.dynamics}" in self.nodes:
             for name in ("simulator", "state_estimator", "lqr_controller"):
                 del classes[name]
         self._handle.set_param(f"/{vehicle.name}/{BUFFER}", vehicle.buffer)
         self._handle.set_param(f"/{vehicle.name}/{PLACE}", self._places[vehicle.name])
         frames = {"fixed": self._config.fixed_frame, "robot": vehicle.name}
-        tree = parameters(vehicle, frames, self._common(vehicle.settings.dynamics))
+        tree = parameters(vehicle, frames, self._common(vehicle.dynamics))
         if vehicle.name in self._unplaced:
             tree["takeoff_server"]["topics"]["inhibition"] = INHIBITION
         for name, node_class in (self._config.extra_nodes or {}).items():
@@ -136,9 +136,9 @@ class _NodeFactory:
     def _add_high_level(self, vehicle, tracked):
         name = f"/{vehicle.name}/{HIGH_LEVEL}"
         if name not in self.nodes:
-            own = self._common(vehicle.settings.dynamics).get(HIGH_LEVEL, {})
+            own = self._common(vehicle.dynamics).get(HIGH_LEVEL, {})
             frames = {"fixed": self._config.fixed_frame, "robot": vehicle.name}
-            has_yaw = not self._config.is_simulated or vehicle.settings.dynamics not in WITHOUT_YAW
+            has_yaw = not self._config.is_simulated or vehicle.dynamics not in WITHOUT_YAW
             known: Tree = {"frames": frames, "reference": {"yaw": has_yaw}}
             self._add(name, HighLevelNode(tracked), merged(own, known))
 

@@ -21,7 +21,7 @@ def launch_text(path: str | Path) -> str:
     """
     path = Path(path).absolute()
     fleet = fleet_file.load(path)
-    used = dict.fromkeys(vehicle.settings.machine for vehicle in fleet.vehicles)
+    used = dict.fromkeys(vehicle.machine for vehicle in fleet.vehicles)
     lines = ["<launch>"]
     for name in used:
         if name == LOCAL:

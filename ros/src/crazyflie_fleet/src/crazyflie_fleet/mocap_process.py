@@ -54,17 +54,17 @@ def bodies(
     """
     result: dict[str, Any] = {}
     for vehicle in fleet.vehicles:
-        if vehicle.settings.positioning != MOCAP:
+        if vehicle.positioning != MOCAP:
             continue
         frames = {"parent_frame_id": fixed_frame, "child_frame_id": vehicle.mocap_frame}
-        if vehicle.settings.has_single_marker:
+        if vehicle.has_single_marker:
             result.setdefault("single_markers", {})[vehicle.name] = {
                 **frames,
                 "initial_position": list(vehicle.position),
                 "position": f"/{vehicle.name}/external_position",
                 "heading": f"/{vehicle.name}/heading",
-                **_limits(dynamics.get(vehicle.settings.mocap_dynamics, {})),
-                **_offset(markers.get(vehicle.settings.mocap_marker, {})),
+                **_limits(dynamics.get(vehicle.mocap_dynamics, {})),
+                **_offset(markers.get(vehicle.mocap_marker, {})),
             }
         else:
             result.setdefault("rigid_bodies", {})[vehicle.name] = frames
@@ -92,8 +92,8 @@ def _check_names(fleet, key, setting, configurations):
         f"robots/{vehicle.name}/motion_capture/{key} is {name!r}; expected one of "
         f"{', '.join(dict.fromkeys(known))}: {key}_configurations of mocap_node"
         for vehicle in fleet.vehicles
-        if vehicle.settings.has_single_marker
-        for name in [getattr(vehicle.settings, setting)]
+        if vehicle.has_single_marker
+        for name in [getattr(vehicle, setting)]
         if configurations and name not in known
     ]
     if errors:

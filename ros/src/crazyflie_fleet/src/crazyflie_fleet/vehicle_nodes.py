@@ -58,7 +58,7 @@ HOVER_NODES: dict[str, type[Node]] = {
 def node_classes(vehicle: VehicleConfig, is_simulated: bool) -> dict[str, type[Node]]:
     """Return the classes of a vehicle's nodes, by their names below the vehicle's."""
     if is_simulated:
-        return {"simulator": SIMULATORS[vehicle.settings.dynamics], **HOVER_NODES}
+        return {"simulator": SIMULATORS[vehicle.dynamics], **HOVER_NODES}
     return {"cmd_vel_converter": CmdVelConverterNode, **HOVER_NODES}
 
 
@@ -70,7 +70,7 @@ def parameters(
     ``frames`` are the names of the tf frames, fixed and robot; ``common`` the parameters of all
     vehicles, node by node.
     """
-    hover, model = vehicle.hover_point, vehicle.settings.vehicle_model
+    hover, model = vehicle.hover_point, vehicle.vehicle_model
     own: Tree = {
         "simulator": {
             "frames": frames,

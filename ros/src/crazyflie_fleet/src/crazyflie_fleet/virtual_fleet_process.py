@@ -54,12 +54,12 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
             {
                 "port": config.virtual_port + number,
                 "init": {"x": x, "y": y},
-                "model": vehicle.settings.vehicle_model,
+                "model": vehicle.vehicle_model,
                 "mass_error": config.mass_error,
                 "thrust_error": config.thrust_error,
                 "seed": number,
                 "topics": {"true_pose": f"/{vehicle.name}/true_pose"},
-                "positioning": DECKS.get(vehicle.settings.positioning, DECK),
+                "positioning": DECKS.get(vehicle.positioning, DECK),
                 "observer": {
                     "port": config.observer_port,
                     "name": vehicle.name,
@@ -68,7 +68,7 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
             },
         )
         nodes[name] = VirtualCrazyflieNode()
-        if vehicle.settings.has_single_marker:
+        if vehicle.has_single_marker:
             single_markers.append(str(number + 1))
     seen = bodies(fleet, config.fixed_frame)
     if not seen:

@@ -39,14 +39,14 @@ def told(tmp_path):
 def test_vehicles_with_one_marker_get_their_position_and_tell_their_heading(told):
     (marker,) = told.markers
     assert marker.key == "cf1"
-    assert marker.parameters.initial_position == (0.0, 0.5, 0.0)
-    assert marker.parameters.position == "/cf1/external_position"
-    assert marker.parameters.heading == "/cf1/heading"
-    assert marker.parameters.child_frame_id == "cf1"
+    assert marker.initial_position == (0.0, 0.5, 0.0)
+    assert marker.position == "/cf1/external_position"
+    assert marker.heading == "/cf1/heading"
+    assert marker.child_frame_id == "cf1"
 
 
 def test_others_are_rigid_bodies_unless_they_are_configured(told):
-    frames = {body.key: body.parameters.child_frame_id for body in told.rigid_bodies}
+    frames = {body.key: body.child_frame_id for body in told.rigid_bodies}
     assert frames == {"cf2": "cf2", "7": "cf3"}
 
 
@@ -79,7 +79,7 @@ CONFIGURATIONS = {
 def test_limits_and_offset_are_those_of_the_configurations(tmp_path):
     own = "tracking: single_marker, dynamics: slow, marker: top"
     path = write(tmp_path / "fleet.yaml", [own, "tracking: single_marker"])
-    first, second = (marker.parameters for marker in told_of(path, **CONFIGURATIONS).markers)
+    first, second = told_of(path, **CONFIGURATIONS).markers
     assert (first.max_velocity, first.offset) == ((1.0, 1.0, 0.5), (0.01, 0.0, -0.04))
     assert (second.max_velocity, second.offset) == ((2.0, 2.0, 3.0), (0.0, 0.0, 0.0))
 

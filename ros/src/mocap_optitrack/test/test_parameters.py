@@ -2,7 +2,7 @@
 
 import pytest
 
-from mocap_optitrack.bodies import RIGID_BODIES, RigidBody, RigidBodyParameters
+from mocap_optitrack.bodies import RIGID_BODIES, RigidBody
 from mocap_optitrack.parameters import ADDRESS, GROUP, STREAM_VERSION, MocapParameters
 
 ROBOT = {
@@ -19,7 +19,7 @@ def bodies(value):
 
 def test_a_body_by_its_number():
     (body,) = bodies({"1": ROBOT})
-    assert body == RigidBody("1", RigidBodyParameters(**ROBOT))
+    assert body == RigidBody(key="1", **ROBOT)
     assert (body.name, body.label) == (None, "1")
 
 
@@ -28,8 +28,8 @@ def test_bodies_by_name():
         {"cf7": {"pose": "pose7"}, "2": {"name": "My Drone", "child_frame_id": "/drone"}}
     )
     assert (key_is_name.name, name_apart.name) == ("cf7", "My Drone")
-    assert key_is_name.parameters == RigidBodyParameters(pose="pose7")
-    assert name_apart.parameters == RigidBodyParameters(name="My Drone", child_frame_id="drone")
+    assert key_is_name == RigidBody(key="cf7", pose="pose7")
+    assert name_apart == RigidBody(key="2", own_name="My Drone", child_frame_id="drone")
     assert (key_is_name.label, name_apart.label) == ("cf7", "2 (My Drone)")
 
 

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 from typing import ClassVar
 
@@ -25,8 +25,8 @@ from mocap_optitrack.marker_motion import MotionLimits
 from mocap_optitrack.marker_vehicle import SEPARATION, MarkerVehicle
 
 
-class OutputParameters(Parameters):
-    """Parameters by which a body is published."""
+class Body(Parameters):
+    """A body that is to be published, as its entry in a dictionary says."""
 
     pose: str | None = parameter(
         TOPIC, "topic; a relative name is below the node's: `/mocap_node/Robot_1/pose`", None
@@ -34,28 +34,11 @@ class OutputParameters(Parameters):
     pose2d: str | None = parameter(TOPIC, "topic, likewise", None)
     child_frame_id: str | None = parameter(FRAME, "tf frame of the body", None)
     parent_frame_id: str = parameter(FRAME, "tf frame of the coordinates", "world")
+    key: str = ""  #: Key of the entry.
+    unknown: tuple[str, ...] = ()  #: Names in the entry that are no parameters.
 
-
-class RigidBodyParameters(OutputParameters):
-    """An entry of ``rigid_bodies``: how a rigid body is published."""
-
-    name: str | None = parameter(
-        TEXT,
-        "name on the server, if it is not the key; without it a number is a streaming ID",
-        None,
-    )
-
-
-@dataclass(frozen=True)
-class Body:
-    """A body that is to be published."""
-
-    key: str  #: Its entry in the dictionary.
-    parameters: OutputParameters  #: Its topics and frames.
-    unknown: tuple[str, ...] = ()  #: Names in its entry that are no parameters.
     kind: ClassVar = "rigid body"  #: What it is, in messages.
     dictionary: ClassVar = "rigid_bodies"  #: Where its entry is.
-    parameters_type: ClassVar[type[OutputParameters]]
     #: Parameters of which it has at least one.
     outputs: ClassVar[tuple[str, ...]] = ("pose", "pose2d", "child_frame_id")
 
@@ -75,23 +58,30 @@ class Body:
         return f"{self.kind} {self.label}"
 
 
-@dataclass(frozen=True)
 class RigidBody(Body):
     """A rigid body; its key is its number in the stream, or its name."""
 
-    parameters: RigidBodyParameters
-    parameters_type = RigidBodyParameters
+    own_name: str | None = parameter(
+        TEXT,
+        "name on the server, if it is not the key; without it a number is a streaming ID",
+        None,
+        "name",
+    )
 
     @property
     @override
     def name(self) -> str | None:
-        if self.parameters.name is None and not self.key.isdecimal():
+        if self.own_name is None and not self.key.isdecimal():
             return self.key
-        return self.parameters.name
+        return self.own_name
 
 
-class SingleMarkerParameters(OutputParameters):
-    """An entry of ``single_markers``: a vehicle with one marker, and how it is published."""
+class SingleMarker(Body):
+    """A vehicle with one marker, which is to be published."""
+
+    kind = "single marker"
+    dictionary = "single_markers"
+    outputs = ("position", *Body.outputs)
 
     initial_position: Triple = parameter(
         POSITION,
@@ -128,31 +118,18 @@ class SingleMarkerParameters(OutputParameters):
         if self.heading is None and (self.pose or self.pose2d or self.child_frame_id):
             yield "heading is not set; expected a topic, since one marker does not tell the yaw"
 
-
-@dataclass(frozen=True)
-class SingleMarker(Body):
-    """A vehicle with one marker, which is to be published."""
-
-    parameters: SingleMarkerParameters
-    kind = "single marker"
-    dictionary = "single_markers"
-    parameters_type = SingleMarkerParameters
-    outputs = ("position", *Body.outputs)
-
     @property
     def vehicle(self) -> MarkerVehicle:
         """Configuration for the tracker; its marker is at the start point less `offset`."""
-        p = self.parameters
-        x, y, z = (a - b for a, b in zip(p.initial_position, p.offset, strict=True))
-        limits = MotionLimits(p.max_velocity, p.max_acceleration)
+        x, y, z = (a - b for a, b in zip(self.initial_position, self.offset, strict=True))
+        limits = MotionLimits(self.max_velocity, self.max_acceleration)
         return MarkerVehicle(self.key, (x, y, z), limits)
 
 
 def _bodies(body_type, value):
     if not isinstance(value, dict) or not value:
         raise ValueError
-    entry_type = body_type.parameters_type
-    known = {declaration.name for declaration in entry_type.declarations()}
+    known = {declaration.name for declaration in body_type.declarations()}
     bodies, complaints = [], Complaints()
     for key, entry in value.items():
         label = shortened(str(key))
@@ -162,9 +139,9 @@ def _bodies(body_type, value):
         unknown = tuple(shortened(str(name)) for name in entry if name not in known)
         with complaints:
             values = {name: entry[name] for name in entry if name in known}
-            parameters = entry_type.from_mapping(values, f"{label}/")
-            bodies.append(body_type(str(key), parameters, unknown))
-            if not any(getattr(parameters, name) for name in body_type.outputs):
+            body = body_type.from_mapping(values, f"{label}/")
+            bodies.append(replace(body, key=str(key), unknown=unknown))
+            if not any(getattr(body, name) for name in body_type.outputs):
                 complaints.append(f"{label} has neither {' nor '.join(body_type.outputs)}")
     complaints += shared_outputs(bodies)
     complaints += _shared("name", [(b, b.name) for b in bodies])
@@ -176,7 +153,7 @@ def _bodies(body_type, value):
 
 def _too_near(markers):
     for first, second in itertools.combinations(markers, 2):
-        distance = math.dist(*(each.parameters.initial_position for each in (first, second)))
+        distance = math.dist(*(each.initial_position for each in (first, second)))
         if distance < SEPARATION:
             yield (
                 f"{second.key}/initial_position is {distance:.3g} m from that of {first.key}; "
@@ -202,12 +179,12 @@ SINGLE_MARKERS = Converted(
 def shared_outputs(bodies: Sequence[Body]) -> Iterator[str]:
     """Yield a text about each topic and frame that two bodies share."""
     topics = [
-        (body, getattr(body.parameters, name, None))
+        (body, getattr(body, name, None))
         for body in bodies
         for name in ("pose", "pose2d", "position")
     ]
     yield from _shared("topic", topics)
-    yield from _shared("child_frame_id", [(b, b.parameters.child_frame_id) for b in bodies])
+    yield from _shared("child_frame_id", [(b, b.child_frame_id) for b in bodies])
 
 
 def _shared(what, owned):

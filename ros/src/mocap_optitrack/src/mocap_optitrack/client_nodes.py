@@ -13,7 +13,7 @@ from typing_extensions import override
 
 from crazyflie_utils import NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TEXT, Integer, ListOf
-from mocap_optitrack.bodies import RigidBody, RigidBodyParameters
+from mocap_optitrack.bodies import RigidBody
 from mocap_optitrack.frames import Frame
 from mocap_optitrack.mocap_node import MocapNode, transform_of
 from mocap_optitrack.parameters import LibraryParameters, MocapParameters, NatNetParameters
@@ -31,11 +31,11 @@ class ClientNode(MocapNode):
             if name is not None and name not in self._known:
                 outputs = self._known[name] = self.outputs(name)
                 if outputs is not None:
-                    self.add_body(RigidBody(name, RigidBodyParameters(name=name, **outputs)))
+                    self.add_body(RigidBody(key=name, own_name=name, **outputs))
         super().on_frame(frame)
 
     def outputs(self, name: str) -> Mapping[str, Any] | None:
-        """Return how a body is published, as `RigidBodyParameters`; None if it is not."""
+        """Return how a body is published, as `RigidBody`; None if it is not."""
         raise NotImplementedError
 
     def use(self, backend: str, hostname: str) -> None:

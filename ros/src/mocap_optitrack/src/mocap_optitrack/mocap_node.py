@@ -68,13 +68,13 @@ class MocapNode(Node):
         self._positions = _publishers(handle, markers, "position", PointStamped)
         self._headings: dict[str, tuple[float, float]] = {}
         for marker in markers:
-            if marker.parameters.heading is not None:
+            if marker.heading is not None:
                 on_heading = partial(self._on_heading, marker.key)
-                handle.subscribe(_private(marker.parameters.heading), Float32, on_heading)
+                handle.subscribe(_private(marker.heading), Float32, on_heading)
         if markers:
             handle.advertise_service("~reset_lost", Trigger, self._reset_lost)
         self._broadcast: Callable[[list[TransformStamped]], None] | None = None
-        if any(body.parameters.child_frame_id for body in bodies):
+        if any(body.child_frame_id for body in bodies):
             self._broadcast = handle.broadcast_transforms()
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         handle.timer(_REPORT_PERIOD, self._report, steady=True)
@@ -89,7 +89,7 @@ class MocapNode(Node):
         self._tracker.add(body)
         self._health.add(body)
         self._poses |= _publishers(self._handle, [body], "pose", self.pose_type)
-        if self._broadcast is None and body.parameters.child_frame_id:
+        if self._broadcast is None and body.child_frame_id:
             self._broadcast = self._handle.broadcast_transforms()
 
     def _reconfigure(self, parameters):
@@ -142,7 +142,7 @@ class MocapNode(Node):
         transforms = []
         for pose in poses:
             body = pose.body
-            header = Header(stamp=stamp, frame_id=body.parameters.parent_frame_id)
+            header = Header(stamp=stamp, frame_id=body.parent_frame_id)
             if body.key in self._positions:
                 point = PointStamped(header, Point(*pose.position))
                 self._positions[body.key].publish(point)
@@ -156,7 +156,7 @@ class MocapNode(Node):
                 x, y, _ = pose.position
                 yaw = zyx_from_quaternion(quaternion)[2]
                 self._poses2d[body.key].publish(Pose2D(x, y, yaw))
-            if body.parameters.child_frame_id is not None:
+            if body.child_frame_id is not None:
                 transforms.append(transform_of(header, oriented))
         if transforms and self._broadcast is not None:
             self._broadcast(transforms)
@@ -173,13 +173,13 @@ class MocapNode(Node):
 
     def _heading_quaternion(self, body):
         """Return the attitude of a vehicle with one marker, taken as level; None if unknown."""
-        if body.parameters.heading is None:
+        if body.heading is None:
             return None
         now = self._handle.time()
         time, yaw = self._headings.get(body.key, (-math.inf, 0.0))
         if now - time > MAX_HEADING_AGE:
             self._handle.warn(
-                f"{body.key}: no heading on {body.parameters.heading} for {MAX_HEADING_AGE:g} s: "
+                f"{body.key}: no heading on {body.heading} for {MAX_HEADING_AGE:g} s: "
                 "its pose is not published; is the driver connected to it?",
                 throttle=_REPEAT,
                 key=f"heading {body.key}",
@@ -230,7 +230,7 @@ class MocapNode(Node):
 
 def _publishers(handle, bodies, output, message_type):
     """Return body's key -> publisher of an output, for the bodies that have it."""
-    topics = {body.key: getattr(body.parameters, output) for body in bodies}
+    topics = {body.key: getattr(body, output) for body in bodies}
     return {
         key: handle.publisher(_private(topic), message_type)
         for key, topic in topics.items()
@@ -247,4 +247,4 @@ def transform_of(header: Header, pose: BodyPose) -> TransformStamped:
     """Return the frame of a body, whose attitude is known."""
     assert pose.quaternion is not None
     transform = Transform(Vector3(*pose.position), Quaternion(*pose.quaternion))
-    return TransformStamped(header, pose.body.parameters.child_frame_id, transform)
+    return TransformStamped(header, pose.body.child_frame_id, transform)

@@ -121,7 +121,7 @@ class Tracker:
             why = self._marker_tracker.explain(marker.key)
             self._health.body(marker, frame.arrival, position is not None, why)
             if position is not None:
-                x, y, z = (a + b for a, b in zip(position, marker.parameters.offset, strict=True))
+                x, y, z = (a + b for a, b in zip(position, marker.offset, strict=True))
                 poses.append(BodyPose(marker, time, (x, y, z), None))
         return poses
 

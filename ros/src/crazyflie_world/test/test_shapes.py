@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_world.shapes import Ball, Box, Circle, Cylinder, Waypoints, cast, wall
+from crazyflie_world.shapes import Ball, Box, Circle, Cylinder, Wall, Waypoints, cast
 from crazyflie_world.world import Floor, World
 
 BOX = Box(name="box", centre=(2.0, 0.0, 1.0), extent=(1.0, 2.0, 0.5))
 TURNED = Box(name="turned", centre=(2.0, 0.5, 1.0), extent=(1.0, 2.0, 0.5), yaw=0.7)
 CYLINDER = Cylinder(name="cylinder", centre=(0.0, 2.0, 1.0), radius=0.5, height=1.0)
+WALL = Wall(name="wall", start=(1, -1), end=(1, 1), height=2.0, thickness=0.2).box()
 BALL = Ball(name="ball", centre=(-2.0, 0.0, 1.0), radius=0.5)
 
 UNIT = st.floats(-1.0, 1.0)
@@ -43,8 +44,8 @@ def distance(shape, origin, direction):
         (BALL, (0, 0.3, 1), (-1, 0, 0), 1.6),
         (BALL, (0, 0.6, 1), (-1, 0, 0), math.inf),
         (BALL, (-2, 0.1, 1), (0, 0, 1), 0.0),
-        (wall("wall", (1, -1), (1, 1), 2.0, 0.2), (0, 0, 1), (1, 0, 0), 0.9),
-        (wall("wall", (1, -1), (1, 1), 2.0, 0.2), (0, 0, 2.1), (1, 0, 0), math.inf),
+        (WALL, (0, 0, 1), (1, 0, 0), 0.9),
+        (WALL, (0, 0, 2.1), (1, 0, 0), math.inf),
         (Floor(size=(2.0, 2.0)).solid(), (0.5, 0, 1.5), (0, 0, -1), 1.5),
         (Floor(size=(2.0, 2.0)).solid(), (1.5, 0, 1.5), (0, 0, -1), math.inf),
         (Floor(size=(2.0, 2.0)).solid(), (0, 0, 1.5), (1, 0, 0), math.inf),
@@ -83,7 +84,7 @@ def is_inside(shape, point):
 
 
 def test_the_first_is_met():
-    world = World("world", Floor(size=(8.0, 8.0)), (BOX, CYLINDER, BALL))
+    world = World(floor=Floor(size=(8.0, 8.0)), objects=(BOX, CYLINDER, BALL))
     directions = np.array([[[1, 0, 0], [0, 1, 0], [-1, 0, 0]], [[0, 0, -1], [0, 0, 1], [0, -1, 0]]])
     distances, indices = world.cast((0.0, 0.0, 1.0), directions)
     assert indices.tolist() == [[0, 1, 2], [3, -1, -1]]
@@ -121,7 +122,7 @@ def test_waypoints():
 def test_what_moves_is_elsewhere_later():
     path = Circle(centre=(0.0, 0.0, 1.0), radius=1.0, period=4.0)
     moving = Ball(name="moving", centre=(1.0, 0.0, 1.0), radius=0.1, path=path)
-    world = World("world", Floor(size=(4.0, 4.0)), (BOX, moving))
+    world = World(floor=Floor(size=(4.0, 4.0)), objects=(BOX, moving))
     assert world.moving == (moving,)
     later = world.at(1.0)
     assert later["moving"].centre == pytest.approx((0.0, 1.0, 1.0))

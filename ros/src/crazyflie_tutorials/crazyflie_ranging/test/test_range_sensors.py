@@ -37,9 +37,8 @@ ENTRY = """\
 GOOD = "sensors:\n" + ENTRY + ENTRY.replace("front", "back")
 
 WORLD = World(
-    "world",
-    Floor(size=(10.0, 10.0)),
-    (
+    floor=Floor(size=(10.0, 10.0)),
+    objects=(
         Box(name="wall", centre=(2.1, 0.0, 1.0), extent=(0.2, 4.0, 2.0)),
         Ball(name="ball", centre=(0.0, 1.2, 1.0), radius=0.2),
     ),

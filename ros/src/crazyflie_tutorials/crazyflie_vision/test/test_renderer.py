@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from crazyflie_vision.camera import MountParameters, Pinhole, PixelNoise, Pose, optical_pose
 from crazyflie_vision.renderer import SKY, Renderer
-from crazyflie_world.shapes import Ball, Box, Cylinder, wall
+from crazyflie_world.shapes import Ball, Box, Cylinder, Wall
 from crazyflie_world.world import Floor, World
 
 CAMERA = Pinhole.with_fov(320, 240, 75.0)
@@ -26,7 +26,7 @@ def looking(roll=0.0, pitch=0.0, yaw=0.0, position=(0.0, 0.0, 1.0)):
 
 
 def render(objects, pose, floor=FLOOR):
-    return Renderer(CAMERA, World("world", floor, tuple(objects))).render(pose)
+    return Renderer(CAMERA, World(floor=floor, objects=tuple(objects))).render(pose)
 
 
 def is_red(image):
@@ -69,7 +69,7 @@ def test_what_is_nearer_covers():
     # The box is at the left, and ends at the ball's middle.
     assert half.sum() == pytest.approx(whole / 2, rel=0.1)
     assert not half[:, :158].any()
-    behind = wall("wall", (1.5, -2.0), (1.5, 2.0), 2.0, 0.1)
+    behind = Wall(name="wall", start=(1.5, -2.0), end=(1.5, 2.0), height=2.0).box()
     assert not is_red(render([ball, behind], looking())).any()
     assert is_red(render([behind, ball], looking(position=(1.7, 0.0, 1.0)))).any()
 
@@ -155,7 +155,7 @@ def test_any_pose_gives_an_image(position, roll, pitch, yaw):
         Ball(name="ball", centre=(0.5, 0.0, 0.0), radius=0.5, colour=RED),
         Box(name="box", centre=(-1.0, 0.0, 0.0), extent=(1.0, 1.0, 1.0), yaw=0.3),
         Cylinder(name="pillar", centre=(0.0, 1.0, 0.0), radius=0.3, height=1.0),
-        wall("wall", (-3.0, 2.0), (3.0, 2.0), 2.5, 0.1),
+        Wall(name="wall", start=(-3.0, 2.0), end=(3.0, 2.0)).box(),
     )
     with np.errstate(all="raise", under="ignore"):
         floor = Floor(size=(5.0, 5.0), texture="speckles")

@@ -19,6 +19,7 @@ from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FINITE,
+    METRES,
     POSITION,
     TEXT,
     TIME_STEP,
@@ -97,8 +98,6 @@ Vectors = NDArray[np.float64]  #: Shape (..., 3).
 #: Distances at which rays enter and leave, shape (...,); the first is larger for rays that miss the
 #: shape.
 Interval = tuple[NDArray[np.float64], NDArray[np.float64]]
-
-WALL_COLOUR = (0.85, 0.85, 0.8)
 
 
 class Shape(Parameters):
@@ -193,23 +192,31 @@ class Ball(Shape):
         return _within(origins - self.centre, directions, self.radius)
 
 
-def wall(
-    name: str,
-    start: tuple[float, float],
-    end: tuple[float, float],
-    height: float,
-    thickness: float,
-    colour: Colour = WALL_COLOUR,
-) -> Box:
-    """Return a wall that stands on the floor between two points, x and y in m; lengths in m."""
-    (x0, y0), (x1, y1) = start, end
-    return Box(
-        name=name,
-        centre=((x0 + x1) / 2.0, (y0 + y1) / 2.0, height / 2.0),
-        extent=(math.dist(start, end), thickness, height),
-        yaw=math.atan2(y1 - y0, x1 - x0),
-        colour=colour,
-    )
+class Wall(Parameters):
+    """A wall that stands on the floor, as declared in a world file."""
+
+    name: str = parameter(NAME, "unique name")
+    colour: Colour = parameter(COLOUR, "red, green, blue", default=(0.85, 0.85, 0.8))
+    start: tuple[float, float] = parameter(ListOf(METRES, 2), "begin, x and y", name="from")
+    end: tuple[float, float] = parameter(ListOf(METRES, 2), "end, x and y", name="to")
+    height: float = parameter(LENGTH, "height above the floor", default=2.5)
+    thickness: float = parameter(LENGTH, "thickness, half to each side", default=0.1)
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        if self.start == self.end:
+            yield f"from and to are both {list(self.start)}; expected two points (m)"
+
+    def box(self) -> Box:
+        """Return the wall as a shape."""
+        (x0, y0), (x1, y1) = self.start, self.end
+        return Box(
+            name=self.name,
+            centre=((x0 + x1) / 2.0, (y0 + y1) / 2.0, self.height / 2.0),
+            extent=(math.dist(self.start, self.end), self.thickness, self.height),
+            yaw=math.atan2(y1 - y0, x1 - x0),
+            colour=self.colour,
+        )
 
 
 def cast(

@@ -1,14 +1,15 @@
 """A room: its floor, and its fixed or moving objects."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameters.types import ListOf, Text
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import FRAME, ListOf, Text
 from crazyflie_world.shapes import COLOUR, LENGTH, Box, Colour, Position, Shape, cast
 
 FLOOR = "floor"  #: Name of the floor among the solids.
@@ -27,12 +28,11 @@ class Floor(Parameters):
         return Box(name=FLOOR, centre=(0.0, 0.0, 0.0), extent=(*self.size, 0.0), colour=self.colour)
 
 
-@dataclass(frozen=True)
-class World:
-    """A floor and objects, at one moment."""
+class World(Parameters):
+    """A floor and objects, at one moment; all but the objects as declared in a world file."""
 
-    frame: str  #: tf frame of all positions.
-    floor: Floor
+    frame: str = parameter(FRAME, "tf frame of all positions", default="world")
+    floor: Floor = group(Floor, "floor")
     objects: tuple[Shape, ...] = ()  #: Objects; walls are boxes.
 
     @property

@@ -1,69 +1,16 @@
 """Worlds in YAML files."""
 
 import os
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path as FilePath
 
-from typing_extensions import override
-
-from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters import yaml_file
-from crazyflie_utils.parameters.declaration import Complaints, group
-from crazyflie_utils.parameters.types import (
-    FRAME,
-    METRES,
-    ListOf,
-    Text,
-    path_of,
-)
+from crazyflie_utils.parameters.declaration import Complaints
+from crazyflie_utils.parameters.types import Text, path_of
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_utils.text import shortened, shown
-from crazyflie_world.shapes import (
-    COLOUR,
-    LENGTH,
-    NAME,
-    WALL_COLOUR,
-    Ball,
-    Box,
-    Circle,
-    Cylinder,
-    Path,
-    Shape,
-    Waypoints,
-    wall,
-)
-from crazyflie_world.world import FLOOR, Floor, World
-
-_PLACE = ListOf(METRES, 2)
-
-
-class WallParameters(Parameters):
-    """A wall that stands on the floor."""
-
-    name: str = parameter(NAME, "unique name")
-    colour: tuple[float, float, float] = parameter(COLOUR, "red, green, blue", WALL_COLOUR)
-    start: tuple[float, float] = parameter(_PLACE, "begin, x and y", name="from")
-    end: tuple[float, float] = parameter(_PLACE, "end, x and y", name="to")
-    height: float = parameter(LENGTH, "height above the floor", 2.5)
-    thickness: float = parameter(LENGTH, "thickness, half to each side", 0.1)
-
-    @override
-    def complaints(self) -> Iterator[str]:
-        if self.start == self.end:
-            yield f"from and to are both {list(self.start)}; expected two points (m)"
-
-    def shape(self) -> Box:
-        """Return the declared object."""
-        return wall(self.name, self.start, self.end, self.height, self.thickness, self.colour)
-
-
-class WorldParameters(Parameters):
-    """Parameters of a world file, without its objects."""
-
-    frame: str = parameter(FRAME, "tf frame of all positions", "world")
-    floor: Floor = group(Floor, "floor")
-
+from crazyflie_world.shapes import Ball, Box, Circle, Cylinder, Path, Shape, Wall, Waypoints
+from crazyflie_world.world import FLOOR, World
 
 #: Objects that may move, by their type.
 OBJECTS: dict[str, type[Shape]] = {"box": Box, "cylinder": Cylinder, "ball": Ball}
@@ -79,11 +26,11 @@ def load(path: str | FilePath) -> World:
     `ParameterError` names all errors: file, line and what was expected.
     """
     file = yaml_file.load(path)
-    settings = file.read(WorldParameters, extra_keys=("objects",))
+    world = file.read(World, extra_keys=("objects",))
     entries = file["objects"].elements() if "objects" in file else []
     objects: list[Shape] = []
     complaints = Complaints()
-    lines = {FLOOR: "the floor", settings.frame: "the frame"}
+    lines = {FLOOR: "the floor", world.frame: "the frame"}
     for entry in entries:
         with complaints:
             made = _object(entry)
@@ -93,7 +40,7 @@ def load(path: str | FilePath) -> World:
             lines[made.name] = f"the object in line {name.line}"
             objects.append(made)
     complaints.raise_any()
-    return World(settings.frame, settings.floor, tuple(objects))
+    return replace(world, objects=tuple(objects))
 
 
 WORLD_FILE = path_of(load, "a world file")
@@ -102,7 +49,7 @@ WORLD_FILE = path_of(load, "a world file")
 def _object(entry: Entry) -> Shape:
     kind = entry["type"].checked(Text((*OBJECTS, WALL)))
     if kind == WALL:
-        return entry.read(WallParameters, extra_keys=("type",)).shape()
+        return entry.read(Wall, extra_keys=("type",)).box()
     path = _path(entry["path"]) if "path" in entry else None
     shape = entry.read(OBJECTS[kind], extra_keys=("type", "path"))
     if ("centre" in entry) == (path is not None):

@@ -12,7 +12,7 @@ from tf2_msgs.msg import TFMessage
 
 from crazyflie_identification.command import main
 from crazyflie_identification.recording import of_bag
-from crazyflie_lqr.linear_feedback_node import Gains
+from crazyflie_lqr.linear_feedback_node import GAINS
 from crazyflie_model.angles import quaternion_from_zyx
 from crazyflie_utils.parameters import vehicle_model
 
@@ -91,7 +91,7 @@ def test_a_bag_becomes_a_model_that_can_be_flown(bag, vehicle, tmp_path, capsys)
     assert "standard errors" in page
     assert "standard_errors" in out.read_text()
     # The controller takes it for its gains.
-    assert Gains(4, 7)(str(out)).shape == (4, 7)
+    assert GAINS(str(out)).shape == (4, 7)
 
 
 def test_what_is_no_flight_is_refused_and_nothing_is_written(bag, tmp_path, capsys):

@@ -8,7 +8,7 @@ import pytest
 
 from crazyflie_lqr import vehicle_gains
 from crazyflie_lqr.design import DesignError
-from crazyflie_lqr.linear_feedback_node import Gains
+from crazyflie_lqr.linear_feedback_node import GAINS
 from crazyflie_lqr.vehicle_gains import LEAST_DELAY, LEAST_MODULUS, design, gains
 from crazyflie_model.quadrotor import CRAZYFLIE, TYPES
 from crazyflie_model.units import GRAVITY
@@ -43,10 +43,10 @@ def test_where_no_gains_bear_enough_it_says_so(monkeypatch):
 def test_a_controller_takes_a_model_for_a_gain_file(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text("lag: {roll: 0.05, pitch: 0.05}\ndelay: 0.03\n")
-    found = Gains(4, 7)(str(path))
+    found = GAINS(str(path))
     assert found.shape == (4, 7)
     np.testing.assert_array_equal(found != 0.0, gains(CRAZYFLIE) != 0.0)
-    np.testing.assert_array_equal(Gains(4, 7)("brushless"), gains(TYPES["brushless"]))
+    np.testing.assert_array_equal(GAINS("brushless"), gains(TYPES["brushless"]))
     path.write_text("mass: 33\n")
     with pytest.raises(ValueError, match="mass .* is 33; expected"):
-        Gains(4, 7)(str(path))
+        GAINS(str(path))

@@ -11,7 +11,7 @@ import numpy as np
 
 from crazyflie_lqr.design import Design, DesignError, Weights, design_gains
 from crazyflie_lqr.gain_file import save_matrix
-from crazyflie_lqr.margins import FLOWN_PERIOD, Margins, flown, loop_margins
+from crazyflie_lqr.margins import FLOWN_PERIOD, Margins, all_margins, flown
 from crazyflie_lqr.models import CONTROLS, MODELS, LinearModel
 from crazyflie_utils.text import number_from_text
 
@@ -64,8 +64,7 @@ def report(model: LinearModel, design: Design) -> str:
     ]
     lines += ["poles (rad/s): " + _poles(design)]
     lines += ["loop      gain may grow, shrink (dB)   phase margin (deg)   at (rad/s)   delay (ms)"]
-    for loop, control in enumerate(CONTROLS):
-        margins = loop_margins(design, loop)
+    for control, margins in zip(CONTROLS, all_margins(design), strict=True):
         lines.append(
             f"{control:8}{_decibels(margins.gain_up):>15}{_decibels(margins.gain_down):>14}"
             f"{_number(math.degrees(margins.phase)):>21}{_number(margins.crossover):>13}"
@@ -90,8 +89,7 @@ def _flown_margins(options, model, design):
     missing = [name for name in model.states if name not in plant.states]
     if missing:
         raise DesignError(f"{plant.name} has no {', '.join(missing)}; expected a --plant that has")
-    loop = flown(design.K, model.states, plant, _period(options), options.delay)
-    return [loop_margins(loop, each) for each in range(len(CONTROLS))]
+    return all_margins(flown(design.K, model.states, plant, _period(options), options.delay))
 
 
 def _plant(options):

@@ -17,31 +17,28 @@ from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, flight_status, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters import vehicle_model
-from crazyflie_utils.parameters.types import TEXT, TOPIC, Integer, Number
+from crazyflie_utils.parameters.types import TEXT, TOPIC, Converted, Integer, Number
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple, to_vector
 
 MAX_GAIN = 1e6  #: Largest entry of a gain file: larger ones give controls that are not finite.
 
 
-class Gains(MatrixFile):
-    """The path of a gain file; or a type of vehicle or a model file, for `vehicle_gains`."""
+def _gains(value):
+    path = TEXT(value)
+    if not vehicle_model.is_model(path):
+        return _GAIN_FILE(path)
+    # Imported here, since python-control takes a second to load, and most controllers read a file.
+    from crazyflie_lqr.vehicle_gains import gains
 
-    @override
-    def __call__(self, value: Any) -> NDArray[np.float64]:
-        path = TEXT(value)
-        if not vehicle_model.is_model(path):
-            return super().__call__(path)
-        # Imported here, since python-control takes a second to load, and most controllers read a
-        # file.
-        from crazyflie_lqr.vehicle_gains import gains
+    try:
+        return gains(vehicle_model.load(path))
+    except ParameterError as error:
+        raise ValueError(str(error)) from None
 
-        try:
-            return gains(vehicle_model.load(path))
-        except ParameterError as error:
-            raise ValueError(str(error)) from None
 
-    def __str__(self) -> str:
-        return f"{super().__str__()}, or a model of a vehicle"
+_GAIN_FILE = MatrixFile(4, 7)
+#: The path of a gain file; or a type of vehicle or a model file, for `vehicle_gains`.
+GAINS = Converted(_gains, f"{_GAIN_FILE}, or a model of a vehicle", _GAIN_FILE.label)
 
 
 class LinearFeedbackParameters(Parameters):
@@ -50,7 +47,7 @@ class LinearFeedbackParameters(Parameters):
     x_dim: int = parameter(Integer(7, 7), "length of the state")
     u_dim: int = parameter(Integer(4, 4), "length of the control")
     K: NDArray[np.float64] = parameter(
-        Gains(4, 7),
+        GAINS,
         "gain file, `u_dim` rows of `x_dim` numbers; or a type of vehicle or a model file, for "
         "which gains are designed",
         name="K_file",

@@ -121,6 +121,11 @@ def loop_margins(design: Design, loop: int) -> Margins:
     )
 
 
+def all_margins(design: Design) -> list[Margins]:
+    """Return the margins of all loops, in the order of the controls."""
+    return [loop_margins(design, loop) for loop in range(design.B.shape[1])]
+
+
 def _broken_loop(design, loop):
     others = np.arange(design.B.shape[1]) != loop
     feedback = design.feedback

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_lqr.design import Design, DesignError, Weights, design_gains
-from crazyflie_lqr.margins import FLOWN_PERIOD, Margins, flown, loop_margins
-from crazyflie_lqr.models import CONTROLS, LinearModel, near_hover, vehicle_plant
+from crazyflie_lqr.margins import FLOWN_PERIOD, Margins, all_margins, flown
+from crazyflie_lqr.models import near_hover, vehicle_plant
 from crazyflie_model.first_order_quadrotor import lags
 from crazyflie_model.quadrotor import QuadrotorParameters
 from crazyflie_model.units import GRAVITY
@@ -54,7 +54,7 @@ def design(model: QuadrotorParameters) -> tuple[Design, list[Margins]]:
     pace = PACE
     while pace > 0.05:
         found = design_gains(states, weights(model, pace))
-        loops = _margins(found.K, states, plant, model.delay)
+        loops = all_margins(flown(found.K, states.states, plant, delay=model.delay))
         least = min(loop.delay for loop in loops)
         if least >= LEAST_DELAY and min(loop.modulus for loop in loops) >= LEAST_MODULUS:
             return found, loops
@@ -63,13 +63,6 @@ def design(model: QuadrotorParameters) -> tuple[Design, list[Margins]]:
         f"no gains tolerate a delay of {1e3 * model.delay:g} ms and lags of "
         f"{', '.join(f'{1e3 * each:.0f}' for each in lags(model))} ms"
     )
-
-
-def _margins(
-    K: NDArray[np.float64], states: LinearModel, plant: LinearModel, delay: float
-) -> list[Margins]:
-    loop = flown(K, states.states, plant, FLOWN_PERIOD, delay)
-    return [loop_margins(loop, each) for each in range(len(CONTROLS))]
 
 
 def gains(model: QuadrotorParameters) -> NDArray[np.float64]:

@@ -129,6 +129,20 @@ def test_unknown_names_in_a_mapping_are_reported_with_the_rest():
     assert second == "parameter bodies/7/hover/z is not set; expected a finite number (m)"
 
 
+class NamedAxis(AxisParameters):
+    """Gains, and whose they are."""
+
+    name: str = ""
+
+
+def test_a_field_that_is_not_declared_is_no_parameter():
+    assert [each.name for each in NamedAxis.declarations()] == ["kp", "ki"]
+    axis = dataclasses.replace(NamedAxis.from_mapping({"kp": 2.0}), name="x")
+    assert (axis.name, axis.kp) == ("x", 2.0)
+    with pytest.raises(ParameterError, match="name is no parameter"):
+        NamedAxis.from_mapping({"kp": 2.0, "name": "x"})
+
+
 # From a command line.
 
 

@@ -217,3 +217,15 @@ def test_decimation_keeps_peaks():
     assert len(kept) <= 200
     assert kept[peaks.argmax()] == 77_777
     assert (np.diff(kept) > 0).all()
+
+
+def test_chunks_within_chunks_are_damage(tmp_path):
+    data = b""
+    for _ in range(3000):
+        fields = [b"op=\x05", b"compression=none", b"size=" + struct.pack("<I", len(data))]
+        header = b"".join(struct.pack("<I", len(each)) + each for each in fields)
+        size = struct.pack("<I", len(data))
+        data = struct.pack("<I", len(header)) + header + size + data
+    path = tmp_path / "a.bag"
+    path.write_bytes(MAGIC + data)
+    assert "it is damaged" in times(path)[1]

@@ -6,10 +6,10 @@ Format: https://wiki.ros.org/Bags/Format/2.0.
 """
 
 import bz2
-import os
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, ClassVar
 
@@ -25,9 +25,6 @@ _MESSAGE, _BAG_HEADER, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
 #: compressed to a third.
 LARGEST_CHUNK = 1 << 28
 LEAST_TOTAL, LARGEST_RATIO = 1 << 30, 100
-
-#: Largest header of a record (bytes): with a longer one the file is damaged.
-_LARGEST_HEADER = 1 << 20
 
 _PIECE = 1 << 20  # Size of decompressed data (bytes).
 
@@ -121,7 +118,8 @@ class BagFile:
         self._path = path
         self.connections: list[Connection] = []  #: Connections that have been read so far.
         self.interruption = ""  #: Reason why reading has ended early; empty if it has not.
-        self._by_id: dict[bytes, Connection] = {}
+        self.done = 0  #: Number of bytes that have been read.
+        self._by_id: dict[bytes, Connection | None] = {}  # None: not wanted.
         try:
             with path.open("rb") as file:
                 start = file.read(len(MAGIC))
@@ -137,76 +135,58 @@ class BagFile:
             raise BagError(f"{path} is not a bag: it begins with {start!r}, expected {MAGIC!r}")
 
     def messages(
-        self,
-        is_wanted: Callable[[Connection], bool],
-        progress: Callable[[int], Any] = lambda size: None,
+        self, is_wanted: Callable[[Connection], bool]
     ) -> Iterator[tuple[Connection, float, bytes]]:
-        """Yield connection, time of recording (s) and serialized message.
-
-        ``progress`` is called with the number of bytes that have been read since its last call.
-        """
+        """Yield connection, time of recording (s) and serialized message."""
         with self._path.open("rb") as file:
             file.seek(len(MAGIC))
-            done = 0
             try:
-                while file.tell() < self.size:
-                    yield from self._record(file, is_wanted)
-                    progress(file.tell() - done)
-                    done = file.tell()
+                yield from self._messages_in(file, self.size, is_wanted)
             except _BrokenOffError as error:
                 self.interruption = self._broken_off(file.tell(), error)
             except ExpansionError as error:
-                self.interruption = f"{self._path} is read up to {done / 1e6:.2f} MB: {error}"
-            except (struct.error, KeyError, ValueError, EOFError):
+                self.interruption = f"{self._path} is read up to {self.done / 1e6:.2f} MB: {error}"
+            except (struct.error, KeyError, ValueError, EOFError, RecursionError):
                 self.interruption = self._broken_off(file.tell(), "it is damaged")
 
-    def _record(self, file, is_wanted):
-        fields = _fields(_read_sized(file, _LARGEST_HEADER))
-        op = fields[b"op"]
-        (size,) = _UINT32.unpack(_read(file, 4))
-        if op == _CHUNK:
-            # The size of a chunk that was not closed is 0: it extends to the end of the file.
-            content = file.read(size or -1)
-            chunk = self._decompressed(content, fields[b"compression"])
-            yield from self._messages_of(chunk, is_wanted)
-            if len(content) != size:
-                raise _BrokenOffError("its last chunk was not closed")
-            return
-        if op == _BAG_HEADER:
-            (index,) = _UINT64.unpack(fields[b"index_pos"])
-            if index == 0:
-                self.interruption = (
-                    f"{self._path} was not closed, as after a crash: the last second may be missing"
-                )
-            elif index > self.size:
-                self.interruption = self._broken_off(self.size, "its index is missing")
-        if size > self.size - file.tell():
-            raise _BrokenOffError("it ends within a record")
-        # Records that are skipped include indexes, and connections, which chunks also have.
-        file.seek(size, os.SEEK_CUR)
+    def _messages_in(self, file, end, is_wanted):
+        """Yield the messages in the records of a file, or of a chunk."""
+        while file.tell() < end:
+            fields = _fields(_sized(file, end))
+            op = fields[b"op"]
+            if op == _CHUNK:
+                self.done = file.tell()
+                # The size of a chunk that was not closed is 0: it extends to the end of the file.
+                (size,) = _UINT32.unpack(file.read(4))
+                content = file.read(size or -1)
+                chunk = self._decompressed(content, fields[b"compression"])
+                yield from self._messages_in(BytesIO(chunk), len(chunk), is_wanted)
+                if len(content) != size:
+                    raise _BrokenOffError("its last chunk was not closed")
+                continue
+            data = _sized(file, end)
+            if op == _MESSAGE:
+                if (connection := self._by_id[fields[b"conn"]]) is not None:
+                    seconds, nanoseconds = _TIME.unpack(fields[b"time"])
+                    yield connection, seconds + nanoseconds * 1e-9, data
+            elif op == _CONNECTION:
+                self._connect(fields, data, is_wanted)
+            elif op == _BAG_HEADER:
+                self._check_index(*_UINT64.unpack(fields[b"index_pos"]))
+
+    def _check_index(self, place):
+        if place == 0:
+            self.interruption = (
+                f"{self._path} was not closed, as after a crash: the last second may be missing"
+            )
+        elif place > self.size:
+            self.interruption = self._broken_off(self.size, "its index is missing")
 
     def _broken_off(self, place, reason):
         return (
             f"{self._path} breaks off at {place / 1e6:.2f} of {self.size / 1e6:.2f} MB ({reason}), "
             "as after a crash: the rest is missing here"
         )
-
-    def _messages_of(self, chunk, is_wanted):
-        offset, end = 0, len(chunk)
-        wanted: dict[bytes, Connection | None] = {}
-        while offset < end:
-            header, offset = _sized(chunk, offset)
-            data, offset = _sized(chunk, offset)
-            fields = _fields(header)
-            op, key = fields[b"op"], fields[b"conn"]
-            if op == _CONNECTION:
-                self._connect(key, fields, data)
-            elif op == _MESSAGE:
-                if key not in wanted:
-                    wanted[key] = self._by_id[key] if is_wanted(self._by_id[key]) else None
-                if (connection := wanted[key]) is not None:
-                    seconds, nanoseconds = _TIME.unpack(fields[b"time"])
-                    yield connection, seconds + nanoseconds * 1e-9, data
 
     def _decompressed(self, data, compression):
         if compression == b"none":
@@ -219,39 +199,22 @@ class BagFile:
         except (OSError, RuntimeError) as error:
             raise _BrokenOffError(str(error)) from None
 
-    def _connect(self, key, fields, data):
-        if key in self._by_id:
+    def _connect(self, fields, data, is_wanted):
+        if (key := fields[b"conn"]) in self._by_id:
             return
         texts = {name: value.decode(errors="replace") for name, value in _fields(data).items()}
-        self._by_id[key] = Connection(
-            fields[b"topic"].decode(errors="replace"),
-            texts[b"type"],
-            texts[b"md5sum"],
-        )
-        self.connections.append(self._by_id[key])
+        topic = fields[b"topic"].decode(errors="replace")
+        connection = Connection(topic, texts[b"type"], texts[b"md5sum"])
+        self.connections.append(connection)
+        self._by_id[key] = connection if is_wanted(connection) else None
 
 
-def _read(file: BinaryIO, size: int) -> bytes:
-    data = file.read(size)
-    if len(data) < size:
+def _sized(file: BinaryIO, end: int) -> bytes:
+    """Return the next part of a file that has so many bytes; its size is before it."""
+    size = int.from_bytes(file.read(4), "little")
+    if size > end - file.tell():
         raise _BrokenOffError("it ends within a record")
-    return data
-
-
-def _read_sized(file, largest):
-    (size,) = _UINT32.unpack(_read(file, 4))
-    if size > largest:
-        raise _BrokenOffError("it is damaged")
-    return _read(file, size)
-
-
-def _sized(data, offset):
-    end = offset + 4
-    if end <= len(data):
-        end += _UINT32.unpack_from(data, offset)[0]
-    if end > len(data):
-        raise _BrokenOffError("it ends within a message")
-    return data[offset + 4 : end], end
+    return file.read(size)
 
 
 def _fields(header: bytes) -> dict[bytes, bytes]:

@@ -1,13 +1,13 @@
 """The messages of a recording, read once: numbers in files, events in memory."""
 
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from crazyflie_reports.bag_events import EventLog
 from crazyflie_reports.bag_file import BagError, BagFile, Connection, TopicError
@@ -95,7 +95,7 @@ class BagLog:
     remarks: list[str] = field(default_factory=list)
 
 
-def files_of(path: Path) -> list[Path]:
+def _files_of(path: Path) -> list[Path]:
     """Return the files of a recording: those of a folder in their order, or the file itself.
 
     `BagError`: the path does not exist, or the folder has no bags.
@@ -117,28 +117,26 @@ def files_of(path: Path) -> list[Path]:
     return bags
 
 
-def read(
-    path: Path,
-    folder: Path,
-    names: dict[str, str] | None = None,
-    progress: Callable[[int], Any] = lambda size: None,
-) -> list[BagLog]:
-    """Read a recording: a bag, or a folder of bags that follow each other.
+def read(path: Path, folder: Path, names: dict[str, str] | None = None) -> list[BagLog]:
+    """Read a recording: a bag, or a folder of bags that follow each other, with a progress bar.
 
     The result is one log, or one for each start of simulated time. Series that are too long for
     memory are kept in ``folder`` as long as the logs are used. ``names`` has, by role, regular
-    expressions of topics in place of the documented ones; ``progress`` is called with numbers of
-    bytes. `BagError`: the recording cannot be read, or has none of the topics.
+    expressions of topics in place of the documented ones. `BagError`: the recording cannot be read,
+    or has none of the topics.
     """
     reader = _Reader(path.name, folder, names or {})
-    files = [_opened(each, folder) for each in files_of(path)]
-    remarks = []
-    for file in files:
-        for connection, time, data in file.messages(reader.is_wanted, progress):
-            reader.add(connection, time, data)
-        if file.interruption:
-            remarks.append(file.interruption)
-    remarks += reader.remarks()
+    files = [_opened(each, folder) for each in _files_of(path)]
+    size = sum(file.size for file in files)
+    with tqdm(total=size, unit="B", unit_scale=True, desc=path.name, disable=None) as bar:
+        for file in files:
+            done = 0.0
+            for connection, time, data in file.messages(reader.is_wanted):
+                reader.add(connection, time, data)
+                if file.done != done:
+                    bar.update(file.done - done)
+                    done = file.done
+    remarks = [file.interruption for file in files if file.interruption] + [*reader.remarks()]
     connections = [each for file in files for each in file.connections]
     if not connections:
         text = f"{path} has no messages; expected {expected()}"

@@ -13,8 +13,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from crazyflie_reports import bag_log, bag_mcap, report_page
 from crazyflie_reports.bag_events import concerning
 from crazyflie_reports.bag_file import BagError
@@ -136,8 +134,10 @@ def make(
         # Next to the report, since /tmp may be in memory.
         with tempfile.TemporaryDirectory(dir=folder) as place:
             for number, path in enumerate(paths):
+                series = Path(place, str(number))
+                series.mkdir()
                 try:
-                    found = _read(path, Path(place, str(number)), names)
+                    found = bag_log.read(path, series, names)
                 except BagError as error:
                     problems.append(str(error))
                     continue
@@ -200,14 +200,6 @@ def main() -> int:
         problems = [str(error)]
     print(*problems, sep="\n", file=sys.stderr, end="\n" if problems else "")
     return 1 if problems else 0
-
-
-def _read(path, folder, names):
-    """Read a recording with a progress bar; its series are kept in a new folder."""
-    folder.mkdir()
-    size = sum(each.stat().st_size for each in bag_log.files_of(path))
-    with tqdm(total=size, unit="B", unit_scale=True, desc=path.name, disable=None) as bar:
-        return bag_log.read(path, folder, names, bar.update)
 
 
 def _new_folder(top, name):

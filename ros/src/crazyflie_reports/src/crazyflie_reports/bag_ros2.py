@@ -63,7 +63,6 @@ _MCAP = b"\x89MCAP0\r\n"
 _CHUNK = 0x06  # The record of MCAP with compressed messages.
 _ZSTD = b"\x28\xb5\x2f\xfd"  # A message of CDR begins with 0.
 _RECORD = struct.Struct("<BQ")
-_PROGRESS = 1000  # Messages.
 
 _DECOMPRESSORS = {"zstd": zstd.ZstdDecompressor, "lz4": lz4.frame.LZ4FrameDecompressor}
 
@@ -159,6 +158,7 @@ class Ros2BagFile:
         self.connections: list[Connection] = []
         self.interruption = ""  #: Reason why reading has ended early; empty if it has not.
         self.size = path.stat().st_size
+        self.done = 0.0  #: Number of bytes that have been read, estimated by that of messages.
         self._expansion = Expansion(self.size)
         self._source = path
         try:
@@ -186,25 +186,17 @@ class Ros2BagFile:
             self._originals[each.id] = connection
 
     def messages(
-        self,
-        is_wanted: Callable[[Connection], bool],
-        progress: Callable[[int], Any] = lambda size: None,
+        self, is_wanted: Callable[[Connection], bool]
     ) -> Iterator[tuple[Connection, float, bytes]]:
-        """Yield connection, time of recording (s) and serialized message, in the order of times.
-
-        ``progress`` is called with about the number of bytes since its last call.
-        """
+        """Yield connection, time of recording (s) and serialized message, in the order of times."""
         wanted = [c for c in self._reader.connections if is_wanted(self._originals[c.id])]
-        share = _PROGRESS * self.size // max(1, self._reader.message_count)
+        share = self.size / max(1, self._reader.message_count)
         try:
-            for number, (each, time, data) in enumerate(
-                self._reader.messages(wanted) if wanted else ()
-            ):
+            for each, time, data in self._reader.messages(wanted) if wanted else ():
                 if data[:4] == _ZSTD:
                     data = b"".join(self._expansion.pieces(zstd.ZstdDecompressor(), data))
                 yield self._originals[each.id], time * 1e-9, data
-                if number % _PROGRESS == 0:
-                    progress(share)
+                self.done += share
         except ExpansionError as error:
             self.interruption = f"{self._path} is read in part: {error}"
         except Exception as error:  # rosbags may raise any error on a damaged file.

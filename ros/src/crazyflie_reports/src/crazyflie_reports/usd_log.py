@@ -25,7 +25,6 @@ MAGIC = 0xBC
 _TIMES = {1: ("<HI", 1e-3), 2: ("<HQ", 1e-6)}  # By version: kind and time, and its unit, s.
 _LETTERS = frozenset("?bBhHiIlLqQefd")
 _END = 4  # Bytes of the CRC.
-_PROGRESS = 1000  # Events.
 
 _UNKNOWN = [math.nan, math.nan, math.nan]
 
@@ -131,6 +130,7 @@ class UsdLogFile:
         self.interruption = ""  #: Reason why reading has ended early, or fault of the file.
         self._data = path.read_bytes()
         self.size = len(self._data)
+        self.done = 0  #: Number of bytes that have been read.
         try:
             self._version, count = struct.unpack_from("<HH", self._data, 1)
             if self._version not in _TIMES:
@@ -146,9 +146,7 @@ class UsdLogFile:
             )
 
     def messages(
-        self,
-        is_wanted: Callable[[Connection], bool],
-        progress: Callable[[int], Any] = lambda size: None,
+        self, is_wanted: Callable[[Connection], bool]
     ) -> Iterator[tuple[Connection, float, Any]]:
         """Yield connection, time since the vehicle was switched on (s), and row of each event."""
         layout, unit = _TIMES[self._version]
@@ -159,7 +157,6 @@ class UsdLogFile:
             number: [(role, c) for role, c in kind.connections.items() if is_wanted(c)]
             for number, kind in self._kinds.items()
         }
-        done = count = 0
         while place < end:
             try:
                 number, time = head.unpack_from(data, place)
@@ -175,10 +172,7 @@ class UsdLogFile:
             known = dict(zip(kind.names, map(float, values), strict=True))
             for role, connection in wanted[number]:
                 yield connection, unit * time, _ROWS[role](known)
-            count += 1
-            if count % _PROGRESS == 0:
-                progress(place - done)
-                done = place
+            self.done = place
 
     def _kind(self):
         number = self._integer()

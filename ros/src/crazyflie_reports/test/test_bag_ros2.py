@@ -14,9 +14,9 @@ from rosbags.typesys import get_types_from_msg
 
 from crazyflie_reports import bag_file, bag_ros2
 from crazyflie_reports.bag_file import BagError
-from crazyflie_reports.bag_flights import vehicles
+from crazyflie_reports.bag_flights import flights, vehicles
 from crazyflie_reports.bag_log import read
-from crazyflie_reports.bag_report import flights_of, main, make
+from crazyflie_reports.bag_report import main, make
 
 MCAP, SQLITE3 = StoragePlugin.MCAP, StoragePlugin.SQLITE3
 ZSTD = CompressionFormat.ZSTD
@@ -38,7 +38,7 @@ def test_a_flight_of_crazyswarm2(tmp_path, storage, compression, is_folder):
     (file,) = set((tmp_path / "a").iterdir()) - {tmp_path / "a" / "metadata.yaml"}
     (log,) = read(tmp_path / "a" if is_folder else file, tmp_path)
     assert log.remarks == []
-    (flight,) = flights_of(log)
+    (flight,) = flights(log)
     assert flight.vehicle.name == "cf1"
     assert flight.record.state.column("z").max() == pytest.approx(1.0 + bags.OFFSET)
     assert flight.record.reference.values[-1, :3] == pytest.approx([0.0, 0.0, 1.0])
@@ -86,7 +86,7 @@ def test_a_type_with_other_fields_is_left_out(tmp_path):
     (log,) = read(tmp_path / "a", tmp_path)
     (remark,) = log.remarks
     assert "/cf1/status is omitted: crazyflie_interfaces/msg/Status has the fields" in remark
-    assert len(list(flights_of(log))) == 1
+    assert len(list(flights(log))) == 1
 
 
 @pytest.mark.parametrize(
@@ -134,7 +134,7 @@ def test_whatever_is_damaged_is_read_in_part_or_refused(tmp_path, storage, compr
         file.write_bytes(data)
         try:
             for log in read(file, tmp_path / str(number)):
-                list(flights_of(log))
+                list(flights(log))
         except BagError as error:
             assert str(file) in str(error)
             refusals += 1

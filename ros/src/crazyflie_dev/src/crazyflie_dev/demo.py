@@ -13,7 +13,7 @@ import rosgraph
 from crazyflie_demo import figure8
 from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
 from crazyflie_reports import bag_log, bag_report
-from crazyflie_reports.bag_flights import Flight
+from crazyflie_reports.bag_flights import Flight, flights
 from crazyflie_reports.flight_operator import FlightError, FlightOperator
 from crazyflie_reports.flight_record import FlightReport
 from crazyflie_utils.main import begin
@@ -128,9 +128,9 @@ def report_recording(recordings: Path, folder: Path) -> tuple[bag_report.Report,
     with tempfile.TemporaryDirectory(dir=folder) as series:
         (recorded,) = bag_log.read(recording, Path(series))
         page.add(recorded)
-        flights = list(bag_report.flights_of(recorded))
+        flown = list(flights(recorded))
     page.write(folder)
-    return page, flights
+    return page, flown
 
 
 def report(recordings: Path, folder: Path, log: Path) -> int:

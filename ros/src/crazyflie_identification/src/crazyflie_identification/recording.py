@@ -11,7 +11,7 @@ from crazyflie_model.angles import quaternion_from_rpy, zyx_from_quaternion
 from crazyflie_model.quadrotor import QuadrotorParameters
 from crazyflie_model.units import pwm_from_thrust
 from crazyflie_reports import bag_log
-from crazyflie_reports.bag_flights import OTHER_CLOCK, Vehicle, flights, vehicles
+from crazyflie_reports.bag_flights import OTHER_CLOCK, flights, vehicles
 
 _BEGINNING = 1.0  #: Time after the takeoff in which the vehicle settles, s.
 
@@ -23,19 +23,17 @@ def of_bag(path: Path, kind: QuadrotorParameters, name: str = "") -> Recording:
     m/s^2 carries a vehicle of the type ``kind``. ``name`` is the vehicle, if there are several.
     `BagError`: the bag cannot be read. `IdentificationError`: it has no such flight.
     """
-    found: list[tuple[float, float, Vehicle]] = []
-    names = []
     with tempfile.TemporaryDirectory() as folder:
-        for log in bag_log.read(path, Path(folder)):
-            for vehicle in vehicles(log):
-                names.append(vehicle.name)
-                if name not in ("", vehicle.name):
-                    continue
-                states = log.events.flight_states.get(vehicle.namespace, [])
-                for flight in flights(vehicle, states, [], log.end):
-                    found += [(p.end - p.start, p.start, vehicle) for p in flight.phases
-                              if p.name == "flying"]  # fmt: skip
-    if name and name not in names:
+        logs = bag_log.read(path, Path(folder))
+        found = [
+            (phase.end - phase.start, phase.start, flight.vehicle)
+            for log in logs
+            for flight in flights(log)
+            for phase in flight.phases
+            if phase.name == "flying" and name in ("", flight.vehicle.name)
+        ]
+        names = () if found else [each.name for log in logs for each in vehicles(log)]
+    if name and not found and name not in names:
         raise IdentificationError(
             f"{path} has no vehicle {name}; expected one of {', '.join(names) or 'none'}"
         )

@@ -160,8 +160,9 @@ class EventLog:
     }
 
 
-def concerning(events: list[Event], name: str, others: set[str]) -> Iterator[Event]:
-    """Yield the events of a vehicle, and those that belong to no other vehicle, by namespaces."""
+def concerning(events: list[Event], name: str, names: set[str]) -> Iterator[Event]:
+    """Yield the events of a vehicle, and those that belong to no other one of these namespaces."""
+    others = names - {name, ""}
     for event in events:
         words = {word.strip("/").split("/")[0] for word in re.findall(r"[\w/]+", event.text)}
         if event.namespace == name or not (event.namespace in others or words & others):

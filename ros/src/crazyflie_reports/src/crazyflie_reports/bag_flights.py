@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_msgs.msg import FlightStatus
-from crazyflie_reports.bag_events import Event
+from crazyflie_reports.bag_events import Event, concerning
 from crazyflie_reports.bag_log import BagLog, Spool
 from crazyflie_reports.bag_topics import POSE_FIELDS
 from crazyflie_reports.flight_record import (
@@ -62,6 +62,7 @@ class Vehicle:
     battery: Rows  #: V.
     link: Rows  #: Fraction of answered pings, and number of setpoints that were not sent so far.
     toggles: Rows  #: Without fields.
+    flight_states: list[tuple[float, int]]  #: Times (s) and states of its flight, as published.
     delays: Rows  #: Time from the stamp of the newest pose to each control (s).
     #: Number of states that were published and not recorded; None without sequence numbers.
     lost: int | None
@@ -88,12 +89,11 @@ def vehicles(log: BagLog) -> Iterator[Vehicle]:
     for namespace in namespaces:
         driver = _driver(log, namespace)
         sources = [each for each in log.sources.values() if each.namespace in (namespace, driver)]
-        link = np.reshape(log.events.links.get(driver, ()), (-1, 3))
         frame = _frame_of(namespace, len(namespaces) == 1, log.frames)
-        yield _vehicle(namespace, sources, frame, log.frames, link)
+        yield _vehicle(namespace, driver, sources, frame, log)
     if not namespaces:
         for name in sorted(each for each in log.frames if _moves(log.frames[each])):
-            yield _vehicle(name, [], name, log.frames, np.empty((0, 3)))
+            yield _vehicle(name, name, [], name, log)
 
 
 def _having(log, *roles):
@@ -120,7 +120,7 @@ def _moves(spool: Spool) -> bool:
     return bool(spool.rows()[:, _FIRST : _FIRST + 3].any())
 
 
-def _vehicle(namespace, sources, frame, frames, link):
+def _vehicle(namespace, driver, sources, frame, log):
     def rows(role, width):
         of_role = [each.spool for each in sources if each.role.name == role]
         # Among several topics, the one with the most messages.
@@ -129,7 +129,7 @@ def _vehicle(namespace, sources, frame, frames, link):
 
     pose = rows("pose", len(POSE_FIELDS))
     if not len(pose) and frame is not None:
-        pose = frames[frame].rows()
+        pose = log.frames[frame].rows()
     state = rows("state", len(STATE_FIELDS))
     lost = _lost(state)
     if not len(state):
@@ -150,7 +150,8 @@ def _vehicle(namespace, sources, frame, frames, link):
         pose_stamps=pose[:, [_TIME, _STAMP]],
         true_pose=_without_header(rows("true_pose", len(POSE_FIELDS))),
         battery=_without_header(rows("battery", 1)),
-        link=link,
+        link=np.reshape(log.events.links.get(driver, ()), (-1, 3)),
+        flight_states=log.events.flight_states.get(namespace, []),
         toggles=_without_header(rows("toggle", 0)),
         delays=_delays(control, state),
         lost=lost,
@@ -239,21 +240,22 @@ class Flight:
         return [[round(e.time - self.start, 3), e.kind.value, e.text, e.count] for e in self.events]
 
 
-def flights(
-    vehicle: Vehicle, states: list[tuple[float, int]], events: list[Event], end: float
-) -> Iterator[Flight]:
-    """Yield the flights of a vehicle, from the events that concern it.
+def flights(log: BagLog) -> Iterator[Flight]:
+    """Yield the flights of a recording; one vehicle's numbers are in memory at a time.
 
-    ``states`` are times (s) and states of its flight, as the takeoff server has published them;
-    without them, the phases follow from in_flight, thrust and height. ``end`` is that of the
-    recording, s.
+    Phases are those of the states that the takeoff server has published; without them, they follow
+    from in_flight, thrust and height.
     """
-    known = _phases(sorted(states), end) if states else _guessed(vehicle)
-    lasting = (phases for phases in known if phases[-1].end > phases[0].start)
-    for number, phases in enumerate(lasting, 1):
-        first, last = phases[0].start - MARGIN, phases[-1].end + MARGIN
-        own = [each for each in events if first <= each.time <= last]
-        yield Flight(vehicle, number, phases, _record(vehicle, phases, first, last), own)
+    names = set(vehicle_namespaces(log))
+    for vehicle in vehicles(log):
+        own = list(concerning(log.events.events, vehicle.namespace, names))
+        states = sorted(vehicle.flight_states)
+        known = _phases(states, log.end) if states else _guessed(vehicle)
+        lasting = (phases for phases in known if phases[-1].end > phases[0].start)
+        for number, phases in enumerate(lasting, 1):
+            first, last = phases[0].start - MARGIN, phases[-1].end + MARGIN
+            events = [each for each in own if first <= each.time <= last]
+            yield Flight(vehicle, number, phases, _record(vehicle, phases, first, last), events)
 
 
 def _phases(states, end):

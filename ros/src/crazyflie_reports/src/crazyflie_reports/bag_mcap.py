@@ -40,7 +40,7 @@ def write(log: BagLog, folder: Path) -> Path:
     connections: dict[str, Any] = {}
     with writer:
         # One vehicle's numbers are in memory at a time; MCAP's index has the order.
-        for messages in (*(_of_vehicle(each, log) for each in vehicles(log)), _events(log)):
+        for messages in (*map(_of_vehicle, vehicles(log)), _events(log)):
             for time, topic, datatype, message in messages:
                 if topic not in connections:
                     known(datatype)
@@ -61,7 +61,7 @@ def _stamp(time):
     return message("builtin_interfaces/Time", sec=seconds, nanosec=nanoseconds)
 
 
-def _of_vehicle(vehicle: Vehicle, log: BagLog) -> Iterator[Timed]:
+def _of_vehicle(vehicle: Vehicle) -> Iterator[Timed]:
     """Yield the messages of a vehicle in the order of their times."""
     top, name = f"/{vehicle.name}", vehicle.name
     yaw = np.nan_to_num(vehicle.state[:, 7:8])
@@ -69,7 +69,6 @@ def _of_vehicle(vehicle: Vehicle, log: BagLog) -> Iterator[Timed]:
     poses = vehicle.attitude
     if not len(poses):
         poses = np.hstack([vehicle.state[:, :4], flat, yaw])
-    states = log.events.flight_states.get(vehicle.namespace, [])
 
     def series(topic, datatype, rows, made):
         return ((row[0], topic, datatype, made(row)) for row in rows)
@@ -85,7 +84,7 @@ def _of_vehicle(vehicle: Vehicle, log: BagLog) -> Iterator[Timed]:
         _references(name, top, vehicle.reference),
         series(f"{top}/control/final", _CONTROL, vehicle.control, partial(_numbers, _CONTROL)),
         series(f"{top}/battery", _BATTERY, vehicle.battery, _voltage),
-        series(f"{top}/in_flight_flight_status", _STATUS, sorted(states), _status),
+        series(f"{top}/in_flight_flight_status", _STATUS, sorted(vehicle.flight_states), _status),
         key=lambda each: each[0],
     )
 

@@ -8,15 +8,13 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from crazyflie_reports import bag_log, bag_mcap, report_page
-from crazyflie_reports.bag_events import concerning
 from crazyflie_reports.bag_file import BagError
-from crazyflie_reports.bag_flights import Flight, flights, vehicle_namespaces, vehicles
+from crazyflie_reports.bag_flights import flights, vehicle_namespaces
 from crazyflie_reports.bag_topics import ROLES
 from crazyflie_reports.figures import Figure, figures
 from crazyflie_reports.usd_log import is_usd_log
@@ -33,16 +31,6 @@ class ReportError(Exception):
     """No recording can be read, or the report cannot be written; the text says why."""
 
 
-def flights_of(log: bag_log.BagLog) -> Iterator[Flight]:
-    """Yield the flights of a recording; one vehicle's numbers are in memory at a time."""
-    names = set(vehicle_namespaces(log))
-    for vehicle in vehicles(log):
-        others = names - {vehicle.namespace, ""}
-        events = list(concerning(log.events.events, vehicle.namespace, others))
-        states = log.events.flight_states.get(vehicle.namespace, [])
-        yield from flights(vehicle, states, events, log.end)
-
-
 class Report:
     """A report on recordings, to which recordings are added."""
 
@@ -54,7 +42,7 @@ class Report:
         """Add the flights of a recording."""
         points = report_page.points_of(len(vehicle_namespaces(log)))
         data = []
-        for flight in flights_of(log):
+        for flight in flights(log):
             found = figures(flight)
             data.append(report_page.flight_data(flight, found, points))
             entry = {

@@ -89,8 +89,7 @@ def lay_over(usd: BagLog, logs: list[BagLog]) -> bool:
     for topic, source in usd.sources.items():
         source.spool.offset = place.offset
         log.sources[f"{name}/{topic}"] = Source(name, source.role, source.spool)
-    if states := log.events.flight_states.get(vehicle.namespace):
-        log.events.flight_states[name] = list(states)
+    log.events.flight_states[name] = list(vehicle.flight_states)
     log.remarks += [
         f"{usd.name} is laid over {vehicle.name}: its time 0 is at {place.offset - log.start:.3f} s"
         f" of the recording, where the attitudes correlate by {place.correlation:.2f}",

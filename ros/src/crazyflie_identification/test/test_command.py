@@ -87,7 +87,7 @@ def test_a_bag_becomes_a_model_that_can_be_flown(bag, vehicle, tmp_path, capsys)
     printed = capsys.readouterr().out
     assert "roll lag" in printed and "+-" in printed and f"model:={out}" in printed
     page = (tmp_path / "mine.html").read_text()
-    assert page.count("<polyline") == 12
+    assert page.count('id="measured ') == page.count('id="predicted ') == 6
     assert "standard errors" in page
     assert "standard_errors" in out.read_text()
     # The controller takes it for its gains.

@@ -1,15 +1,16 @@
 """The page of a fit: figures with their errors, and measured against predicted poses."""
 
 import html
+import io
 import math
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from crazyflie_identification.fit import Fit, fitted, residuals
+from crazyflie_identification.fit import Fit, Recording, fitted, residuals
 from crazyflie_model.quadrotor import QuadrotorParameters
 
-_WIDTH, _HEIGHT, _POINTS = 860, 150, 600
 _AXES = (("x", "m", 1.0), ("y", "m", 1.0), ("z", "m", 1.0),
          ("roll", "deg", 180.0 / math.pi), ("pitch", "deg", 180.0 / math.pi),
          ("yaw", "deg", 180.0 / math.pi))  # fmt: skip
@@ -17,9 +18,7 @@ _AXES = (("x", "m", 1.0), ("y", "m", 1.0), ("z", "m", 1.0),
 _STYLE = """
 body { font: 15px/1.4 sans-serif; max-width: 900px; margin: 2em auto; color: #222; }
 pre { background: #f4f4f4; padding: .8em; }
-svg { background: #fafafa; display: block; margin-bottom: .3em; }
-.measured { stroke: #1f77b4; } .predicted { stroke: #d62728; }
-polyline { fill: none; stroke-width: 1.2; }
+svg { width: 100%; height: auto; }
 """
 
 
@@ -34,11 +33,6 @@ def page(fit: Fit, kind: QuadrotorParameters, title: str) -> str:
         f"<tr><td>{name}</td><td>{factor * a:.4g}</td><td>{factor * b:.4g}</td><td>{unit}</td></tr>"
         for (name, unit, factor), a, b in zip(_AXES, used, unused, strict=True)
     )
-    plots = "".join(
-        f"<h3>{name} ({unit})</h3>"
-        + _plot(part.pose_times, factor * part.poses[:, k], factor * predicted[:, k])
-        for k, (name, unit, factor) in enumerate(_AXES)
-    )
     return (
         f"<!doctype html><html lang='en'><meta charset='utf-8'><title>{html.escape(title)}</title>"
         f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1>"
@@ -49,27 +43,23 @@ def page(fit: Fit, kind: QuadrotorParameters, title: str) -> str:
         "<table border='1' cellpadding='4'>"
         "<tr><th></th><th>used</th><th>not used</th><th></th></tr>"
         f"{rows}</table>"
-        "<h2>The part that was not used</h2><p>Measured blue, predicted red; position, velocity "
-        f"and heading start again every 3 s.</p>{plots}</html>"
+        "<h2>The part that was not used</h2><p>Position, velocity and heading start "
+        f"again every 3 s.</p>{_plots(part, predicted)}</html>"
     )
 
 
-def _plot(times: NDArray[np.float64], *series: NDArray[np.float64]) -> str:
-    low = min(float(each.min()) for each in series)
-    high = max(float(each.max()) for each in series)
-    pad = max(0.05 * (high - low), 1e-6)
-    low, high = low - pad, high + pad
-    every = max(1, len(times) // _POINTS)
-    lines = []
-    for values, kind in zip(series, ("measured", "predicted"), strict=True):
-        x = (times[::every] - times[0]) / (times[-1] - times[0]) * _WIDTH
-        y = (high - values[::every]) / (high - low) * _HEIGHT
-        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
-        lines.append(f"<polyline class='{kind}' points='{points}'/>")
-    seconds = times[-1] - times[0]
-    return (
-        f"<svg width='{_WIDTH}' height='{_HEIGHT + 18}'>{''.join(lines)}"
-        f"<text x='2' y='12' font-size='11'>{high:.3g}</text>"
-        f"<text x='2' y='{_HEIGHT - 2}' font-size='11'>{low:.3g}</text>"
-        f"<text x='{_WIDTH - 40}' y='{_HEIGHT + 14}' font-size='11'>{seconds:.0f} s</text></svg>"
-    )
+def _plots(part: Recording, predicted: NDArray[np.float64]) -> str:
+    """Return measured and predicted poses over time, as SVG."""
+    figure = Figure(figsize=(9.0, 13.0), layout="constrained")
+    seconds = part.pose_times - part.pose_times[0]
+    for k, (axes, (name, unit, factor)) in enumerate(zip(figure.subplots(6), _AXES, strict=True)):
+        for label, poses in (("measured", part.poses), ("predicted", predicted)):
+            curve = factor * poses[:, k]
+            axes.plot(seconds, curve, linewidth=1.0, label=label, gid=f"{label} {name}")
+        axes.set(ylabel=f"{name} ({unit})", xlabel="time (s)")
+        axes.grid(alpha=0.4)
+    figure.axes[0].legend()
+    picture = io.StringIO()
+    figure.savefig(picture, format="svg")
+    # Before it are declarations of a file.
+    return picture.getvalue()[picture.getvalue().index("<svg") :]

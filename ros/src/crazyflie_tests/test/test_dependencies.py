@@ -201,6 +201,12 @@ def test_a_flight_needs_no_other_section(flight):
     nodes, parameters = expand(launch_file, rviz=False, record=True, **arguments)
     for package in {node.package for node in nodes.values()} - own_packages():
         assert owner(SHARE / package / "package.xml") in brought
+    modules = {path.partition(":")[0] for path in composed_nodes(parameters).values()}
+    import_without_others([*programs, *modules], brought)
+
+
+def import_without_others(modules, brought):
+    """Import modules with nothing of Debian but its packages that were brought."""
     # A module that is None in sys.modules is treated as not installed. If Debian's package of a
     # module that is in requirements.txt is not installed either, pip installs it.
     absent = [
@@ -209,12 +215,24 @@ def test_a_flight_needs_no_other_section(flight):
         if (file := debian_file(module)) and owner(file) not in brought
     ]
     assert {"cv2", "llvmlite", "pytest"} <= set(absent)
-    modules = {path.partition(":")[0] for path in composed_nodes(parameters).values()}
     output(
         *(sys.executable, "-c"),
         f"import importlib, sys; sys.modules.update(dict.fromkeys({absent}))\n"
-        f"for name in {[*programs, *modules]}: importlib.import_module(name)",
+        f"for name in {modules}: importlib.import_module(name)",
     )
+
+
+@pytest.mark.parametrize(
+    ("word", "module"),
+    [
+        ("identify", "crazyflie_identification.command"),
+        ("first_flight", "crazyflie_examples.first_flight_program"),
+    ],
+)
+def test_a_word_of_run_installs_what_its_program_needs(word, module):
+    text = (ROS.parent / "run").read_text()
+    sections = re.search(rf'^{word}\(\) {{ start ("[a-z ]+"|\w+) rosrun', text, re.MULTILINE)[1]
+    import_without_others([module], installed_by_the_list(*sections.strip('"').split()))
 
 
 def locked_versions():

@@ -16,6 +16,7 @@ from crazyflie_reports.flight_record import (
     OVERSHOOT_LIMIT,
     TOUCHDOWN_LIMIT,
 )
+from crazyflie_reports.usd_overlay import position
 
 #: Largest distance of a real or virtual vehicle from its hover point, m: motion capture, trim and
 #: propellers are not ideal.
@@ -36,7 +37,7 @@ _ROUNDING = 1e-6  #: Rounding error of a control that was sent in degrees (rad).
 HOVER_LIMITS = (0.85, 1.15)
 #: Largest delay of roll and pitch behind their commands (s): the firmware's loops take 0.19 s.
 LATENESS_LIMIT = 0.25
-_MAX_LATENESS, _LATENESS_STEP, _LEAST_POSES, _LEAST_CORRELATION = 0.5, 0.01, 200, 0.5
+_MAX_LATENESS, _LEAST_POSES, _LEAST_CORRELATION = 0.5, 200, 0.5
 LEAST_VOLTAGE = 3.2  #: Lowest voltage of one lithium polymer cell under load (V).
 
 _LANDING = "a landing on the ground at z = 0"
@@ -192,25 +193,11 @@ def _lateness(flight, start, end):
     NaN without a correlation: without motion, noise exceeds the commands.
     """
     poses = between(flight.vehicle.attitude, start, end)
-    control = flight.record.final_control
-    if len(poses) < _LEAST_POSES or len(control) < 2:
+    commands = between(flight.record.final_control.rows, start, end)
+    if len(poses) < _LEAST_POSES:
         return math.nan
-    times = np.arange(poses[0, 0], poses[-1, 0] - _MAX_LATENESS, _LATENESS_STEP)
-    shifts = np.arange(0.0, _MAX_LATENESS, _LATENESS_STEP)
-    command = _tilts(times, control.times, control.values[:, :2])
-    found = np.zeros(len(shifts))
-    for k, shift in enumerate(shifts):
-        tilt = _tilts(times + shift, poses[:, 0], poses[:, 4:6])
-        spread = np.linalg.norm(command) * np.linalg.norm(tilt)
-        found[k] = (command * tilt).sum() / spread if spread > 0.0 else 0.0
-    best = int(found.argmax())
-    return float(shifts[best]) if found[best] > _LEAST_CORRELATION else math.nan
-
-
-def _tilts(times, known, values):
-    """Return roll and pitch at some times, less their means, shape (n, 2)."""
-    tilts = np.column_stack([np.interp(times, known, column) for column in values.T])
-    return tilts - tilts.mean(axis=0)
+    found = position(commands[:, :3], poses[:, [0, 4, 5]], (0.0, _MAX_LATENESS))
+    return found.offset if found and found.correlation > _LEAST_CORRELATION else math.nan
 
 
 def _loop(flight: Flight) -> Iterator[Figure]:

@@ -1,5 +1,6 @@
 """Finds the place of a micro SD card's log in a recording by its attitudes."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,12 +23,16 @@ class Position:
     correlation: float
 
 
-def position(measured: NDArray[np.float64], recorded: NDArray[np.float64]) -> Position | None:
+def position(
+    measured: NDArray[np.float64],
+    recorded: NDArray[np.float64],
+    limits: tuple[float, float] = (-math.inf, math.inf),
+) -> Position | None:
     """Return the place at which roll and pitch of a log correlate best with those of a recording.
 
-    Both have times (s), roll and pitch (rad), shape (n, 3). None if they never overlap for
-    `LEAST_OVERLAP`. The correlation is that of the common part, with both means removed from the
-    whole; the offset is between two samples by a parabola.
+    Both have times (s), roll and pitch (rad), shape (n, 3); ``limits`` are those of the offset (s).
+    None if they never overlap for `LEAST_OVERLAP`. The correlation is that of the common part, with
+    both means removed from the whole; the offset is between two samples by a parabola.
     """
     a, b = (_resampled(each) for each in (recorded, measured))
     if min(len(a), len(b)) * PERIOD < LEAST_OVERLAP:
@@ -41,15 +46,16 @@ def position(measured: NDArray[np.float64], recorded: NDArray[np.float64]) -> Po
     one_a, one_b = np.ones(len(a)), np.ones(len(b))
     product = correlated(a, b).sum(axis=1)
     energies = correlated((a**2).sum(axis=1), one_b) * correlated(one_a, (b**2).sum(axis=1))
+    offsets = recorded[0, 0] - measured[0, 0] + PERIOD * (np.arange(size) - (len(b) - 1))
     overlaps = np.rint(correlated(one_a, one_b)) * PERIOD >= LEAST_OVERLAP
+    overlaps &= (offsets >= limits[0]) & (offsets <= limits[1])
     shares = np.where(overlaps, product / np.sqrt(np.maximum(energies, 1e-12)), -1.0)
     best = int(shares.argmax())
-    shift = float(best)
+    shift = 0.0
     if 0 < best < size - 1 and overlaps[best - 1] and overlaps[best + 1]:
         before, middle, after = shares[best - 1 : best + 2]
-        shift += 0.5 * (before - after) / min(before - 2.0 * middle + after, -1e-12)
-    start = recorded[0, 0] - measured[0, 0]
-    return Position(start + PERIOD * (shift - (len(b) - 1)), float(shares[best]))
+        shift = 0.5 * (before - after) / min(before - 2.0 * middle + after, -1e-12)
+    return Position(float(offsets[best]) + PERIOD * shift, float(shares[best]))
 
 
 def _resampled(rows):

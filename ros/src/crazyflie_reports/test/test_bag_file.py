@@ -146,7 +146,7 @@ def test_a_definition_in_a_bag_runs_nothing(tmp_path):
     with rosbag.Bag(str(path), "a") as bag:
         bag.write("/battery", Hostile(data=3.7), bags.stamp(5.0))
     (log,) = read(path, tmp_path)
-    assert log.sources["/battery"].spool.rows()[0, -1] == pytest.approx(3.7)
+    assert log.sources["/battery"].rows()[0, -1] == pytest.approx(3.7)
     assert not trace.exists()
 
 

@@ -97,7 +97,7 @@ def vehicles(log: BagLog) -> Iterator[Vehicle]:
 
 
 def _having(log, *roles):
-    return {each.namespace for each in log.sources.values() if each.role.name in roles}
+    return {each.namespace for each in log.sources.values() if each.role in roles}
 
 
 def _driver(log, namespace):
@@ -122,7 +122,7 @@ def _moves(spool: Spool) -> bool:
 
 def _vehicle(namespace, driver, sources, frame, log):
     def rows(role, width):
-        of_role = [each.spool for each in sources if each.role.name == role]
+        of_role = [each for each in sources if each.role == role]
         # Among several topics, the one with the most messages.
         longest = max(of_role, key=lambda spool: spool.count, default=None)
         return longest.rows() if longest else np.empty((0, _FIRST + width))
@@ -135,7 +135,7 @@ def _vehicle(namespace, driver, sources, frame, log):
     if not len(state):
         state = _states_of(pose)
     control, cmd_vel = (rows(role, len(CONTROL_FIELDS)) for role in ("final_control", "cmd_vel"))
-    is_driven = len(cmd_vel) > 0 or any(each.role.name == "battery" for each in sources)
+    is_driven = len(cmd_vel) > 0 or any(each.role == "battery" for each in sources)
     control = control if len(control) else cmd_vel
     return Vehicle(
         name=namespace or frame or "vehicle",

@@ -14,7 +14,6 @@ from crazyflie_reports.bag_file import BagError, BagFile, Connection, TopicError
 from crazyflie_reports.bag_ros2 import SUFFIXES, Ros2BagFile
 from crazyflie_reports.bag_topics import (
     POSE_FIELDS,
-    Role,
     Topic,
     expected,
     placed,
@@ -41,8 +40,10 @@ class Spool:
     sequence; then it has ``fields``. The file is made when it is needed.
     """
 
-    def __init__(self, path: Path, fields: tuple[str, ...]):
-        self._path, self.fields = path, fields
+    def __init__(self, path: Path, fields: tuple[str, ...], namespace: str = "", role: str = ""):
+        self._path, self._width = path, len(fields)
+        #: namespace, role: Vehicle and name of the role; empty for a frame.
+        self.namespace, self.role = namespace, role
         self._buffer = array("d")
         self.count = 0  #: Number of rows.
         self.offset = 0.0  #: Offset that is added to the times of recording (s).
@@ -64,7 +65,7 @@ class Spool:
     def rows(self) -> NDArray[np.float64]:
         """Return all rows in the order of their times, shape (count, 3 + len(fields))."""
         self._flush()
-        rows = np.fromfile(self._path).reshape(-1, 3 + len(self.fields))
+        rows = np.fromfile(self._path).reshape(-1, 3 + self._width)
         rows[:, 0] += self.offset
         # Merged bags may be in another order.
         is_sorted = (np.diff(rows[:, 0]) >= 0.0).all()
@@ -72,20 +73,11 @@ class Spool:
 
 
 @dataclass
-class Source:
-    """The series of a topic."""
-
-    namespace: str
-    role: Role
-    spool: Spool
-
-
-@dataclass
 class BagLog:
     """The contents of a recording that a report needs."""
 
     name: str  #: Name of the recording.
-    sources: dict[str, Source] = field(default_factory=dict)  #: By topic.
+    sources: dict[str, Spool] = field(default_factory=dict)  #: By topic.
     frames: dict[str, Spool] = field(default_factory=dict)  #: `POSE_FIELDS` by child frame of /tf.
     events: EventLog = field(default_factory=EventLog)
     #: start, end: Times of the first and the last message that was read, s.
@@ -195,8 +187,10 @@ class _Reader:
         log.start, log.end = min(log.start, time), max(log.end, time)
         try:
             stamp, number, content = topic.decode(data)
-            if topic.role is not None:
-                self._spool(connection.topic, topic).append(time, stamp, number, content)
+            if (role := topic.role) is not None:
+                owner = topic.namespace, role.name
+                spool = self._spool(log.sources, connection.topic, role.fields, *owner)
+                spool.append(time, stamp, number, content)
             elif hasattr(content, "transforms") or hasattr(content, "poses"):
                 self._add_transforms(time, content)
             else:
@@ -213,25 +207,17 @@ class _Reader:
         if dropped := sum(each.events.dropped for each in self.logs):
             yield f"{dropped} more events are left out"
 
-    def _spool(self, name, topic):
-        sources = self.logs[-1].sources
-        if name not in sources:
-            spool = self._new_spool(topic.role.fields)
-            sources[name] = Source(topic.namespace, topic.role, spool)
-        return sources[name].spool
-
     def _add_transforms(self, time, message):
         for frame, stamp, row in _poses_of(message):
-            frames = self.logs[-1].frames
-            if frame not in frames:
-                frames[frame] = self._new_spool(POSE_FIELDS)
-            spool = frames[frame]
+            spool = self._spool(self.logs[-1].frames, frame, POSE_FIELDS)
             if time - spool.last_time >= POSE_PERIOD:
                 spool.append(time, seconds(stamp), 0, row)
 
-    def _new_spool(self, fields):
-        number = sum(len(each.sources) + len(each.frames) for each in self.logs)
-        return Spool(self._folder / f"{number}.doubles", fields)
+    def _spool(self, spools, key, fields, *owner):
+        if key not in spools:
+            number = sum(len(each.sources) + len(each.frames) for each in self.logs)
+            spools[key] = Spool(self._folder / f"{number}.doubles", fields, *owner)
+        return spools[key]
 
 
 def _poses_of(message):

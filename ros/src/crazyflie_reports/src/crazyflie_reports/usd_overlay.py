@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from crazyflie_model.angles import quaternion_from_rpy, zyx_from_quaternion
 from crazyflie_reports.bag_flights import Vehicle, vehicles
-from crazyflie_reports.bag_log import BagLog, Source
+from crazyflie_reports.bag_log import BagLog
 
 PERIOD = 0.01  #: Sampling period of the attitudes that are compared (s).
 LEAST_OVERLAP = 3.0  #: Shortest time that a log and a recording have in common (s).
@@ -92,9 +92,9 @@ def lay_over(usd: BagLog, logs: list[BagLog]) -> bool:
         return False
     place, log, vehicle = best
     name = f"{vehicle.name} {usd.name}"
-    for topic, source in usd.sources.items():
-        source.spool.offset = place.offset
-        log.sources[f"{name}/{topic}"] = Source(name, source.role, source.spool)
+    for topic, spool in usd.sources.items():
+        spool.offset, spool.namespace = place.offset, name
+        log.sources[f"{name}/{topic}"] = spool
     log.events.flight_states[name] = list(vehicle.flight_states)
     log.remarks += [
         f"{usd.name} is laid over {vehicle.name}: its time 0 is at {place.offset - log.start:.3f} s"

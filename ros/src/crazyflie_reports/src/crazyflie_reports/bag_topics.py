@@ -78,7 +78,11 @@ _CONTROLS: dict[str, Callable[[Any], Row]] = {"crazyflie_msgs/ControlStamped": t
 _POSES: dict[str, Callable[[Any], Row]] = {
     "geometry_msgs/PoseStamped": lambda message: pose_row(message.pose)
 }
+_STATUS: dict[str, Callable[[Any], Row]] = {
+    "crazyflie_interfaces/Status": lambda message: (message.battery_voltage,)
+}
 
+#: The types of crazyflie_interfaces, and cmd_vel_legacy, are those of crazyswarm2, in ROS 2.
 ROLES = (
     Role("state", "state", STATE_FIELDS, _STATES),
     Role("reference", "ref|ref/position_velocity_yaw", STATE_FIELDS, _STATES),
@@ -90,14 +94,17 @@ ROLES = (
             "geometry_msgs/PoseStamped": _at_rest_at_pose,
             "crazyflie_driver/FullState": _of_full_state,
             "crazyflie_driver/Position": _of_position,
+            "crazyflie_interfaces/FullState": _of_full_state,
+            "crazyflie_interfaces/Position": _of_position,
         },
     ),
     Role("final_control", "control/final", CONTROL_FIELDS, _CONTROLS),
-    Role("cmd_vel", "cmd_vel", CONTROL_FIELDS, {"geometry_msgs/Twist": _of_cmd_vel}),
+    Role("cmd_vel", "cmd_vel|cmd_vel_legacy", CONTROL_FIELDS, {"geometry_msgs/Twist": _of_cmd_vel}),
     Role("pose", "pose", POSE_FIELDS, _POSES),
     # A virtual vehicle publishes it.
     Role("true_pose", "true_pose", POSE_FIELDS, _POSES),
     Role("battery", "battery", ("voltage",), {"std_msgs/Float32": lambda m: (m.data,)}),
+    Role("battery", "status", ("voltage",), _STATUS),
     Role("toggle", "in_flight", (), {"std_msgs/Empty": lambda message: ()}),
 )
 
@@ -108,9 +115,11 @@ EVENT_TYPES = {
     "crazyflie_msgs/VehicleStatus": r"vehicle_status",
     "dynamic_reconfigure/Config": r".+/parameter_updates",
     "rosgraph_msgs/Log": r"rosout",
+    "rcl_interfaces/Log": r"rosout",
     "diagnostic_msgs/DiagnosticArray": r"diagnostics",
     "tf2_msgs/TFMessage": r"tf",
     "tf/tfMessage": r"tf",
+    "motion_capture_tracking_interfaces/NamedPoseArray": r"poses",
 }
 
 #: Counts of numbers behind the header: these frequent messages are decoded without an object.
@@ -119,29 +128,6 @@ FLOATS = {
     "crazyflie_msgs/PositionVelocityStateStamped": 6,
     "crazyflie_msgs/PositionVelocityYawStateStamped": 7,
     "crazyflie_msgs/FullStateStamped": 12,
-}
-
-_STATUS: dict[str, Callable[[Any], Row]] = {
-    "crazyflie_interfaces/Status": lambda message: (message.battery_voltage,)
-}
-
-#: Roles of ROS 2 only: those of crazyswarm2.
-_ROS2_ROLES = (
-    Role(
-        "reference",
-        "cmd_full_state|cmd_position",
-        STATE_FIELDS,
-        {
-            "crazyflie_interfaces/FullState": _of_full_state,
-            "crazyflie_interfaces/Position": _of_position,
-        },
-    ),
-    Role("cmd_vel", "cmd_vel_legacy", CONTROL_FIELDS, {"geometry_msgs/Twist": _of_cmd_vel}),
-    Role("battery", "status", ("voltage",), _STATUS),
-)
-_ROS2_EVENT_TYPES = {
-    "rcl_interfaces/Log": r"rosout",
-    "motion_capture_tracking_interfaces/NamedPoseArray": r"poses",
 }
 
 _HEADER = struct.Struct("<III")
@@ -163,15 +149,13 @@ def topic_of(connection: Connection, names: dict[str, str]) -> Topic | None:
 
     For ``names`` see `bag_log.read`. `TopicError`: its type is not defined here, or differently.
     """
-    is_ros2 = connection.encoding == "cdr"
-    events = EVENT_TYPES | (_ROS2_EVENT_TYPES if is_ros2 else {})
-    for role in (*ROLES, *_ROS2_ROLES) if is_ros2 else ROLES:
+    for role in ROLES:
         namespace = _namespace(connection.topic, names.get(role.name, role.topics))
         if namespace is not None and connection.datatype in role.rows:
             row = role.rows[connection.datatype]
             return Topic(namespace, role, _decoder(connection, row))
-    if connection.datatype in events:
-        namespace = _namespace(connection.topic, events[connection.datatype])
+    if connection.datatype in EVENT_TYPES:
+        namespace = _namespace(connection.topic, EVENT_TYPES[connection.datatype])
         if namespace is not None:
             return Topic(namespace, None, _decoder(connection, lambda message: message))
     return None

@@ -1,6 +1,5 @@
 """Results of a Monte-Carlo run: flights within limits, worst case, sensitivities."""
 
-import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,14 +103,10 @@ def table(found: Findings) -> str:
 
 def write_csv(found: Findings, path: Path) -> None:
     """Write a row for each flight."""
-    columns = {**found.values, **found.outcomes, "is_within": found.is_within.astype(float)}
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["flight", *columns])
-        rows = zip(*(part.tolist() for part in columns.values()), strict=True)
-        writer.writerows(
-            [number, *(f"{value:.9g}" for value in row)] for number, row in enumerate(rows)
-        )
+    columns = {**found.values, **found.outcomes, "is_within": found.is_within}
+    rows = np.column_stack([np.arange(len(found.is_within)), *columns.values()])
+    header = ",".join(["flight", *columns])
+    np.savetxt(path, rows, "%.9g", ",", "\r\n", header, comments="")
 
 
 def _correlation(a, b):

@@ -36,7 +36,7 @@ def decoded(picture):
     ("encoding", "kind"),
     [
         *(("mono8", np.uint8), ("8UC1", np.uint8), ("mono16", np.uint16), ("16UC1", ">u2")),
-        ("32FC1", np.float32),
+        *(("32FC1", np.float32), ("32FC1", ">f4")),
     ],
 )
 @pytest.mark.parametrize("width", [64, 1280])
@@ -50,7 +50,11 @@ def test_one_channel_of_any_size_is_the_picture_that_it_was(encoding, kind, widt
 
 
 @pytest.mark.parametrize(
-    ("encoding", "order"), [("rgb8", [2, 1, 0]), ("bgr8", [0, 1, 2]), ("bgra8", [0, 1, 2, 3])]
+    ("encoding", "order"),
+    [
+        *(("rgb8", [2, 1, 0]), ("rgba8", [2, 1, 0, 3])),
+        *(("bgr8", [0, 1, 2]), ("bgra8", [0, 1, 2, 3]), ("8UC3", [0, 1, 2])),
+    ],
 )
 def test_colors_are_in_their_order(encoding, order):
     blue, green, red = 200, 100, 20
@@ -66,6 +70,8 @@ def test_what_cannot_be_shown_is_reported():
     short.data = short.data[:-1]
     with pytest.raises(ValueError, match="15 bytes for 4 rows of 4; expected 16"):
         encoded(short)
+    with pytest.raises(ValueError, match="4 x 70000 pixels cannot be encoded as JPEG"):
+        encoded(message(np.zeros((70000, 4), np.uint8), "mono8"))
 
 
 class Later:

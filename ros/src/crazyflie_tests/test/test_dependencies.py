@@ -227,12 +227,16 @@ def import_without_others(modules, brought):
     [
         ("identify", "crazyflie_identification.command"),
         ("first_flight", "crazyflie_examples.first_flight_program"),
+        ("fly", "crazyflie_dashboard.page"),
     ],
 )
 def test_a_word_of_run_installs_what_its_program_needs(word, module):
     text = (ROS.parent / "run").read_text()
-    sections = re.search(rf'^{word}\(\) {{ start ("[a-z ]+"|\w+) rosrun', text, re.MULTILINE)[1]
-    import_without_others([module], installed_by_the_list(*sections.strip('"').split()))
+    names = "|".join(package_sections("debian.txt"))
+    sections = re.search(
+        rf'^{word}\(\) {{\s+(?:start|ready) "?((?:(?:{names}) ?)+)', text, re.MULTILINE
+    )
+    import_without_others([module], installed_by_the_list(*sections[1].split()))
 
 
 def locked_versions():

@@ -1,24 +1,26 @@
 """Converts pictures of cameras to formats that a browser shows."""
 
+import io
 from typing import Any
 
-import cv2
 import numpy as np
+from PIL import Image
 
 _MAX_WIDTH = 640  #: Largest picture; larger ones are reduced (pixels).
 _QUALITY = 80  #: Quality of JPEG (%).
 
-#: Encoding of sensor_msgs/Image -> type of a number, and indices of blue, green and red; a single
-#: channel of more than a byte is scaled to its range.
-_ENCODINGS: dict[str, tuple[str, list[int]]] = {
-    "bgr8": ("u1", [0, 1, 2]),
-    "bgra8": ("u1", [0, 1, 2, 3]),
-    "rgb8": ("u1", [2, 1, 0]),
-    "rgba8": ("u1", [2, 1, 0, 3]),
-    "8UC3": ("u1", [0, 1, 2]),
-    **dict.fromkeys(("mono8", "8UC1"), ("u1", [0])),
-    **dict.fromkeys(("mono16", "16UC1"), ("u2", [0])),
-    "32FC1": ("f4", [0]),
+#: Encoding of sensor_msgs/Image -> Pillow's modes of the picture and of the data, whose order of
+#: bytes is filled in, and bytes of a pixel; a single channel of more than a byte is scaled to its
+#: range.
+_ENCODINGS: dict[str, tuple[str, str, int]] = {
+    "bgr8": ("RGB", "BGR", 3),
+    "bgra8": ("RGB", "BGRX", 4),
+    "rgb8": ("RGB", "RGB", 3),
+    "rgba8": ("RGB", "RGBX", 4),
+    "8UC3": ("RGB", "BGR", 3),
+    **dict.fromkeys(("mono8", "8UC1"), ("L", "L", 1)),
+    **dict.fromkeys(("mono16", "16UC1"), ("F", "F;16{}", 2)),
+    "32FC1": ("F", "F;32{}F", 4),
 }
 
 
@@ -40,29 +42,26 @@ def encoded(message: Any) -> bytes:
         raise ValueError(
             f"its encoding is {message.encoding}; expected one of {', '.join(_ENCODINGS)}"
         )
-    kind, order = _ENCODINGS[message.encoding]
-    number = np.dtype(kind).newbyteorder(">" if message.is_bigendian else "<")
+    mode, pixel, size = _ENCODINGS[message.encoding]
     height, width, step = message.height, message.width, message.step
-    row = width * len(order) * number.itemsize
-    if len(message.data) < height * step or step < row or not height * width:
+    if len(message.data) < height * step or step < width * size or not height * width:
         raise ValueError(
             f"it has {len(message.data)} bytes for {height} rows of {width}; expected "
-            f"{height * max(step, row)}, and some"
+            f"{height * max(step, width * size)}, and some"
         )
-    rows = np.frombuffer(message.data, np.uint8, height * step).reshape(height, step)[:, :row]
-    picture: Any = np.ascontiguousarray(rows).view(number).reshape(height, width, len(order))
-    picture = picture[..., order[:3]]
-    scale = _MAX_WIDTH / width
-    if scale < 1.0:
-        size = (_MAX_WIDTH, max(1, round(height * scale)))
-        native = picture.astype(number.newbyteorder("="), copy=False)
-        picture = cv2.resize(native, size, interpolation=cv2.INTER_AREA)
-    if number.itemsize > 1:
-        picture = _in_bytes(picture.astype(float))
-    is_done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    if not is_done:
-        raise ValueError(f"{width} x {height} pixels cannot be encoded as JPEG")
-    return data.tobytes()
+    pixel = pixel.format("B" if message.is_bigendian else "")
+    picture = Image.frombytes(mode, (width, height), message.data, "raw", pixel, step)
+    if width > _MAX_WIDTH:
+        height = max(1, round(height * _MAX_WIDTH / width))
+        picture = picture.resize((_MAX_WIDTH, height), Image.Resampling.BOX)
+    if mode == "F":
+        picture = Image.fromarray(_in_bytes(np.asarray(picture)))
+    file = io.BytesIO()
+    try:
+        picture.save(file, "JPEG", quality=_QUALITY)
+    except OSError:
+        raise ValueError(f"{width} x {height} pixels cannot be encoded as JPEG") from None
+    return file.getvalue()
 
 
 def _in_bytes(numbers):

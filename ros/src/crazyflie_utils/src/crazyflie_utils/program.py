@@ -21,7 +21,7 @@ PACKAGES = {
     "natnet": ("demo", "natnet"),
     "nicegui": ("dashboard", "nicegui"),
     "numpy": ("demo", "python3-numpy"),
-    "PIL": ("rviz", "python3-pil"),
+    "PIL": ("dashboard", "python3-pil"),
     "pytest": ("tests", "python3-pytest"),
     "rosbags": ("demo", "rosbags"),
     "scipy": ("vehicles", "python3-scipy"),

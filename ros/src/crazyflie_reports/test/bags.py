@@ -162,7 +162,7 @@ def flight_bag(path, compression="none", **options):
 
 @contextlib.contextmanager
 def ros2_bag(folder, storage=StoragePlugin.MCAP, compression=None, definitions=None):
-    """Yield a function that writes topic, type ("package/Name"), message and time of the flight.
+    """Yield a function that writes topic, type ("package/Name"), fields and time of the flight.
 
     ``compression``: mode and format; ``definitions``: by type, other ones than the messages have.
     """
@@ -172,7 +172,7 @@ def ros2_bag(folder, storage=StoragePlugin.MCAP, compression=None, definitions=N
     connections = {}
     with writer:
 
-        def write(topic, datatype, message, time):
+        def write(topic, datatype, fields, time):
             name = bag_ros2.ros2_name(datatype)
             if topic not in connections:
                 other = (
@@ -181,45 +181,37 @@ def ros2_bag(folder, storage=StoragePlugin.MCAP, compression=None, definitions=N
                     else {"typestore": bag_ros2.types()}
                 )
                 connections[topic] = writer.add_connection(topic, name, **other)
-            data = bag_ros2.types().serialize_cdr(message, name)
+            data = bag_ros2.types().serialize_cdr(bag_ros2.message(datatype, fields), name)
             writer.write(connections[topic], round((START + time) * 1e9), data)
 
         yield write
 
 
 def ros2_header(time, frame=""):
-    """Return a header of ROS 2."""
-    stamp = bag_ros2.message("builtin_interfaces/Time", sec=int(START + time))
-    return bag_ros2.message("std_msgs/Header", stamp=stamp, frame_id=frame)
+    """Return the fields of a header of ROS 2."""
+    return (int(START + time), 0), frame
 
 
 def ros2_pose(z):
-    """Return a pose of ROS 2 at a height (m)."""
-    pose = bag_ros2.message("geometry_msgs/Pose")
-    pose.position.z, pose.orientation.w = z, 1.0
-    return pose
+    """Return the fields of a pose of ROS 2 at a height (m)."""
+    return (0.0, 0.0, z), (0.0, 0.0, 0.0, 1.0)
 
 
 def write_crazyswarm2(write, name="cf1", poses="pose", end=END):
     """Write what crazyswarm2 has of the flight; poses on "pose" or on motion capture's "poses"."""
-    message = bag_ros2.message
     for _, time in steps():
         if time > end:
             break
         z, _ = height(time)
         if poses == "pose":
-            pose = message("geometry_msgs/PoseStamped", header=ros2_header(time), pose=ros2_pose(z))
+            pose = ros2_header(time), ros2_pose(z)
             write(f"/{name}/pose", "geometry_msgs/PoseStamped", pose, time)
         else:
-            mocap = "motion_capture_tracking_interfaces"
-            body = message(f"{mocap}/NamedPose", name=name, pose=ros2_pose(z))
-            array = message(f"{mocap}/NamedPoseArray", header=ros2_header(time), poses=[body])
-            write("/poses", f"{mocap}/NamedPoseArray", array, time)
-    goal = message(
-        "crazyflie_interfaces/FullState", header=ros2_header(TAKEOFF), pose=ros2_pose(1.0)
-    )
+            mocap = "motion_capture_tracking_interfaces/NamedPoseArray"
+            write("/poses", mocap, (ros2_header(time), [(name, ros2_pose(z))]), time)
+    goal = ros2_header(TAKEOFF), ros2_pose(1.0)
     write(f"/{name}/cmd_full_state", "crazyflie_interfaces/FullState", goal, TAKEOFF)
-    status = message("crazyflie_interfaces/Status", battery_voltage=3.9)
+    status = {"battery_voltage": 3.9}
     write(f"/{name}/status", "crazyflie_interfaces/Status", status, 5.0)
-    line = message("rcl_interfaces/Log", level=30, name=f"{name}.link", msg="latency is high")
+    line = {"level": 30, "name": f"{name}.link", "msg": "latency is high"}
     write("/rosout", "rcl_interfaces/Log", line, 6.0)

@@ -68,7 +68,7 @@ def test_a_definition_in_a_bag_runs_nothing(tmp_path, monkeypatch, storage):
     text = f"float32 data\nfloat32 X={code}\nuint8 y[{code}]\n"
     with bags.ros2_bag(tmp_path / "a", storage, None, {"std_msgs/Float32": text}) as write:
         bags.write_crazyswarm2(write)
-        write("/cf1/battery", "std_msgs/Float32", bag_ros2.message("std_msgs/Float32"), 5.0)
+        write("/cf1/battery", "std_msgs/Float32", (), 5.0)
     registered = []
     monkeypatch.setattr(
         type(bag_ros2.types()), "register", lambda self, each: registered.append(each)

@@ -17,7 +17,7 @@ from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_reports.bag_events import Kind
 from crazyflie_reports.bag_flights import Vehicle, vehicles
 from crazyflie_reports.bag_log import BagLog
-from crazyflie_reports.bag_ros2 import known, message, ros2_name, types
+from crazyflie_reports.bag_ros2 import message, ros2_name, types
 
 FIXED = "world"  #: The frame of positions.
 
@@ -25,12 +25,12 @@ ARM, ROTOR = 0.046, 0.023  #: Half of the diagonal of a Crazyflie, radius of a p
 PATH_POINTS = 2000  #: Points of a path's marker.
 
 _STATE, _CONTROL = "crazyflie_msgs/PositionVelocityYawStateStamped", "crazyflie_msgs/ControlStamped"
-_STATUS, _BATTERY = "crazyflie_msgs/FlightStatus", "std_msgs/Float32"
+_STATUS = "crazyflie_msgs/FlightStatus"
 _LINE_STRIP, _LINE_LIST, _SPHERE, _CYLINDER, _TEXT = 4, 5, 2, 3, 9  # Types of a Marker.
 _WARN, _ERROR = 30, 40  # Levels of a Log.
 _ERRORS = (Kind.ERROR, Kind.EMERGENCY)
 
-Timed = tuple[float, str, str, Any]  # Time (s), topic, type, message.
+Timed = tuple[float, str, str, Any]  # Time (s), topic, type, fields as `bag_ros2.message` has them.
 
 
 def write(log: BagLog, folder: Path) -> Path:
@@ -41,24 +41,21 @@ def write(log: BagLog, folder: Path) -> Path:
     with writer:
         # One vehicle's numbers are in memory at a time; MCAP's index has the order.
         for messages in (*map(_of_vehicle, vehicles(log)), _events(log)):
-            for time, topic, datatype, message in messages:
+            for time, topic, datatype, fields in messages:
+                name = ros2_name(datatype)
+                data = types().serialize_cdr(message(datatype, fields), name)
                 if topic not in connections:
-                    known(datatype)
-                    connections[topic] = writer.add_connection(
-                        topic, ros2_name(datatype), typestore=types()
-                    )
-                data = types().serialize_cdr(message, ros2_name(datatype))
+                    connections[topic] = writer.add_connection(topic, name, typestore=types())
                 writer.write(connections[topic], round(time * 1e9), data)
     return folder / f"{folder.name}.mcap"
 
 
 def _header(time, frame=FIXED):
-    return message("std_msgs/Header", stamp=_stamp(time), frame_id=frame)
+    return _stamp(time), frame
 
 
 def _stamp(time):
-    seconds, nanoseconds = divmod(round(time * 1e9), 10**9)
-    return message("builtin_interfaces/Time", sec=seconds, nanosec=nanoseconds)
+    return divmod(round(time * 1e9), 10**9)
 
 
 def _of_vehicle(vehicle: Vehicle) -> Iterator[Timed]:
@@ -73,84 +70,48 @@ def _of_vehicle(vehicle: Vehicle) -> Iterator[Timed]:
     def series(topic, datatype, rows, made):
         return ((row[0], topic, datatype, made(row)) for row in rows)
 
+    def numbers(row):
+        return _header(row[0]), row[1:]
+
+    def status(row):
+        return {"header": _header(row[0]), "state": row[1]}
+
     yield from _model(name, top, poses)
     yield from heapq.merge(
         series("/tf", "tf2_msgs/TFMessage", poses, partial(_transform, name)),
         (
-            (row[0], f"{top}/state", _STATE, _numbers(_STATE, row, stamp))
+            (row[0], f"{top}/state", _STATE, (_header(stamp), row[1:]))
             for row, (_, stamp) in zip(vehicle.state, vehicle.stamps, strict=True)
         ),
-        series(f"{top}/ref", _STATE, vehicle.reference, partial(_numbers, _STATE)),
+        series(f"{top}/ref", _STATE, vehicle.reference, numbers),
         _references(name, top, vehicle.reference),
-        series(f"{top}/control/final", _CONTROL, vehicle.control, partial(_numbers, _CONTROL)),
-        series(f"{top}/battery", _BATTERY, vehicle.battery, _voltage),
-        series(f"{top}/in_flight_flight_status", _STATUS, sorted(vehicle.flight_states), _status),
+        series(f"{top}/control/final", _CONTROL, vehicle.control, numbers),
+        series(f"{top}/battery", "std_msgs/Float32", vehicle.battery, lambda row: row[1:]),
+        series(f"{top}/in_flight_flight_status", _STATUS, sorted(vehicle.flight_states), status),
         key=lambda each: each[0],
     )
 
 
-def _voltage(row):
-    return message(_BATTERY, data=row[1])
-
-
-def _status(row):
-    return message(_STATUS, header=_header(row[0]), state=row[1])
-
-
-def _numbers(datatype, row, stamp=None):
-    """Return a message of a header, with a stamp or the row's time (s), and one of numbers."""
-    known(datatype)
-    _, (field, kind) = types().fielddefs[ros2_name(datatype)][1]
-    inner = types().types[kind[1]](*(float(each) for each in row[1:]))
-    return message(
-        datatype, **{"header": _header(row[0] if stamp is None else stamp), field: inner}
-    )
-
-
 def _transform(name, row):
-    x, y, z, w = quaternion_from_rpy(*row[4:7])
-    transform = message(
-        "geometry_msgs/Transform",
-        translation=_vector("Vector3", row[1:4]),
-        rotation=message("geometry_msgs/Quaternion", x=x, y=y, z=z, w=w),
-    )
-    stamped = message(
-        "geometry_msgs/TransformStamped",
-        header=_header(row[0]),
-        child_frame_id=name,
-        transform=transform,
-    )
-    return message("tf2_msgs/TFMessage", transforms=[stamped])
-
-
-def _vector(kind, numbers):
-    x, y, z = (float(each) for each in numbers)
-    return message(f"geometry_msgs/{kind}", x=x, y=y, z=z)
+    transform = row[1:4], quaternion_from_rpy(*row[4:7])
+    return ([(_header(row[0]), name, transform)],)
 
 
 def _marker(time, name, kind, size, color, frame=FIXED, place=(0.0, 0.0, 0.0), **fields):
-    red, green, blue = color
-    return message(
-        "visualization_msgs/Marker",
-        header=_header(time, frame),
-        ns=name,
-        type=kind,
-        pose=message(
-            "geometry_msgs/Pose",
-            position=_vector("Point", place),
-            orientation=message("geometry_msgs/Quaternion", w=1.0),
-        ),
-        scale=_vector("Vector3", size),
-        color=message("std_msgs/ColorRGBA", r=red, g=green, b=blue, a=1.0),
+    return {
+        "header": _header(time, frame),
+        "ns": name,
+        "type": kind,
+        "pose": (place, (0.0, 0.0, 0.0, 1.0)),
+        "scale": size,
+        "color": (*color, 1.0),
         **fields,
-    )
+    }
 
 
 def _markers(time, topic, markers):
-    for number, marker in enumerate(markers):
-        marker.id = number
-    array = message("visualization_msgs/MarkerArray", markers=list(markers))
-    return time, topic, "visualization_msgs/MarkerArray", array
+    array = [{**marker, "id": number} for number, marker in enumerate(markers)]
+    return time, topic, "visualization_msgs/MarkerArray", (array,)
 
 
 def _model(name: str, top: str, poses: np.ndarray) -> Iterator[Timed]:
@@ -160,7 +121,7 @@ def _model(name: str, top: str, poses: np.ndarray) -> Iterator[Timed]:
     time, edge = float(poses[0, 0]), ARM / math.sqrt(2.0)
     ends = [(a * edge, b * edge, 0.0) for a in (1, -1) for b in (1, -1)]
     dark, light, blue = (0.1, 0.13, 0.19), (0.6, 0.64, 0.7), (0.0, 0.45, 0.7)
-    arms = [_vector("Point", point) for end in ends for point in ((0.0, 0.0, 0.0), end)]
+    arms = [point for end in ends for point in ((0.0, 0.0, 0.0), end)]
     own = {"frame": name, "frame_locked": True}
     marker = partial(_marker, time, name)
     parts = [marker(_LINE_LIST, (0.006, 0.0, 0.0), dark, points=arms, **own)]
@@ -170,8 +131,8 @@ def _model(name: str, top: str, poses: np.ndarray) -> Iterator[Timed]:
         parts.append(marker(_CYLINDER, (2 * ROTOR, 2 * ROTOR, 0.004), color, place=place, **own))
     parts.append(marker(_TEXT, (0.0, 0.0, 0.05), dark, place=(0, 0, 0.08), text=name, **own))
     yield _markers(time, f"{top}/model", parts)
-    path = [_vector("Point", row[1:4]) for row in poses[:: 1 + len(poses) // PATH_POINTS]]
-    line = marker(_LINE_STRIP, (0.005, 0.0, 0.0), blue, points=path)
+    path = poses[:: 1 + len(poses) // PATH_POINTS, 1:4]
+    line = marker(_LINE_STRIP, (0.005, 0.0, 0.0), blue, points=list(path))
     yield _markers(time, f"{top}/path", [line])
 
 
@@ -186,11 +147,10 @@ def _references(name, top, rows):
 def _events(log: BagLog) -> Iterator[Timed]:
     """Yield the recording's events as lines of a log."""
     for event in log.events.events:
-        line = message(
-            "rcl_interfaces/Log",
-            stamp=_stamp(event.time),
-            level=_ERROR if event.kind in _ERRORS else _WARN,
-            name=event.namespace or "flight",
-            msg=f"{event.kind.value}: {event.text}",
-        )
+        line = {
+            "stamp": _stamp(event.time),
+            "level": _ERROR if event.kind in _ERRORS else _WARN,
+            "name": event.namespace or "flight",
+            "msg": f"{event.kind.value}: {event.text}",
+        }
         yield event.time, "/rosout", "rcl_interfaces/Log", line

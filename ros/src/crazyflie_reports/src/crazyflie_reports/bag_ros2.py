@@ -92,24 +92,36 @@ def ros2_name(datatype: str) -> str:
     return f"{package}/msg/{name}"
 
 
-def message(datatype: str, **fields: Any) -> Any:
-    """Return a message of ROS 2 with some fields; the others are 0 or empty."""
+def message(datatype: str, fields: Any = ()) -> Any:
+    """Return a message of ROS 2 with some fields, by name or in their order; others are 0 or empty.
+
+    A message in a field is given by its fields, too.
+    """
+    message_type, kinds = _type(datatype)
+    given = fields if isinstance(fields, dict) else dict(zip(kinds, fields, strict=False))
+    values = dict.fromkeys(kinds) | given
+    return message_type(**{field: _value(kinds[field], value) for field, value in values.items()})
+
+
+@cache
+def _type(datatype):
     if not known(datatype):
         raise KeyError(datatype)
     name = ros2_name(datatype)
-    kinds = types().fielddefs[name][1]
-    values = {field: _zero(kind) for field, kind in kinds if field not in fields}
-    return types().types[name](**values, **fields)
+    return types().types[name], dict(types().fielddefs[name][1])
 
 
-def _zero(kind):
+def _value(kind, given):
     if kind[0] == Nodetype.NAME:
-        return message(kind[1].replace("/msg/", "/"))
+        return message(kind[1].replace("/msg/", "/"), () if given is None else given)
     if kind[0] == Nodetype.BASE:
-        return "" if kind[1][0] == "string" else False if kind[1][0] == "bool" else 0
+        zero = "" if kind[1][0] == "string" else False if kind[1][0] == "bool" else 0
+        return zero if given is None else given
     element, length = kind[1]
     is_number = element[0] == Nodetype.BASE and element[1][0] != "string"
-    return np.zeros(length, element[1][0]) if is_number else []
+    if is_number and given is None:
+        return np.zeros(length, element[1][0])
+    return given if is_number else [_value(element, each) for each in given or ()]
 
 
 @dataclass(frozen=True)

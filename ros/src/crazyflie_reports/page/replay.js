@@ -26,14 +26,6 @@ function poseAt({ rows, start, period }, time) {
   return [rows[k], (place - k) * period];
 }
 
-// Return the rows of a path until a place, in parts without gaps.
-function partsOf(rows, count = rows.length) {
-  const parts = [[]];
-  for (const row of rows.slice(0, Math.max(0, count)))
-    if (row) parts.at(-1).push(row); else if (parts.at(-1).length) parts.push([]);
-  return parts;
-}
-
 // R = Rx(roll) Ry(pitch) Rz(yaw), times a vector.
 function rotated([x, y, z], roll, pitch, yaw) {
   [x, y] = [x * Math.cos(yaw) - y * Math.sin(yaw), x * Math.sin(yaw) + y * Math.cos(yaw)];
@@ -100,12 +92,12 @@ class Replay {
     this.ground();
     for (const other of this.others) {
       const at = time + this.flight.start - other.start;
-      for (const part of partsOf(other.path.rows)) this.line(part, "#d0d5dd", 1);
+      this.line(other.path.rows, "#d0d5dd", 1);
       this.vehicle(other, poseAt(other.path, at)[0], "#98a2b3");
     }
     const { path } = this.flight, done = Math.ceil((time - path.start) / path.period);
-    for (const part of partsOf(path.rows)) this.line(part, "#bfd3fb", 1.2);
-    for (const part of partsOf(path.rows, done)) this.line(part, "#2563eb", 2.2);
+    this.line(path.rows, "#bfd3fb", 1.2);
+    this.line(path.rows.slice(0, Math.max(0, done)), "#2563eb", 2.2);
     const [pose, age] = poseAt(path, time);
     if (pose.length > 6) this.cross(pose.slice(6));
     this.line([pose, [pose[0], pose[1], this.floor]], "#98a2b3", 1, [3, 3]);
@@ -143,13 +135,16 @@ class Replay {
     });
   }
 
+  // Draw a line through points, with a gap where there is none.
   line(points, color, width, dash = []) {
     const { context } = this;
     context.strokeStyle = color;
     context.lineWidth = width;
     context.setLineDash(dash);
     context.beginPath();
-    for (const point of points) context.lineTo(...this.project(point));
+    points.forEach((point, k) => {
+      if (point) context[points[k - 1] ? "lineTo" : "moveTo"](...this.project(point));
+    });
     context.stroke();
     context.setLineDash([]);
   }

@@ -15,10 +15,9 @@ from crazyflie_dashboard.snapshot import STALE_AGE, Kind, Reference, VehicleSnap
 from crazyflie_driver.msg import GenericLogData
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
-from crazyflie_reports.bag_topics import FLOATS, ROLES
+from crazyflie_reports.bag_topics import ROLES
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.flight_status import WORDS
-from crazyflie_utils.vectors import to_tuple
 
 #: Role -> type -> function that returns the row of a message.
 _ROWS: dict[str, dict[str, Callable[[Any], Any]]] = defaultdict(dict)
@@ -165,11 +164,8 @@ class VehicleModel:
         take = getattr(self, f"_on_{role}", None)
         if take is None:
             convert = _ROWS[role][kind]
-            is_flat, is_control = kind in FLOATS, "Control" in kind
 
             def take(message):
-                if is_flat:
-                    message = to_tuple(getattr(message, "control" if is_control else "state"))
                 self._note(role, convert(message))
 
         handle.subscribe(topic, message_type, take)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import lz4.frame
 import numpy as np
@@ -129,8 +129,6 @@ class Ros2Connection(Connection):
     """A topic of a ROS 2 bag."""
 
     definition: str = ""  #: Definition in the bag; "" if it has none.
-
-    encoding: ClassVar[str] = "cdr"
 
     def deserializer(self) -> Callable[[bytes], Any]:
         """Return what makes a message of its data.

@@ -5,9 +5,9 @@ The topics are those of the examples, of the C++ workspace and of crazyflie_ros.
 
 import math
 import re
-import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 from crazyflie_model.angles import rpy_from_quaternion
@@ -69,12 +69,20 @@ def _of_position(message):
     return _at_rest(message.x, message.y, message.z, math.radians(message.yaw))
 
 
+def _numbers(field, names):
+    return attrgetter(*(f"{field}.{name}" for name in names))
+
+
+_position_velocity = _numbers("state", STATE_FIELDS[:6])
+
 _STATES: dict[str, Callable[[Any], Row]] = {
-    "crazyflie_msgs/PositionVelocityYawStateStamped": tuple,
-    "crazyflie_msgs/PositionVelocityStateStamped": lambda numbers: (*numbers, math.nan),
-    "crazyflie_msgs/FullStateStamped": lambda numbers: (*numbers[:6], numbers[8]),
+    "crazyflie_msgs/PositionVelocityYawStateStamped": _numbers("state", STATE_FIELDS),
+    "crazyflie_msgs/PositionVelocityStateStamped": lambda m: (*_position_velocity(m), math.nan),
+    "crazyflie_msgs/FullStateStamped": _numbers("state", STATE_FIELDS),
 }
-_CONTROLS: dict[str, Callable[[Any], Row]] = {"crazyflie_msgs/ControlStamped": tuple}
+_CONTROLS: dict[str, Callable[[Any], Row]] = {
+    "crazyflie_msgs/ControlStamped": _numbers("control", CONTROL_FIELDS)
+}
 _POSES: dict[str, Callable[[Any], Row]] = {
     "geometry_msgs/PoseStamped": lambda message: pose_row(message.pose)
 }
@@ -121,16 +129,6 @@ EVENT_TYPES = {
     "tf/tfMessage": r"tf",
     "motion_capture_tracking_interfaces/NamedPoseArray": r"poses",
 }
-
-#: Counts of numbers behind the header: these frequent messages are decoded without an object.
-FLOATS = {
-    "crazyflie_msgs/ControlStamped": 4,
-    "crazyflie_msgs/PositionVelocityStateStamped": 6,
-    "crazyflie_msgs/PositionVelocityYawStateStamped": 7,
-    "crazyflie_msgs/FullStateStamped": 12,
-}
-
-_HEADER = struct.Struct("<III")
 
 
 @dataclass(frozen=True)
@@ -182,33 +180,11 @@ def seconds(stamp: Any) -> float:
 
 def _decoder(connection, convert):
     deserialize = connection.deserializer()
-    is_flat = connection.datatype in FLOATS
-    if is_flat and connection.encoding == "ros1":
-        numbers = struct.Struct(f"<{FLOATS[connection.datatype]}d")
-        return lambda data: _decode_floats(data, numbers, convert)
 
     def decode(data):
         message = deserialize(data)
         header = getattr(message, "header", None)
         stamp = seconds(header.stamp) if header else 0.0
-        if is_flat:
-            # A header, and a message that has numbers only.
-            _, message = _values(message)
-            message = _values(message)
         return stamp, getattr(header, "seq", 0), convert(message)
 
     return decode
-
-
-def _values(message):
-    """Return the fields of a message of rosbags, without its type and constants."""
-    return tuple(v for name, v in vars(message).items() if name[0] != "_" and name.islower())
-
-
-def _decode_floats(data, numbers, convert):
-    number, seconds, nanoseconds = _HEADER.unpack_from(data)
-    return (
-        seconds + nanoseconds * 1e-9,
-        number,
-        convert(numbers.unpack_from(data, len(data) - numbers.size)),
-    )

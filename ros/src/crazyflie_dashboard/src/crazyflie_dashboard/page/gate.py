@@ -1,7 +1,6 @@
 """Admits only requests that may see the page, and tells browsers what the page may load."""
 
-from urllib.parse import parse_qs
-
+from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -34,12 +33,11 @@ class Gate:
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
             return
-        headers = {
-            name.decode("latin-1"): text.decode("latin-1") for name, text in scope["headers"]
-        }
+        request = HTTPConnection(scope)
+        headers = dict(request.headers)
         if scope["type"] == "websocket":
             headers["upgrade"] = "websocket"
-        given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
+        given = request.query_params.get("token", "")
         refusal = self._access.refusal(headers, given)
         if refusal and scope["type"] == "websocket":
             await receive()

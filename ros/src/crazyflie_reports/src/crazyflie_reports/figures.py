@@ -45,7 +45,7 @@ _STAMPS = "states with stamps of the recording's clock"
 _HOVER = "a takeoff, and a hover of 1 s at its reference"
 _TRACKING = "states and references while the controller flies"
 _CONTROL, _STATE, _BATTERY = "controls in flight", "states in flight", "battery voltages"
-_TILTS = "controls and poses with an attitude, and motion"
+_TILTS = "3 s of controls and poses with an attitude, and motion"
 _TRUTH = "true_pose, which a virtual vehicle publishes"
 _STATUS = "vehicle_status, which a driver publishes"
 

@@ -1,6 +1,7 @@
 """The messages of a recording, read once: numbers in files, events in memory."""
 
 from array import array
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -160,20 +161,18 @@ class _Reader:
         self._newest: dict[str, float] = {}  # By topic, s.
         self._topics: dict[Connection, Topic] = {}
         self._errors: dict[str, str] = {}
-        self._bad: dict[str, int] = {}
+        self._bad: Counter[str] = Counter()
 
     def is_wanted(self, connection):
-        if connection not in self._topics:
-            try:
-                is_usd = isinstance(connection, UsdConnection)
-                topic = connection.entry() if is_usd else topic_of(connection, self._names)
-            except TopicError as error:
-                topic = None
-                self._errors[connection.topic] = str(error)
-            if topic is None:
-                return False
+        try:
+            is_usd = isinstance(connection, UsdConnection)
+            topic = connection.entry() if is_usd else topic_of(connection, self._names)
+        except TopicError as error:
+            self._errors[connection.topic] = str(error)
+            return False
+        if topic is not None:
             self._topics[connection] = topic
-        return True
+        return topic is not None
 
     def add(self, connection, time, data):
         topic = self._topics[connection]
@@ -198,11 +197,11 @@ class _Reader:
                 log.events.add(time, *names, content)
         except Exception as error:  # Damaged fields of a bag may raise any error.
             self._errors.setdefault(connection.topic, f"{connection.topic}: {error}")
-            self._bad[connection.topic] = self._bad.get(connection.topic, 0) + 1
+            self._bad[connection.topic] += 1
 
     def remarks(self):
         for topic, text in self._errors.items():
-            count = self._bad.get(topic)
+            count = self._bad[topic]
             yield f"{count} messages of {text}" if count else text
         if dropped := sum(each.events.dropped for each in self.logs):
             yield f"{dropped} more events are left out"

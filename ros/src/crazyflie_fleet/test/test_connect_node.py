@@ -11,7 +11,6 @@ from crazyflie_driver.srv import (
     WriteLighthouseResponse,
 )
 from crazyflie_fleet.connect_node import FleetConnectNode
-from crazyflie_fleet.high_level_services import in_turn
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
@@ -172,21 +171,3 @@ def test_a_lighthouse_file_that_is_not_there(tmp_path):
     )
     (error,) = process.logged("error") or process.logged("fatal")
     assert "lighthouse of cf1 is 'no.yaml', and there is no file" in error
-
-
-def test_calls_in_turn_until_one_fails():
-    begun = []
-
-    def calls():
-        for number in range(5000):
-            begun.append(Future())
-            if number != 4000:
-                begun[-1].set_result(number)
-            yield begun[-1]
-
-    outcome = in_turn(calls())
-    assert len(begun) == 4001
-    begun[-1].set_exception(ServiceError("refused"))
-    assert str(outcome.exception(timeout=0.0)) == "refused"
-    assert len(begun) == 4001
-    assert in_turn(iter(begun[:3])).result(timeout=0.0) == 2

@@ -12,7 +12,7 @@ import roslib.packages
 from geometry_msgs.msg import Point
 from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest
 
-from crazyflie_dashboard.answers import Steps, any_of, follow, gathered
+from crazyflie_dashboard.answers import any_of, gathered
 from crazyflie_dashboard.discovery import FoundVehicle, Graph, Service
 from crazyflie_dashboard.graph_model import GraphModel
 from crazyflie_dashboard.master import Master
@@ -25,6 +25,7 @@ from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_takeoff.limits import Box
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.steps import Steps, follow
 
 _FLIGHT_TIMEOUT = 60.0  #: Timeout of services that answer when the vehicle flies or has landed (s).
 _TIMEOUT = 10.0  #: Timeout of the other services (s).

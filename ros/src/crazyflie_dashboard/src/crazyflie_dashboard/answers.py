@@ -1,39 +1,15 @@
 """Work that waits for answers of services; their texts."""
 
 import contextlib
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future
-from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 from crazyflie_dashboard.page_data import Outcome
 from crazyflie_utils import ServiceError
+from crazyflie_utils.steps import Steps
 
 _MAX_NAMES = 8  #: Largest number of vehicle names in one text.
-
-Result = TypeVar("Result")
-
-#: A generator that yields a future where it waits for one, and returns its result.
-Steps = Generator[Future[Any], Any, Result]
-
-
-def follow(steps: Steps[Result], submit: Callable[..., None]) -> "Future[Result]":
-    """Do steps, each but the first by ``submit(function, argument)``; return their result."""
-    outcome: Future[Result] = Future()
-
-    def go_on(done):
-        try:
-            error = done and done.exception()
-            awaited = steps.throw(error) if error else steps.send(done and done.result())
-        except StopIteration as end:
-            outcome.set_result(end.value)
-        except Exception as error:
-            outcome.set_exception(error)
-        else:
-            awaited.add_done_callback(partial(submit, go_on))
-
-    go_on(None)
-    return outcome
 
 
 def words(error: BaseException) -> str:

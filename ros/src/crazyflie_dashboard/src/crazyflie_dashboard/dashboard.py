@@ -9,7 +9,7 @@ from typing import Any
 
 from crazyflie_dashboard import missions
 from crazyflie_dashboard.actions import Actions, expect_fresh
-from crazyflie_dashboard.answers import follow, listed, summary, words
+from crazyflie_dashboard.answers import listed, summary, words
 from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.graph_model import GraphModel
@@ -29,6 +29,7 @@ from crazyflie_dashboard.recording import Recording
 from crazyflie_dashboard.snapshot import Action, Scene
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.steps import follow
 
 
 class Dashboard:

@@ -7,11 +7,11 @@ from typing import Any
 import roslib.message
 
 from crazyflie_dashboard import images
-from crazyflie_dashboard.answers import follow
 from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.plots import Ring, expect_field, number_in, split_path
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.steps import follow
 
 IMAGES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")  #: Types of the topics of cameras.
 _IMAGE_PERIOD = 0.2  #: Shortest period of pictures of a camera (s).

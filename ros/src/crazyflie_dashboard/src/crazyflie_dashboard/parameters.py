@@ -11,7 +11,6 @@ from typing import Any
 from dynamic_reconfigure.msg import Config, ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
 
-from crazyflie_dashboard.answers import Steps
 from crazyflie_dashboard.graph_model import GraphModel
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.page_data import ParameterInfo
@@ -19,6 +18,7 @@ from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.parameters.server import config_message
 from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.steps import Steps
 from crazyflie_utils.text import number_from_text
 
 _TIMEOUT = 3.0  #: Longest time for a latched message of a node, by the machine's clock (s).

@@ -23,10 +23,10 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters
-from crazyflie_fleet.high_level_services import in_turn
 from crazyflie_fleet.vehicle_nodes import PLACE
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import TEXT, ListOf
+from crazyflie_utils.steps import follow
 
 _PERIOD = 30.0  #: Least time between two reports about one vehicle (s).
 
@@ -136,11 +136,11 @@ class FleetConnectNode(Node):
         for vehicle in self._vehicles:
             connection = self._connections[vehicle.name]
             handle.set_param(f"{connection.prefix}/{POSITIONING_PARAMETER}", connection.positioning)
-            connected = in_turn(self._connect(vehicle))
+            connected = follow(self._connect(vehicle), handle.submit)
             connected.add_done_callback(partial(handle.submit, self._finish, vehicle))
 
     def _connect(self, vehicle):
-        """Yield the calls that connect a vehicle; see `in_turn`."""
+        """Connect a vehicle, in steps."""
         handle, name = self._handle, vehicle.name
         yield handle.call_service(ADD, AddCrazyflie, self._connections[name].request(), TIMEOUT)
         if file := self._lighthouse_files.get(name):

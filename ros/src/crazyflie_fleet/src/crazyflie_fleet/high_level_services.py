@@ -1,7 +1,6 @@
 """The driver's interface for a vehicle that a controller flies: messages, parameters, calls."""
 
 import math
-from collections.abc import Iterator
 from concurrent.futures import Future
 from typing import Any
 
@@ -119,30 +118,6 @@ class HighLevelParameters(Parameters):
 
 
 _CALL_TIMEOUT = 58.0  #: Timeout of the server's takeoffs and landings (s of the machine's clock).
-
-
-def in_turn(calls: Iterator["Future[Any]"]) -> "Future[Any]":
-    """Make calls one after the other; return the future of the last one, or of one that fails.
-
-    A call begins when the next one of ``calls`` is demanded.
-    """
-    outcome: Future[Any] = Future()
-
-    def go_on(answer):
-        # A loop: a vehicle may have hundreds of parameters that are set already.
-        while answer is None or answer.exception() is None:
-            call = next(calls, None)
-            if call is None:
-                outcome.set_result(answer.result())
-                return
-            if not call.done():
-                call.add_done_callback(go_on)
-                return
-            answer = call
-        outcome.set_exception(answer.exception())
-
-    go_on(None)
-    return outcome
 
 
 def relay(handle: NodeHandle, service: str, response_type: type) -> "Future[Any]":

@@ -15,7 +15,6 @@ from crazyflie_driver import srv
 from crazyflie_fleet.high_level_services import (
     HIGH_LEVEL,
     heading,
-    in_turn,
     to_message,
 )
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
@@ -40,6 +39,7 @@ from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import NodeHandle, ServiceError, TransformError
 from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.parameters.types import FINITE
+from crazyflie_utils.steps import follow
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 
 _LANDED_HEIGHT = 0.1  #: Largest height above the start of a vehicle that has landed (m).
@@ -349,9 +349,9 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
                 yield self.call("update_params", srv.UpdateParams, [])
                 yield self._handle.set_param_later(f"{prefix(self.name)}/{_HIGH_LEVEL}", 1)
                 yield self.call("update_params", srv.UpdateParams, [_HIGH_LEVEL])
-            yield super(RosVehicle, self).takeoff(height, duration, group_mask)
+            return (yield super(RosVehicle, self).takeoff(height, duration, group_mask))
 
-        return in_turn(calls())
+        return follow(calls())
 
     @override
     def land(self, height: float | None, duration: float, group_mask: int = 0) -> "Future[Any]":

@@ -1,6 +1,5 @@
 """ROS interfaces of flights by high-level commands: there and back, and along a trajectory."""
 
-from collections.abc import Iterator
 from concurrent.futures import Future
 from typing import Any
 
@@ -10,10 +9,11 @@ from typing_extensions import TypeVar, override
 
 from crazyflie_demo.trajectory_file import load, summary
 from crazyflie_driver import srv
-from crazyflie_fleet.high_level_services import in_turn, to_message
+from crazyflie_fleet.high_level_services import to_message
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, METRES, Number, path_of
+from crazyflie_utils.steps import Steps, follow
 
 #: Timeout of a service call, of the driver's connection before the first one, and of the master's
 #: answer (s).
@@ -27,8 +27,6 @@ _PAUSE = 0.5  #: Pause between two manoeuvres (s).
 _LANDING = 1.5
 
 _HIGH_LEVEL = "commander/enHighLevel"
-
-Calls = Iterator["Future[Any]"]  #: For `in_turn`.
 
 
 class FlightPlanParameters(Parameters):
@@ -54,17 +52,17 @@ class FlightPlanNode(Node[P]):
     def __init__(self) -> None:
         self._is_flying = False
 
-    def manoeuvres(self) -> Calls:
+    def manoeuvres(self) -> Steps[None]:
         """Yield the calls between takeoff and landing; see `call`."""
         raise NotImplementedError
 
-    def preparations(self) -> Calls:
+    def preparations(self) -> Steps[None]:
         """Yield the calls before the takeoff."""
-        return iter(())
+        yield from ()
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        in_turn(self._calls()).add_done_callback(self._end)
+        follow(self._calls(), handle.submit).add_done_callback(self._end)
 
     def _calls(self):
         height, duration = self._parameters.height, self._parameters.duration
@@ -92,7 +90,9 @@ class FlightPlanNode(Node[P]):
             self._handle.warn("landing")
             next(self._land())
 
-    def call(self, service: str, service_type: Any, length: float = 0.0, **request: Any) -> Calls:
+    def call(
+        self, service: str, service_type: Any, length: float = 0.0, **request: Any
+    ) -> Steps[None]:
         """Yield the call of a service in the node's namespace, and the wait for its manoeuvre.
 
         The manoeuvre takes ``length`` (s); ``request`` are the fields of the request.
@@ -147,7 +147,7 @@ class HighLevelFlightNode(FlightPlanNode[HighLevelFlightParameters]):
     """Take off, fly ahead and back, land."""
 
     @override
-    def manoeuvres(self) -> Calls:
+    def manoeuvres(self) -> Steps[None]:
         duration = self._parameters.duration
         for x in (self._parameters.distance, -self._parameters.distance):
             yield from self.call(
@@ -188,12 +188,12 @@ class TrajectoryFlightNode(FlightPlanNode[TrajectoryFlightParameters]):
         )
 
     @override
-    def preparations(self) -> Calls:
+    def preparations(self) -> Steps[None]:
         pieces = [to_message(piece) for piece in self._parameters.pieces]
         return self.call("upload_trajectory", srv.UploadTrajectory, pieces=pieces)
 
     @override
-    def manoeuvres(self) -> Calls:
+    def manoeuvres(self) -> Steps[None]:
         parameters = self._parameters
         return self.call(
             "start_trajectory",

@@ -1,6 +1,8 @@
 """The process that flies a fleet, without ROS: all nodes on hand-moved time."""
 
 import math
+import subprocess
+import sys
 from collections import Counter
 
 import pytest
@@ -16,6 +18,11 @@ from crazyflie_utils import Node, ParameterError, ServiceError
 from crazyflie_utils.parameters.types import FRAME, Number
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.topics import Publisher
+
+
+def test_a_simulated_fleet_needs_no_cflib():
+    program = "import sys; sys.modules['cflib'] = None; import crazyflie_fleet.fleet_process"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
 
 
 class Waver(Node):

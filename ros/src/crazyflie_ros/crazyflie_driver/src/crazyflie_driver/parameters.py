@@ -9,9 +9,13 @@ from typing_extensions import override
 from crazyflie_driver.msg import LogBlock
 from crazyflie_driver.positioning import MOCAP, SOURCES
 from crazyflie_driver.srv import AddCrazyflieRequest
-from crazyflie_link.broadcast import REPEAT_PERIOD, REPEATS
-from crazyflie_link.log import LONGEST_PERIOD_MS, SHORTEST_PERIOD_MS
-from crazyflie_link.subsystem import MIN_DURATION
+from crazyflie_link.limits import (
+    LONGEST_PERIOD_MS,
+    MIN_DURATION,
+    REPEAT_PERIOD,
+    REPEATS,
+    SHORTEST_PERIOD_MS,
+)
 from crazyflie_utils import ParameterError, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, group, read_parameter
 from crazyflie_utils.parameters.types import (

@@ -11,12 +11,9 @@ from cflib.crtp.crtpstack import CRTPPacket
 
 from crazyflie_link.address import Address
 from crazyflie_link.cflib_internals import RadioBroadcast, packet
+from crazyflie_link.limits import REPEAT_PERIOD, REPEATS
 from crazyflie_link.link import Link
 from crazyflie_link.transmission import TransmitQueue
-
-#: Number of times that a command is sent, and the period (s): a vehicle that receives only the last
-#: one begins 4 ms after the others.
-REPEATS, REPEAT_PERIOD = 5, 0.001
 
 #: Time limit from the first vehicle that is ready for a shared command to the last, s; after 0.2 s
 #: without an answer each is sent its own command.

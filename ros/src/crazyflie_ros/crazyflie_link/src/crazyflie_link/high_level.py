@@ -63,7 +63,7 @@ class HighLevel(Subsystem):
 
     All raise `CrazyflieError`: `RefusedError` with the vehicle's reason,
     `NoReplyError`, `LinkLostError`, or `ValueRangeError` before anything is sent. Durations and
-    time scales are at least `crazyflie_link.subsystem.MIN_DURATION`.
+    time scales are at least `crazyflie_link.limits.MIN_DURATION`.
     """
 
     def __init__(self, current_link: Callable[[], Link]):

@@ -14,12 +14,10 @@ from crazyflie_link.errors import (
     ValueRangeError,
     unknown_name,
 )
+from crazyflie_link.limits import LONGEST_PERIOD_MS, PERIOD_STEP_MS, SHORTEST_PERIOD_MS
 from crazyflie_link.link import Link
 from crazyflie_link.subsystem import Subsystem, elements
 from crazyflie_link.transmission import REPLY_LIMIT
-
-#: Unit of periods in the firmware (ms): one byte, in which 255 is not allowed.
-SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS, PERIOD_STEP_MS = 10, 2540, 10
 
 _STAMP_END = 4  #: A log packet begins with the number of its block and three bytes of time.
 _TICKS = 1 << 24  #: The vehicle's time in ms has 24 bits.

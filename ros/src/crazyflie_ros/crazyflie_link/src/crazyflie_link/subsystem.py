@@ -10,15 +10,12 @@ from cflib.crazyflie.mem import CHAN_WRITE, MemoryElement, _WriteRequest
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.errors import RefusedError, ValueRangeError
+from crazyflie_link.limits import MIN_DURATION
 from crazyflie_link.link import Link
 from crazyflie_link.transmission import MaySend, Request
 
 #: Numbers go over the link in single precision; a smaller one may arrive as 0.
 SMALLEST_FLOAT, LARGEST_FLOAT = 1.2e-38, 3.4e38
-
-#: A shorter duration (s), or a smaller time scale, is a mistake: the planner, at 100 Hz, would ask
-#: for the end of the motion at once.
-MIN_DURATION = 0.01
 
 
 def check_finite(what: str, *values: float) -> None:

@@ -23,9 +23,9 @@ LONGEST_WAIT = 60.0
 """s, for what a loaded machine does in one."""
 
 
-def wait_for(condition, what):
+def wait_for(condition, what, limit=LONGEST_WAIT):
     """Return the first true result of a condition; the page may replace what it looks at."""
-    end = time.monotonic() + LONGEST_WAIT
+    end = time.monotonic() + limit
     cause = "no error"
     while time.monotonic() < end:
         try:
@@ -34,7 +34,7 @@ def wait_for(condition, what):
         except WebDriverException as error:
             cause = error
         time.sleep(0.05)
-    raise AssertionError(f"not within {LONGEST_WAIT} s: {what}; last: {cause}")
+    raise AssertionError(f"not within {limit} s: {what}; last: {cause}")
 
 
 @contextlib.contextmanager
@@ -103,6 +103,14 @@ class Browser:
     def press(self, text):
         """Click a button by its text."""
         wait_for(lambda: self.button(text).click() or True, f"button {text}")
+
+    def command(self, text, is_done, what):
+        """Click a button until its command is carried out: one that has become old does nothing."""
+        for _ in range(5):
+            self.press(text)
+            with contextlib.suppress(AssertionError):
+                return wait_for(is_done, what, LONGEST_WAIT / 5.0)
+        raise AssertionError(f"{text}: not {what}")
 
     def select(self, label, option):
         """Choose an option of a list."""

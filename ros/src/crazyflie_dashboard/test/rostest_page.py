@@ -46,22 +46,25 @@ def test_all_take_off_go_where_the_floor_is_clicked_and_land(browser, dashboard)
     middle = sum(each.position[0] for each in dashboard.scene().vehicles.values()) / 3
     browser.take_control()
     browser.press("All")
-    browser.press("Take off")
-    browser.has("3 in flight")
+    fly(browser, "Take off", "3 in flight")
     wait_for(lambda: vehicle(dashboard, "cf3").position[2] > 0.9, "cf3 at its height")
     x = vehicle(dashboard, "cf1").position[0]
     browser.click_floor(middle + 0.4, 0.0)
-    browser.press("Go")
-    wait_for(lambda: abs(vehicle(dashboard, "cf1").position[0] - x - 0.4) < 0.1, "cf1 is there")
-    browser.press("Land")
-    browser.has("0 in flight")
+    browser.command(
+        "Go", lambda: abs(vehicle(dashboard, "cf1").position[0] - x - 0.4) < 0.1, "cf1 is there"
+    )
+    fly(browser, "Land", "0 in flight")
     wait_for(lambda: vehicle(dashboard, "cf2").position[2] < 0.03, "cf2 on the ground")
 
 
-def go(browser, *goal):
+def fly(browser, command, seen):
+    browser.command(command, lambda: seen in browser.text(), seen)
+
+
+def go(browser, goal, is_there, what):
     for axis, value in zip("xyz", goal, strict=True):
         browser.enter(f'input[aria-label="{axis}, m"]', f"{value:.2f}")
-    browser.press("Go")
+    browser.command("Go", is_there, what)
 
 
 def test_two_above_each_other_keep_their_distance(browser, dashboard):
@@ -74,25 +77,22 @@ def test_two_above_each_other_keep_their_distance(browser, dashboard):
     browser.press("None")
     browser.choose("cf1", "cf2")
     browser.has("on the ground", browser.card("cf2"))
-    browser.press("Take off")
+    fly(browser, "Take off", "2 in flight")
     for name in ("cf1", "cf2"):
         wait_for(lambda name=name: place(name)[2] > 0.9, f"{name} at its height")
     x, y, _ = place("cf2")
     browser.press("None")
     browser.choose("cf1")
     # The way there would lead through the other.
-    go(browser, x, y, 1.0)
-    browser.has("cf1 and cf2 would be 0.")
-    go(browser, place("cf1")[0], y, 2.0)
-    wait_for(lambda: place("cf1")[2] > 1.9, "cf1 above")
-    go(browser, x, y, 2.0)
-    wait_for(lambda: is_near("cf1", (x, y, 2.0)), "cf1 above cf2")
+    refusal = "cf1 and cf2 would be 0."
+    go(browser, (x, y, 1.0), lambda: refusal in browser.text(), "the refusal")
+    go(browser, (place("cf1")[0], y, 2.0), lambda: place("cf1")[2] > 1.9, "cf1 above")
+    go(browser, (x, y, 2.0), lambda: is_near("cf1", (x, y, 2.0)), "cf1 above cf2")
     browser.choose("cf2")
-    go(browser, x + 0.5, y, 1.5)
-    wait_for(lambda: is_near("cf2", (x + 0.5, y, 1.0)), "cf2 below the goal")
+    below = (x + 0.5, y, 1.0)
+    go(browser, (x + 0.5, y, 1.5), lambda: is_near("cf2", below), "cf2 below the goal")
     wait_for(lambda: is_near("cf1", (x + 0.5, y, 2.0)), "cf1 above it")
-    browser.press("Land")
-    browser.has("0 in flight")
+    fly(browser, "Land", "0 in flight")
 
 
 def test_the_key_of_the_emergency_counts_right_after_loading_with_a_stopped_master(
@@ -101,8 +101,7 @@ def test_the_key_of_the_emergency_counts_right_after_loading_with_a_stopped_mast
     browser.press("None")
     browser.choose("cf1")
     browser.has("on the ground", browser.card("cf1"))
-    browser.press("Take off")
-    browser.has("1 in flight")
+    fly(browser, "Take off", "1 in flight")
     # Plotted topics are received for one page only: the subscription begins and ends with the page.
     wait_for(lambda: dashboard.plots(dashboard.pages.pages[-1]), "plots")
     with stopped(rosgraph.Master("/dashboard").getPid()):

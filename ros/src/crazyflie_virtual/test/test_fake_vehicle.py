@@ -175,3 +175,22 @@ def test_what_is_sent_to_a_frozen_vehicle_is_lost_also_if_its_thread_is_late():
         vehicle.wait_for_packets(15, 0, 2)
         assert vehicle.received == [(15, 0, b""), (15, 0, b"")]
         assert vehicle.broadcasts == []
+
+
+def test_a_flight_that_restarts_while_commands_come_can_fly():
+    flight, is_over = FakeFlight(), threading.Event()
+
+    def answer():
+        while not is_over.is_set():
+            flight.update()
+
+    thread = threading.Thread(target=answer)
+    thread.start()
+    try:
+        for _ in range(200):
+            flight.update()
+            flight.restart()
+            assert command(flight, takeoff()) == 0
+    finally:
+        is_over.set()
+        thread.join()

@@ -74,17 +74,21 @@ class FakeFlight(Firmware):
         settings: dict[str, Any] = {"protocol": protocol, "sensor_noise": False}
         self._settings = VehicleSettings(**settings)
         self._clock = clock
+        #: Held by whoever uses it: tests restart it while the vehicle's thread answers.
+        self.in_use = threading.RLock()
         #: Time by which the clock of log data, which is real, is ahead of this machine's (ms).
         self.clock_ahead_ms = 0
         self.restart()
 
     def restart(self) -> None:
         """Begin as after a restart of the vehicle: on the ground, armed."""
-        super().__init__(Physics((0.0, 0.0, 0.0), 0.0), switches(self._settings), self._settings)
-        self.starts = 0
-        self._pinned: SupervisorState | None = None
-        self._motors_ran = False
-        self._stop_time = -math.inf
+        with self.in_use:
+            physics = Physics((0.0, 0.0, 0.0), 0.0)
+            super().__init__(physics, switches(self._settings), self._settings)
+            self.starts = 0
+            self._pinned: SupervisorState | None = None
+            self._motors_ran = False
+            self._stop_time = -math.inf
 
     def pin(self, state: SupervisorState | int | None) -> None:
         """Report a state whatever happens, with a planner that fits to it; None for no longer."""
@@ -124,6 +128,10 @@ class FakeFlight(Firmware):
 
     def update(self) -> None:
         """Advance to the present time; called before and after each command."""
+        with self.in_use:
+            self._advance()
+
+    def _advance(self):
         now = self.time = self._clock()
         planner, setpoint = self.planner, self.commander.setpoint
         has_landed = planner.state is TrajectoryState.LANDING and planner.is_finished(now)
@@ -285,9 +293,10 @@ class FakeVehicle(Server, contextlib.AbstractContextManager["FakeVehicle"]):
             return
         answer = self.answers.get((port, channel, data[0] if data else None))
         if answer is None:
-            self.flight.update()
-            answer = self._answer(port, channel, data)
-            self.flight.update()
+            with self.flight.in_use:
+                self.flight.update()
+                answer = self._answer(port, channel, data)
+                self.flight.update()
         if answer is None:
             return
         self._replies += 1

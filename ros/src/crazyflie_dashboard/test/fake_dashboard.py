@@ -211,7 +211,11 @@ class FakeDashboard:
         if mission.is_trajectory:
             return done(DryRunResult(False, "cf1 and cf2 come as near as 0.1 m at 3.2 s"))
         path = ((0, 0, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1))
+        self._scene = replace(self._scene, paths={"cf1": path})
         return done(DryRunResult(True, "12.0 s, all land", 12.0, (("cf1", path),)))
+
+    def forget_paths(self, page):
+        self._scene = replace(self._scene, paths={})
 
     def fly(self, page, mission, vehicles, clicked):
         self.flown.append(mission.path)

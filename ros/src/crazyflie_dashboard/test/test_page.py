@@ -312,6 +312,22 @@ def test_a_mission_flies_after_its_dry_run_has_passed(browser, server):
     assert server.dashboard.flown == ["/missions/square.py"]
 
 
+def test_the_path_of_a_dry_run_is_drawn_once_until_another_mission_is_chosen(browser):
+    def wait_for_lines(count):
+        lines = "surroundings.paths.children.length"
+        wait_for(lambda: browser.in_scene(lines) == count, f"{count} lines")
+
+    browser.take_control()
+    browser.choose("cf1")
+    browser.tab("Missions")
+    browser.select("mission or trajectory", "square.py: flies a square")
+    browser.press("Dry run")
+    browser.has("The dry run has passed: 12.0 s, all land")
+    wait_for_lines(1)
+    browser.select("mission or trajectory", "eight.csv")
+    wait_for_lines(0)
+
+
 def test_messages_and_plots(browser):
     browser.tab("Messages")
     browser.has("cf2 has a weak link")

@@ -171,6 +171,15 @@ class Dashboard:
 
         return self._do(do)
 
+    def forget_paths(self, page: int) -> None:
+        """Remove the paths of the last dry run from the scene, if the page has control."""
+
+        def do():
+            if self.pages.controller == page:
+                self._model.paths = {}
+
+        self._submit(do)
+
     def fly(
         self, page: int, mission: MissionFile, vehicles: tuple[str, ...], clicked: float
     ) -> "Future[str]":

@@ -5,7 +5,7 @@ from nicegui.events import GenericEventArguments
 
 from crazyflie_dashboard.page.session import CLICKED, Session
 from crazyflie_dashboard.page_data import MissionFile
-from crazyflie_dashboard.snapshot import Scene, Triple
+from crazyflie_dashboard.snapshot import Scene
 
 
 class MissionsPanel:
@@ -13,7 +13,6 @@ class MissionsPanel:
 
     def __init__(self, session: Session):
         self._session = session
-        self.paths: dict[str, tuple[Triple, ...]] = {}  #: Paths of the last dry run, for the scene.
         self._files: dict[str, MissionFile] = {}
         self._passed: tuple[str, tuple[str, ...]] | None = None
         self._choice = ui.label().classes("choice")
@@ -47,7 +46,7 @@ class MissionsPanel:
 
     def _forget(self) -> None:
         self._passed = None
-        self.paths = {}
+        self._session.dashboard.forget_paths(self._session.page)
         self._tell("", "")
 
     def _tell(self, text: str, look: str) -> None:
@@ -71,7 +70,6 @@ class MissionsPanel:
             f"The dry run has passed: {result.text}" if result.passed else result.text,
             "good" if result.passed else "bad",
         )
-        self.paths = dict(result.paths)
         self._passed = (mission.path, names) if result.passed else None
 
     async def _start(self, event: GenericEventArguments) -> None:

@@ -4,7 +4,7 @@ import math
 import time
 from base64 import b64encode
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -88,7 +88,7 @@ class SceneView(
         self._unanswered.clear()
         self._solids, self._solids_at = [], 0.0
 
-    async def show(self, scene: Scene, chosen: set[str], extra_paths: Mapping[str, Any]) -> None:
+    async def show(self, scene: Scene, chosen: set[str]) -> None:
         """Draw a scene; parts that have not changed since the last one are not sent."""
         self._send("setNames", [list(scene.vehicles)])
         solids = [each.what for each in scene.solids]
@@ -100,7 +100,7 @@ class SceneView(
         if solids == self._solids:
             self._send("placeSolids", [[[e.position, e.rotation] for e in scene.solids]])
         self._send("setFences", [[list(each) for each in scene.fences]])
-        self._send("setPaths", [[*scene.paths.values(), *extra_paths.values()]])
+        self._send("setPaths", [[*scene.paths.values()]])
         frames = [[each.name, *_pose(each.position, each.rotation)] for each in scene.frames]
         self._send("setFrames", [frames])
         rows = vehicle_rows(scene, chosen)

@@ -119,9 +119,7 @@ class View:
         return replace(scene, vehicles=vehicles, sentences=(held_up, *scene.sentences))
 
     async def _draw(self) -> None:
-        await self._scene_view.show(
-            self._scene(), self._session.chosen, self._panels["Missions"].paths
-        )
+        await self._scene_view.show(self._scene(), self._session.chosen)
 
     def _refresh(self) -> None:
         ui.run_javascript(f"setBeat({time.monotonic()})")

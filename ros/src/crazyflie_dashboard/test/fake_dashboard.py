@@ -14,7 +14,6 @@ from crazyflie_dashboard.moves import formation
 from crazyflie_dashboard.page_data import (
     DryRunResult,
     MissionFile,
-    Outcome,
     ParameterInfo,
     Series,
 )
@@ -148,10 +147,10 @@ class FakeDashboard:
         if age > self.max_age:
             return failed(RefusalError(f"the click is {age:.0f} s old"))
         self.commands.append(command)
-        outcomes = tuple(Outcome(name, self.refusals.get(name, "")) for name in command.vehicles)
-        for outcome in outcomes:
-            if not outcome.text:
-                self._carry_out(outcome.vehicle, command)
+        outcomes = {name: self.refusals.get(name, "") for name in command.vehicles}
+        for name, text in outcomes.items():
+            if not text:
+                self._carry_out(name, command)
         return done(outcomes)
 
     def emergency(self, vehicles, age):
@@ -159,7 +158,7 @@ class FakeDashboard:
         names = tuple(self._scene.vehicles) if vehicles is None else vehicles
         for name in names:
             self.change(name, is_in_flight=False, is_emergency=True, state="emergency")
-        return done(tuple(Outcome(name, self.refusals.get(name, "")) for name in names))
+        return done({name: self.refusals.get(name, "") for name in names})
 
     def _carry_out(self, name, command):
         x, y, _ = self._scene.vehicles[name].position

@@ -58,7 +58,7 @@ class FakeLane:
     def stop(self, services, age):
         self.stopped.append(services)
         done = Future()
-        done.set_result(())
+        done.set_result({})
         return done
 
     def close(self):
@@ -159,5 +159,4 @@ class FakeFleet:
         """Give a command; return its outcomes, vehicle to text."""
         clicked = self.process.clock.time() - age
         made = Command(action, tuple(self.names if names is None else names), clicked, **details)
-        outcomes = self.dashboard.command(self.page, made).result(0)
-        return {each.vehicle: each.text for each in outcomes}
+        return self.dashboard.command(self.page, made).result(0)

@@ -82,8 +82,7 @@ class Bench:
         wait_until(lambda: set(self.lane.ready) == self.nodes.keys(), "connections", LIMIT)
 
     def stop(self, services=None, age=0.0):
-        outcomes = self.lane.stop(services, age).result(LIMIT)
-        return {each.vehicle: each.text for each in outcomes}
+        return self.lane.stop(services, age).result(LIMIT)
 
 
 @pytest.fixture
@@ -114,7 +113,7 @@ def test_a_node_that_has_stopped_delays_no_other_and_is_named(bench):
     assert not result.done()
     # A second click does not wait for the answer of the first.
     assert bench.stop(["/cf1/emergency"]) == {"/cf1/emergency": ""}
-    texts = {each.vehicle: each.text for each in result.result(LIMIT)}
+    texts = result.result(LIMIT)
     assert texts == {**dict.fromkeys(others, ""), ALL[0]: "it has not answered within 5 s"}
     assert f"{ALL[0]}: it has not answered within 5 s" in bench.reports[-1]
     stopped.is_running.set()

@@ -17,7 +17,7 @@ from crazyflie_dashboard.discovery import FoundVehicle, Graph, Service
 from crazyflie_dashboard.graph_model import GraphModel
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.moves import Move, expect_apart, formation, in_frame
-from crazyflie_dashboard.page_data import MAX_COMMAND_AGE, Command, Outcome
+from crazyflie_dashboard.page_data import MAX_COMMAND_AGE, Command, Outcomes
 from crazyflie_dashboard.snapshot import Action, Triple, VehicleSnapshot
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import BUFFER
@@ -88,7 +88,7 @@ class Actions:
         self._moves: dict[str, Move] = {}
         self._commanders: dict[str, subprocess.Popen[bytes]] = {}
 
-    def carry_out(self, command: Command) -> "Steps[tuple[Outcome, ...]]":
+    def carry_out(self, command: Command) -> "Steps[Outcomes]":
         """Call the services that a command needs; return all outcomes.
 
         Raises
@@ -195,7 +195,7 @@ class Actions:
         """Send vehicles so that their centre comes to the goal: all of them, or none."""
         reasons = {n: self._why_it_stays(targets.get(n)) for n in command.vehicles}
         if any(reasons.values()):
-            return tuple(Outcome(name, text or _STAYS) for name, text in reasons.items())
+            return {name: text or _STAYS for name, text in reasons.items()}
         chosen = {name: targets[name] for name in command.vehicles}
         moving = {name: move for name, move in self._moves.items() if name in targets}
         moves, requests = yield self._workers.submit(
@@ -205,14 +205,12 @@ class Actions:
         answers = {name: self._begin(call) for name, call in calls.items()}
         self._moves = {**moving, **moves}
         outcomes = yield from gathered(answers)
-        gone = [targets[each.vehicle] for each in outcomes if not each.text]
+        gone = [targets[name] for name, text in outcomes.items() if not text]
         if 0 < len(gone) < len(outcomes):
             # The paths were checked for all vehicles together.
             self._hold(gone)
-            outcomes = tuple(
-                each if each.text else Outcome(each.vehicle, f"is held: {_STAYS}")
-                for each in outcomes
-            )
+            held = f"is held: {_STAYS}"
+            outcomes = {name: text or held for name, text in outcomes.items()}
         return outcomes
 
     def _why_it_stays(self, target):

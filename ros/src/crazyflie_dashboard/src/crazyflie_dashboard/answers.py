@@ -1,12 +1,13 @@
 """Work that waits for answers of services; their texts."""
 
 import contextlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from typing import Any
 
-from crazyflie_dashboard.page_data import Outcome
+from crazyflie_dashboard.page_data import Outcomes
 from crazyflie_utils import ServiceError
+from crazyflie_utils.refusal import by_reason
 from crazyflie_utils.steps import Steps
 
 _MAX_NAMES = 8  #: Largest number of vehicle names in one text.
@@ -37,7 +38,7 @@ def any_of(answers: "list[Future[Any]]") -> "Future[Any]":
     return outcome
 
 
-def gathered(answers: "Mapping[str, Future[Any]]") -> Steps[tuple[Outcome, ...]]:
+def gathered(answers: "Mapping[str, Future[Any]]") -> Steps[Outcomes]:
     """Return the outcomes of all vehicles, when the last one has answered."""
     texts = dict.fromkeys(answers, "")
     for name, answer in answers.items():
@@ -45,16 +46,12 @@ def gathered(answers: "Mapping[str, Future[Any]]") -> Steps[tuple[Outcome, ...]]
             yield answer
         except Exception as error:
             texts[name] = words(error)
-    return tuple(Outcome(name, text) for name, text in texts.items())
+    return texts
 
 
-def summary(outcomes: Iterable[Outcome]) -> list[str]:
+def summary(outcomes: Outcomes) -> list[str]:
     """Return the refusals, each text once with its vehicles."""
-    names: dict[str, list[str]] = {}
-    for each in outcomes:
-        if each.text:
-            names.setdefault(each.text, []).append(each.vehicle)
-    return [f"{listed(each)}: {text}" for text, each in names.items()]
+    return by_reason({name: text for name, text in outcomes.items() if text}, listed)
 
 
 def listed(names: Sequence[str]) -> str:

@@ -19,7 +19,7 @@ from crazyflie_dashboard.page_data import (
     Command,
     DryRunResult,
     MissionFile,
-    Outcome,
+    Outcomes,
     ParameterInfo,
     Series,
 )
@@ -118,13 +118,11 @@ class Dashboard:
         """Remove the plot of a field."""
         self._submit(lambda: self._page(page).remove_field(path))
 
-    def command(self, page: int, command: Command) -> "Future[tuple[Outcome, ...]]":
+    def command(self, page: int, command: Command) -> "Future[Outcomes]":
         """Carry out a command of the page that has control; return an outcome for each vehicle."""
         return self._control(page, command.words, self._actions.carry_out, command)
 
-    def emergency(
-        self, vehicles: tuple[str, ...] | None, age: float
-    ) -> "Future[tuple[Outcome, ...]]":
+    def emergency(self, vehicles: tuple[str, ...] | None, age: float) -> "Future[Outcomes]":
         """Stop motors, of all vehicles if ``vehicles`` is None; the page does not need control.
 
         The call waits for no other command and for no turn. ``age`` (s) is that of the click. The
@@ -263,7 +261,7 @@ class Dashboard:
         def log(done):
             error, result = done.exception(), None if done.exception() else done.result()
             refused = [words(error)] if error else []
-            if isinstance(result, tuple):
+            if isinstance(result, dict):
                 refused = summary(result)
             if refused:
                 self._handle.warn(f"{what}: {'; '.join(refused)}")

@@ -22,7 +22,7 @@ from rosgraph.network import (
 from std_srvs.srv import Empty
 
 from crazyflie_dashboard.master import Master
-from crazyflie_dashboard.page_data import Outcome
+from crazyflie_dashboard.page_data import Outcomes
 from crazyflie_utils.ros1.calls import has_closed
 
 #: Largest age of a click, and longest time for an answer (s).
@@ -74,7 +74,7 @@ class EmergencyLane:
                 connection.close()
             self._open.clear()
 
-    def stop(self, services: Iterable[str] | None, age: float) -> "Future[tuple[Outcome, ...]]":
+    def stop(self, services: Iterable[str] | None, age: float) -> "Future[Outcomes]":
         """Call emergency services, of all vehicles if ``services`` is None.
 
         Parameters
@@ -88,7 +88,7 @@ class EmergencyLane:
         concurrent.futures.Future
             An outcome for each service, after 5 s at the latest; its text is "" if it has answered.
         """
-        result: Future[tuple[Outcome, ...]] = Future()
+        result: Future[Outcomes] = Future()
         what = "all vehicles" if services is None else ", ".join(services := tuple(services))
         if not age <= MAX_EMERGENCY_AGE:
             text = f"the click is {age:.1f} s old; expected at most {MAX_EMERGENCY_AGE:g} s"
@@ -134,7 +134,7 @@ class EmergencyLane:
         return result
 
     def _end(self, what, result, texts):
-        result.set_result(tuple(Outcome(name, text) for name, text in texts.items()))
+        result.set_result(texts)
         failures = "; ".join(f"{name}: {text}" for name, text in texts.items() if text)
         self._report(f"emergency for {what}: {failures or 'all services have answered'}")
 

@@ -1,5 +1,6 @@
 """Requests of pages and their answers, as plain data."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from crazyflie_dashboard.snapshot import Action, Triple
@@ -7,6 +8,8 @@ from crazyflie_dashboard.snapshot import Action, Triple
 #: Largest age of a command (s): an older one was delayed in a browser or a network, and is not
 #: carried out.
 MAX_COMMAND_AGE = 1.0
+
+Outcomes = Mapping[str, str]  #: Vehicle to the refusal of a command, or "".
 
 
 @dataclass(frozen=True)
@@ -30,14 +33,6 @@ class Command:
         if self.goal is not None:
             text += f" to ({', '.join(f'{x:.2f}' for x in self.goal)}) m"
         return text
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The outcome of a command: ``text`` is the refusal, or ""."""
-
-    vehicle: str
-    text: str = ""
 
 
 @dataclass(frozen=True)

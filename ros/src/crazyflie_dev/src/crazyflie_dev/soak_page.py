@@ -71,7 +71,7 @@ class PageNode(Node):
 
         def settle(done: Future[Any]) -> None:
             error = done.exception()
-            text = str(error) if error else done.result()[0].text
+            text = str(error) if error else done.result()[VEHICLE]
             outcome.set_exception(ServiceError(text)) if text else outcome.set_result(None)
 
         command = Command(action, (VEHICLE,), self._time() - lag)

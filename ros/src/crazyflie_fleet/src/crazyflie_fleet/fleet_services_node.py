@@ -16,6 +16,7 @@ from crazyflie_fleet.mission_watch import MISSION_TIMEOUT, MissionWatch
 from crazyflie_fleet.references_node import VehicleStates
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, ServiceError
+from crazyflie_utils.refusal import refusals_text
 
 _HIGH_LEVEL_SERVICES = {
     "land": srv.Land,
@@ -227,11 +228,7 @@ class FleetServicesNode(Node):
             answer.set_result(response)
 
     def _text(self, refusals: Refusals) -> str:
-        names: dict[str, list[str]] = {}
-        for name, reason in sorted(refusals.items()):
-            names.setdefault(reason, []).append(name)
-        texts = "; ".join(f"{', '.join(each)}: {reason}" for reason, each in names.items())
-        return f"{len(refusals)} of {len(self._fleet.vehicles)} vehicles: {texts}"
+        return refusals_text(refusals, len(self._fleet.vehicles))
 
     def _on_go_to(self, service, request):
         if not request.relative and len(self._fleet.vehicles) > 1:

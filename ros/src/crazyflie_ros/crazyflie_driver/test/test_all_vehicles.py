@@ -264,7 +264,9 @@ def test_bad_input(swarm):
     server, vehicles = swarm
     with pytest.raises(ServiceError, match="relative is False.*expected True"):
         server.call(ALL + "go_to", GoToRequest(goal=Point(1, 0, 1), duration=Duration(2)))
-    with pytest.raises(ServiceError, match="3 of 3 vehicles: cf1: takeoff: nan is not finite"):
+    with pytest.raises(
+        ServiceError, match="3 of 3 vehicles: cf1, cf2, cf3: takeoff: nan is not finite"
+    ):
         server.call(ALL + "takeoff", TakeoffRequest(0, float("nan"), Duration(2)))
     assert [commands(vehicle) for vehicle in vehicles] == [([], [])] * 3
 

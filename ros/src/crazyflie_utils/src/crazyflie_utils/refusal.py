@@ -1,4 +1,7 @@
-"""The exceptions by which a command is refused, with the reason."""
+"""The exceptions by which a command is refused, with the reason; refusals of several vehicles."""
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping
 
 
 class RefusalError(Exception):
@@ -10,3 +13,17 @@ class RefusalError(Exception):
 
 class ServiceError(Exception):
     """A service refused or failed; the text is the reason, for the caller."""
+
+
+def by_reason(refusals: Mapping[str, str], listed: Callable[..., str] = ", ".join) -> list[str]:
+    """Return refusals (vehicle to reason) as texts: each reason once, after its vehicles."""
+    names = defaultdict(list)
+    for name, reason in refusals.items():
+        names[reason].append(name)
+    return [f"{listed(each)}: {reason}" for reason, each in names.items()]
+
+
+def refusals_text(refusals: Mapping[str, str], count: int) -> str:
+    """Return the refusals (vehicle to reason) of some of ``count`` vehicles as one text."""
+    texts = "; ".join(by_reason(dict(sorted(refusals.items()))))
+    return f"{len(refusals)} of {count} vehicles: {texts}"

@@ -40,7 +40,7 @@ async def _emergency(dashboard: Dashboard, request: Request) -> Response:
     except (KeyError, TypeError, ValueError):
         return JSONResponse(['the request is not {"age": s, "vehicles": list or null}'], 422)
     outcomes = await asyncio.wrap_future(dashboard.emergency(names, age))
-    return JSONResponse([f"{each.vehicle}: {each.text}" for each in outcomes if each.text])
+    return JSONResponse([f"{name}: {text}" for name, text in outcomes.items() if text])
 
 
 async def _camera(dashboard: Dashboard, request: Request) -> Response:

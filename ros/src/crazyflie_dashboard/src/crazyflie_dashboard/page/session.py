@@ -106,7 +106,7 @@ class Session:
             return False
         future = self.dashboard.command(self.page, Command(action, names, clicked, **details))
         outcomes = await self.result(future)
-        refusals = summary(outcomes or ())
+        refusals = summary(outcomes or {})
         for text in refusals:
             self.say(text, "negative")
         return bool(outcomes) and not refusals

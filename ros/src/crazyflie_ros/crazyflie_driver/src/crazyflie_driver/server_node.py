@@ -37,6 +37,7 @@ from crazyflie_link.link import Link
 from crazyflie_link.localization import PackedPoses
 from crazyflie_link.supervisor import BROADCAST_STOP
 from crazyflie_utils import Node, NodeHandle, ServiceError
+from crazyflie_utils.refusal import refusals_text
 
 _DIAGNOSTICS_PERIOD = 1.0
 _FLIGHTS_PERIOD = 0.2
@@ -253,7 +254,7 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
         needs, refusals = _results(checks, not command.ends_flight)
         if refusals and not command.ends_flight:
             raise ServiceError(
-                f"{command.name} was sent to no vehicle: {_text(refusals, len(checks))}"
+                f"{command.name} was sent to no vehicle: {refusals_text(refusals, len(checks))}"
             )
         sent = {}
         for channel in channels:
@@ -265,7 +266,7 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
                     sent[vehicle] = vehicle.commands.send(own, None)
         refusals.update(_results(sent, not command.ends_flight)[1])
         if refusals:
-            raise ServiceError(f"{command.name}: {_text(refusals, len(checks))}")
+            raise ServiceError(f"{command.name}: {refusals_text(refusals, len(checks))}")
 
     def _on_emergency(self, _):
         # A broadcast reaches all at once; then each is sent its own until it has obeyed.
@@ -315,22 +316,17 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
 
 def _results(
     futures: Mapping[DriverVehicle, Future[Any]], may_withdraw: bool
-) -> tuple[dict[DriverVehicle, Any], dict[DriverVehicle, str]]:
-    # Results and errors.
+) -> tuple[dict[DriverVehicle, Any], dict[str, str]]:
+    # Results; errors by name.
     wait(futures.values(), ANSWER_LIMIT)
     results: dict[DriverVehicle, Any] = {}
-    errors: dict[DriverVehicle, str] = {}
+    errors: dict[str, str] = {}
     for vehicle, future in futures.items():
         # A refused command must not be carried out later.
         if future.cancel() if may_withdraw else not future.done():
-            errors[vehicle] = f"no answer within {ANSWER_LIMIT:g} s"
+            errors[vehicle.name] = f"no answer within {ANSWER_LIMIT:g} s"
         elif (error := future.exception()) is not None:
-            errors[vehicle] = str(error)
+            errors[vehicle.name] = str(error)
         else:
             results[vehicle] = future.result()
     return results, errors
-
-
-def _text(refusals: Mapping[DriverVehicle, str], count: int) -> str:
-    texts = sorted(f"{vehicle.name}: {text}" for vehicle, text in refusals.items())
-    return f"{len(texts)} of {count} vehicles: " + "; ".join(texts)

@@ -6,6 +6,7 @@ import re
 import threading
 import time
 import urllib.request
+from concurrent.futures import Future
 
 import cv2
 import numpy as np
@@ -326,6 +327,26 @@ def test_the_path_of_a_dry_run_is_drawn_once_until_another_mission_is_chosen(bro
     wait_for_lines(1)
     browser.select("mission or trajectory", "eight.csv")
     wait_for_lines(0)
+
+
+def test_a_dry_run_that_ends_after_another_mission_was_chosen_is_not_shown(
+    browser, server, monkeypatch
+):
+    begun, answer, dry_run = [], Future(), server.dashboard.dry_run
+    monkeypatch.setattr(server.dashboard, "dry_run", lambda *asked: begun.append(asked) or answer)
+    browser.take_control()
+    browser.choose("cf1")
+    browser.tab("Missions")
+    browser.select("mission or trajectory", "square.py: flies a square")
+    browser.press("Dry run")
+    wait_for(lambda: begun, "the beginning of the dry run")
+    result = dry_run(*begun[0]).result()
+    browser.select("mission or trajectory", "eight.csv")
+    wait_for(lambda: not server.dashboard.scene().paths, "the choice")
+    dry_run(*begun[0])
+    answer.set_result(result)
+    wait_for(lambda: not server.dashboard.scene().paths, "no paths")
+    assert "has passed:" not in browser.text(".panels")
 
 
 def test_messages_and_plots(browser):

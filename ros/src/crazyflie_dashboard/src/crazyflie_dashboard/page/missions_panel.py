@@ -66,6 +66,9 @@ class MissionsPanel:
         self._dry_run.props(remove="loading")
         if result is None:
             return
+        if self._file.value != mission.path:
+            self._forget()
+            return
         self._tell(
             f"The dry run has passed: {result.text}" if result.passed else result.text,
             "good" if result.passed else "bad",

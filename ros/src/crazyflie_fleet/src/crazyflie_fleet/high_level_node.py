@@ -24,7 +24,7 @@ from crazyflie_fleet.high_level_services import (
 from crazyflie_fleet.references_node import TrackedVehicle
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import FlightStatus
-from crazyflie_utils import Node, NodeHandle, ServiceError, flight_status
+from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.refusal import RefusalError
@@ -89,12 +89,7 @@ class HighLevelNode(Node[HighLevelParameters]):
             ("update_params", srv.UpdateParams, lambda _: srv.UpdateParamsResponse()),
         ):
             handle.advertise_service(f"~{name}", service_type, callback)
-        flight_status.subscribe(
-            handle,
-            parameters.flight_status_topic,
-            parameters.flight_state_topic,
-            self._on_flight_status,
-        )
+        parameters.flight.subscribe(handle, self._on_flight_status)
         if self._vehicle is None:
             topic = parameters.reference_topic
             handle.subscribe(topic, parameters.reference_type, lambda _: self._on_reference())

@@ -18,6 +18,8 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_utils import NodeHandle, Parameters, parameter
+from crazyflie_utils.flight_status import FlightTopics
+from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, SERVICE, TIME_STEP, TOPIC
 from crazyflie_utils.vectors import to_tuple
 
@@ -93,12 +95,7 @@ class HighLevelParameters(Parameters):
         name="reference/yaw",
     )
     state_topic: str = parameter(TOPIC, "states of the vehicle", "state", "topics/state")
-    flight_status_topic: str = parameter(
-        TOPIC, "of the takeoff server", "in_flight_flight_status", "topics/flight_status"
-    )
-    flight_state_topic: str | None = parameter(
-        TOPIC, "text of a takeoff server without flight status", None, "topics/flight_state"
-    )
+    flight: FlightTopics = group(FlightTopics, "topics")
     takeoff: str = parameter(SERVICE, "the takeoff server's", "takeoff", "srv/takeoff")
     land: str = parameter(SERVICE, "the takeoff server's", "land", "srv/land")
     emergency: str = parameter(SERVICE, "stops the motors", "emergency", "srv/emergency")

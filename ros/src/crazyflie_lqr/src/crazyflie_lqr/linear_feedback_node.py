@@ -14,9 +14,11 @@ from crazyflie_lqr.linear_feedback import GroundGuess, LinearFeedback, at_rest
 from crazyflie_lqr.reference import GuardedReference, StateAge
 from crazyflie_model.limits import MAX_SPEED
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
-from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, flight_status, parameter
+from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
+from crazyflie_utils.flight_status import FlightTopics
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters import vehicle_model
+from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import TEXT, TOPIC, Converted, Integer, Number
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple, to_vector
 
@@ -69,12 +71,7 @@ class LinearFeedbackParameters(Parameters):
         None,
         name="topics/descent_reference",
     )
-    flight_status_topic: str = parameter(
-        TOPIC, "of the takeoff server", "in_flight_flight_status", name="topics/flight_status"
-    )
-    flight_state_topic: str | None = parameter(
-        TOPIC, "text of a takeoff server without flight status", None, name="topics/flight_state"
-    )
+    flight: FlightTopics = group(FlightTopics, "topics")
     max_jump: float = parameter(
         Number("m", above=0.0),
         "largest distance of a new reference from the vehicle; a further one is moved nearer",
@@ -164,12 +161,7 @@ class LinearFeedbackNode(Node):
         handle.subscribe(
             parameters.descent_topic, self.reference_type, self._on_descent, finite="state"
         )
-        flight_status.subscribe(
-            handle,
-            parameters.flight_status_topic,
-            parameters.flight_state_topic,
-            self._on_flight_status,
-        )
+        parameters.flight.subscribe(handle, self._on_flight_status)
         handle.subscribe(parameters.state_topic, self.state_type, self._on_state, finite="state")
 
     def _reconfigure(self, parameters):

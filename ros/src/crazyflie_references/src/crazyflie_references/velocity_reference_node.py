@@ -10,7 +10,8 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_references.velocity_reference import LimitParameters, Velocity, VelocityReference
-from crazyflie_utils import Node, NodeHandle, Parameters, flight_status, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.flight_status import FlightTopics
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_utils.vectors import is_finite, stamped
@@ -30,15 +31,7 @@ class VelocityReferenceParameters(Parameters):
     controller_reference_topic: str = parameter(
         TOPIC, "references for the controller go here", name="topics/controller_reference"
     )
-    flight_status_topic: str = parameter(
-        TOPIC,
-        "flight status of the takeoff server",
-        "in_flight_flight_status",
-        "topics/flight_status",
-    )
-    flight_state_topic: str | None = parameter(
-        TOPIC, "text of a takeoff server without flight status", None, "topics/flight_state"
-    )
+    flight: FlightTopics = group(FlightTopics, "topics")
     time_step: float = parameter(TIME_STEP, "period of the references", 0.02)
     silence: float = parameter(
         TIME_STEP, "time without a velocity after which the vehicle stops", 0.5, live=True
@@ -71,12 +64,7 @@ class VelocityReferenceNode(Node):
         self._publisher = handle.publisher(
             parameters.controller_reference_topic, PositionVelocityYawStateStamped, latch=True
         )
-        flight_status.subscribe(
-            handle,
-            parameters.flight_status_topic,
-            parameters.flight_state_topic,
-            self._on_flight_status,
-        )
+        parameters.flight.subscribe(handle, self._on_flight_status)
         handle.subscribe(
             parameters.reference_topic,
             PositionVelocityStateStamped,

@@ -6,6 +6,8 @@ from std_msgs.msg import String
 
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.handle import NodeHandle
+from crazyflie_utils.parameters.declaration import Parameters, parameter
+from crazyflie_utils.parameters.types import TOPIC
 
 #: Constant of `FlightStatus` to words.
 WORDS = {
@@ -18,21 +20,26 @@ WORDS = {
 }
 
 
-def subscribe(
-    handle: NodeHandle,
-    topic: str | None,
-    text_topic: str | None,
-    callback: Callable[[FlightStatus], None],
-) -> None:
-    """Call ``callback(status)`` for each flight status on a topic, if there is one.
+class FlightTopics(Parameters):
+    """Topics of a takeoff server with the flight status, for a group of the prefix "topics"."""
 
-    A takeoff server without flight status has a ``text_topic`` of std_msgs/String: names of states
-    in small letters; any other text is `FlightStatus.UNKNOWN`.
-    """
-    if topic is not None:
-        handle.subscribe(topic, FlightStatus, callback)
-    if text_topic is not None:
-        handle.subscribe(text_topic, String, lambda message: callback(_from_text(message.data)))
+    status: str | None = parameter(
+        TOPIC,
+        "flight status of the takeoff server",
+        "in_flight_flight_status",
+        name="flight_status",
+    )
+    #: std_msgs/String: names of states in small letters; any other text is `FlightStatus.UNKNOWN`.
+    state: str | None = parameter(
+        TOPIC, "text of a takeoff server without flight status", None, name="flight_state"
+    )
+
+    def subscribe(self, handle: NodeHandle, callback: Callable[[FlightStatus], None]) -> None:
+        """Call ``callback(status)`` for each flight status on the topics that are set."""
+        if self.status is not None:
+            handle.subscribe(self.status, FlightStatus, callback)
+        if self.state is not None:
+            handle.subscribe(self.state, String, lambda message: callback(_from_text(message.data)))
 
 
 def _from_text(text):

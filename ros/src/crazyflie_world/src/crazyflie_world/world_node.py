@@ -7,7 +7,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import FlightStatus
-from crazyflie_utils import Node, NodeHandle, Parameters, flight_status, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.flight_status import FlightTopics
+from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_world.shapes import Ball, Box, Cylinder, Shape
 from crazyflie_world.world import World
@@ -43,6 +45,15 @@ def pose(shape: Shape) -> Pose:
     return Pose(Point(*shape.centre), Quaternion(*quaternion_from_rpy(0.0, 0.0, yaw)))
 
 
+class _FlightTopics(FlightTopics):
+    status: str | None = parameter(
+        TOPIC,
+        "flight status of the takeoff server: paths begin when a vehicle flies; by default at once",
+        None,
+        name="flight_status",
+    )
+
+
 class WorldNodeParameters(Parameters):
     """Parameters of `WorldNode`."""
 
@@ -53,18 +64,7 @@ class WorldNodeParameters(Parameters):
     poses_topic: str = parameter(
         TOPIC, "namespace of the moving objects' poses, NAME/pose", "world", name="topics/poses"
     )
-    flight_status_topic: str | None = parameter(
-        TOPIC,
-        "flight status of the takeoff server: paths begin when a vehicle flies; by default at once",
-        None,
-        name="topics/flight_status",
-    )
-    flight_state_topic: str | None = parameter(
-        TOPIC,
-        "text of a takeoff server without flight status: as topics/flight_status",
-        None,
-        name="topics/flight_state",
-    )
+    flight: _FlightTopics = group(_FlightTopics, "topics")
     time_step: float = parameter(TIME_STEP, "period of the poses", 0.02)
 
 
@@ -84,13 +84,8 @@ class WorldNode(Node[WorldNodeParameters]):
         }
         self._broadcast = handle.broadcast_transforms()
         handle.publisher(parameters.markers_topic, MarkerArray, latch=True).publish(markers(world))
-        flight_status.subscribe(
-            handle,
-            parameters.flight_status_topic,
-            parameters.flight_state_topic,
-            self._on_flight_status,
-        )
-        if not (parameters.flight_status_topic or parameters.flight_state_topic):
+        parameters.flight.subscribe(handle, self._on_flight_status)
+        if not (parameters.flight.status or parameters.flight.state):
             self._begin = handle.time()
         if world.moving:
             handle.timer(parameters.time_step, self._on_timer)

@@ -15,7 +15,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_sweep.sweep_parameters import SweepParameters
+from crazyflie_sweep.sweep_parameters import SweepPlan
 from crazyflie_sweep.sweeper import Sweeper
 from crazyflie_sweep.velocities import VelocitySource, oscillator_velocity, random_velocities
 from crazyflie_tutorial_msgs.msg import SweepReport, Vel
@@ -26,8 +26,18 @@ from crazyflie_tutorial_msgs.srv import (
     VelocityAtResponse,
     VelocityResponse,
 )
-from crazyflie_utils import Node, NodeHandle, Parameters, flight_status, parameter
-from crazyflie_utils.parameters.types import SERVICE, Integer
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.flight_status import FlightTopics
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import (
+    BOOLEAN,
+    FRAME,
+    SERVICE,
+    TIME_STEP,
+    TOPIC,
+    Integer,
+    Number,
+)
 from crazyflie_utils.vectors import stamped
 
 COVERED_COLOUR = ColorRGBA(0.15, 0.65, 0.35, 0.75)
@@ -77,13 +87,44 @@ def _marker(name, shape, colour, frame):
     return marker
 
 
-TIME_STEP = 0.02  #: Period of the references (s).
+PERIOD = 0.02  #: Period of the references (s).
 ASK_PERIOD = 0.1  #: Period of the calls for a velocity (s).
 REPORT_PERIOD = 0.5  #: Period of reports, and of markers for RViz (s).
 STATE_LIMIT = 0.5  #: Time without a state after which the reference stands still (s).
 FLIGHT_LIMIT = 120.0  #: Timeout of takeoff and landing (s of the machine's clock).
 #: States in which a sweep may begin.
 IDLE = (SweepReport.WAITING, SweepReport.DONE, SweepReport.FAILED)
+
+
+class SweepParameters(SweepPlan):
+    """Parameters of `SweepNode`."""
+
+    velocity_limit: float = parameter(
+        TIME_STEP,
+        "time for which an answer of the velocity service is valid",
+        0.5,
+        "velocity/limit",
+    )
+    velocity_most: float = parameter(
+        Number(above=0.0), "largest valid answer; it must also be > 0", 3.0, "velocity/most"
+    )
+    start: bool = parameter(
+        BOOLEAN, "begin as soon as a vehicle is present; otherwise wait for `~start`", True
+    )
+    fixed_frame: str = parameter(FRAME, "frame of the area", "world", "frames/fixed")
+    takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
+    land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
+    velocity_service: str = parameter(
+        SERVICE, "service with the velocity for a position", "oscillator", "srv/velocity"
+    )
+    state_topic: str = parameter(TOPIC, "states of the vehicle", name="topics/state")
+    reference_topic: str = parameter(TOPIC, "where references go", name="topics/reference")
+    flight: FlightTopics = group(FlightTopics, "topics")
+    report_topic: str = parameter(TOPIC, "status of the sweep", "~report", "topics/report")
+    velocity_topic: str = parameter(
+        TOPIC, "speed of the reference, as `Vel` linear", "~velocity", "topics/velocity"
+    )
+    markers_topic: str = parameter(TOPIC, "for RViz", "~markers", "topics/markers")
 
 
 class SweepNode(Node[SweepParameters]):
@@ -111,18 +152,13 @@ class SweepNode(Node[SweepParameters]):
         self._velocity = handle.publisher(parameters.velocity_topic, Vel)
         self._markers = handle.publisher(parameters.markers_topic, MarkerArray, latch=True)
         handle.advertise_service("~start", Trigger, self._on_start)
-        flight_status.subscribe(
-            handle,
-            parameters.flight_status_topic,
-            parameters.flight_state_topic,
-            self._on_flight_status,
-        )
+        parameters.flight.subscribe(handle, self._on_flight_status)
         handle.subscribe(
             parameters.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
         )
         self._publish_report()
         self._tick_time = handle.time()
-        handle.timer(TIME_STEP, self._on_timer)
+        handle.timer(PERIOD, self._on_timer)
         handle.timer(ASK_PERIOD, self._ask)
         handle.timer(REPORT_PERIOD, self._publish_report)
         if parameters.start:

@@ -6,16 +6,7 @@ from typing_extensions import override
 
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import (
-    BOOLEAN,
-    FRAME,
-    METRES,
-    SERVICE,
-    TIME_STEP,
-    TOPIC,
-    Integer,
-    Number,
-)
+from crazyflie_utils.parameters.types import METRES, Integer, Number
 
 _WIDTH = Number("m", above=0.0)
 _SPEED = Number("m/s", above=0.0)
@@ -73,42 +64,3 @@ class SweepPlan(Parameters):
         speed = self.speed
         if speed.min > speed.max:
             yield f"speed/min is {speed.min:g}; expected <= speed/max, {speed.max:g} (m/s)"
-
-
-class SweepParameters(SweepPlan):
-    """Parameters of `SweepNode`."""
-
-    velocity_limit: float = parameter(
-        TIME_STEP,
-        "time for which an answer of the velocity service is valid",
-        0.5,
-        "velocity/limit",
-    )
-    velocity_most: float = parameter(
-        Number(above=0.0), "largest valid answer; it must also be > 0", 3.0, "velocity/most"
-    )
-    start: bool = parameter(
-        BOOLEAN, "begin as soon as a vehicle is present; otherwise wait for `~start`", True
-    )
-    fixed_frame: str = parameter(FRAME, "frame of the area", "world", "frames/fixed")
-    takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
-    land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
-    velocity_service: str = parameter(
-        SERVICE, "service with the velocity for a position", "oscillator", "srv/velocity"
-    )
-    state_topic: str = parameter(TOPIC, "states of the vehicle", name="topics/state")
-    reference_topic: str = parameter(TOPIC, "where references go", name="topics/reference")
-    flight_status_topic: str = parameter(
-        TOPIC,
-        "flight status of the takeoff server",
-        "in_flight_flight_status",
-        "topics/flight_status",
-    )
-    flight_state_topic: str | None = parameter(
-        TOPIC, "text of a takeoff server without flight status", None, "topics/flight_state"
-    )
-    report_topic: str = parameter(TOPIC, "status of the sweep", "~report", "topics/report")
-    velocity_topic: str = parameter(
-        TOPIC, "speed of the reference, as `Vel` linear", "~velocity", "topics/velocity"
-    )
-    markers_topic: str = parameter(TOPIC, "for RViz", "~markers", "topics/markers")

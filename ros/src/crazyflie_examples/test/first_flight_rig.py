@@ -16,7 +16,7 @@ from crazyflie_doctor.vehicle import ALL_MOTORS, VehicleFacts
 from crazyflie_examples.first_flight import HEIGHT, Sample, Stop
 from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_msgs.msg import PositionVelocityStateStamped
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
 from crazyflie_virtual.crtp import Packet, Port
@@ -160,7 +160,7 @@ class FastRig:
         _, parameters = expand(launch, composed=True, rviz=False, takeoff_hover_z=HEIGHT)
         self._graph = FakeGraph(parameters, start=1000.0)
         self._graph.listen("/crazyflie/cmd_vel", self._on_twist)
-        for name, node in NodeClasses()(composed_nodes(parameters)).items():
+        for name, node in NODE_CLASSES(composed_nodes(parameters)).items():
             self._graph.start(f"/{name}", node())
 
     def _on_twist(self, message: Twist):

@@ -9,23 +9,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 from std_srvs.srv import EmptyRequest, EmptyResponse
 
-from crazyflie_examples.move_server_node import DEFAULT_POINTS, MoveServerNode, Points
-from crazyflie_utils.main import NodeClasses
+from crazyflie_examples.move_server_node import DEFAULT_POINTS, POINTS, MoveServerNode
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_utils.vectors import to_vector
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch" / "move.launch"
 COORDINATE = st.floats(-100.0, 100.0) | st.integers(-100, 100)
-POINTS = st.lists(st.lists(COORDINATE, min_size=3, max_size=3), min_size=1, max_size=8)
+LISTS = st.lists(st.lists(COORDINATE, min_size=3, max_size=3), min_size=1, max_size=8)
 
 
-@given(POINTS)
+@given(LISTS)
 def test_points_are_tuples_of_three_floats(points):
-    assert Points()(points) == tuple(map(tuple, points))
+    assert POINTS(points) == tuple(map(tuple, points))
 
 
 def test_default_points_are_points_that_begin_and_end_apart():
-    assert Points()([list(point) for point in DEFAULT_POINTS]) == DEFAULT_POINTS
+    assert POINTS([list(point) for point in DEFAULT_POINTS]) == DEFAULT_POINTS
     around = zip(DEFAULT_POINTS, DEFAULT_POINTS[1:] + DEFAULT_POINTS[:1], strict=True)
     assert all(math.dist(a, b) > 0.1 for a, b in around)
 
@@ -107,7 +107,7 @@ def test_launch_file_takes_points_and_topic(composed):
     assert to_vector(reference.state)[:3].tolist() == [1.0, 0.0, 1.5]
     listed = launch_files.composed_nodes(parameters)
     if composed == "true":
-        assert NodeClasses()(listed) == {"move_server": MoveServerNode}
+        assert NODE_CLASSES(listed) == {"move_server": MoveServerNode}
 
 
 def test_launch_file_leaves_the_points_to_the_node():

@@ -8,7 +8,7 @@ import rospkg
 import yaml
 
 from crazyflie_description.visualizer_node import VisualizerNode
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import FakeProcess, launch_files
 
 PACKAGES = rospkg.RosPack()
@@ -57,7 +57,7 @@ def test_the_visualizer_finds_its_parameters(composed):
 def test_the_composed_process_can_make_a_visualizer():
     _, parameters = expand(composed="true")
     listed = {"visualizer": parameters["/composed/nodes/visualizer"]}
-    assert NodeClasses()(listed) == {"visualizer": VisualizerNode}
+    assert NODE_CLASSES(listed) == {"visualizer": VisualizerNode}
 
 
 def test_without_rviz_there_is_only_the_description():

@@ -13,7 +13,7 @@ from crazyflie_lqr.lqr_nodes import (
     PositionVelocityYawStateLqrNode,
 )
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_utils.vectors import to_vector
 
@@ -38,7 +38,7 @@ def expand(**arguments):
 def launch_all(parameters):
     """Return a process with all nodes that the parameters list."""
     process = FakeProcess(parameters)
-    for name, node_class in NodeClasses()(launch_files.composed_nodes(parameters)).items():
+    for name, node_class in NODE_CLASSES(launch_files.composed_nodes(parameters)).items():
         assert process.launch(node_class(), f"/{name}"), process.logged("error")
     return process
 
@@ -50,7 +50,7 @@ def test_controller_is_the_one_asked_for(controller, dynamics):
     composed, parameters = expand(
         controller=controller, dynamics=dynamics, composed="true", sim_time="true"
     )
-    classes = NodeClasses()(launch_files.composed_nodes(parameters))
+    classes = NODE_CLASSES(launch_files.composed_nodes(parameters))
     assert classes["lqr_controller"] is CLASSES[controller]
     assert {f"/{name}" for name in classes} == set(nodes) - {"/robot_base_link_publisher"}
     for name, node_class in classes.items():

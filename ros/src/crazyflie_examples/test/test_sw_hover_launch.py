@@ -8,7 +8,7 @@ import rospkg
 from roslaunch.core import RLException
 
 from crazyflie_lqr.gain_file import load_matrix
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import launch_files
 
 PACKAGES = rospkg.RosPack()
@@ -26,7 +26,7 @@ def test_executables_and_classes_are_the_same_nodes(dynamics):
     nodes, _ = expand(dynamics=dynamics)
     composed, parameters = expand(dynamics=dynamics, composed="true")
     assert set(composed) == {"/composed", "/robot_base_link_publisher"}
-    classes = NodeClasses()(launch_files.composed_nodes(parameters))
+    classes = NODE_CLASSES(launch_files.composed_nodes(parameters))
     assert {f"/{name}" for name in classes} == set(nodes) - {"/robot_base_link_publisher"}
     for name, node_class in classes.items():
         node = nodes[f"/{name}"]

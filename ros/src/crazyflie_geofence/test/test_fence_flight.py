@@ -9,7 +9,7 @@ from dynamic_reconfigure.srv import ReconfigureRequest
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
@@ -23,7 +23,7 @@ class FencedFlight:
 
     def __init__(self, **arguments):
         _, parameters = expand(LAUNCH, composed=True, rviz=False, simulator_dt=0.005, **arguments)
-        self.classes = NodeClasses()(composed_nodes(parameters))
+        self.classes = NODE_CLASSES(composed_nodes(parameters))
         self.graph = FakeGraph(parameters)
         self.texts = {}
         self.position = (0.0, 0.0, 0.0)

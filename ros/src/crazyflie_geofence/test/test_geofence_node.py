@@ -16,7 +16,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_utils.vectors import to_vector
@@ -152,7 +152,7 @@ def test_one_process_has_fence_and_merger():
     _, parameters = launch_files.expand(
         LAUNCH / "sw_geofence.launch", rviz="false", composed="true", sim_time="true"
     )
-    classes = NodeClasses()(launch_files.composed_nodes(parameters))
+    classes = NODE_CLASSES(launch_files.composed_nodes(parameters))
     assert classes["geofence"] is GeofenceNode
     assert classes["control_merger"] is RegularControlMergerNode
     process = FakeProcess(parameters)

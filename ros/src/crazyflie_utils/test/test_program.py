@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import rospkg
 
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.node import Node
 from crazyflie_utils.program import PACKAGES, missing_module, run_program
 
@@ -45,7 +45,7 @@ def test_a_node_names_the_module_and_what_installs_it(process):
 @pytest.mark.usefixtures("no_cv2")
 def test_a_node_of_many_names_the_module_and_its_class():
     with pytest.raises(ValueError) as caught:
-        NodeClasses()({"a": "needs_opencv:Vision"})
+        NODE_CLASSES({"a": "needs_opencv:Vision"})
     assert str(caught.value) == f"no class 'needs_opencv:Vision': {SENTENCE}"
     assert missing_module(caught.value) == SENTENCE
 

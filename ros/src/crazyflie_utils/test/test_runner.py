@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.node import Node
 
 NODE = "crazyflie_utils.node:Node"
@@ -10,7 +10,7 @@ NODE = "crazyflie_utils.node:Node"
 
 @pytest.fixture
 def kind():
-    return NodeClasses()
+    return NODE_CLASSES
 
 
 def test_names_and_classes(kind):

@@ -34,7 +34,7 @@ from crazyflie_dev.soak_faults import (
 from crazyflie_dev.soak_page import NAME, PageNode
 from crazyflie_dev.soak_watch import Watch
 from crazyflie_msgs.msg import PositionVelocityStateStamped
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
 
@@ -67,7 +67,7 @@ class Soak:
         for mission in MISSIONS:
             nodes[mission.strip("/")] = "crazyflie_fleet.high_level_node:HighLevelNode"
             parameters |= {f"{mission}/{key}": name for key, name in MISSION_PARAMETERS.items()}
-        self._classes = {f"/{name}": node for name, node in NodeClasses()(nodes).items()}
+        self._classes = {f"/{name}": node for name, node in NODE_CLASSES(nodes).items()}
         # Far from the beginning of time: the wall clock is set back, too.
         self.graph = FakeGraph({**parameters, "/simulator/seed": seed}, start=1e6)
         self.random = Random(seed)

@@ -1,14 +1,13 @@
 """ROS interface of a route: a service that sends the vehicle to its next point."""
 
 import itertools
-from typing import Any
 
 from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import METRES, SERVICE, TOPIC, ParameterType
+from crazyflie_utils.parameters.types import METRES, SERVICE, TOPIC, Converted
 from crazyflie_utils.text import shown
 from crazyflie_utils.vectors import stamped
 
@@ -24,22 +23,10 @@ DEFAULT_POINTS: tuple[Point, ...] = (
 )
 
 
-class Points(ParameterType):
-    """A list of points."""
-
-    label = "list of [x, y, z]"
-    unit = "m"
-    range = "at least one"
-
-    @override
-    def __call__(self, value: Any) -> tuple[Point, ...]:
-        if not isinstance(value, list) or not value:
-            raise ValueError
-        return tuple(_point(number, item) for number, item in enumerate(value, start=1))
-
-    @override
-    def __str__(self) -> str:
-        return "a list of points [x, y, z], finite numbers in m"
+def _points(value):
+    if not isinstance(value, list) or not value:
+        raise ValueError
+    return tuple(_point(number, item) for number, item in enumerate(value, start=1))
 
 
 def _point(number, item):
@@ -50,13 +37,22 @@ def _point(number, item):
         raise ValueError(f"point {number} is {shown(item)}") from None
 
 
+POINTS = Converted(
+    _points,
+    "a list of points [x, y, z], finite numbers in m",
+    "list of [x, y, z]",
+    "m",
+    "at least one",
+)
+
+
 class MoveServerParameters(Parameters):
     """Parameters of `MoveServerNode`."""
 
     reference_topic: str = parameter(TOPIC, "where references go", name="topics/ref")
     service: str = parameter(SERVICE, "moves the vehicle to the next point", "/move", "srv/move")
     points: tuple[Point, ...] = parameter(
-        Points(), "the route; after its last point it starts again", DEFAULT_POINTS
+        POINTS, "the route; after its last point it starts again", DEFAULT_POINTS
     )
 
 

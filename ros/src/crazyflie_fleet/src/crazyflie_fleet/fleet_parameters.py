@@ -7,7 +7,7 @@ from crazyflie_driver.positioning import SOURCES
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_utils import Node, ParameterError, Parameters, parameter
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FRAME,
@@ -119,5 +119,5 @@ class FlyParameters(FleetParameters):
         "models",
     )
     extra_nodes: Mapping[str, type[Node]] | None = parameter(
-        NodeClasses(), "more nodes of every vehicle, by their names below its own", None, "further"
+        NODE_CLASSES, "more nodes of every vehicle, by their names below its own", None, "further"
     )

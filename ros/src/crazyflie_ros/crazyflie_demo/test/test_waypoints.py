@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_demo.waypoint_node import Demo1Node, Demo2Node, DemoNode
-from crazyflie_demo.waypoints import Waypoint, WaypointFollower, WaypointList
+from crazyflie_demo.waypoints import WAYPOINTS, Waypoint, WaypointFollower
 
 A = Waypoint(0.0, 0.0, 1.0, 0.0, 2.0)
 B = Waypoint(1.0, 0.0, 1.0, 1.0, 0.0)
@@ -37,16 +37,16 @@ def follower(*waypoints):
 )
 def test_a_bad_list_is_refused(value):
     with pytest.raises(ValueError):
-        WaypointList()(value)
+        WAYPOINTS(value)
 
 
 def test_says_which_waypoint_is_bad():
     with pytest.raises(ValueError, match=r"waypoint 1 is \[0, 0, 1, 0, -2\]"):
-        WaypointList()([[0, 0, 1, 0, 2], [0, 0, 1, 0, -2]])
+        WAYPOINTS([[0, 0, 1, 0, 2], [0, 0, 1, 0, -2]])
 
 
 def test_a_good_list():
-    assert WaypointList()([[0, 0, 1, 0, 2], [1.5, -2, 1, 3.1, 0]]) == [
+    assert WAYPOINTS([[0, 0, 1, 0, 2], [1.5, -2, 1, 3.1, 0]]) == [
         Waypoint(0.0, 0.0, 1.0, 0.0, 2.0),
         Waypoint(1.5, -2.0, 1.0, 3.1, 0.0),
     ]
@@ -110,7 +110,7 @@ def test_who_is_always_at_the_goal_ends_after_all_seconds(path):
 
 @pytest.mark.parametrize("node", [DemoNode, Demo1Node, Demo2Node])
 def test_the_waypoints_of_the_demos_are_in_a_room(node):
-    assert WaypointList()([list(waypoint) for waypoint in node.waypoints]) == list(node.waypoints)
+    assert WAYPOINTS([list(waypoint) for waypoint in node.waypoints]) == list(node.waypoints)
     for x, y, z, _, _ in node.waypoints:
         assert max(abs(x), abs(y)) <= 1.0
         assert 0.3 <= z <= 1.0

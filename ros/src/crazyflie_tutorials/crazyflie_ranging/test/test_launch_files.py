@@ -8,7 +8,7 @@ import rospkg
 
 from crazyflie_ranging.ranger_nodes import DeckRangerNode, SimulatedRangerNode
 from crazyflie_ranging.reaction_nodes import FollowObjectNode, ObstacleStopNode
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import FakeProcess, launch_files, launching
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_ranging")) / "launch"
@@ -49,7 +49,7 @@ def test_launch_files(file, flight, composed, classes):
             )
         assert process.launch(node(), f"/{name}"), process.logged("error")
     if composed == "true":
-        assert classes.items() <= NodeClasses()(launch_files.composed_nodes(parameters)).items()
+        assert classes.items() <= NODE_CLASSES(launch_files.composed_nodes(parameters)).items()
     steers = {"follow_object": "follow_object", "teleop_with_obstacle_stop": "joy_velocity"}[file]
     wanted = parameters["/obstacle_stop/topics/cmd_vel_in"]
     assert parameters[f"/{steers}/topics/cmd_vel"] == wanted

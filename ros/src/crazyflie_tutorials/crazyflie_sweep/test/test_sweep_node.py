@@ -19,7 +19,7 @@ from crazyflie_sweep.sweep_parameters import SweepPlan
 from crazyflie_tutorial_msgs.msg import SweepReport
 from crazyflie_tutorial_msgs.srv import VelocityAtResponse
 from crazyflie_utils import ServiceError
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import FakeProcess, launch_files
 
 PARAMETERS = {
@@ -293,7 +293,7 @@ def test_launch_file(composed, flight):
     process = FakeProcess(parameters)
     assert process.launch(SweepNode(), "/sweep"), process.logged("error")
     if composed == "true":
-        listed = NodeClasses()(launch_files.composed_nodes(parameters))
+        listed = NODE_CLASSES(launch_files.composed_nodes(parameters))
         assert listed["sweep"] is SweepNode
         assert listed["velocity_server"] is VelocityServerNode
 

@@ -20,7 +20,7 @@ from crazyflie_teleop.nodes import (
     TakeoffCallerNode,
     circle_velocity,
 )
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import FakeProcess, launch_files
 
 
@@ -129,5 +129,5 @@ def test_launch_files(file, flight, composed):
         assert fake.launch(node(), f"/{name}"), fake.logged("error")
     assert parameters["/lqr_controller/topics/reference"] == "/ref/position_velocity_yaw"
     if composed == "true":
-        assert classes.items() <= NodeClasses()(launch_files.composed_nodes(parameters)).items()
+        assert classes.items() <= NODE_CLASSES(launch_files.composed_nodes(parameters)).items()
     assert ("/takeoff_caller" in nodes) == (file == "circle")

@@ -10,7 +10,7 @@ from test_camera import CONFIG
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_model.angles import quaternion_from_rpy
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_vision.camera_node import CameraNode
 from crazyflie_vision.filter_nodes import BlurNode, EdgesNode, GreyNode, ThresholdNode
@@ -283,6 +283,6 @@ def test_launch_files(file, composed):
         assert (f"/{name}" in nodes) == (composed == "false")
         assert fake.launch(node(), f"/{name}"), fake.logged("error")
     if composed == "true":
-        composition = NodeClasses()(launch_files.composed_nodes(parameters))
+        composition = NODE_CLASSES(launch_files.composed_nodes(parameters))
         assert CLASSES[file].items() <= composition.items()
     assert "/takeoff_caller" in nodes

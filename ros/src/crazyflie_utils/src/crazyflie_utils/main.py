@@ -9,17 +9,16 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import rosgraph
 import rospy
-from typing_extensions import override
 
 from crazyflie_utils.context import Flights
 from crazyflie_utils.handle import NodeHandle
 from crazyflie_utils.node import Node, Process, initialization_failure
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, TOPIC, ParameterType
+from crazyflie_utils.parameters.types import BOOLEAN, TOPIC, Converted
 from crazyflie_utils.program import load, missing_module
 from crazyflie_utils.ros1.master_watch import MasterWatch, namesake
 from crazyflie_utils.ros1.transport import RosTransport
@@ -70,25 +69,24 @@ def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, No
     _run(begin(default_name, signals), make_nodes, signals)
 
 
-class NodeClasses(ParameterType):
-    """The nodes of a process: a dictionary of name to class."""
+def _node_classes(value):
+    if not isinstance(value, dict) or not value:
+        raise ValueError
+    return {TOPIC(name): _node_class(path) for name, path in _flatten(value).items()}
 
-    label = "dictionary, string to string"
 
-    @override
-    def __call__(self, value: Any) -> dict[str, type[Node]]:
-        if not isinstance(value, dict) or not value:
-            raise ValueError
-        return {TOPIC(name): _node_class(path) for name, path in _flatten(value).items()}
-
-    def __str__(self) -> str:
-        return 'a dictionary of node name: "package.module:Class"'
+#: The nodes of a process: a dictionary of name to class.
+NODE_CLASSES = Converted(
+    _node_classes,
+    'a dictionary of node name: "package.module:Class"',
+    "dictionary, string to string",
+)
 
 
 class ComposedParameters(Parameters):
     """Parameters of a process of many nodes."""
 
-    nodes: dict[str, type[Node]] = parameter(NodeClasses(), 'node name to "package.module:Class"')
+    nodes: dict[str, type[Node]] = parameter(NODE_CLASSES, 'node name to "package.module:Class"')
 
 
 def _flatten(tree, prefix=""):

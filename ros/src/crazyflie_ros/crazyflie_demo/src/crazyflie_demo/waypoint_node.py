@@ -5,7 +5,7 @@ from typing_extensions import override
 
 from crazyflie_controller.pose_source import PoseParameters, PoseSource
 from crazyflie_demo.node_parts import GoalParameters, goal_message
-from crazyflie_demo.waypoints import Waypoint, WaypointFollower, WaypointList
+from crazyflie_demo.waypoints import WAYPOINTS, Waypoint, WaypointFollower
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import Number
 
@@ -14,7 +14,7 @@ class WaypointParameters(GoalParameters, PoseParameters):
     """Parameters of `DemoNode`."""
 
     waypoints: list[Waypoint] | None = parameter(
-        WaypointList(), "waypoints; by default the demo's own", None
+        WAYPOINTS, "waypoints; by default the demo's own", None
     )
     position_tolerance: float = parameter(
         Number("m", above=0.0),

@@ -3,10 +3,8 @@
 import math
 from typing import NamedTuple
 
-from typing_extensions import override
-
 from crazyflie_model.angles import wrap_to_pi
-from crazyflie_utils.parameters.types import DURATION, FINITE, ParameterType
+from crazyflie_utils.parameters.types import DURATION, FINITE, Converted
 from crazyflie_utils.text import shown
 
 
@@ -20,32 +18,30 @@ class Waypoint(NamedTuple):
     seconds: float
 
 
-class WaypointList(ParameterType):
-    """A list of waypoints [x, y, z, yaw, seconds]."""
+def _waypoints(value):
+    if not isinstance(value, list) or not value:
+        raise ValueError
+    return [_waypoint(number, entry) for number, entry in enumerate(value)]
 
-    label = "list of [x, y, z, yaw, seconds]"
-    unit = "m, rad, s"
-    range = "finite, seconds >= 0"
 
-    @override
-    def __call__(self, value: object) -> list[Waypoint]:
-        if not isinstance(value, list) or not value:
-            raise ValueError
-        return [self._waypoint(number, entry) for number, entry in enumerate(value)]
+def _waypoint(number, entry):
+    if not isinstance(entry, (list, tuple)) or len(entry) != len(Waypoint._fields):
+        raise ValueError(f"waypoint {number} is {shown(entry)}")
+    *pose, duration = entry
+    try:
+        x, y, z, yaw = map(FINITE, pose)
+        return Waypoint(x, y, z, yaw, DURATION(duration))
+    except ValueError:
+        raise ValueError(f"waypoint {number} is {shown(entry)}") from None
 
-    def __str__(self) -> str:
-        return f"a {self.label} in {self.unit}, {self.range}"
 
-    @staticmethod
-    def _waypoint(number: int, entry: object) -> Waypoint:
-        if not isinstance(entry, (list, tuple)) or len(entry) != len(Waypoint._fields):
-            raise ValueError(f"waypoint {number} is {shown(entry)}")
-        *pose, duration = entry
-        try:
-            x, y, z, yaw = map(FINITE, pose)
-            return Waypoint(x, y, z, yaw, DURATION(duration))
-        except ValueError:
-            raise ValueError(f"waypoint {number} is {shown(entry)}") from None
+WAYPOINTS = Converted(
+    _waypoints,
+    "a list of [x, y, z, yaw, seconds] in m, rad, s, finite, seconds >= 0",
+    "list of [x, y, z, yaw, seconds]",
+    "m, rad, s",
+    "finite, seconds >= 0",
+)
 
 
 class WaypointFollower:

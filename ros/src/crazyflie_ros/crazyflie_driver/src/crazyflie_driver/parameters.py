@@ -23,10 +23,10 @@ from crazyflie_utils.parameters.types import (
     FRAME,
     TEXT,
     TOPIC,
+    Converted,
     Integer,
     ListOf,
     Number,
-    ParameterType,
     Text,
 )
 
@@ -131,51 +131,29 @@ CONNECTED_TOPIC = "connected"  #: Topic with whether the driver is connected to 
 POSITIONING_PARAMETER = "positioning"
 
 
-class EachLogBlock(ListOf):
-    """A value for each log block; on the parameter server, a parameter for each."""
-
-    @property
-    @override
-    def label(self) -> str:  # type: ignore[override]
-        return self.entry.label
-
-
-class Namespace(ParameterType):
-    """The name of a namespace, empty for the root; slashes around it are dropped."""
-
-    label = "string"
-
-    @override
-    def __call__(self, value: object) -> str:
-        name = value.strip("/ ") if isinstance(value, str) else None
-        if name is None or not rosgraph.names.is_legal_name("/" + name):
-            raise ValueError
-        return name
-
-    def __str__(self) -> str:
-        """Return what is expected."""
-        return "the name of a namespace, such as crazyflie1, or nothing for the root"
+def _namespace(value):
+    """Return a name, empty for the root, without the slashes around it."""
+    name = value.strip("/ ") if isinstance(value, str) else None
+    if name is None or not rosgraph.names.is_legal_name("/" + name):
+        raise ValueError
+    return name
 
 
-class LogTopic(Namespace):
-    """The name of a topic for a custom log block, which the driver itself does not use."""
-
-    @override
-    def __call__(self, value: object) -> str:
-        name = super().__call__(value)
-        if not name:
-            raise ValueError
-        if name in _OWN_TOPICS:
-            raise ValueError(f"the driver itself has a topic {name!r}")
-        return name
-
-    def __str__(self) -> str:
-        """Return what is expected."""
-        return "the name of a topic, such as motors"
+def _log_topic(value):
+    name = _namespace(value)
+    if not name:
+        raise ValueError
+    if name in _OWN_TOPICS:
+        raise ValueError(f"the driver itself has a topic {name!r}")
+    return name
 
 
-_TOPICS = ListOf(LogTopic())
+_NAMESPACE = Converted(
+    _namespace, "the name of a namespace, such as crazyflie1, or nothing for the root"
+)
+_TOPICS = ListOf(Converted(_log_topic, "the name of a topic, such as motors"))
 _VARIABLES = ListOf(TEXT)
+_ALL_VARIABLES = ListOf(_VARIABLES)
 
 _VARIABLES_NAME = "genericLogTopic_NAME_Variables"
 
@@ -198,7 +176,7 @@ class VehicleParameters(Parameters):
         TEXT, "`radio://DONGLE/CHANNEL/RATE/ADDRESS`, `udp://HOST:PORT` or `usb://NUMBER`"
     )
     tf_prefix: str = parameter(
-        Namespace(), "namespace of the vehicle's topics, services and parameters", ""
+        _NAMESPACE, "namespace of the vehicle's topics, services and parameters", ""
     )
     roll_trim: float = parameter(Number("degrees"), "added to cmd_vel", 0.0)
     pitch_trim: float = parameter(Number("degrees"), "added to cmd_vel", 0.0)
@@ -224,7 +202,8 @@ class VehicleParameters(Parameters):
         "genericLogTopicFrequencies",
     )
     log_variables: tuple[tuple[str, ...], ...] = parameter(
-        EachLogBlock(_VARIABLES),
+        # On the parameter server, each log block has a parameter.
+        Converted(_ALL_VARIABLES, str(_ALL_VARIABLES), _VARIABLES.label),
         "for each NAME in genericLogTopics: its variables",
         name=_VARIABLES_NAME,
     )

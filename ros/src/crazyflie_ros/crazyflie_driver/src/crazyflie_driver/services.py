@@ -9,7 +9,6 @@ from functools import partial
 from typing import Any
 
 from std_srvs.srv import Empty, SetBool, SetBoolResponse
-from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_driver.commands import SERVICE_TYPES, FlightState, requested
@@ -21,7 +20,7 @@ from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
-from crazyflie_utils.parameters.types import ParameterType
+from crazyflie_utils.parameters.types import Converted
 
 #: Period and limit of the wait for a controller that has parameters, s.
 CONTROLLER_PERIOD, CONTROLLER_LIMIT = 0.1, 3.0
@@ -38,23 +37,17 @@ _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 _COMMANDS = ("kalman.resetEstimation",)
 
 
-@dataclass(frozen=True)
-class _Value(ParameterType):
-    types: tuple[type, ...]
-    words: str
-
-    @override
-    def __call__(self, value: Any) -> Any:
-        if not isinstance(value, self.types):
+def _instance_of(types: type | tuple[type, ...], words: str) -> Converted:
+    def convert(value: Any) -> Any:
+        if not isinstance(value, types):
             raise ValueError
         return value
 
-    def __str__(self) -> str:
-        return self.words
+    return Converted(convert, words)
 
 
-_FIRMWARE_VALUE = _Value((bool, int, float), "a number")
-_NAMESPACE = _Value((dict,), "a namespace")
+_FIRMWARE_VALUE = _instance_of((bool, int, float), "a number")
+_NAMESPACE = _instance_of(dict, "a namespace")
 
 
 @dataclass(eq=False)

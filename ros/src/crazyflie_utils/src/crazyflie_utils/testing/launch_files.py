@@ -9,7 +9,7 @@ from roslaunch.core import Node
 from roslaunch.xmlloader import XmlLoader
 from roslib.packages import find_node
 
-from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing.fake_process import FakeProcess
 
 
@@ -44,7 +44,7 @@ def launch(path: Path, start: float = 100.0, **arguments: object) -> FakeProcess
     """
     _, parameters = expand(path, **{"composed": "true", "rviz": "false", **arguments})
     process = FakeProcess(parameters, start)
-    for name, node in NodeClasses()(composed_nodes(parameters)).items():
+    for name, node in NODE_CLASSES(composed_nodes(parameters)).items():
         assert process.launch(node(), f"/{name}"), process.logged("error")
     return process
 

@@ -107,7 +107,7 @@ class LinearFeedbackParameters(Parameters):
         return self.own_descent_topic or f"{self.reference_topic}_descent"
 
 
-class LinearFeedbackNode(Node):
+class LinearFeedbackNode(Node[LinearFeedbackParameters]):
     """Answer every state with a control that moves the vehicle towards the reference.
 
     A subclass describes its state in class attributes, and may override `complete_reference` and
@@ -119,8 +119,6 @@ class LinearFeedbackNode(Node):
     #: state_type, reference_type: Stamped messages with a field ``state``, all float64.
     state_type: type
     reference_type: type
-    #: `LinearFeedbackParameters` or a subclass.
-    parameters_type: type[LinearFeedbackParameters] = LinearFeedbackParameters
     yaw_index: int  #: Index of the yaw in the state, which begins with position and velocity.
     #: Reference of the states that the messages do not contain.
     reference_tail: tuple[float, ...] = ()
@@ -143,7 +141,7 @@ class LinearFeedbackNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(self.parameters_type, self._reconfigure)
+        super().load_parameters(handle)
         self._completes_itself = _overrides(self, LinearFeedbackNode, "complete_reference")
         self._apply(self._parameters, self.make_controller(self._parameters))
 

@@ -120,7 +120,7 @@ class SimulatorParameters(Parameters):
     )
 
 
-class SimulatorNode(Node):
+class SimulatorNode(Node[SimulatorParameters]):
     """Simulates a vehicle with the controls of a topic, and broadcasts its pose to tf.
 
     A subclass defines the vehicle's model in `make_dynamics`.
@@ -128,8 +128,6 @@ class SimulatorNode(Node):
 
     needed_in_flight = True
 
-    #: `SimulatorParameters`, or a subclass if the model has parameters of its own.
-    parameters_type: type[SimulatorParameters] = SimulatorParameters
     max_tilt = math.inf  #: See `SimulatedVehicle`; for models that can turn over.
     delay = 0.0  #: Delay from a control to its effect (s).
 

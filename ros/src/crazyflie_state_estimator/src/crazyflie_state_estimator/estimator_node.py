@@ -129,14 +129,12 @@ REPORT_PERIOD = 1.0  #: Period of the diagnostics, as REP 107 recommends (s).
 SILENCE_PERIOD = 0.1  #: Period at which an estimator that acts on arrival checks for silence (s).
 
 
-class StateEstimatorNode(Node):
+class StateEstimatorNode(Node[StateEstimatorParameters]):
     """Publishes the state of a vehicle from its pose on tf."""
 
     needed_in_flight = True
 
     state_type: type  #: Stamped message to publish, with a field ``state``, all float64.
-    #: `StateEstimatorParameters` or a subclass.
-    parameters_type: type[StateEstimatorParameters] = StateEstimatorParameters
 
     def __init__(self) -> None:
         self._control = ControlInput()

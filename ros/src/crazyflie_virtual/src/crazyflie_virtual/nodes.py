@@ -6,14 +6,7 @@ from typing import ClassVar, cast
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from typing_extensions import override
 
-from crazyflie_utils import (
-    Node,
-    NodeHandle,
-    ParameterError,
-    Parameters,
-    TransformError,
-    parameter,
-)
+from crazyflie_utils import Node, NodeHandle, ParameterError, TransformError, parameter
 from crazyflie_utils.parameters.types import TOPIC
 from crazyflie_virtual.mocap import MocapServer, MocapSettings
 from crazyflie_virtual.server import Server, VehicleServer
@@ -27,19 +20,14 @@ class ServerNode(Node):
 
     needed_in_flight = True
 
-    settings_type: ClassVar[type[Parameters]]  #: Subclass of `Parameters`.
-    #: ``server_type(settings, warn)`` listens, or raises `OSError`; ``warn(text)`` logs.
+    #: ``server_type(parameters, warn)`` listens, or raises `OSError`; ``warn(text)`` logs.
     server_type: ClassVar[type]
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._settings = handle.load(self.settings_type, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         try:
             self._server: Server = self.server_type(
-                self._settings, lambda text: handle.warn(text, throttle=1.0)
+                self._parameters, lambda text: handle.warn(text, throttle=1.0)
             )
         except OSError as error:
             raise ParameterError(
@@ -61,16 +49,16 @@ class ServerNode(Node):
 
     def _poll(self):
         try:
-            settings = self._handle.load(self.settings_type)
+            parameters = self._handle.load(self.parameters_type)
         except ParameterError as error:
             self._handle.warn(str(error), throttle=5.0)
             return
         # Only changed values, since clients may also have set switches.
         for name in vars(self._server.switches):
-            value = getattr(settings, name)
-            if value != getattr(self._settings, name):
+            value = getattr(parameters, name)
+            if value != getattr(self._parameters, name):
                 setattr(self._server.switches, name, value)
-        self._settings = settings
+        self._parameters = parameters
 
 
 _POSE_PERIOD = 0.05  #: Period at which the true pose is published (s).
@@ -91,15 +79,14 @@ class VirtualCrazyflieNode(ServerNode):
     Moving objects of its world have the pose on /tf, or their initial one.
     """
 
-    settings_type = VehicleParameters
+    parameters_type = VehicleParameters
     server_type = VehicleServer
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         super().register_callbacks(handle)
         physics = cast(VehicleServer, self._server).vehicle.physics
-        parameters = cast(VehicleParameters, self._settings)
-        self._true_pose = handle.publisher(parameters.true_pose_topic, PoseStamped)
+        self._true_pose = handle.publisher(self._parameters.true_pose_topic, PoseStamped)
         handle.timer(_POSE_PERIOD, partial(self._publish, physics))
         if physics.world is not None and physics.world.moving:
             self._lookup = handle.listen_to_transforms()
@@ -127,5 +114,5 @@ class VirtualCrazyflieNode(ServerNode):
 class VirtualMocapNode(ServerNode):
     """A NatNet server."""
 
-    settings_type = MocapSettings
+    parameters_type = MocapSettings
     server_type = MocapServer

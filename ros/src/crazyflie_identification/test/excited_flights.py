@@ -15,7 +15,7 @@ from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
 from crazyflie_model.quadrotor import TYPES
 from crazyflie_simulator.vehicle import MotionCapture, SimulatedVehicle
-from crazyflie_utils.parameters import vehicle_model
+from crazyflie_utils.parameters import model_file
 from crazyflie_virtual.crtp import Packet, Port
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
@@ -73,7 +73,7 @@ class Virtual:
     def __init__(self, true):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "true.yaml"
-            vehicle_model.save(path, "cf21_markers", true, {})
+            model_file.save(path, "cf21_markers", true, {})
             settings = {"model": str(path), "positioning": "none", "observer/port": 0}
             self._vehicle = VirtualVehicle(VehicleSettings.from_mapping(settings))
         self._start = 0.2

@@ -127,6 +127,8 @@ IN_FUNCTIONS = {
     "mocap_optitrack/library_worker.py",
     # Programs without ROS have parameters, but no names of topics.
     "crazyflie_utils/parameters/types.py",
+    # Model files are read at the start, and most vehicles have none.
+    "crazyflie_utils/parameters/vehicle_model.py",
     # cflib takes half a second, and the arguments may be wrong.
     "crazyflie_tools/tools.py",
 }

@@ -6,7 +6,7 @@ import pytest
 
 from crazyflie_model.quadrotor import CRAZYFLIE, TYPES
 from crazyflie_utils import ParameterError
-from crazyflie_utils.parameters import vehicle_model
+from crazyflie_utils.parameters import model_file, vehicle_model
 
 
 def written(tmp_path, text):
@@ -78,7 +78,7 @@ def test_what_is_saved_is_what_is_read(tmp_path):
     path = tmp_path / "model.yaml"
     text = "mass: 0.03\nlag: {roll: 0.1, pitch: 0.11, yaw: 0.09}\ntrim: {roll: 0.01}\n"
     model = vehicle_model.load(written(tmp_path, text))
-    vehicle_model.save(path, "cf21", model, {"bag": "flight.bag"})
+    model_file.save(path, "cf21", model, {"bag": "flight.bag"})
     loaded = vehicle_model.load(str(path))
     assert (loaded.yaw_lag, loaded.roll_trim, loaded.mass) == (0.09, 0.01, 0.03)
     assert math.isclose(loaded.pwm(9.81), model.pwm(9.81))

@@ -8,7 +8,7 @@ from crazyflie_identification import fit, page, recording
 from crazyflie_identification.fit import NAMES, IdentificationError
 from crazyflie_model.quadrotor import TYPES
 from crazyflie_reports.bag_file import BagError
-from crazyflie_utils.parameters import vehicle_model
+from crazyflie_utils.parameters import model_file
 
 _DESCRIPTION = """
 Find the model of a vehicle in the bag of a flight: mass, thrust curve, delay, lags of roll, pitch
@@ -38,7 +38,7 @@ def _identify(bag: Path, kind: str, vehicle: str, out: Path) -> None:
     print(*found.lines(), sep="\n")
     errors = dict(zip(NAMES, map(float, found.errors), strict=True))
     result = {"bag": str(bag), "standard_errors": errors}
-    vehicle_model.save(out, kind, found.model, result)
+    model_file.save(out, kind, found.model, result)
     shown = out.with_suffix(".html")
     shown.write_text(page.page(found, model, f"{bag.name}: {kind}"), encoding="utf-8")
     print(f"model: {out}", f"page: {shown}", f"fly it: model:={out.resolve()}", sep="\n")

@@ -40,7 +40,7 @@ class Moment:
     """The vehicle, its range sensors and the world at a moment."""
 
     time: float  #: Time since the takeoff (s).
-    position: tuple[float, float, float]  #: Of the vehicle (m).
+    position: tuple[float, float, float]  #: Position of the vehicle (m).
     ranges: dict[str, float]  #: Reading of each sensor (m).
     command: float  #: Commanded velocity ahead (m/s).
     world: World

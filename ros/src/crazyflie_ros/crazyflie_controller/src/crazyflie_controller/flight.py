@@ -58,7 +58,7 @@ class GoToFlight:
         self._controller = controller
         self.state = State.IDLE  #: After the last tick or command.
         self._warning: str | None = None
-        self.goal: HeadingPose | None = None  #: Of this flight, or of the next one.
+        self.goal: HeadingPose | None = None  #: Goal of this flight, or of the next one.
         # Never used before the first pose.
         self._pose = self._hover = self._descent_start = HeadingPose(0.0, 0.0, 0.0, 0.0)
         self._stamp: float | None = None

@@ -149,7 +149,7 @@ class Text(ParameterType):
 
 @dataclass(frozen=True)
 class Converted(ParameterType):
-    """What ``convert(raw value)`` returns; it raises as `ParameterType.__call__`."""
+    """A type whose value is ``convert(raw value)``, which raises as `ParameterType.__call__`."""
 
     convert: Callable[[Any], Any]
     expected: str  #: Description for messages, such as "a world file".

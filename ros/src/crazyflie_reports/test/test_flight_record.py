@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from crazyflie_reports.flight_record import FlightRecord, FlightReport
+from crazyflie_reports.flight_record import FlightRecord, FlightReport, Series
 
 HOVER = (0.0, 0.0, 1.0)
 
@@ -57,6 +57,26 @@ def test_overshoot():
 
 def test_hover_error():
     assert flight(hover_offset=0.004).hover_error(HOVER, 5.0) == pytest.approx((0.004, 0.004))
+
+
+def test_what_is_recorded_meanwhile_is_left_out(tmp_path, monkeypatch):
+    record, times = flight(), Series.times.fget
+    record.reference.append(10.0, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    before = FlightReport.of(record, HOVER), len(record.tracking_errors()[0]), len(record.state)
+
+    def growing(series):
+        """Return the times; another thread appends as soon as they are taken."""
+        taken = times(series)
+        series.append(30.0, [0.0] * len(series.fields))
+        return taken
+
+    monkeypatch.setattr(Series, "times", property(growing))
+    report = FlightReport.of(record, HOVER)
+    assert report.hover_error_max == before[0].hover_error_max
+    assert report.touchdown_speed == before[0].touchdown_speed
+    assert len(record.tracking_errors()[0]) >= before[1]
+    record.save_csv(tmp_path / "flight.csv")
+    assert len((tmp_path / "flight.csv").read_text().splitlines()) > before[2]
 
 
 def test_touchdown_speed():

@@ -71,8 +71,12 @@ class Series:
     @property
     def rows(self) -> NDArray[np.float64]:
         """Times (s) and rows, shape (n, 1 + len(fields))."""
+        return np.column_stack(self.taken())
+
+    def taken(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return `times` and as many `values`, while another thread appends."""
         times = self.times
-        return np.column_stack([times, self.values[: len(times)]])
+        return times, self.values[: len(times)]
 
     def column(self, name: str) -> NDArray[np.float64]:
         """Return one column, shape (n,)."""
@@ -118,8 +122,8 @@ class FlightRecord:
         From the end of the takeoff until /land was called at the latest.
         """
         begin, end = self.events.get("flying", self.events["takeoff"]), self.events["land"]
-        times = self.reference.times
-        distances = np.linalg.norm(self.reference.values[:, :3] - np.asarray(point), axis=1)
+        times, references = self.reference.taken()
+        distances = np.linalg.norm(references[:, :3] - np.asarray(point), axis=1)
         arrived = (times >= self.events["takeoff"]) & (distances < AT_POINT)
         if arrived.any():
             begin = max(begin, float(times[arrived][0]))
@@ -132,11 +136,11 @@ class FlightRecord:
 
         States before the first reference are not included.
         """
-        times = self.state.times
+        times, states = self.state.taken()
         newest = np.searchsorted(self.reference.times, times, side="right") - 1
         known = newest >= 0
         references = self.reference.values[newest[known], :3]
-        states = self.state.values[known, :3]
+        states = states[known, :3]
         return times[known], np.linalg.norm(states - references, axis=1)
 
     def time_to_hover(self, point: ArrayLike, tolerance: float) -> float:
@@ -154,8 +158,8 @@ class FlightRecord:
 
     def overshoot(self, point: ArrayLike) -> float:
         """Return the overshoot above a hover point (m), at least 0."""
-        times, height = self.state.times, np.asarray(point)[2]
-        until = self.state.column("z")[times <= self.hover_interval(point)[1]]
+        (times, states), height = self.state.taken(), np.asarray(point)[2]
+        until = states[times <= self.hover_interval(point)[1], self.state.fields.index("z")]
         return max(0.0, float(until.max(initial=height)) - float(height))
 
     def hover_error(self, point: ArrayLike, duration: float) -> tuple[float, float]:
@@ -175,32 +179,32 @@ class FlightRecord:
         The fastest of the last tenth of a second above `GROUND_TOLERANCE`; NaN when the vehicle did
         not come down, or no velocity is known there.
         """
-        times, heights = self.state.times, self.state.column("z")
+        times, states = self.state.taken()
+        heights = states[:, self.state.fields.index("z")]
         descending = np.flatnonzero((times >= self.events["land"]) & (heights > GROUND_TOLERANCE))
         if not descending.size or descending[-1] == len(times) - 1:
             return float("nan")
         contact = times[descending[-1] + 1]
         window = (times >= contact - 0.1) & (times <= contact)
-        speeds = -self.state.column("z_dot")[window]
+        speeds = -states[window, self.state.fields.index("z_dot")]
         speeds = speeds[np.isfinite(speeds)]
         return float(max(0.0, speeds.max())) if speeds.size else float("nan")
 
     def save_csv(self, path: Path) -> None:
         """Write state and control, one row for every state, times from the call of /takeoff."""
-        control_times = self.final_control.times
-        controls = self.final_control.values
+        control_times, controls = self.final_control.taken()
         with path.open("w", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(["time", *STATE_FIELDS, *CONTROL_FIELDS])
-            for time, state in zip(self.state.times, self.state.values, strict=True):
+            for time, state in zip(*self.state.taken(), strict=True):
                 index = int(np.searchsorted(control_times, time, side="right")) - 1
                 control = controls[index] if index >= 0 else [np.nan] * len(CONTROL_FIELDS)
                 writer.writerow([f"{time - self.events['takeoff']:.3f}", *state, *control])
 
     def _hover(self, point):
-        times = self.state.times
+        times, states = self.state.taken()
         hover = (times >= self.events["takeoff"]) & (times <= self.hover_interval(point)[1])
-        return times[hover], self.position_error(point)[hover]
+        return times[hover], np.linalg.norm(states[hover, :3] - np.asarray(point), axis=1)
 
 
 @dataclass(frozen=True)

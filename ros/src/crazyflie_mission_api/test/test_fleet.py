@@ -237,6 +237,32 @@ def test_all_vehicles_of_a_driver_start_by_its_service_for_all(process):
         assert len(requests) == 1
 
 
+def test_vehicles_that_are_streamed_to_start_one_by_one(process):
+    vehicles = [DriverVehicle(process, f"cf{k}", (k - 1.0, 0.0, 0.0)) for k in (1, 2)]
+    handle = process.handle("/this_process")
+    for name in ("start_trajectory", "go_to"):
+        handle.advertise_service(f"~all/{name}", StartTrajectory, lambda _: pytest.fail("all"))
+    path = plan([(0, 0, 1), (0.2, 0, 1)])
+    with Fleet(NAMES, process=process, startup_timeout=0.5) as fleet:
+        fleet.takeoff(1.0)
+        fleet["cf1"].follow(path, stream=True, wait=False)
+        fleet.wait(0.2)
+        vehicles[1].position[0] += 0.2
+        fleet.adopt("cf1")
+        fleet.follow(path, relative=True)
+        assert all("start_trajectory" in vehicle.called() for vehicle in vehicles)
+
+
+def test_vehicles_of_controllers_start_by_one_message(process):
+    for number in (1, 2):
+        ControllerVehicle(process, f"cf{number}", (number - 1.0, 0.0, 0.0))
+    with Fleet(NAMES, process=process, startup_timeout=0.5) as fleet:
+        fleet.takeoff(1.0)
+        fleet.go_to((0.2, 0.0, 0.0), relative=True)
+    (message,) = process.published("/all/start_trajectory")
+    assert message.data == "/cf1/high_level /cf2/high_level"
+
+
 def test_vehicles_of_a_graph_are_found_by_their_services():
     services = {
         **dict.fromkeys(["/cf1/go_to", "/cf1/takeoff", "/cf1/upload_trajectory"], "/driver"),

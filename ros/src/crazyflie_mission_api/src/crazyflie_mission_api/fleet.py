@@ -18,7 +18,7 @@ from typing_extensions import override
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import BUFFER
 from crazyflie_fleet.high_level_node import HighLevelNode
-from crazyflie_fleet.high_level_services import START_TOPIC
+from crazyflie_fleet.high_level_services import HIGH_LEVEL, START_TOPIC
 from crazyflie_fleet.mission_watch import MISSION_PERIOD, MISSION_TOPIC, Claim, MissionWatch
 from crazyflie_mission_api import observer
 from crazyflie_mission_api.dry_run import dry_run
@@ -27,7 +27,7 @@ from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionErro
 from crazyflie_mission_api.mission_vehicle import Clock, Playback, done
 from crazyflie_mission_api.ros_vehicle import (
     ALL_OF_FLEET,
-    JointStart,
+    Access,
     RosVehicle,
     RosVehicleState,
     ServiceCommands,
@@ -136,7 +136,12 @@ class Fleet(VehicleGroup):
         self._heartbeat: Timer | None = None
         self._others: dict[str, RosVehicleState] = {}
         try:
-            vehicles = _connect(process, self._handle, chosen, startup_timeout)
+            vehicles, common = _connect(process, self._handle, chosen, startup_timeout)
+            # Commands to all vehicles of a driver, if they are exactly these.
+            self._driver: ServiceCommands | None = None
+            if common not in (None, ALL_OF_FLEET):
+                self._driver = ServiceCommands(self._handle, common)
+            self._starts = self._handle.publisher(START_TOPIC, String)
             clock = RosClock(self._handle, lambda: process.exit_status is not None)
             # The buffers of the fleet process that flies them, if one does.
             watched = {name: _buffer(self._handle, name) for name in chosen}
@@ -205,6 +210,17 @@ class Fleet(VehicleGroup):
                 self._release()
             self._end()
 
+    @override
+    def _start(self, names):
+        vehicles = [self.vehicle(name) for name in names]
+        is_streamed = any(vehicle.is_streamed for vehicle in vehicles)
+        # All vehicles of a driver; fewer are called one by one.
+        if self._driver and len(vehicles) == len(self._all_vehicles) and not is_streamed:
+            return dict.fromkeys(names, self._driver.start_trajectory(Playback(0)))
+        if tops := [vehicle.top for vehicle in vehicles if not vehicle.uses_driver]:
+            self._handle.submit(self._starts.publish, String(" ".join(tops)))
+        return {v.name: v.start() if v.uses_driver else done(None) for v in vehicles}
+
     # Other missions.
 
     def _claim_vehicles(self):
@@ -257,8 +273,8 @@ class Fleet(VehicleGroup):
 
     def _place_of_other(self, name):
         if name not in self._others:
-            how = _how_seen(self._handle, name, flown_vehicles(self._handle.service_nodes()))
-            self._others[name] = RosVehicleState(name, self._handle, *how)
+            access = _access(self._handle, name, flown_vehicles(self._handle.service_nodes()))
+            self._others[name] = RosVehicleState(name, self._handle, access)
             if buffer := _buffer(self._handle, name):
                 self._buffers[name] = buffer
         vehicle = self._others[name]
@@ -307,87 +323,57 @@ def _buffer(handle, name):
 
 
 def _connect(process, handle, names, timeout):
+    """Return the vehicles, and the namespace of services for all of them, if there is one."""
     end = time.monotonic() + timeout
-    missing = list(names)
-    found = {}
-    while missing:
+    found: dict[str, RosVehicle] = {}
+    while True:
         services = handle.service_nodes()
         drivers = flown_vehicles(services)
-        for name in list(missing):
-            how = _how_seen(handle, name, drivers)
-            vehicle = _vehicle(process, handle, name, services, how)
-            if vehicle is not None:
-                found[name] = vehicle
-                missing.remove(name)
-        if missing and time.monotonic() > end:
-            tops = ", ".join(prefix(name) for name in missing)
+        for name in names:
+            top = prefix(name)
+            if name in found or not (
+                name in drivers or {f"{top}/takeoff", f"{top}/land"} <= services.keys()
+            ):
+                continue
+            access = _access(handle, name, drivers)
+            if name not in drivers:
+                handle.set_param(f"{access.top}/reference/yaw", access.has_yaw)
+                if not HighLevelNode().initialize(process.handle(access.top)):
+                    raise MissionError(
+                        f"{access.top} could not be started; its reason is in the log"
+                    )
+            found[name] = RosVehicle(name, handle, access)
+        missing = [prefix(name) for name in names if name not in found]
+        if not missing:
+            return [found[name] for name in names], common_services(services, names)
+        if time.monotonic() > end:
             there = sorted(
                 {s.rpartition("/takeoff")[0].strip("/") or "/" for s in services if "takeoff" in s}
             )
             raise MissionError(
-                f"no takeoff and land, and no go_to, below {tops} after {timeout:g} s; takeoff is "
-                f"offered by: {', '.join(there) or 'no node'}"
+                f"no takeoff and land, and no go_to, below {', '.join(missing)} after {timeout:g} "
+                f"s; takeoff is offered by: {', '.join(there) or 'no node'}"
             )
-        if missing:
-            time.sleep(_POLL)
-    vehicles = [found[name] for name in names]
-    _start_together(handle, vehicles, common_services(services, names))
-    return vehicles
+        time.sleep(_POLL)
 
 
-def _start_together(handle, vehicles, top):
-    """Give vehicles what starts them together; ``top`` is as from `common_services`."""
-    publisher = handle.publisher(START_TOPIC, String)
-
-    def publish(starting):
-        publisher.publish(String(" ".join(vehicle.top for vehicle in starting)))
-        return [done(None) for _ in starting]
-
-    def broadcast(starting):
-        # All vehicles of a driver; fewer are called one by one.
-        if len(starting) == len(vehicles):
-            return [ServiceCommands(handle, top).start_trajectory(Playback(0))] * len(vehicles)
-        return [vehicle.start_trajectory(Playback(0)) for vehicle in starting]
-
-    by_driver = None if top in (None, ALL_OF_FLEET) else JointStart(handle, broadcast)
-    by_message = JointStart(handle, publish)
-    for vehicle in vehicles:
-        vehicle.joint_start = by_driver if vehicle.uses_driver else by_message
-
-
-def _how_seen(handle, name, drivers):
-    """Return the arguments of `RosVehicleState` for a vehicle: uses_driver, frames, has_yaw."""
+def _access(handle, name, drivers):
+    """Return the `Access` to a vehicle; ``drivers`` are as from `flown_vehicles`."""
     top = prefix(name)
-    driver = drivers.get(name)
-    if driver == "":
-        has_yaw = handle.get_param(f"{top}/high_level/reference/yaw", BOOLEAN, False)
-        return False, _frames(handle, f"{top}/high_level"), has_yaw
-    if driver is not None:
-        return True, (handle.get_param(f"{driver}/frames/fixed", FRAME, "world"), name), True
-    return False, None, topic_types(handle).get(f"{top}/ref") == _YAW_STATE
-
-
-def _vehicle(process, handle, name, services, how):
-    top = prefix(name)
-    commander = f"{top}/high_level"
-    uses_driver, _, has_yaw = how
-    if uses_driver:
-        return RosVehicle(name, handle, top, *how)
-    if f"{commander}/go_to" not in services:
-        if not {f"{top}/takeoff", f"{top}/land"} <= services.keys():
-            return None
-        handle.set_param(f"{commander}/reference/yaw", has_yaw)
-        if not HighLevelNode().initialize(process.handle(commander)):
-            raise MissionError(f"{commander} could not be started; its reason is in the log")
-    return RosVehicle(name, handle, commander, *how)
-
-
-def _frames(handle, commander):
+    commander = f"{top}/{HIGH_LEVEL}"
+    if name not in drivers:
+        # This process has its `HighLevelNode`.
+        has_yaw = topic_types(handle).get(f"{top}/ref") == _YAW_STATE
+        return Access(commander, False, None, has_yaw)
+    if driver := drivers[name]:
+        fixed = handle.get_param(f"{driver}/frames/fixed", FRAME, "world")
+        return Access(top, True, (fixed, name), True)
     # In a fleet, one message on /tf has the poses of all vehicles.
     fixed, own = (
         handle.get_param(f"{commander}/frames/{frame}", FRAME, None) for frame in ("fixed", "robot")
     )
-    return None if fixed is None or own is None else (fixed, own)
+    has_yaw = handle.get_param(f"{commander}/reference/yaw", BOOLEAN, False)
+    return Access(commander, False, None if None in (fixed, own) else (fixed, own), has_yaw)
 
 
 def topic_types(handle: NodeHandle) -> dict[str, str]:

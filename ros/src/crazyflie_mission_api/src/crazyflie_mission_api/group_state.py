@@ -11,7 +11,12 @@ from typing import NamedTuple, Self
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Clearance, Limits, MissionError, number
 from crazyflie_mission_api.mission_vehicle import Clock, MissionVehicle, never
 from crazyflie_mission_api.observer import MissionObserver, command
-from crazyflie_mission_api.trajectories import TimedTrajectory, check_apart, within_limits
+from crazyflie_mission_api.trajectories import (
+    TimedTrajectory,
+    check_apart,
+    check_with_skew,
+    within_limits,
+)
 from crazyflie_model import trajectory
 from crazyflie_model.angles import Triple
 
@@ -133,7 +138,7 @@ class GroupState:
     @command
     def emergency(self) -> None:
         """Stop all motors at once, wherever the vehicles are: they fall."""
-        failures = self._answers(lambda name: self._vehicles[name].emergency())
+        failures = self._answers({name: v.emergency() for name, v in self._vehicles.items()})
         for name in self._vehicles.keys() - failures.keys():
             self._commanded.pop(name, None)
         raise_failures("emergency", failures)
@@ -160,6 +165,10 @@ class GroupState:
             if measured is not None:
                 places[name] = measured
         return places
+
+    def _check_moves(self, moves):
+        """Check trajectories, also with a late start, together with those of all other vehicles."""
+        check_with_skew({**self._commanded, **moves}, self.time(), self._check_apart)
 
     def _check_apart(self, changed):
         """Check trajectories together with those of all other vehicles.
@@ -189,9 +198,8 @@ class GroupState:
                     f"no vehicle has the name {name!r}; expected one of {', '.join(self._vehicles)}"
                 )
 
-    def _answers(self, command, names=None):
-        """Return why ``command(name)`` was refused: name to reason; by default of all vehicles."""
-        futures = {name: command(name) for name in (self._vehicles if names is None else names)}
+    def _answers(self, futures):
+        """Wait for the answers to commands; return why some were refused: name to reason."""
         # Their timeout is by the machine's clock: simulated time may run faster than a slow answer.
         self.clock.wait_until(lambda: all(f.done() for f in futures.values()), math.inf)
         errors = {name: future.exception() for name, future in futures.items()}

@@ -10,7 +10,7 @@ from crazyflie_fleet.landing import LandingSide, Place, Situation, land_in_round
 from crazyflie_mission_api.group_state import GroupState
 from crazyflie_mission_api.limits import EVERYWHERE
 from crazyflie_mission_api.mission_vehicle import Move, never
-from crazyflie_mission_api.trajectories import TimedTrajectory, check_with_skew, straight
+from crazyflie_mission_api.trajectories import TimedTrajectory, straight
 
 _DESCENT_SPEED = 0.3  #: Mean speed of landings (m/s).
 _SHORTEST_LANDING = 2.0  #: Shortest duration of a landing (s).
@@ -68,13 +68,12 @@ class _Landing(LandingSide):
             for name, (goal, yaw) in poses.items()
         }
         if self._is_checked:
-            check_with_skew({**group._commanded, **moves}, now, group._check_apart)
-
-        def go_to(name):
-            goal, yaw = poses[name]
-            return group._vehicles[name].go_to(Move(goal, yaw, duration))
-
-        failures = group._answers(go_to, poses)
+            group._check_moves(moves)
+        calls = {
+            name: group._vehicles[name].go_to(Move(goal, yaw, duration))
+            for name, (goal, yaw) in poses.items()
+        }
+        failures = group._answers(calls)
         group._commanded.update({n: move for n, move in moves.items() if n not in failures})
         return failures
 
@@ -151,7 +150,8 @@ class _Landing(LandingSide):
         if self._is_checked:
             group._check_apart(descents)
         # A vehicle that refuses does not keep the others in the air.
-        refusals = group._answers(lambda name: group._vehicles[name].land(None, duration), names)
+        calls = {name: group._vehicles[name].land(None, duration) for name in names}
+        refusals = group._answers(calls)
         self.failures |= refusals
         self._descending = [name for name in names if name not in refusals]
         group._commanded.update({name: descents[name] for name in self._descending})

@@ -1,7 +1,7 @@
 """Vehicles of a mission by ROS services and topics."""
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from concurrent.futures import Future
 from functools import partial
 from typing import Any, NamedTuple
@@ -27,7 +27,6 @@ from crazyflie_mission_api.mission_vehicle import (
     Playback,
     Setpoint,
     done,
-    forward,
 )
 from crazyflie_mission_api.stream import SetpointPublishers, SetpointStream
 from crazyflie_mission_api.trajectories import START_SKEW
@@ -46,7 +45,6 @@ _LANDED_HEIGHT = 0.1  #: Largest height above the start of a vehicle that has la
 #: States of the takeoff server after the flight.
 _ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
 
-_STEP = 0.02  #: Time within which starts of vehicles are combined (s).
 ALL_OF_FLEET = f"/all/{HIGH_LEVEL}"  #: Namespace of a fleet's services for all.
 CALL_TIMEOUT = 60.0  #: Timeout of a service (s of the machine's clock).
 _SETTLING_TIME = 0.5  #: Time after the planned end of a landing until the vehicle is down (s).
@@ -75,23 +73,26 @@ def velocity_between(first: TimedPose, last: TimedPose) -> Triple:
     return x, y, z
 
 
+class Access(NamedTuple):
+    """How a vehicle is seen and flown."""
+
+    top: str  #: Namespace of its high-level services.
+    uses_driver: bool
+    #: The fixed and its own frame, if its position comes by tf; with the driver only as long as
+    #: there are no poses.
+    frames: tuple[str, str] | None
+    has_yaw: bool  #: Whether it can have another heading than 0.
+
+
 class RosVehicleState:
     """Pose of a vehicle, whether it can fly on, and whether it has landed.
 
     The driver publishes its pose and status; otherwise the takeoff server its status, and an
-    estimator its state. ``frames`` are the fixed and its own frame, if its position comes by tf;
-    with the driver only as long as there are no poses. ``has_yaw`` is whether it can have another
-    heading than 0.
+    estimator its state.
     """
 
-    def __init__(
-        self,
-        name: str,
-        handle: NodeHandle,
-        uses_driver: bool,
-        frames: tuple[str, str] | None,
-        has_yaw: bool,
-    ):
+    def __init__(self, name: str, handle: NodeHandle, access: Access):
+        _, uses_driver, frames, has_yaw = access
         self.name = name
         self._handle = handle
         self.uses_driver = uses_driver
@@ -198,35 +199,6 @@ def prefix(name: str) -> str:
     return "" if name == "/" else f"/{name}"
 
 
-class JointStart:
-    """Starts the uploaded trajectories 0 of vehicles that are to start within `_STEP` together.
-
-    ``start(vehicles)`` starts vehicles; it returns the future of the answer of each.
-    """
-
-    def __init__(
-        self,
-        handle: NodeHandle,
-        start: Callable[[Sequence["RosVehicle"]], "Iterable[Future[Any]]"],
-    ):
-        self._handle = handle
-        self._start = start
-        self._waiting: dict[RosVehicle, Future[Any]] = {}
-        handle.timer(_STEP, self._on_timer)
-
-    def start(self, vehicle: "RosVehicle") -> "Future[Any]":
-        """Start a vehicle with others; return the future of its answer."""
-        answer: Future[Any] = Future()
-        self._handle.submit(lambda: self._waiting.update({vehicle: answer}))
-        return answer
-
-    def _on_timer(self):
-        if self._waiting:
-            waiting, self._waiting = self._waiting, {}
-            for call, answer in zip(self._start([*waiting]), waiting.values(), strict=True):
-                forward(call, answer)
-
-
 def flown_vehicles(services: Mapping[str, str]) -> dict[str, str]:
     """Return the vehicles with services for high-level commands: name to the driver's node.
 
@@ -309,25 +281,16 @@ class ServiceCommands(Commands):
 class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
     """A vehicle by the services of the driver, or by those of `HighLevelNode`, below ``top``."""
 
-    def __init__(
-        self,
-        name: str,
-        handle: NodeHandle,
-        top: str,
-        uses_driver: bool,
-        frames: tuple[str, str] | None,
-        has_yaw: bool,
-    ):
-        RosVehicleState.__init__(self, name, handle, uses_driver, frames, has_yaw)
-        ServiceCommands.__init__(self, handle, top)
+    def __init__(self, name: str, handle: NodeHandle, access: Access):
+        RosVehicleState.__init__(self, name, handle, access)
+        ServiceCommands.__init__(self, handle, access.top)
         self.bounds = fence(handle, prefix(name))
-        self.start_skew = START_SKEW if uses_driver else 0.0
-        self.joint_start: JointStart | None = None  #: Starts it together with others.
+        self.start_skew = START_SKEW if access.uses_driver else 0.0
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
-        self._setpoints = SetpointPublishers(handle, top)
-        if uses_driver:
-            frame = "" if frames is None else frames[0]
+        self._setpoints = SetpointPublishers(handle, access.top)
+        if access.uses_driver:
+            frame = "" if access.frames is None else access.frames[0]
             self._stream = SetpointStream(
                 handle, f"{prefix(name)}/cmd_full_state", frame, self._hold
             )
@@ -335,6 +298,11 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
     @override
     def fault(self) -> str:
         return super().fault() or ("" if self._stream is None else self._stream.fault)
+
+    @property
+    def is_streamed(self) -> bool:
+        """Whether there are setpoints, or `start` begins to send them."""
+        return self._prepared is not None or (self._stream is not None and self._stream.is_active)
 
     # Commands.
 
@@ -383,9 +351,6 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
     def start(self) -> "Future[Any]":
         if self._prepared is not None and self._stream is not None:
             return self._stream.start(self._prepared)
-        joint = self.joint_start
-        if joint is not None:
-            return self._hand_over(lambda: joint.start(self))
         return self._hand_over(lambda: self.start_trajectory(Playback(0)))
 
     @override

@@ -2,10 +2,8 @@
 
 import math
 import time
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -27,7 +25,8 @@ from crazyflie_mission_api.mission_vehicle import (
 from crazyflie_mission_api.trajectories import TimedTrajectory
 from crazyflie_model.polynomials import Goal
 from crazyflie_model.trajectory import Pieces
-from crazyflie_utils import NodeHandle
+from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils.steps import follow
 from crazyflie_utils.topics import Publisher
 
 STEP = 0.02  #: Period of the setpoints (s).
@@ -42,17 +41,6 @@ RETRY_PERIOD = 1.0  #: Time from a failed command to the next try (s).
 _CONNECTION_LIMIT = 2.0
 
 Send = Callable[[], "Future[Any]"]
-
-
-@dataclass
-class _Command:
-    """A command in the queue; times are in s."""
-
-    send: Send
-    retry_end: float
-    trajectory: TimedTrajectory | None = None
-    sent_time: float = 0.0
-    outcome: "Future[Any]" = field(default_factory=Future)
 
 
 class SetpointStream:
@@ -86,21 +74,21 @@ class SetpointStream:
         self._frame = frame
         self._hold = hold
         self._trajectory: TimedTrajectory | None = None
-        self._commands: deque[_Command] = deque()
+        self._last_turn: Future[None] = done(None)
         self._next_hold = 0.0
         #: Why ``hold`` has failed at the end of a trajectory; empty if it has not.
         self.fault = ""
         self._publisher = handle.publisher(topic, FullState)
         handle.timer(STEP, self._on_timer)
 
+    @property
+    def is_active(self) -> bool:
+        """Whether there are setpoints."""
+        return self._trajectory is not None
+
     def start(self, pieces: Pieces) -> "Future[Any]":
         """Stream a trajectory from now on, instead of the present one."""
-
-        def begin():
-            self._trajectory = TimedTrajectory(pieces, self._handle.time())
-            return done(None)
-
-        return self.hand_over(begin)
+        return follow(self._in_turn(self._begin(pieces)), self._handle.submit)
 
     def hand_over(self, send: Send, retry_time: float = 0.0) -> "Future[Any]":
         """Send a command; setpoints end when it has been accepted. Return the last answer.
@@ -108,50 +96,51 @@ class SetpointStream:
         ``send()`` returns the future of an answer. A command that fails while there are setpoints
         is sent again for ``retry_time``, s.
         """
-        command = _Command(send, self._handle.time() + retry_time)
-        self._handle.submit(self._enqueue, command)
-        return command.outcome
+        steps = self._take_over(send, self._handle.time() + retry_time)
+        return follow(self._in_turn(steps), self._handle.submit)
 
     def stop(self) -> None:
         """End the setpoints at once, without a command that takes over."""
         self._trajectory = None
 
-    def _enqueue(self, command):
-        self._commands.append(command)
-        if len(self._commands) == 1:
-            self._send()
+    def _in_turn(self, steps):
+        """Do steps when those before them have ended."""
+        # All that follows is done by the executor of the node.
+        yield done(None)
+        before = self._last_turn
+        turn: Future[None] = Future()
+        self._last_turn = turn
+        yield before
+        try:
+            return (yield from steps)
+        finally:
+            turn.set_result(None)
 
-    def _send(self):
-        command = self._commands[0]
-        command.trajectory, command.sent_time = self._trajectory, self._handle.time()
-        command.send().add_done_callback(partial(self._handle.submit, self._on_answer))
+    def _begin(self, pieces):
+        self._trajectory = TimedTrajectory(pieces, self._handle.time())
+        yield from ()
 
-    def _on_answer(self, answer):
-        command, error, now = self._commands[0], answer.exception(), self._handle.time()
-        is_streaming = self._trajectory is not None and self._trajectory is command.trajectory
-        if is_streaming and error is not None and now < command.retry_end:
-            self._send_later()
-            return
-        if is_streaming and error is None:
-            if now - command.sent_time > MAX_ANSWER_TIME:
-                self._send()
-                return
-            self._trajectory = None
-        self._commands.popleft()
-        if self._commands:
-            self._send()
-        if error is None:
-            self.fault = ""
-            command.outcome.set_result(answer.result())
-        else:
-            command.outcome.set_exception(error)
+    def _take_over(self, send, retry_end):
+        while True:
+            sent_time = self._handle.time()
+            try:
+                answer = yield send()
+            except ServiceError:
+                if not self.is_active or self._handle.time() >= retry_end:
+                    raise
+                yield self._pause()
+            else:
+                if not self.is_active or self._handle.time() - sent_time <= MAX_ANSWER_TIME:
+                    break
+        self.fault = ""
+        self.stop()
+        return answer
 
-    def _send_later(self):
-        def send():
-            timer.stop()
-            self._send()
-
-        timer = self._handle.timer(RETRY_PERIOD, send)
+    def _pause(self):
+        end: Future[None] = Future()
+        timer = self._handle.timer(RETRY_PERIOD, lambda: end.set_result(None))
+        end.add_done_callback(lambda _: timer.stop())
+        return end
 
     def _on_timer(self):
         trajectory, now = self._trajectory, self._handle.time()
@@ -160,13 +149,13 @@ class SetpointStream:
         message = full_state_message(trajectory.goal(now), self._frame)
         message.header.stamp = self._handle.stamp()
         self._publisher.publish(message)
-        if now >= max(trajectory.end, self._next_hold) and not self._commands:
+        if now >= max(trajectory.end, self._next_hold) and self._last_turn.done():
             self._next_hold = now + RETRY_PERIOD
             held = self.hand_over(partial(self._hold, trajectory.destination))
             held.add_done_callback(self._note_hold)
 
     def _note_hold(self, held):
-        if held.exception() is not None and self._trajectory is not None:
+        if held.exception() is not None and self.is_active:
             self.fault = (
                 f"the trajectory has ended, and go_to has failed: {held.exception()}; setpoints "
                 "go on at its end"

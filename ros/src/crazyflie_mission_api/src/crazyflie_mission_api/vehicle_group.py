@@ -14,11 +14,7 @@ from crazyflie_mission_api.landing import land_all
 from crazyflie_mission_api.limits import Array, MissionError, number, point
 from crazyflie_mission_api.mission_vehicle import Move
 from crazyflie_mission_api.observer import command
-from crazyflie_mission_api.trajectories import (
-    TimedTrajectory,
-    check_with_skew,
-    straight,
-)
+from crazyflie_mission_api.trajectories import TimedTrajectory, straight
 from crazyflie_model.trajectory import Pieces, duration, moved, stretched
 
 Point = Sequence[float]
@@ -60,11 +56,8 @@ class VehicleGroup(GroupState):
         self._check_climbs(height)
         # Stored first: vehicles that have begun to take off must be landed after any error.
         self._commanded.update({n: TimedTrajectory(c, self.time()) for n, c in climbs.items()})
-
-        def begin(name):
-            return self._vehicles[name].takeoff(height, duration(climbs[name]))
-
-        failures = self._answers(begin)
+        calls = {n: self._vehicles[n].takeoff(height, duration(c)) for n, c in climbs.items()}
+        failures = self._answers(calls)
         for name, climb in climbs.items():
             # A takeoff server answers after some time, before the height is reached.
             self._commanded[name] = TimedTrajectory(climb, self.time())
@@ -118,12 +111,12 @@ class VehicleGroup(GroupState):
         together = prompt if len(moves) > 1 else []
         self._prepare({name: moves[name] for name in together}, "go_to", stream=False)
 
-        def command(name):
-            if name in together:
-                return self._vehicles[name].start()
-            return self._vehicles[name].go_to(Move(places[name], yaws[name], seconds))
+        def begin():
+            others = [name for name in moves if name not in together]
+            calls = {n: self._vehicles[n].go_to(Move(places[n], yaws[n], seconds)) for n in others}
+            return self._start(together) | calls
 
-        self._fly(moves, "go_to", command, wait)
+        self._fly(moves, "go_to", begin, wait)
 
     @command
     def follow(
@@ -170,7 +163,7 @@ class VehicleGroup(GroupState):
                 )
         self._check(flown, "trajectory", "a timescale > 1")
         self._prepare(flown, "upload", stream)
-        self._fly(flown, "follow", lambda name: self._vehicles[name].start(), wait)
+        self._fly(flown, "follow", lambda: self._start(flown), wait)
 
     @command
     def formation(
@@ -272,18 +265,19 @@ class VehicleGroup(GroupState):
             fence = self.fence(name)
             trajectories.check(pieces, self.rules.limits, fence, f"{name}: {what}", slower)
         now = self.time()
-        timed = {name: self._timed(name, pieces, now) for name, pieces in flown.items()}
-        check_with_skew({**self._commanded, **timed}, now, self._check_apart)
+        self._check_moves({name: self._timed(name, each, now) for name, each in flown.items()})
 
     def _prepare(self, flown, what, stream):
-        def prepare(name):
-            return self._vehicles[name].prepare(flown[name], stream)
+        calls = {name: self._vehicles[name].prepare(each, stream) for name, each in flown.items()}
+        raise_failures(what, self._answers(calls))
 
-        raise_failures(what, self._answers(prepare, flown))
+    def _start(self, names):
+        """Start the trajectories that were prepared last; return the futures of the answers."""
+        return {name: self._vehicles[name].start() for name in names}
 
-    def _fly(self, flown, what, command, wait):
+    def _fly(self, flown, what, call, wait):
         begin = self.time()
-        failures = self._answers(command, flown)
+        failures = self._answers(call())
         for name, pieces in flown.items():
             if name not in failures:
                 self._commanded[name] = self._timed(name, pieces, begin)

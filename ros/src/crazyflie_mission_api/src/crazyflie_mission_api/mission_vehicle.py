@@ -203,15 +203,3 @@ def done(error: Exception | None) -> "Future[Any]":
     else:
         future.set_exception(error)
     return future
-
-
-def forward(source: "Future[Any]", target: "Future[Any]") -> None:
-    """Complete a future as another one."""
-
-    def complete(answer):
-        if (error := answer.exception()) is not None:
-            target.set_exception(error)
-        else:
-            target.set_result(answer.result())
-
-    source.add_done_callback(complete)

@@ -4,6 +4,9 @@ Such a script is a node of its own and calls rospy.init_node first: this is plai
 methods block.
 """
 
+# The names of methods and arguments are those that existing scripts use.
+# ruff: noqa: N802, N803
+
 import contextlib
 import math
 import time
@@ -63,8 +66,6 @@ class Crazyflie:
     tf.TransformListener or tf2_ros.Buffer, which is asked for the frame ``prefix``.
     """
 
-    # The names of arguments, here and below, are those that existing scripts use.
-
     _world = _WORLD
 
     def __init__(self, prefix: str, tf: Any):
@@ -88,19 +89,19 @@ class Crazyflie:
     def _call(self, service, *arguments):
         self._services[service](*arguments)
 
-    def setGroupMask(self, groupMask: int) -> None:  # noqa: N802, N803
+    def setGroupMask(self, groupMask: int) -> None:
         """Make the vehicle a member of groups, one for each bit."""
         self._call("set_group_mask", groupMask)
 
-    def takeoff(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:  # noqa: N803
+    def takeoff(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
         """Climb to a height (m) within a duration (s)."""
         self._call("takeoff", groupMask, targetHeight, rospy.Duration.from_sec(duration))
 
-    def land(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:  # noqa: N803
+    def land(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
         """Sink to a height (m) within a duration (s)."""
         self._call("land", groupMask, targetHeight, rospy.Duration.from_sec(duration))
 
-    def stop(self, groupMask: int = 0) -> None:  # noqa: N803
+    def stop(self, groupMask: int = 0) -> None:
         """Stop the motors."""
         self._call("stop", groupMask)
 
@@ -108,27 +109,23 @@ class Crazyflie:
         """Stop the motors at once, for good."""
         self._call("emergency")
 
-    def notifySetpointsStop(  # noqa: N802
-        self,
-        remainValidMillisecs: int = 100,  # noqa: N803
-        groupMask: int = 0,  # noqa: N803
-    ) -> None:
+    def notifySetpointsStop(self, remainValidMillisecs: int = 100, groupMask: int = 0) -> None:
         """Return from setpoints to commands; the last setpoint remains valid for some ms."""
         self._call("notify_setpoints_stop", groupMask, remainValidMillisecs)
 
-    def goTo(  # noqa: N802
+    def goTo(
         self,
         goal: Sequence[float],
         yaw: float,
         duration: float,
         relative: bool = False,
-        groupMask: int = 0,  # noqa: N803
+        groupMask: int = 0,
     ) -> None:
         """Fly to a point x, y, z (m) and a yaw (rad) within a duration (s)."""
         period = rospy.Duration.from_sec(duration)
         self._call("go_to", groupMask, relative, Point(*goal), yaw, period)
 
-    def uploadTrajectory(self, trajectoryId: int, pieceOffset: int, trajectory: Trajectory) -> None:  # noqa: N802, N803
+    def uploadTrajectory(self, trajectoryId: int, pieceOffset: int, trajectory: Trajectory) -> None:
         """Write a trajectory into the vehicle's memory, after ``pieceOffset`` pieces."""
         pieces = [
             TrajectoryPolynomialPiece(
@@ -139,13 +136,13 @@ class Crazyflie:
         ]
         self._call("upload_trajectory", trajectoryId, pieceOffset, pieces)
 
-    def startTrajectory(  # noqa: N802
+    def startTrajectory(
         self,
-        trajectoryId: int,  # noqa: N803
+        trajectoryId: int,
         timescale: float = 1.0,
         reverse: bool = False,
         relative: bool = True,
-        groupMask: int = 0,  # noqa: N803
+        groupMask: int = 0,
     ) -> None:
         """Fly along a trajectory; with ``timescale`` 2 it takes twice as long."""
         self._call("start_trajectory", groupMask, trajectoryId, timescale, reverse, relative)
@@ -188,13 +185,13 @@ class Crazyflie:
     def _frame(self):
         return self.tf if isinstance(self.tf, str) else self.prefix
 
-    def getVoltage(self) -> float:  # noqa: N802
+    def getVoltage(self) -> float:
         """Return the battery's voltage, V; `rospy.ROSException` if none comes for 10 s."""
         return rospy.wait_for_message(f"{self.prefix}/battery", Float32, _TF_LIMIT).data
 
     # Setpoints: the firmware levels out 0.5 s after the last one.
 
-    def cmdFullState(  # noqa: N802
+    def cmdFullState(
         self,
         pos: Sequence[float],
         vel: Sequence[float],
@@ -210,15 +207,15 @@ class Crazyflie:
         )
         self._send("cmd_full_state", message)
 
-    def cmdPosition(self, pos: Sequence[float], yaw: float = 0.0) -> None:  # noqa: N802
+    def cmdPosition(self, pos: Sequence[float], yaw: float = 0.0) -> None:
         """Track a position, m, and a yaw, rad."""
         self._send("cmd_position", Position(None, *pos, math.degrees(yaw)))
 
-    def cmdVelocityWorld(self, vel: Sequence[float], yawRate: float) -> None:  # noqa: N802, N803
+    def cmdVelocityWorld(self, vel: Sequence[float], yawRate: float) -> None:
         """Fly at a velocity, m/s, and turn at a rate, degrees/s, with the driver's sign."""
         self._send("cmd_velocity_world", VelocityWorld(None, Vector3(*vel), yawRate))
 
-    def cmdStop(self) -> None:  # noqa: N802
+    def cmdStop(self) -> None:
         """Stop the motors, as a setpoint."""
         self._setpoints["cmd_stop"].publish(Empty())
 
@@ -227,15 +224,15 @@ class Crazyflie:
         message.header.frame_id = self._world
         self._setpoints[name].publish(message)
 
-    def getParam(self, name: str) -> Any:  # noqa: N802
+    def getParam(self, name: str) -> Any:
         """Return a firmware parameter GROUP/NAME."""
         return rospy.get_param(f"{self.prefix}/{name}")
 
-    def setParam(self, name: str, value: float) -> None:  # noqa: N802
+    def setParam(self, name: str, value: float) -> None:
         """Set a firmware parameter GROUP/NAME."""
         self.setParams({name: value})
 
-    def setParams(self, params: Mapping[str, float]) -> None:  # noqa: N802
+    def setParams(self, params: Mapping[str, float]) -> None:
         """Set firmware parameters, GROUP/NAME -> value."""
         for name, value in params.items():
             rospy.set_param(f"{self.prefix}/{name}", value)

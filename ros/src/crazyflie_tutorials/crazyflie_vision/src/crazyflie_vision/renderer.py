@@ -7,8 +7,8 @@ linear in the pixel's coordinates.
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 
 import cv2
 import numpy as np
@@ -40,12 +40,13 @@ class Face:
     #: Picture on a face with four corners: they are those at the lower left, lower
     #: right, upper right and upper left.
     texture: Image | None = None
-    normal: NDArray[np.float64] = field(init=False)
 
-    def __post_init__(self) -> None:
+    @cached_property
+    def normal(self) -> NDArray[np.float64]:
+        """Outward normal of length 1, shape (3,)."""
         a, b, c = self.corners[:3]
         cross = np.cross(b - a, c - b)
-        object.__setattr__(self, "normal", cross / np.linalg.norm(cross))
+        return cross / np.linalg.norm(cross)
 
     @property
     def shade(self) -> float:
@@ -58,11 +59,35 @@ def bgr(colour: Colour) -> NDArray[np.float64]:
     return 255.0 * np.array(colour[::-1])
 
 
+#: Corners of a box about its vertical axis, in half lengths. The side from the last to the first
+#: one is the front.
+_BOX_RIM = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+
+
 def faces_of(shape: Shape) -> list[Face]:
-    """Return the faces of a box or a cylinder; of other shapes, none."""
-    if isinstance(shape, Box):
-        return _faces_of_box(shape)
-    return _faces_of_cylinder(shape) if isinstance(shape, Cylinder) else []
+    """Return the faces of a box, its front first, or of a cylinder; of other shapes, none."""
+    if isinstance(shape, Cylinder):
+        angles = np.linspace(0.0, 2.0 * math.pi, CYLINDER_SIDES, endpoint=False)
+        return _faces_of_prism(
+            shape, shape.radius * np.column_stack([np.cos(angles), np.sin(angles)])
+        )
+    if not isinstance(shape, Box):
+        return []
+    c, s = math.cos(shape.yaw), math.sin(shape.yaw)
+    rim = _BOX_RIM * shape.extent[:2] / 2.0 @ np.array([[c, s], [-s, c]])
+    front, *others = _faces_of_prism(shape, rim)
+    if shape.picture:
+        front = replace(front, texture=load_picture(shape.picture))
+    return [front, *others]
+
+
+def _faces_of_prism(shape, rim):
+    # The rim, counter-clockwise about the vertical through the centre, has shape (n, 2).
+    middle = np.column_stack([rim, np.zeros(len(rim))]) + shape.centre
+    up = np.array([0.0, 0.0, shape.size[2] / 2.0])
+    bottom, top = middle - up, middle + up
+    sides = [np.array([bottom[k - 1], bottom[k], top[k], top[k - 1]]) for k in range(len(rim))]
+    return [Face(corners, bgr(shape.colour)) for corners in (*sides, top, bottom[::-1])]
 
 
 def face_of(floor: Floor) -> Face:
@@ -80,46 +105,6 @@ def load_picture(path: str) -> Image:
     if picture is None:
         raise OSError(f"{path} is not a picture that can be read")
     return picture
-
-
-#: Sides of a box: outward normal, and the direction that is up on it. The first is the front.
-_SIDES = (
-    ((1, 0, 0), (0, 0, 1)),
-    ((-1, 0, 0), (0, 0, 1)),
-    ((0, 1, 0), (0, 0, 1)),
-    ((0, -1, 0), (0, 0, 1)),
-    ((0, 0, 1), (0, 1, 0)),
-    ((0, 0, -1), (0, 1, 0)),
-)
-
-
-def _faces_of_box(box):
-    c, s = math.cos(box.yaw), math.sin(box.yaw)
-    to_world = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    half = np.array(box.extent) / 2.0
-    faces = []
-    for normal, up in _SIDES:
-        out, above, right = np.array(normal), np.array(up), np.cross(up, normal)
-        own = [
-            half * (out + a * right + b * above) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
-        ]
-        faces.append(Face(np.array(own) @ to_world.T + box.centre, bgr(box.colour)))
-    if box.picture:
-        faces[0] = replace(faces[0], texture=load_picture(box.picture))
-    return faces
-
-
-def _faces_of_cylinder(cylinder):
-    angles = np.linspace(0.0, 2.0 * math.pi, CYLINDER_SIDES, endpoint=False)
-    rim = cylinder.radius * np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
-    up = np.array([0.0, 0.0, cylinder.height / 2.0])
-    bottom, top = cylinder.centre + rim - up, cylinder.centre + rim + up
-    colour = bgr(cylinder.colour)
-    sides = [
-        Face(np.array([bottom[k - 1], bottom[k], top[k], top[k - 1]]), colour)
-        for k in range(CYLINDER_SIDES)
-    ]
-    return [*sides, Face(top, colour), Face(bottom[::-1], colour)]
 
 
 def _texture(floor):
@@ -214,14 +199,8 @@ class Renderer:
         # Transformation from texels to the plane, to the optical frame, to pixels of the patch.
         rows, columns = face.texture.shape[:2]
         lower_left, _, upper_right, upper_left = corners
-        plane = np.stack(
-            [
-                (upper_right - upper_left) / columns,
-                (lower_left - upper_left) / rows,
-                upper_left,
-            ],
-            axis=1,
-        )
+        right, down = (upper_right - upper_left) / columns, (lower_left - upper_left) / rows
+        plane = np.column_stack([right, down, upper_left])
         matrix = self._camera.matrix.copy()
         matrix[:2, 2] -= corner
         warped = cv2.warpPerspective(

@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,6 @@ from crazyflie_mission_api.ros_vehicle import (
     flown_vehicles,
     prefix,
 )
-from crazyflie_mission_api.trajectories import TimedTrajectory
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_utils import NodeHandle, ParameterError
 from crazyflie_utils.main import begin_script
@@ -248,10 +247,10 @@ class Fleet(VehicleGroup):
                 )
 
     @override
-    def _check_apart(self, changed: Mapping[str, TimedTrajectory]) -> None:
+    def _check_apart(self, changed, may_be_late=False):
         # The other mission may have begun at the same moment, or while this one was stopped.
         self._refuse_claimed()
-        super()._check_apart(changed)
+        super()._check_apart(changed, may_be_late)
 
     def _publish_claim(self):
         # A fleet process lands those that fly when these messages end.

@@ -11,12 +11,7 @@ from typing import NamedTuple, Self
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Clearance, Limits, MissionError, number
 from crazyflie_mission_api.mission_vehicle import Clock, MissionVehicle, never
 from crazyflie_mission_api.observer import MissionObserver, command
-from crazyflie_mission_api.trajectories import (
-    TimedTrajectory,
-    check_apart,
-    check_with_skew,
-    within_limits,
-)
+from crazyflie_mission_api.trajectories import TimedTrajectory, check_apart, within_limits
 from crazyflie_model import trajectory
 from crazyflie_model.angles import Triple
 
@@ -166,11 +161,7 @@ class GroupState:
                 places[name] = measured
         return places
 
-    def _check_moves(self, moves):
-        """Check trajectories, also with a late start, together with those of all other vehicles."""
-        check_with_skew({**self._commanded, **moves}, self.time(), self._check_apart)
-
-    def _check_apart(self, changed):
+    def _check_apart(self, changed, may_be_late=False):
         """Check trajectories together with those of all other vehicles.
 
         Vehicles of other missions have fixed positions: their missions check them among each other.
@@ -189,7 +180,8 @@ class GroupState:
                 )
         resting = {name: TimedTrajectory.hover(p) for name, p in on_ground.items() if p is not None}
         everything = {**resting, **self._commanded, **changed}
-        check_apart(everything, self.time(), self.rules.clearance, resting.keys() - changed.keys())
+        at_rest = resting.keys() - changed.keys()
+        check_apart(everything, self.time(), self.rules.clearance, at_rest, may_be_late)
 
     def _check_names(self, names):
         for name in names:

@@ -68,7 +68,7 @@ class _Landing(LandingSide):
             for name, (goal, yaw) in poses.items()
         }
         if self._is_checked:
-            group._check_moves(moves)
+            group._check_apart(moves, may_be_late=True)
         calls = {
             name: group._vehicles[name].go_to(Move(goal, yaw, duration))
             for name, (goal, yaw) in poses.items()

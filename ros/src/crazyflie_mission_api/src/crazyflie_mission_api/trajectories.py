@@ -1,7 +1,7 @@
 """Trajectories of polynomials: demands on a vehicle, positions over time, and checks."""
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -202,36 +202,16 @@ class TimedTrajectory:
         return np.stack(self._trajectory.evaluate(times - self.begin).position, axis=-1)
 
 
-def check_with_skew(
-    trajectories: Mapping[str, TimedTrajectory],
-    now: float,
-    check: Callable[[Mapping[str, TimedTrajectory]], None],
-) -> None:
-    """Check trajectories, also with a delay of each vehicle that may begin late.
-
-    ``check(trajectories)`` raises `MissionError`; ``now`` is in s.
-    """
-    check(trajectories)
-    moving = {name: each for name, each in trajectories.items() if each.end > now}
-    skew = max((each.start_skew for each in moving.values()), default=0.0)
-    if skew == 0.0 or len(trajectories) < 2:
-        return
-    for name, trajectory in moving.items():
-        try:
-            check({**trajectories, name: trajectory.later(skew)})
-        except MissionError as error:
-            raise MissionError(
-                f"{error}; this happens if {name} begins {skew:g} s after the others"
-            ) from None
-
-
 def check_apart(
     trajectories: Mapping[str, TimedTrajectory],
     now: float,
     clearance: Clearance,
     resting: Collection[str] = (),
+    may_be_late: bool = False,
 ) -> None:
     """Refuse trajectories on which two vehicles come too near, unless both are ``resting``.
+
+    They are also checked with a late start of each vehicle, if starts ``may_be_late``.
 
     Raises
     ------
@@ -243,3 +223,15 @@ def check_apart(
     times = np.linspace(now, end, math.ceil((end - now) / _STEP) + 1, dtype=np.float64)
     places = np.stack([each.positions(times) for each in trajectories.values()])
     clearance.check([*trajectories], times - now, places, resting)
+    moving = [name for name, each in trajectories.items() if each.end > now]
+    skew = max((trajectories[name].start_skew for name in moving), default=0.0)
+    if not may_be_late or skew == 0.0 or len(moving) < 2:
+        return
+    for name in moving:
+        late = {**trajectories, name: trajectories[name].later(skew)}
+        try:
+            check_apart(late, now, clearance, resting)
+        except MissionError as error:
+            raise MissionError(
+                f"{error}; this happens if {name} begins {skew:g} s after the others"
+            ) from None

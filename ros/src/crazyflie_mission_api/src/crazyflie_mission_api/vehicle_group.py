@@ -265,7 +265,8 @@ class VehicleGroup(GroupState):
             fence = self.fence(name)
             trajectories.check(pieces, self.rules.limits, fence, f"{name}: {what}", slower)
         now = self.time()
-        self._check_moves({name: self._timed(name, each, now) for name, each in flown.items()})
+        timed = {name: self._timed(name, pieces, now) for name, pieces in flown.items()}
+        self._check_apart(timed, may_be_late=True)
 
     def _prepare(self, flown, what, stream):
         calls = {name: self._vehicles[name].prepare(each, stream) for name, each in flown.items()}

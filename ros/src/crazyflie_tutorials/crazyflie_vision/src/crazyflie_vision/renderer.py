@@ -135,11 +135,9 @@ class Renderer:
 
     def __init__(self, camera: Pinhole, world: World):
         self._camera = camera
-        cx, cy = camera.centre
-        self._x = ((np.arange(camera.width) - cx) / camera.focal_length).astype(np.float32)
-        self._y = ((np.arange(camera.height) - cy) / camera.focal_length).astype(np.float32)[
-            :, None
-        ]
+        (cx, cy), f = camera.centre, camera.focal_length
+        self._x = ((np.arange(camera.width) - cx) / f).astype(np.float32)
+        self._y = ((np.arange(camera.height)[:, None] - cy) / f).astype(np.float32)
         self._floor = face_of(world.floor)
         self._still = [each for each in world.objects if each.path is None]
         self._still_faces = [face for each in self._still for face in faces_of(each)]
@@ -165,7 +163,8 @@ class Renderer:
         return self._image
 
     def _draw_face(self, face: Face, pose: Pose) -> None:
-        if face.normal @ (pose.position - face.corners[0]) < 1e-6:
+        height = face.normal @ (pose.position - face.corners[0])
+        if height < 1e-6:
             return
         corners = (face.corners - pose.position) @ pose.rotation
         seen = _clipped(corners)
@@ -173,20 +172,16 @@ class Renderer:
             return
         camera = self._camera
         pixels = camera.focal_length * seen[:, :2] / seen[:, 2:] + camera.centre
-        patch = self._patch(*pixels.min(axis=0), *pixels.max(axis=0))
+        patch = self._patch(*np.transpose([pixels.min(axis=0), pixels.max(axis=0)]))
         if patch is None:
             return
         rows, columns = patch
         corner = (columns.start, rows.start)
-        mask = np.zeros((rows.stop - rows.start, columns.stop - columns.start), dtype=np.uint8)
+        mask = np.zeros_like(self._inverse_depth[patch], dtype=np.uint8)
         points = np.round((pixels - corner) * 2**_SUBPIXEL_BITS).astype(np.int32)
         cv2.fillConvexPoly(mask, points, 1, shift=_SUBPIXEL_BITS)
-        a, b, c = (pose.rotation.T @ face.normal) / (
-            face.normal @ (face.corners[0] - pose.position)
-        )
-        inverse_depth = np.float32(a) * self._x[columns] + (
-            np.float32(b) * self._y[rows] + np.float32(c)
-        )
+        a, b, c = (pose.rotation.T @ face.normal / -height).astype(np.float32)
+        inverse_depth = a * self._x[columns] + (b * self._y[rows] + c)
         # Pixels on the rim lie a little beyond the face.
         nearest, furthest = seen[:, 2].min(), seen[:, 2].max()
         np.clip(inverse_depth, 1.0 / furthest, 1.0 / nearest, out=inverse_depth)
@@ -214,9 +209,10 @@ class Renderer:
         camera = self._camera
         if np.linalg.norm(centre) <= ball.radius + NEAR or z < -ball.radius:
             return
-        columns = _silhouette(x, z, ball.radius, camera.focal_length, camera.centre[0])
-        rows = _silhouette(y, z, ball.radius, camera.focal_length, camera.centre[1])
-        patch = self._patch(columns[0], rows[0], columns[1], rows[1])
+        patch = self._patch(
+            _silhouette(x, z, ball.radius, camera.focal_length, camera.centre[0]),
+            _silhouette(y, z, ball.radius, camera.focal_length, camera.centre[1]),
+        )
         if patch is None:
             return
         # |t d - c|^2 = r^2 with d = (x, y, 1), so that t is the depth.
@@ -233,18 +229,13 @@ class Renderer:
         colours = np.minimum(light[..., None] * bgr(ball.colour).astype(np.float32), 255.0)
         self._put(patch, mask, 1.0 / np.maximum(depth, np.float32(NEAR)), colours.astype(np.uint8))
 
-    def _patch(self, left, top, right, bottom):
-        # Rows and columns of the image within limits; None for none.
-        columns, rows = (
+    def _patch(self, columns, rows):
+        # Rows and columns of the image, each from the first to the last; None for none.
+        patch = tuple(
             slice(math.floor(max(first, 0.0)), math.ceil(min(last + 1.0, count)))
-            for first, last, count in (
-                (left, right, self._camera.width),
-                (top, bottom, self._camera.height),
-            )
+            for (first, last), count in ((rows, self._camera.height), (columns, self._camera.width))
         )
-        if columns.start >= columns.stop or rows.start >= rows.stop:
-            return None
-        return rows, columns
+        return patch if all(part.start < part.stop for part in patch) else None
 
     def _put(self, patch, mask, inverse_depth, colours):
         held = self._inverse_depth[patch]

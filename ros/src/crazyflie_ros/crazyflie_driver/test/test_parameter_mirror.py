@@ -1,11 +1,15 @@
-"""Parameters that were written to a vehicle are written again when it may have lost them."""
+"""Parameters that are written to a vehicle, and again when it may have lost them."""
 
+import threading
 from types import SimpleNamespace
 
 import pytest
+from std_srvs.srv import SetBoolRequest
 
 from crazyflie_driver.services import ParameterMirror
+from crazyflie_driver.srv import UpdateParamsRequest
 from crazyflie_link.errors import LinkLostError, NoReplyError, RefusedError
+from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
 
@@ -64,3 +68,18 @@ def test_a_link_that_is_lost_meanwhile_stops_them(mirror):
     firmware.errors["motor.trim"] = LinkLostError("gone")
     with pytest.raises(LinkLostError):
         mirror.reapply_parameters()
+
+
+def test_a_master_that_is_frozen_does_not_block_the_jobs_of_a_vehicle(server, vehicle, monkeypatch):
+    """It accepts connections, and never answers."""
+    answers = threading.Event()
+    monkeypatch.setattr(server.process.transport, "get_param", lambda name: answers.wait(20.0))
+    monkeypatch.setattr("crazyflie_driver.services.MASTER_LIMIT", 0.1)
+    update = server.process.call("/cf1/update_params", UpdateParamsRequest(["ring/effect"]))
+    following = server.process.call("/cf1/arm", SetBoolRequest(True))
+    try:
+        with pytest.raises(ServiceError, match="master .*/cf1/ring/effect within 0.1 s: is it fr"):
+            update.result(10.0)
+        assert following.result(10.0).success
+    finally:
+        answers.set()

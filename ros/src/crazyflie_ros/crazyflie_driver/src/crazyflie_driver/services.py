@@ -24,7 +24,8 @@ from crazyflie_utils.parameters.types import Converted
 
 #: Period and limit of the wait for a controller that has parameters, s.
 CONTROLLER_PERIOD, CONTROLLER_LIMIT = 0.1, 3.0
-#: Longest wait for ROS parameters to be set (s): without the master, jobs for the vehicle go on.
+#: Longest wait for ROS parameters to be read or set (s): without the master, jobs for the vehicle
+#: go on.
 MASTER_LIMIT = 3.0
 #: Namespace, below the vehicle's, of services whose names belong to other nodes.
 ASIDE = "driver"
@@ -89,13 +90,13 @@ class ParameterMirror:
         """Write parameters, named GROUP/NAME, with the values of the ROS parameters.
 
         All are tried, and a `ServiceError` names those that could not be written; the ROS
-        parameters are then what the firmware has confirmed.
+        parameters are then what the firmware has confirmed. See `MASTER_LIMIT`.
         """
         problems = []
         for name in names:
             try:
                 known = parsed_name(name)
-                self.set(known, self._handle.get_param(self._full_name(known), _FIRMWARE_VALUE))
+                self.set(known, self._on_master(known))
             except (CrazyflieError, ParameterError) as error:
                 problems.append(str(error))
         if problems:
@@ -106,6 +107,17 @@ class ParameterMirror:
         confirmed = self._crazyflie.parameters.write(name, value)
         self._written[name] = value
         self._set_on_master({self._full_name(name): _portable(confirmed)})
+
+    def _on_master(self, name):
+        # A frozen master never answers; the thread that asks it is left behind.
+        asked = Job(lambda _: self._handle.get_param(self._full_name(name), _FIRMWARE_VALUE))
+        try:
+            return asked.start("ask-master").result(MASTER_LIMIT)
+        except TimeoutError:
+            raise ServiceError(
+                f"the ROS master has not told the parameter {self._full_name(name)} within "
+                f"{MASTER_LIMIT:g} s: is it frozen?"
+            ) from None
 
     def _set_on_master(self, values):
         later = self._handle.set_param_later

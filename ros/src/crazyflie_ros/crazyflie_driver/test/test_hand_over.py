@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from safety_helpers import (
     FLYING,
+    HIGH_LEVEL,
     LAND,
     SETPOINTS_STOP,
     TAKEOFF,
@@ -33,6 +34,7 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.programs import wait_until
+from crazyflie_virtual.firmware.setpoints import PRIORITY_CRTP
 
 GROUPS, KNOWN_TRAJECTORY = 0b0101, 7
 
@@ -224,6 +226,27 @@ def test_a_command_that_is_carried_out_keeps_setpoints_under_way_out(flight):
     vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 2)
     assert vehicle.packets(7, 0) == []
     assert vehicle.packets(7, 1) == [struct.pack("<BI", 0, 0)]
+
+
+@pytest.mark.parametrize(
+    ("name", "request_"), [("land", LAND), ("go_to", GoToRequest(duration=Duration(1)))]
+)
+def test_a_notice_that_is_lost_is_sent_again_with_the_next_command(flight, name, request_):
+    """The vehicle accepts the command, and does not fly by it until setpoints stop."""
+    server, vehicle = flight
+    vehicle.deaf.add((7, 1, b""))
+    server.call("/cf1/land", LAND)
+    assert vehicle.flight.commander.priority == PRIORITY_CRTP
+    vehicle.deaf.clear()
+    is_(vehicle, HIGH_LEVEL)
+    server.process.advance(0.5)
+    server.call(f"/cf1/{name}", request_)
+    assert [(p, c) for p, c, _ in vehicle.received if p in (7, 8)] == 2 * [(7, 1), (8, 0)]
+    assert vehicle.flight.commander.priority < PRIORITY_CRTP
+    # By then a vehicle that has not received it is locked.
+    server.process.advance(2.0)
+    server.call("/cf1/go_to", GoToRequest(duration=Duration(1)))
+    assert len(vehicle.packets(7, 1)) == 2
 
 
 def test_a_notice_is_kept_where_the_log_does_not_tell_whether_the_vehicle_flies(server):

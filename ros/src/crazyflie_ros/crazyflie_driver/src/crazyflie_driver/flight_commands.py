@@ -328,7 +328,8 @@ class FlightCommands:
         # In the thread that sends: what is sent next is the command itself.
         if not job.may_send() or self._vehicle.gate.is_emergency:
             return False
-        if self._setpoints.is_streaming:
+        # A vehicle on which they have no priority ignores the notice.
+        if self._setpoints.may_have_priority:
             try:
                 self._setpoints.notify_setpoints_stop(self._pending_notify or 0, at_once=True)
             except LinkLostError:

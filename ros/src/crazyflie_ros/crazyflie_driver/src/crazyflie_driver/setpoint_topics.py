@@ -19,7 +19,7 @@ from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
-from crazyflie_model.limits import MAX_SETPOINT_PWM
+from crazyflie_model.limits import MAX_SETPOINT_PWM, OFF_AGE
 from crazyflie_model.supervisor import SupervisorState
 
 CMD_VEL, CMD_STOP = "cmd_vel", "cmd_stop"
@@ -144,6 +144,15 @@ class SetpointTopics:
     def is_streaming(self) -> bool:
         """Whether setpoints were sent since the last notice that they stop."""
         return self.control is not Control.HIGH_LEVEL
+
+    @property
+    def may_have_priority(self) -> bool:
+        """Whether setpoints may keep the vehicle from obeying high-level commands.
+
+        Over UDP the notice that they stop is not acknowledged, and may have been lost; the vehicle
+        locks itself once the last setpoint is as old as that.
+        """
+        return self.is_streaming or self._vehicle.handle.time() - self.last_time < OFF_AGE
 
     @property
     def runs_motors(self) -> bool:

@@ -89,9 +89,10 @@ class FlightCommands:
     _feeds_watchdog: bool = False
     # The landing under way, to be followed to the ground; None after any other command.
     _touchdown: Touchdown | None = None
-    # A command that was not answered and was refused to its caller; it may still be carried out.
+    # A command that was not answered and was refused to its caller, which may still be carried out;
+    # and when the vehicle was first heard after that (s).
     _unanswered: Command | None = None
-    _look_up: Future[bool] | None = None
+    _heard: float | None = None
     # A landing of the driver's own: its reason, its latest command, and the times at which that was
     # sent and should have been carried out (s).
     _reason: Reason | None = None
@@ -191,7 +192,7 @@ class FlightCommands:
             return
         is_critical = self._log.battery.charge is Charge.CRITICAL
         is_active = self._is_active(state)
-        obeys_late = self._check_unanswered()
+        obeys_late = self._obeys_late(state)
         if is_active and is_critical:
             self.land(Reason.BATTERY)
         elif is_active and self._is_position_lost():
@@ -314,7 +315,7 @@ class FlightCommands:
             raise
         # A command whose caller waits no longer was refused as well.
         is_refused = job.done.cancelled() and not command.ends_flight
-        self._unanswered = command if is_refused else None
+        self._unanswered, self._heard = command if is_refused else None, None
         self._setpoints.high_level_until(handle.time() + command.duration)
         if command.height is not None and (is_accepted or self._touchdown is None):
             self._touchdown = Touchdown(begin, command.height, command.duration)
@@ -355,13 +356,12 @@ class FlightCommands:
         except (NoReplyError, LinkLostError) as error:
             if command.ends_flight or not is_sent:
                 raise
-            self._unanswered = command
             state, obeys = self._state_after(command, job, was_at_rest)
             if state is None:
+                self._unanswered, self._heard = command, None
                 raise NoReplyError(
                     f"{error}; when the vehicle is heard again, it is landed if it obeys"
                 ) from None
-            self._unanswered = None
             if not obeys:
                 raise NoReplyError(f"{error}; the vehicle's state is: {state.words()}") from None
             self._vehicle.warn(f"{error}: the vehicle's state shows that it obeys")
@@ -372,8 +372,7 @@ class FlightCommands:
         # The vehicle answers in the order in which it receives. It shows a command a little later.
         end = time.monotonic() + _LOOK_UP_LIMIT
         answered = None
-        while True:
-            job.check()
+        while job.may_send():
             try:
                 state = self._flight.read()
             except LinkLostError:
@@ -381,39 +380,30 @@ class FlightCommands:
             now = time.monotonic()
             if state is not None:
                 answered = now if answered is None else answered
-                if command.name == TAKEOFF:
-                    obeys = self._flight.has_taken_off(state)
-                else:
-                    obeys = was_at_rest and self._flight.is_moving(state)
+                obeys = self._is_obeyed(command, state, was_at_rest)
                 if obeys or now - answered > REPORT_LAG:
                     return state, obeys
             elif now > end:
-                return None, False
+                break
             time.sleep(_LOOK_UP_PERIOD)
+        return None, False
 
-    def _obeys(self, job):
-        # Whether it carries out what was refused. If it is not heard, it is looked up again.
-        command = self._unanswered
-        is_emergency = self._vehicle.gate.is_emergency
-        if command is None or is_emergency or self._setpoints.is_streaming:
-            self._unanswered = None
+    def _is_obeyed(self, command, state, was_at_rest):
+        if command.name == TAKEOFF:
+            return self._flight.has_taken_off(state)
+        return was_at_rest and self._flight.is_moving(state)
+
+    def _obeys_late(self, state):
+        # Whether the vehicle carries out what was refused, once.
+        command, now = self._unanswered, self._vehicle.handle.time()
+        if command is None:
             return False
-        state, obeys = self._state_after(command, job, True)
-        if state is not None:
-            self._unanswered = None
+        self._heard = now if self._heard is None else self._heard
+        is_replaced = self._vehicle.gate.is_emergency or self._setpoints.is_streaming
+        obeys = not is_replaced and self._is_obeyed(command, state, True)
+        if obeys or is_replaced or now >= self._heard + _LOG_DELAY:
+            self._unanswered = self._heard = None
         return obeys
-
-    def _check_unanswered(self):
-        # Whether the vehicle carries out a command that was refused as not answered, once.
-        look_up = self._look_up
-        if look_up is None:
-            if self._unanswered is not None:
-                self._look_up = self._vehicle.jobs.submit("looking up a command", self._obeys)
-            return False
-        if not look_up.done():
-            return False
-        self._look_up = None
-        return look_up.exception() is None and look_up.result()
 
     # Landings.
 

@@ -304,7 +304,7 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
                 status=[
                     diagnostics(
                         vehicle.status.status(),
-                        f"{component}: {vehicle.name}",
+                        f"{component}: {vehicle.parameters.name}",
                         vehicle.parameters.uri,
                         self._parameters.link,
                     )
@@ -324,9 +324,9 @@ def _results(
     for vehicle, future in futures.items():
         # A refused command must not be carried out later.
         if future.cancel() if may_withdraw else not future.done():
-            errors[vehicle.name] = f"no answer within {ANSWER_LIMIT:g} s"
+            errors[vehicle.parameters.name] = f"no answer within {ANSWER_LIMIT:g} s"
         elif (error := future.exception()) is not None:
-            errors[vehicle.name] = str(error)
+            errors[vehicle.parameters.name] = str(error)
         else:
             results[vehicle] = future.result()
     return results, errors

@@ -165,9 +165,9 @@ class VehicleServices:
         ended long ago: therefore the wait has a limit.
         """
         vehicle = self._vehicle
-        values = vehicle.handle.get_param(vehicle.prefix or "/", _NAMESPACE, {})
+        values = vehicle.handle.get_param(vehicle.parameters.prefix or "/", _NAMESPACE, {})
         awaited = {
-            f"{vehicle.prefix}/{name}"
+            f"{vehicle.parameters.prefix}/{name}"
             for name, below in values.items()
             if isinstance(below, dict) and "PIDs" in below
         }
@@ -224,7 +224,7 @@ class VehicleServices:
             services[name] = kind, partial(self._on_job, name, kind, work)
         for name, kind in SERVICE_TYPES.items():
             services[name] = kind, partial(self._on_command, name, kind)
-        handle, prefix = self._vehicle.handle, self._vehicle.prefix
+        handle, prefix = self._vehicle.handle, self._vehicle.parameters.prefix
         nodes = handle.service_nodes()
         for name, (kind, callback) in services.items():
             free = desired = f"{prefix}/{name}"

@@ -256,7 +256,7 @@ class SetpointTopics:
         self._high_level_end = moment
 
     def _subscribe(self, name, sender, callback):
-        topic = f"{self._vehicle.prefix}/{name}"
+        topic = f"{self._vehicle.parameters.prefix}/{name}"
         self._vehicle.handle.subscribe(topic, sender.message_type, partial(callback, name, sender))
 
     def _on_external(self, name, sender, message):

@@ -70,7 +70,7 @@ class DriverVehicle(BaseVehicle):
         self.flight = FlightState(self, self.log, self.setpoints)
         self.status = StatusPublisher(self, self.log, self.setpoints)
         self.commands = FlightCommands(self, self.log, self.setpoints, self.flight)
-        self._mirror = ParameterMirror(own, self.prefix, self.crazyflie)
+        self._mirror = ParameterMirror(own, parameters.prefix, self.crazyflie)
         self._services = VehicleServices(
             self, self.flight, self.commands, self._mirror, self.latch_emergency
         )
@@ -110,7 +110,7 @@ class DriverVehicle(BaseVehicle):
         self.status.publish()
         self.gate.handle(GateEvent.REMOVAL)
         self.jobs.supersede("the removal")
-        return Job(lambda _: self._remove(limit)).start(f"{self.name}-close")
+        return Job(lambda _: self._remove(limit)).start(f"{self.parameters.name}-close")
 
     # Connecting and the end, in threads that may block.
 
@@ -123,8 +123,11 @@ class DriverVehicle(BaseVehicle):
             with self._announcing:
                 if self.is_closing():
                     raise ServiceError("removed while connecting")
-                self._connection_count = self.crazyflie.connection_count
-                self._announce()
+                self.log.start()
+                self._set_up()
+                self._services.advertise()
+                self.setpoints.subscribe()
+                self.commands.start()
                 self.transition(ConnectionEvent.ANNOUNCED)
                 # A new link may have come meanwhile.
                 self._take_up_link()
@@ -136,33 +139,26 @@ class DriverVehicle(BaseVehicle):
         self.info(f"connected to {self.parameters.uri}")
 
     def _choose_positioning(self):
-        name = f"{self.prefix}/{POSITIONING_PARAMETER}"
+        name = f"{self.parameters.prefix}/{POSITIONING_PARAMETER}"
         source = self.handle.get_param(name, Text(SOURCES), MOCAP)
         self.parameters = dataclasses.replace(self.parameters, positioning=source)
 
-    def _announce(self):
-        self.log.start()
+    def _set_up(self):
+        # Once on each link.
+        count = self.crazyflie.connection_count
+        if self.gate.is_emergency or self._connection_count == count:
+            return
+        for problem in self._mirror.reapply_parameters():
+            self.warn(f"not written again: {problem}")
+        self.setpoints.open_thrust_lock(self.flight.read())
+        # If it fails before, it is done when the vehicle is heard again.
+        self._connection_count = count
         if self.parameters.enable_parameters:
             self._mirror.publish()
-        if not self.gate.is_emergency:
-            self.setpoints.open_thrust_lock(self.flight.read())
-        self._services.advertise()
-        self.setpoints.subscribe()
-        self.commands.start()
 
     def _resume(self, _: Job) -> None:
-        # On a new link the vehicle is set up again, once.
-        count = self.crazyflie.connection_count
         try:
-            if self.gate.is_emergency or self._connection_count == count:
-                return
-            for problem in self._mirror.reapply_parameters():
-                self.warn(f"not written again: {problem}")
-            self.setpoints.open_thrust_lock(self.flight.read())
-            # If it fails before, it is done when the vehicle is heard again.
-            self._connection_count = count
-            if self.parameters.enable_parameters:
-                self._mirror.publish()
+            self._set_up()
         finally:
             self.transition(ConnectionEvent.RESUMED)
 

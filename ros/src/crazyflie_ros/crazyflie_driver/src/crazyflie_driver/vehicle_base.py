@@ -7,7 +7,6 @@ import contextlib
 import enum
 import queue
 import threading
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, InvalidStateError
 from dataclasses import dataclass, field
@@ -31,13 +30,12 @@ MAX_WAITING = 1000
 
 @dataclass(eq=False)
 class Job:
-    """A call ``work(job)``, which takes time; an urgent job supersedes one that is for a flight.
+    """A call ``work(job)``, which takes time, and which something else may supersede.
 
     A caller that waits no longer cancels `done`: the job is not begun, or may send nothing more.
     """
 
     work: Callable[["Job"], Any]
-    is_flight: bool = False
     superseded_by: str = ""
     done: Future[Any] = field(default_factory=Future)
 
@@ -58,7 +56,7 @@ class Job:
 
     def run(self) -> None:
         """Call `work`; result or error go to `done`."""
-        # It may have been cancelled meanwhile.
+        # It may have been cancelled or superseded meanwhile.
         with contextlib.suppress(InvalidStateError):
             try:
                 self.check()
@@ -70,20 +68,20 @@ class Job:
 class Jobs:
     """A queue with a lane for urgent jobs; a thread for each lane does its jobs in their order.
 
-    Urgent jobs supersede every flight job that was submitted before them: a queued one is given up,
-    a running one is marked. When a job fails, ``on_error(text)`` is called in its thread.
+    Urgent jobs supersede every flight job that was submitted before them. When a job fails,
+    ``on_error(text)`` is called in its thread.
     """
 
     def __init__(self, name: str, on_error: Callable[[str], None] = lambda text: None):
         self._on_error = on_error
-        self._wake = threading.Condition()
-        self._queued: dict[bool, deque[Job]] = {False: deque(), True: deque()}
-        self._running: Job | None = None
+        self._lock = threading.Lock()
+        # A lane ends with None.
+        self._lane: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+        self._urgent_lane: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+        self._flights: list[Job] = []
         self._is_closed = False
-        for urgent, suffix in ((False, ""), (True, "-urgent")):
-            threading.Thread(
-                target=self._run, args=(urgent,), name=name + suffix, daemon=True
-            ).start()
+        for lane, each in ((self._lane, name), (self._urgent_lane, f"{name}-urgent")):
+            threading.Thread(target=self._run, args=(lane,), name=each, daemon=True).start()
 
     def submit(
         self,
@@ -111,49 +109,39 @@ class Jobs:
 
         if urgent:
             self.supersede(what)
-        job = Job(run, is_flight)
-        with self._wake:
-            queued = self._queued[urgent]
+        job = Job(run)
+        lane = self._urgent_lane if urgent else self._lane
+        with self._lock:
             if self._is_closed:
                 job.done.set_exception(ServiceError("the vehicle has been removed"))
-            elif len(queued) >= MOST_JOBS:
+            elif lane.qsize() >= MOST_JOBS:
                 job.done.set_exception(ServiceError(f"{MOST_JOBS} calls wait for the vehicle"))
             else:
-                queued.append(job)
-                self._wake.notify_all()
+                lane.put(job)
+                if is_flight and not urgent:
+                    self._flights = [each for each in self._flights if not each.done.done()]
+                    self._flights.append(job)
         return job.done
 
     def supersede(self, what: str) -> None:
-        """Give up all flight jobs for something else."""
-        with self._wake:
-            queued = self._queued[False]
-            for job in [*queued, *([self._running] if self._running else [])]:
-                if job.is_flight:
-                    job.superseded_by = what
-            # Their turn may be far off, and their callers are blocked.
-            given_up = [job for job in queued if job.is_flight]
-            self._queued[False] = deque(job for job in queued if not job.is_flight)
-        for job in given_up:
+        """Give up all flight jobs for something else; their callers are told at once."""
+        with self._lock:
+            flights, self._flights = self._flights, []
+        for job in flights:
+            job.superseded_by = what
+            # It does nothing but fail, here and in its turn.
             job.run()
 
     def close(self) -> None:
         """Take no more jobs; the threads end once the queue is empty."""
-        with self._wake:
+        with self._lock:
             self._is_closed = True
-            self._wake.notify_all()
+        self._lane.put(None)
+        self._urgent_lane.put(None)
 
-    def _run(self, urgent):
-        while True:
-            with self._wake:
-                self._wake.wait_for(lambda: self._queued[urgent] or self._is_closed)
-                if not self._queued[urgent]:
-                    return
-                job = self._queued[urgent].popleft()
-                if not urgent:
-                    self._running = job
+    def _run(self, lane):
+        while (job := lane.get()) is not None:
             job.run()
-            if not urgent:
-                self._running = None
 
 
 class Delivery:
@@ -184,11 +172,8 @@ class Delivery:
         self._queue.put(lambda: None)
 
     def _run(self):
-        while True:
-            callback = self._queue.get()
-            if self._is_closed:
-                return
-            self._handle.submit(callback)
+        while not self._is_closed:
+            self._handle.submit(self._queue.get())
 
 
 class ConnectionState(enum.Enum):
@@ -257,16 +242,6 @@ class BaseVehicle:
     state: ConnectionState = ConnectionState.CONNECTING
     _state_lock: threading.Lock = field(default_factory=threading.Lock)
 
-    @property
-    def name(self) -> str:
-        """Name of the vehicle in messages."""
-        return self.parameters.name
-
-    @property
-    def prefix(self) -> str:
-        """Absolute namespace of the vehicle, such as /crazyflie1; empty for the root."""
-        return self.parameters.prefix
-
     def transition(self, event: ConnectionEvent) -> ConnectionState:
         """Change the state by an event, and return it."""
         with self._state_lock:
@@ -282,20 +257,21 @@ class BaseVehicle:
         return self.state in (ConnectionState.CLOSING, ConnectionState.CLOSED)
 
     def publisher(self, name: str, message_type: type, latch: bool = False) -> Publisher:
-        """Announce a topic below `prefix`; see `NodeHandle.publisher`."""
-        return self.handle.publisher(f"{self.prefix}/{name}", message_type, latch)
+        """Announce a topic of the vehicle; see `NodeHandle.publisher`."""
+        return self.handle.publisher(f"{self.parameters.prefix}/{name}", message_type, latch)
 
     def info(self, text: str) -> None:
         """Log information about the vehicle."""
-        self.handle.info(f"{self.name}: {text}")
+        self.handle.info(f"{self.parameters.name}: {text}")
 
     def warn(self, text: str, throttle: float = 0.0, key: str = "") -> None:
         """Log a warning about the vehicle; see `NodeLog.warn`."""
-        self.handle.warn(f"{self.name}: {text}", throttle, (self.name, key or text))
+        name = self.parameters.name
+        self.handle.warn(f"{name}: {text}", throttle, (name, key or text))
 
     def error(self, text: str) -> None:
         """Log an error of the vehicle."""
-        self.handle.error(f"{self.name}: {text}")
+        self.handle.error(f"{self.parameters.name}: {text}")
 
     def refuse_after_emergency(self) -> None:
         """Raise `ServiceError` after an emergency stop, which holds until the removal."""

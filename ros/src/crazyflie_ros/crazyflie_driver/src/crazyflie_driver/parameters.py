@@ -279,21 +279,13 @@ class VehicleParameters(Parameters):
 
         The request has no ``positioning``: its type is that of other drivers, too.
         """
-
-        def get(name: str) -> Any:
-            if name in _LOG_BLOCK_FIELDS:
-                field = _LOG_BLOCK_FIELDS[name]
-                return [getattr(block, field) for block in request.log_blocks]
-            if name == POSITIONING_PARAMETER:
-                return MOCAP
-            value = getattr(request, name)
-            return value.strip() if isinstance(value, str) else value
-
-        def full_name(name: str) -> str:
-            return f"log_blocks/{_LOG_BLOCK_FIELDS[name]}" if name in _LOG_BLOCK_FIELDS else name
-
+        values = {name: getattr(request, name) for name in request.__slots__}
+        values["uri"] = request.uri.strip()
+        for name, field in _LOG_BLOCK_FIELDS.items():
+            values[name] = [getattr(block, field) for block in request.log_blocks]
+        names = {name: f"log_blocks/{field}" for name, field in _LOG_BLOCK_FIELDS.items()}
         try:
-            return cls.read(get, full_name)
+            return cls.read(values.__getitem__, lambda name: names.get(name, name))
         except ParameterError as error:
             raise ServiceError("; ".join(error.complaints)) from None
 
@@ -344,11 +336,8 @@ class CrazyflieAddParameters(VehicleParameters):
                 topics = _TOPICS(get("genericLogTopics"))
             except (KeyError, ValueError):
                 return ()
-            return [read_parameter(_variables_of(topic), get, full_name) for topic in topics]
+            names = [_VARIABLES_NAME.replace("NAME", topic) for topic in topics]
+            declarations = [Declaration(n, _VARIABLES, "", REQUIRED, live=False) for n in names]
+            return [read_parameter(each, get, full_name) for each in declarations]
 
         return super().read(get_or_collect, full_name)
-
-
-def _variables_of(topic):
-    name = _VARIABLES_NAME.replace("NAME", topic)
-    return Declaration(name, _VARIABLES, "", REQUIRED, live=False)

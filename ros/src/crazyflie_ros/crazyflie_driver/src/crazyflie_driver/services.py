@@ -30,6 +30,8 @@ MASTER_LIMIT = 3.0
 #: Namespace, below the vehicle's, of services whose names belong to other nodes.
 ASIDE = "driver"
 _SHARED = {"takeoff", "land"}  #: Services of controllers, unless they are remapped.
+#: Services that are carried out at once; all others are jobs.
+_AT_ONCE = {"emergency", "notify_setpoints_stop", "send_packet"}
 _UPLOADS = {"upload_trajectory", "upload_compressed_trajectory"}  #: They end before a landing.
 _SOLID_COLOR = 7  #: The firmware's ring.effect for a given color.
 _XMLRPC_INTEGERS = range(-(2**31), 2**31)
@@ -165,38 +167,31 @@ class VehicleServices:
         ended long ago: therefore the wait has a limit.
         """
         vehicle = self._vehicle
-        values = vehicle.handle.get_param(vehicle.parameters.prefix or "/", _NAMESPACE, {})
+        prefix = vehicle.parameters.prefix
+        values = vehicle.handle.get_param(prefix or "/", _NAMESPACE, {})
         awaited = {
-            f"{vehicle.parameters.prefix}/{name}"
+            (f"{prefix}/{name}", service)
             for name, below in values.items()
             if isinstance(below, dict) and "PIDs" in below
+            for service in _SHARED
         }
         end = time.monotonic() + CONTROLLER_LIMIT
         while awaited and not vehicle.is_closing() and time.monotonic() < end:
-            awaited = {node for node in awaited if not self._is_ready(node)}
+            nodes = vehicle.handle.service_nodes()
+            awaited -= {(node, name.rpartition("/")[2]) for name, node in nodes.items()}
             if awaited:
                 time.sleep(CONTROLLER_PERIOD)
-
-    def _is_ready(self, node):
-        offered = {
-            service.rpartition("/")[2]
-            for service, owner in self._vehicle.handle.service_nodes().items()
-            if owner == node
-        }
-        return _SHARED <= offered
 
     def advertise(self) -> None:
         """Offer all services that the vehicle has, below `ASIDE` what is another node's; blocks."""
         crazyflie, mirror = self._vehicle.crazyflie, self._mirror
-        at_once: dict[str, tuple[type, Callable[[Any], Any]]] = {
+        services: dict[str, tuple[type, Callable[[Job, Any], Any]]] = {
             "emergency": (Empty, self._emergency),
             "notify_setpoints_stop": (
                 srv.NotifySetpointsStop,
-                lambda r: self._commands.notify(r.remainValidMillisecs),
+                lambda _, r: self._commands.notify(r.remainValidMillisecs),
             ),
             "send_packet": (srv.sendPacket, self._send_packet),
-        }
-        jobs: dict[str, tuple[type, Callable[[Job, Any], Any]]] = {
             "arm": (SetBool, self._arm),
             "recover": (Empty, self._recover),
             "upload_trajectory": (srv.UploadTrajectory, self._upload),
@@ -216,17 +211,16 @@ class VehicleServices:
             "write_lighthouse": (srv.WriteLighthouse, self._write_lighthouse),
         }
         if crazyflie.address.is_radio:
-            jobs["reboot"] = Empty, self._reboot
-        services: dict[str, tuple[type, Callable[[Any], Any]]] = {
-            name: (kind, partial(_answer, kind, work)) for name, (kind, work) in at_once.items()
+            services["reboot"] = Empty, self._reboot
+        callbacks: dict[str, tuple[type, Callable[[Any], Any]]] = {
+            name: (kind, partial(self._on_call, name, kind, work))
+            for name, (kind, work) in services.items()
         }
-        for name, (kind, work) in jobs.items():
-            services[name] = kind, partial(self._on_job, name, kind, work)
         for name, kind in SERVICE_TYPES.items():
-            services[name] = kind, partial(self._on_command, name, kind)
+            callbacks[name] = kind, partial(self._on_command, name, kind)
         handle, prefix = self._vehicle.handle, self._vehicle.parameters.prefix
         nodes = handle.service_nodes()
-        for name, (kind, callback) in services.items():
+        for name, (kind, callback) in callbacks.items():
             free = desired = f"{prefix}/{name}"
             if desired in nodes:
                 free = f"{prefix}/{ASIDE}/{name}"
@@ -236,16 +230,21 @@ class VehicleServices:
     def _on_command(self, name, kind, request):
         return self._commands.send(requested(name, request), kind._response_class())
 
-    def _on_job(self, name, kind, work, request):
-        return self._vehicle.jobs.submit(
-            name,
-            lambda job: _answer(kind, partial(work, job), request),
-            is_flight=name in _UPLOADS,
-        )
+    def _on_call(self, name, kind, work, request):
+        def answer(job):
+            response = work(job, request)
+            return kind._response_class() if response is None else response
+
+        if name not in _AT_ONCE:
+            return self._vehicle.jobs.submit(name, answer, is_flight=name in _UPLOADS)
+        try:
+            return answer(None)
+        except CrazyflieError as error:
+            raise ServiceError(str(error)) from None
 
     # At once.
 
-    def _emergency(self, _):
+    def _emergency(self, *_):
         try:
             self._latch_emergency()
         except CrazyflieError as error:
@@ -256,7 +255,7 @@ class VehicleServices:
             "emergency stop; to fly again remove the vehicle, restart it and add it again"
         )
 
-    def _send_packet(self, request):
+    def _send_packet(self, _, request):
         packet = request.packet
         data = bytes(packet.data)
         if packet.size > len(data):
@@ -347,14 +346,6 @@ class VehicleServices:
                 f"fall; its state is: {state.words()}"
             )
         self._vehicle.crazyflie.reboot()
-
-
-def _answer(kind, work, request):
-    try:
-        response = work(request)
-    except CrazyflieError as error:
-        raise ServiceError(str(error)) from None
-    return kind._response_class() if response is None else response
 
 
 def _for_each(act, _, request):

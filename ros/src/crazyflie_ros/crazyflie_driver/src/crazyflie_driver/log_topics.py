@@ -2,7 +2,7 @@
 
 import math
 import threading
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -23,9 +23,6 @@ from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_utils import ServiceError
 from crazyflie_utils.topics import Publisher
 
-#: Periods of imu and pose, and of the other topics, ms: those of the C++ driver.
-FAST_MS, SLOW_MS = 10, 100
-_MOST_VARIABLES = 6  #: Number of four-byte variables that fit in a log packet's 26 bytes.
 _UNKNOWN = -1.0  #: First element of the covariance of a missing measurement (sensor_msgs/Imu).
 
 
@@ -37,7 +34,6 @@ class StandardTopic(NamedTuple):
 
     name: str
     message_type: type[genpy.Message]
-    period_ms: int
     variables: tuple[str, ...]
     convert: Callable[[Header, Sequence[float]], genpy.Message]
     in_world: bool = False
@@ -63,61 +59,36 @@ def _float(_, values):
     return Float32(values[0])
 
 
-STANDARD = (
-    StandardTopic(
-        "imu", Imu, FAST_MS, ("acc.x", "acc.y", "acc.z", "gyro.x", "gyro.y", "gyro.z"), _imu
-    ),
-    StandardTopic(
-        "pose",
-        PoseStamped,
-        FAST_MS,
-        ("stateEstimate.x", "stateEstimate.y", "stateEstimate.z", "stateEstimateZ.quat"),
-        _pose,
-        in_world=True,
-    ),
+_IMU = StandardTopic("imu", Imu, ("acc.x", "acc.y", "acc.z", "gyro.x", "gyro.y", "gyro.z"), _imu)
+_POSE = StandardTopic(
+    "pose",
+    PoseStamped,
+    ("stateEstimate.x", "stateEstimate.y", "stateEstimate.z", "stateEstimateZ.quat"),
+    _pose,
+    in_world=True,
+)
+_SLOW = (
     StandardTopic(
         "magnetic_field",
         MagneticField,
-        SLOW_MS,
         ("mag.x", "mag.y", "mag.z"),
         lambda header, values: MagneticField(header=header, magnetic_field=Vector3(*values)),
     ),
     StandardTopic(
         "temperature",
         Temperature,
-        SLOW_MS,
         ("baro.temp",),
         lambda header, values: Temperature(header=header, temperature=values[0]),
     ),
-    StandardTopic("pressure", Float32, SLOW_MS, ("baro.pressure",), _float),
-    StandardTopic("battery", Float32, SLOW_MS, ("pm.vbat",), _float),
+    StandardTopic("pressure", Float32, ("baro.pressure",), _float),
+    StandardTopic("battery", Float32, ("pm.vbat",), _float),
 )
 
+#: Periods of imu and pose, and of the other topics, ms: those of the C++ driver.
+FAST_MS, SLOW_MS = 10, 100
 
-def packed(
-    topics: list[StandardTopic], known: Container[str]
-) -> tuple[list[list[StandardTopic]], dict[str, list[str]]]:
-    """Put the variables of topics that have the same period into common log blocks.
-
-    Returns groups of topics that fit in a log packet each, and for every topic that the vehicle
-    cannot fill the variables that it lacks.
-    """
-    missing: dict[str, list[str]] = {}
-    groups: list[list[StandardTopic]] = []
-    for topic in topics:
-        lacking = [variable for variable in topic.variables if variable not in known]
-        if lacking:
-            missing[topic.name] = lacking
-            continue
-        for group in groups:
-            size = sum(len(other.variables) for other in group) + len(topic.variables)
-            if group[0].period_ms == topic.period_ms and size <= _MOST_VARIABLES:
-                group.append(topic)
-                break
-        else:
-            groups.append([topic])
-    return groups, missing
-
+#: Log blocks: period (ms), and topics. Six variables of four bytes fit in a packet.
+STANDARD_BLOCKS = ((FAST_MS, (_IMU,)), (FAST_MS, (_POSE,)), (SLOW_MS, _SLOW))
 
 #: Period of the log block with the vehicle's status, ms; its absence shows a restart.
 STATUS_PERIOD_MS = 100
@@ -169,9 +140,6 @@ class LogTopics:
     #: The state of its own positioning; None where it is flown by motion capture.
     positioning: Positioning | None = None
     _packets: Publisher | None = None
-    _heading: Publisher = field(init=False)
-    _broadcast: Callable[[list[TransformStamped]], None] = field(init=False)
-    _positioning_text: str | None = None
     _logs_state: bool = False
     _states: int = 0
     _state_came: threading.Condition = field(default_factory=threading.Condition)
@@ -196,17 +164,19 @@ class LogTopics:
         if "packets" in parameters.topics:
             self._packets = self._vehicle.publisher("packets", crtpPacket)
         known = self._vehicle.crazyflie.log.variables()
-        self._heading = self._vehicle.publisher("heading", Float32)
-        self._start_status(known, self._vehicle.publisher("rssi", Float32))
-        self._start_variances(known)
+        self._start_status(known)
+        self.variances.is_logged = all(name in known for name in VARIANCES)
+        if self.variances.is_logged:
+            self._log(
+                "variances", VARIANCES_PERIOD_MS, VARIANCES, lambda _, v: self.variances.add(v)
+            )
+        topics = parameters.topics
         if parameters.is_own_estimate:
             self._start_positioning(parameters.positioning, known)
-        selected = [topic for topic in STANDARD if topic.name in parameters.topics]
-        groups, missing = packed(selected, known)
-        for name, variables in missing.items():
-            self._vehicle.warn(f"no topic {name}: the firmware has no " + ", ".join(variables))
-        for group in groups:
-            self._start_standard(group)
+            topics -= {_POSE.name}
+        for period_ms, block in STANDARD_BLOCKS:
+            chosen = [topic for topic in block if topic.name in topics]
+            self._start_standard(period_ms, chosen, known)
         if parameters.enable_logging:
             for block in parameters.log_blocks:
                 self._start_custom(block)
@@ -240,74 +210,72 @@ class LogTopics:
         )
         self._vehicle.delivery.submit_data(publisher.publish, message)
 
-    def _start_status(self, known, rssi_publisher):
-        variables = tuple(variable for variable in STATUS_VARIABLES if variable in known)
+    def _log(self, name, period_ms, variables, deliver):
+        self._vehicle.crazyflie.add_log_block(LogBlock(name, period_ms, tuple(variables), deliver))
+
+    def _start_status(self, known):
+        vehicle = self._vehicle
+        publishers = vehicle.publisher("heading", Float32), vehicle.publisher("rssi", Float32)
+        variables = [variable for variable in STATUS_VARIABLES if variable in known]
         self._logs_state = "supervisor.info" in known
-        if not variables:
-            return
 
         def deliver(_, values):
             latest = dict(zip(variables, values, strict=True))
             self._note_state(latest)
-            self._vehicle.delivery.submit_data(self._note_status, latest, rssi_publisher)
+            vehicle.delivery.submit_data(self._note_status, latest, *publishers)
 
-        self._vehicle.crazyflie.add_log_block(
-            LogBlock("status", STATUS_PERIOD_MS, variables, deliver)
-        )
-
-    def _start_variances(self, known):
-        self.variances.is_logged = all(name in known for name in VARIANCES)
-        if self.variances.is_logged:
-            self._vehicle.crazyflie.add_log_block(
-                LogBlock(
-                    "variances",
-                    VARIANCES_PERIOD_MS,
-                    VARIANCES,
-                    lambda _, values: self.variances.add(values),
-                )
-            )
+        if variables:
+            self._log("status", STATUS_PERIOD_MS, variables, deliver)
 
     def _start_positioning(self, source, known):
         vehicle, system = self._vehicle, SYSTEMS[source]
         check_deck(source, vehicle.crazyflie.parameters.values())
-        _, pose, *_ = STANDARD
-        if missing := [name for name in (*system.variables, *pose.variables) if name not in known]:
+        needed = (*system.variables, *_POSE.variables)
+        if missing := [name for name in needed if name not in known]:
             raise ServiceError(
                 f"positioning is {source}, and the firmware does not log {', '.join(missing)}; "
                 "update the firmware"
             )
         positioning = self.positioning = Positioning(source)
         publisher = vehicle.publisher(POSITIONING_TOPIC, String, latch=True)
-        self._broadcast = vehicle.handle.broadcast_transforms()
+        before = None
 
         def follow():
+            nonlocal before
             text = positioning.problem(vehicle.handle.time())
-            if text != self._positioning_text:
-                if text and self._positioning_text == "":
+            if text != before:
+                if text and before == "":
                     vehicle.warn(text)
-                self._positioning_text = text
+                before = text
                 publisher.publish(String(text))
 
         def deliver(_, values):
             positioning.update(vehicle.handle.time(), values)
             vehicle.delivery.submit(follow)
 
-        vehicle.crazyflie.add_log_block(
-            LogBlock("positioning", PERIOD_MS, system.variables, deliver)
-        )
+        self._log("positioning", PERIOD_MS, system.variables, deliver)
         vehicle.handle.timer(PERIOD_MS / 1000.0, follow)
+        self._start_estimate(positioning)
 
-    def _publish_estimate(self, publisher, message):
-        """Publish the vehicle's own estimate, as motion capture publishes a pose."""
-        publisher.publish(message)
-        assert self.positioning is not None
-        if self.positioning.is_lost(self._vehicle.handle.time()):
-            return
-        pose = message.pose
-        place = Vector3(pose.position.x, pose.position.y, pose.position.z)
-        frame = self._vehicle.parameters.estimate_frame
-        transform = TransformStamped(message.header, frame, Transform(place, pose.orientation))
-        self._broadcast([transform])
+    def _start_estimate(self, positioning):
+        """Publish the vehicle's pose also as motion capture publishes one, with its own time."""
+        handle, frame = self._vehicle.handle, self._vehicle.parameters.estimate_frame
+        publisher = self._vehicle.publisher(_POSE.name, PoseStamped)
+        broadcast = handle.broadcast_transforms()
+
+        def stamp_of(time_ms):
+            time = positioning.local_time(time_ms / 1000.0, handle.time())
+            return None if time is None else handle.stamp(time)
+
+        def publish(stamp, values):
+            message = _pose(self._header(stamp, True), values)
+            publisher.publish(message)
+            if not positioning.is_lost(handle.time()):
+                place, orientation = message.pose.position, message.pose.orientation
+                transform = Transform(Vector3(place.x, place.y, place.z), orientation)
+                broadcast([TransformStamped(message.header, frame, transform)])
+
+        self._log_stamped(_POSE.name, FAST_MS, _POSE.variables, publish, stamp_of)
 
     def _note_state(self, latest):
         # In the link's thread: the state is waited for where no callback has its turn.
@@ -317,7 +285,7 @@ class LogTopics:
                 self._states += 1
                 self._state_came.notify_all()
 
-    def _note_status(self, latest, rssi_publisher):
+    def _note_status(self, latest, heading_publisher, rssi_publisher):
         if "pm.vbat" in latest:
             self.battery.update(latest["pm.vbat"], self._vehicle.handle.time())
         self.power_state = latest.get("pm.state", VehicleStatus.PM_STATE_UNKNOWN) & 0xFF
@@ -329,7 +297,7 @@ class LogTopics:
         target = latest.get("ctrltargetZ.z")
         self.target_height = None if target is None else target / 1000.0
         if self.heading is not None:
-            self._heading.publish(Float32(math.radians(self.heading)))
+            heading_publisher.publish(Float32(math.radians(self.heading)))
         # The Crazyradio's figure is the same, and comes without the firmware's help.
         self.rssi = self._vehicle.crazyflie.rssi
         if self.rssi is None:
@@ -338,24 +306,28 @@ class LogTopics:
             rssi_publisher.publish(Float32(self.rssi))
         self._on_status()
 
-    def _start_standard(self, group):
-        publishers = [self._vehicle.publisher(topic.name, topic.message_type) for topic in group]
-        variables = sum((topic.variables for topic in group), ())
+    def _start_standard(self, period_ms, topics, known):
+        outlets = []
+        for topic in topics:
+            if lacking := [variable for variable in topic.variables if variable not in known]:
+                text = f"no topic {topic.name}: the firmware has no {', '.join(lacking)}"
+                self._vehicle.warn(text)
+            else:
+                outlets.append((topic, self._vehicle.publisher(topic.name, topic.message_type)))
+        if not outlets:
+            return
 
         def publish(stamp, values):
             begin = 0
-            for topic, publisher in zip(group, publishers, strict=True):
+            for topic, publisher in outlets:
                 end = begin + len(topic.variables)
-                message = topic.convert(self._header(stamp, topic.in_world), values[begin:end])
-                if topic.name == "pose" and self.positioning is not None:
-                    self._publish_estimate(publisher, message)
-                else:
-                    publisher.publish(message)
+                header = self._header(stamp, topic.in_world)
+                publisher.publish(topic.convert(header, values[begin:end]))
                 begin = end
 
-        name = "+".join(topic.name for topic in group)
-        is_estimate = self.positioning is not None and group[0].name == "pose"
-        self._add(name, group[0].period_ms, variables, publish, is_estimate)
+        name = "+".join(topic.name for topic, _ in outlets)
+        variables = [variable for topic, _ in outlets for variable in topic.variables]
+        self._log_stamped(name, period_ms, variables, publish, self._stamp)
 
     def _start_custom(self, block):
         publisher = self._vehicle.publisher(block.topic_name, GenericLogData)
@@ -371,26 +343,20 @@ class LogTopics:
                 f"log block {block.topic_name}: its period is {block.frequency} ms; the firmware "
                 f"counts in steps of {PERIOD_STEP_MS} ms: it comes every {period} ms"
             )
-        self._add(block.topic_name, period, tuple(block.variables), publish)
+        self._log_stamped(block.topic_name, period, block.variables, publish, self._stamp)
 
-    def _add(self, name, period_ms, variables, publish, is_estimate=False):
+    def _log_stamped(self, name, period_ms, variables, publish, stamp_of):
         def deliver(time_ms, values):
-            stamp = self._estimate_stamp(time_ms) if is_estimate else self._stamp(time_ms)
+            stamp = stamp_of(time_ms)
             if stamp is not None:
                 self._vehicle.delivery.submit_data(publish, stamp, values)
 
-        self._vehicle.crazyflie.add_log_block(LogBlock(name, period_ms, variables, deliver))
+        self._log(name, period_ms, variables, deliver)
 
     def _stamp(self, time_ms):
         if self._vehicle.parameters.use_ros_time:
             return self._vehicle.handle.stamp()
         return genpy.Time(*divmod(time_ms * 1_000_000, 1_000_000_000))
-
-    def _estimate_stamp(self, time_ms):
-        handle = self._vehicle.handle
-        assert self.positioning is not None
-        time = self.positioning.local_time(time_ms / 1000.0, handle.time())
-        return None if time is None else handle.stamp(time)
 
     def _header(self, stamp, in_world):
         vehicle = self._vehicle

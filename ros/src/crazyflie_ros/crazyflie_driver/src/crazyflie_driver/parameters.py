@@ -246,12 +246,12 @@ class VehicleParameters(Parameters):
 
     @property
     def topics(self) -> frozenset[str]:
-        """Standard topics that are published."""
+        """Standard topics that are chosen."""
         return frozenset(
             name
             for name in STANDARD_TOPICS
             if (self.enable_logging or name == "packets") and getattr(self, _SWITCH + name)
-        ) | ({"pose"} if self.is_own_estimate else set())
+        )
 
     @property
     def is_own_estimate(self) -> bool:

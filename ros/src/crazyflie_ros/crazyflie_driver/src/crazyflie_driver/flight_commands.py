@@ -316,7 +316,7 @@ class FlightCommands:
         # A command whose caller waits no longer was refused as well.
         is_refused = job.done.cancelled() and not command.ends_flight
         self._unanswered, self._heard = command if is_refused else None, None
-        self._setpoints.high_level_until(handle.time() + command.duration)
+        self._setpoints.high_level_end = handle.time() + command.duration
         if command.height is not None and (is_accepted or self._touchdown is None):
             self._touchdown = Touchdown(begin, command.height, command.duration)
         if command.ends_flight:

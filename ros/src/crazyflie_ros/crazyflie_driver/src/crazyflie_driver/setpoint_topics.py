@@ -120,10 +120,12 @@ class SetpointTopics:
     #: The kind of command that the vehicle was sent last.
     control: Control = Control.HIGH_LEVEL
     ignored: int = 0  #: Setpoints that were not sent.
+    #: When the latest high-level command will have been carried out, s; setpoints until then are
+    #: warned of.
+    high_level_end: float = -math.inf
     _times: deque[float] = field(default_factory=lambda: deque(maxlen=1000))
-    _high_level_end: float | None = None
     _topic: str = ""
-    _external_time: float | None = None
+    _external_time: float = -math.inf
     _lift: LiftWatch = field(default_factory=LiftWatch)
     _commanded_yaw: float | None = None
 
@@ -134,11 +136,12 @@ class SetpointTopics:
             CMD_STOP: Sender(Empty, lambda crazyflie, _: crazyflie.setpoints.stop()),
             **SETPOINTS,
         }
-        for name, sender in senders.items():
-            self._subscribe(name, sender, self._on_setpoint)
-        for name, sender in EXTERNAL.items():
-            self._subscribe(name, sender, self._on_external)
-        self._vehicle.handle.timer(_REST_PERIOD, self._end_stream_at_rest)
+        handle, prefix = self._vehicle.handle, self._vehicle.parameters.prefix
+        for callback, each in ((self._on_setpoint, senders), (self._on_external, EXTERNAL)):
+            for name, sender in each.items():
+                receive = partial(callback, name, sender)
+                handle.subscribe(f"{prefix}/{name}", sender.message_type, receive)
+        handle.timer(_REST_PERIOD, self._end_stream_at_rest)
 
     @property
     def is_streaming(self) -> bool:
@@ -171,8 +174,7 @@ class SetpointTopics:
 
     def can_land_autonomously(self) -> bool:
         """Return whether the vehicle's planner can land it, as far as its inputs show."""
-        fed = self._external_time
-        is_fed = fed is not None and self._vehicle.handle.time() - fed <= _RATE_WINDOW
+        is_fed = self._vehicle.handle.time() - self._external_time <= _RATE_WINDOW
         return is_fed or self.control is not Control.THRUST
 
     def send_zero_thrust(self) -> None:
@@ -251,14 +253,6 @@ class SetpointTopics:
             key="heading",
         )
 
-    def high_level_until(self, moment: float) -> None:
-        """Warn of setpoints until a high-level command has been carried out, at a time (s)."""
-        self._high_level_end = moment
-
-    def _subscribe(self, name, sender, callback):
-        topic = f"{self._vehicle.parameters.prefix}/{name}"
-        self._vehicle.handle.subscribe(topic, sender.message_type, partial(callback, name, sender))
-
     def _on_external(self, name, sender, message):
         if self._log.positioning is not None:
             # It may be the vehicle's own estimate, which must not be fed back.
@@ -278,7 +272,8 @@ class SetpointTopics:
                 if name == CMD_STOP:
                     self._vehicle.gate.stop(now)
                 self._times.append(now)
-                self.control, self._topic = _control(name, at_rest), name
+                moving = Control.THRUST if name == CMD_VEL else Control.REFERENCE
+                self.control, self._topic = Control.ZERO_THRUST if at_rest else moving, name
         if refusal:
             self._warn(f"ignoring {name}: {refusal}", key="gate")
         if not is_sent:
@@ -287,7 +282,7 @@ class SetpointTopics:
         height, self._commanded_yaw = sender.height_and_yaw(message)
         if self._lift.command(now, height):
             self._check_heading()
-        if self._high_level_end is not None and now < self._high_level_end:
+        if now < self.high_level_end:
             self._warn(f"{name} overrides the high-level command", key="override")
 
     def _send(self, name, sender, message):
@@ -299,10 +294,8 @@ class SetpointTopics:
         return True
 
     def _end_stream_at_rest(self):
-        if (
-            self.control is Control.ZERO_THRUST
-            and self._vehicle.handle.time() - self._times[-1] > _REST
-        ):
+        silence = self._vehicle.handle.time() - self.last_time
+        if self.control is Control.ZERO_THRUST and silence > _REST:
             # Without a link, which its state shows; it is tried again.
             with contextlib.suppress(CrazyflieError):
                 self.notify_setpoints_stop()
@@ -326,9 +319,3 @@ class SetpointTopics:
             message.angular.z,
             thrust,
         )
-
-
-def _control(topic: str, is_at_rest: bool) -> Control:
-    if is_at_rest:
-        return Control.ZERO_THRUST
-    return Control.THRUST if topic == CMD_VEL else Control.REFERENCE

@@ -21,7 +21,6 @@ from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.setpoint_topics import Control, SetpointTopics
 from crazyflie_driver.vehicle_base import BaseVehicle, Job
 from crazyflie_link.errors import AlreadyLandingError, CrazyflieError, LinkLostError, NoReplyError
-from crazyflie_link.high_level import HighLevel
 from crazyflie_link.supervisor import Supervisor
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import ServiceError
@@ -123,7 +122,7 @@ class FlightCommands:
         def work(job: Job) -> Result:
             need = self._check(command, job)
             if need is Need.NOT_ADDRESSED:
-                _send(command, self._vehicle.crazyflie.high_level.guarded(job.may_send))
+                command.send(self._vehicle.crazyflie.high_level.guarded(job.may_send))
             elif need is not Need.ON_GROUND:
                 self._execute(command, job)
             return response
@@ -229,8 +228,14 @@ class FlightCommands:
         command.send(self._vehicle.crazyflie.high_level.dry_run())
         if not self._is_addressed(command):
             return Need.NOT_ADDRESSED
-        if not self._is_ready(command, job):
+        if command.name == TAKEOFF:
+            self._check_and_arm(job)
+        elif command.name == LAND and self._flight.is_on_ground():
+            text = "land is not sent, the vehicle is on the ground: it would start its motors"
+            self._vehicle.info(text)
             return Need.ON_GROUND
+        elif not command.ends_flight:
+            self._check_motion(command)
         return Need.SETPOINTS_STOP if self._setpoints.is_streaming else Need.COMMAND
 
     def _is_addressed(self, command):
@@ -242,19 +247,6 @@ class FlightCommands:
                 "ignored the command. Call set_group_mask first, or use the group mask 0"
             )
         return is_addressed is not False
-
-    def _is_ready(self, command, job):
-        if command.name == TAKEOFF:
-            self._check_and_arm(job)
-        elif command.name == LAND:
-            if self._flight.is_on_ground():
-                self._vehicle.info(
-                    "land is not sent, the vehicle is on the ground: it would start its motors"
-                )
-                return False
-        elif command.name != STOP:
-            self._check_motion(command)
-        return True
 
     def _check_motion(self, command):
         battery, state = self._log.battery, self._log.supervisor
@@ -307,8 +299,12 @@ class FlightCommands:
         number = gate.high_level(begin)
         if command.name != LAND:
             self._touchdown = None
+        is_accepted = True
         try:
-            is_accepted = self._send_and_look_up(command, job)
+            self._send_and_look_up(command, job)
+        except AlreadyLandingError:
+            # A success as well.
+            is_accepted = False
         except CrazyflieError:
             gate.resume(number)
             job.check()
@@ -341,7 +337,6 @@ class FlightCommands:
         return True
 
     def _send_and_look_up(self, command, job):
-        # Returns False for a landing of a vehicle that lands already.
         was_at_rest = self._flight.is_at_rest()
         is_sent = False
 
@@ -352,7 +347,7 @@ class FlightCommands:
             return may
 
         try:
-            return _send(command, self._vehicle.crazyflie.high_level.guarded(may_send))
+            command.send(self._vehicle.crazyflie.high_level.guarded(may_send))
         except (NoReplyError, LinkLostError) as error:
             if command.ends_flight or not is_sent:
                 raise
@@ -365,7 +360,6 @@ class FlightCommands:
             if not obeys:
                 raise NoReplyError(f"{error}; the vehicle's state is: {state.words()}") from None
             self._vehicle.warn(f"{error}: the vehicle's state shows that it obeys")
-            return True
 
     def _state_after(self, command, job, was_at_rest):
         # Returns the state, None if the vehicle is silent, and whether it shows that it obeys.
@@ -461,15 +455,6 @@ class FlightCommands:
                 vehicle.crazyflie.supervisor.feed_watchdog()
             except CrazyflieError as error:
                 vehicle.warn(f"watchdog not fed: {error}", 1.0, "watchdog")
-
-
-def _send(command: Command, high_level: HighLevel) -> bool:
-    # Returns False if the vehicle lands already, which is a success as well.
-    try:
-        command.send(high_level)
-    except AlreadyLandingError:
-        return False
-    return True
 
 
 def _is_accepted(sent):

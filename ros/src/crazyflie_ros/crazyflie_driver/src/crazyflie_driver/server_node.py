@@ -261,8 +261,7 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
             shared = channel.share(needs)
             for vehicle in channel.vehicles:
                 if vehicle in needs:
-                    is_shared = shared is not None and needs[vehicle] is Need.COMMAND
-                    own = command.by(shared if is_shared else None)
+                    own = command.by(shared if needs[vehicle] is Need.COMMAND else None)
                     sent[vehicle] = vehicle.commands.send(own, None)
         refusals.update(_results(sent, not command.ends_flight)[1])
         if refusals:

@@ -58,7 +58,7 @@ class DriverVehicle(BaseVehicle):
                 reconnect=True,
                 on_state=self._on_link_state,
                 on_console=self.info,
-                on_packet=self._on_packet,
+                on_packet=lambda *packet: self.log.publish_packet(*packet),
             ),
             SetpointGate(),
             Jobs(name, self.error),
@@ -247,10 +247,6 @@ class DriverVehicle(BaseVehicle):
         event = ConnectionEvent.LINK_HEARD if is_known else ConnectionEvent.LINK_RENEWED
         if self.transition(event) is ConnectionState.RESUMING:
             self.jobs.submit("taking up the link again", self._resume)
-
-    def _on_packet(self, port: int, channel: int, data: bytes) -> None:
-        if not self.is_closing():
-            self.log.publish_packet(port, channel, data)
 
     # In turn with the callbacks of the node.
 

@@ -3,6 +3,7 @@
 import copy
 import math
 import struct
+from dataclasses import replace
 
 import pytest
 from genpy import Duration
@@ -247,6 +248,17 @@ def test_a_notice_that_is_lost_is_sent_again_with_the_next_command(flight, name,
     server.process.advance(2.0)
     server.call("/cf1/go_to", GoToRequest(duration=Duration(1)))
     assert len(vehicle.packets(7, 1)) == 2
+
+
+def test_a_notice_by_radio_which_acknowledges_it_is_sent_once(flight, monkeypatch):
+    server, vehicle = flight
+    crazyflie = server.node._vehicles[vehicle.uri].crazyflie
+    monkeypatch.setattr(crazyflie, "address", replace(crazyflie.address, scheme="radio"))
+    server.call("/cf1/land", LAND)
+    is_(vehicle, HIGH_LEVEL)
+    server.process.advance(0.5)
+    server.call("/cf1/go_to", GoToRequest(duration=Duration(1)))
+    assert len(vehicle.packets(7, 1)) == 1
 
 
 def test_a_notice_is_kept_where_the_log_does_not_tell_whether_the_vehicle_flies(server):

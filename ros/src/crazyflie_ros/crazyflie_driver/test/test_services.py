@@ -1,6 +1,7 @@
 """Services of a vehicle, down to the bytes on the link."""
 
 import struct
+from itertools import groupby
 
 import pytest
 from genpy import Duration
@@ -118,7 +119,8 @@ def test_arming(flying):
     server, vehicle = flying
     assert server.call("/cf1/arm", SetBoolRequest(True)).success
     assert server.call("/cf1/arm", SetBoolRequest(False)).message == "disarmed"
-    assert vehicle.packets(9, 1) == [b"\x01\x01", b"\x01\x00"]
+    # A busy machine may repeat a request before its answer is read.
+    assert [data for data, _ in groupby(vehicle.packets(9, 1))] == [b"\x01\x01", b"\x01\x00"]
     vehicle.answers[9, 1, 1] = b"\x81\x00\x00"
     answer = server.call("/cf1/arm", SetBoolRequest(True))
     assert not answer.success

@@ -325,7 +325,7 @@ class FlightCommands:
         # In the thread that sends: what is sent next is the command itself.
         if not job.may_send() or self._vehicle.gate.is_emergency:
             return False
-        # A vehicle on which they have no priority ignores the notice.
+        # If they have none, the notice makes the next command begin at the estimated state.
         if self._setpoints.may_have_priority:
             try:
                 self._setpoints.notify_setpoints_stop(self._pending_notify or 0, at_once=True)

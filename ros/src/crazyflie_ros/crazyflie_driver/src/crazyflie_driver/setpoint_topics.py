@@ -152,10 +152,12 @@ class SetpointTopics:
     def may_have_priority(self) -> bool:
         """Whether setpoints may keep the vehicle from obeying high-level commands.
 
-        Over UDP the notice that they stop is not acknowledged, and may have been lost; the vehicle
-        locks itself once the last setpoint is as old as that.
+        UDP alone does not acknowledge the notice that they stop, which may have been lost; the
+        vehicle locks itself once the last setpoint is as old as that.
         """
-        return self.is_streaming or self._vehicle.handle.time() - self.last_time < OFF_AGE
+        may_lose = self._vehicle.crazyflie.address.scheme == "udp"
+        is_recent = self._vehicle.handle.time() - self.last_time < OFF_AGE
+        return self.is_streaming or (may_lose and is_recent)
 
     @property
     def runs_motors(self) -> bool:

@@ -2,6 +2,7 @@
 
 import struct
 import threading
+from dataclasses import replace
 
 import pytest
 import usb
@@ -280,7 +281,8 @@ def test_poses_are_packed_from_a_number_of_vehicles_on(make_server, monkeypatch)
     server = make_server({"broadcast/poses": 2})
     vehicles = [server.make_vehicle() for _ in range(2)]
     ids = {vehicle.uri: number for number, vehicle in enumerate(vehicles, start=1)}
-    monkeypatch.setattr(Address, "vehicle_id", property(lambda self: ids[self.uri]))
+    parse = Address.parse
+    monkeypatch.setattr(Address, "parse", lambda uri: replace(parse(uri), vehicle_id=ids[uri]))
 
     def publish(number):
         pose = Pose(Point(1.0, 2.0, 0.5), Quaternion(0, 0, 0, 1))

@@ -20,7 +20,7 @@ from crazyflie_link.errors import AddressError
 )
 def test_good_addresses(uri, scheme):
     address = Address.parse(uri)
-    assert address == Address(uri.strip(), scheme)
+    assert (address.uri, address.scheme) == (uri.strip(), scheme)
     assert address.is_radio == (scheme == "radio")
 
 

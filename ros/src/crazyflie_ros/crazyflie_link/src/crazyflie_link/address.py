@@ -24,9 +24,8 @@ EXPECTED = (
     "tcp://HOST:PORT or usb://NUMBER"
 )
 
-_HIGHEST_CHANNEL = 125
 DEFAULT_ADDRESS = "E7E7E7E7E7"  #: Radio address of new vehicles, and of URIs without one.
-_HIGHEST_PORT = 65535
+_HIGHEST_CHANNEL, _HIGHEST_PORT = 125, 65535
 #: Number of digits that cflib treats as a serial number; fewer are a dongle's number.
 _SERIAL_LENGTH = 10
 _THIS_MACHINE = "127.0.0.1"
@@ -38,57 +37,22 @@ class Address:
 
     uri: str
     scheme: str
+    #: The same for all spellings of addresses that lead to one vehicle. The dongle and the text
+    #: after a question mark are ignored. Names of hosts are not looked up: one other than localhost
+    #: differs from its number.
+    key: str
+    #: Name of the group of vehicles that a broadcast reaches: channel and rate, for any dongle.
+    #: Vehicles on UDP are on one channel; any other is alone on its own.
+    channel: str
+    #: The Crazyradio of a radio's address, number or serial number; empty without a radio.
+    dongle: str = ""
+    #: Last byte of the radio's address, by which packed poses name it; None if unknown.
+    vehicle_id: int | None = None
 
     @property
     def is_radio(self) -> bool:
         """Whether a Crazyradio is between us and the vehicle."""
         return self.scheme == "radio"
-
-    @property
-    def channel(self) -> str:
-        """Name of the group of vehicles that a broadcast reaches: channel and rate, for any dongle.
-
-        Vehicles on UDP are on one channel; any other is alone on its own.
-        """
-        parts = self._parts
-        if self.scheme == "radio":
-            return f"{int(parts['channel'])}/{parts['rate']}"
-        return self.scheme if self.scheme == "udp" else self.key
-
-    @property
-    def dongle(self) -> str:
-        """The Crazyradio of a radio's address, number or serial number; empty without a radio."""
-        dongle = self._parts.get("dongle", "").upper()
-        return str(int(dongle)) if dongle.isdigit() and len(dongle) < _SERIAL_LENGTH else dongle
-
-    @property
-    def key(self) -> str:
-        """An address that is the same for all spellings of addresses that lead to one vehicle.
-
-        The dongle and the text after a question mark are ignored. Names of hosts are not looked up:
-        one other than localhost differs from its number.
-        """
-        parts = self._parts
-        if self.scheme == "radio":
-            return f"radio://*/{self.channel}/{self._radio_address:010X}"
-        if self.scheme == "usb":
-            return f"usb://{int(parts['number'])}"
-        return f"{self.scheme}://{_host_key(parts['host'])}:{int(parts['port'])}"
-
-    @property
-    def vehicle_id(self) -> int | None:
-        """Last byte of the radio's address, by which packed poses name it; None if unknown."""
-        return self._radio_address & 0xFF if self.scheme == "radio" else None
-
-    @property
-    def _radio_address(self):
-        return int(self._parts["address"] or DEFAULT_ADDRESS, 16)
-
-    @property
-    def _parts(self):
-        match = _FORMS[self.scheme].fullmatch(self.uri)
-        assert match is not None, f"{self.uri} was not parsed"
-        return match.groupdict("")
 
     @classmethod
     def parse(cls, uri: str) -> "Address":
@@ -98,14 +62,25 @@ class Address:
         match = _FORMS[scheme].fullmatch(text) if scheme in _FORMS else None
         if match is None:
             raise AddressError(f"{text!r} is no address of a vehicle: expected {EXPECTED}")
-        parts = match.groupdict()
-        if int(parts.get("channel") or 0) > _HIGHEST_CHANNEL:
-            raise AddressError(
-                f"{text!r}: no radio channel {parts['channel']}; expected {EXPECTED}"
-            )
-        if not 0 < int(parts.get("port") or 1) <= _HIGHEST_PORT:
-            raise AddressError(f"{text!r}: no port {parts['port']}; expected {EXPECTED}")
-        return cls(text, scheme)
+        parts = match.groupdict("")
+        if scheme == "radio":
+            if int(parts["channel"]) > _HIGHEST_CHANNEL:
+                raise AddressError(
+                    f"{text!r}: no radio channel {parts['channel']}; expected {EXPECTED}"
+                )
+            channel = f"{int(parts['channel'])}/{parts['rate']}"
+            number = int(parts["address"] or DEFAULT_ADDRESS, 16)
+            key, dongle = f"radio://*/{channel}/{number:010X}", parts["dongle"].upper()
+            if dongle.isdigit() and len(dongle) < _SERIAL_LENGTH:
+                dongle = str(int(dongle))
+            return cls(text, scheme, key, channel, dongle, number & 0xFF)
+        if scheme == "usb":
+            key = f"usb://{int(parts['number'])}"
+        else:
+            if not 0 < int(parts["port"]) <= _HIGHEST_PORT:
+                raise AddressError(f"{text!r}: no port {parts['port']}; expected {EXPECTED}")
+            key = f"{scheme}://{_host_key(parts['host'])}:{int(parts['port'])}"
+        return cls(text, scheme, key, channel=scheme if scheme == "udp" else key)
 
 
 def radio_address(text: str) -> int:

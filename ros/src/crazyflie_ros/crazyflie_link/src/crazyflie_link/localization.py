@@ -55,17 +55,14 @@ def pack(poses: Mapping[int, Pose]) -> list[CRTPPacket]:
         else:
             attitude = compress_quaternion(quaternion)
             full.append(_POSE.pack(vehicle_id, *millimetres, attitude))
-    port, poses_channel = CRTPPort.LOCALIZATION, CflibLocalization.GENERIC_CH
-    poses_type = bytes([CflibLocalization.EXT_POSE_PACKED])
+    port, poses_type = CRTPPort.LOCALIZATION, bytes([CflibLocalization.EXT_POSE_PACKED])
     return [
-        *(
-            packet(port, poses_channel, poses_type + b"".join(part))
-            for part in _split(full, POSES_PER_PACKET)
-        ),
-        *(
-            packet(port, _POSITIONS_CHANNEL, b"".join(part))
-            for part in _split(positions, POSITIONS_PER_PACKET)
-        ),
+        packet(port, channel, kind + b"".join(entries[begin : begin + size]))
+        for channel, kind, entries, size in (
+            (CflibLocalization.GENERIC_CH, poses_type, full, POSES_PER_PACKET),
+            (_POSITIONS_CHANNEL, b"", positions, POSITIONS_PER_PACKET),
+        )
+        for begin in range(0, len(entries), size)
     ]
 
 
@@ -98,10 +95,6 @@ class PackedPoses:
             self._changed.wait_for(self._is_complete, FRAME_WINDOW)
             waiting, self._waiting = self._waiting, {}
         return pack(waiting)
-
-
-def _split(items, size):
-    return [items[begin : begin + size] for begin in range(0, len(items), size)]
 
 
 class Localization(Subsystem):
@@ -164,16 +157,19 @@ class Lighthouse(Subsystem):
         link = self._current_link()
         find_memory(link, MemoryElement.TYPE_LH, "base stations")
         helper = LighthouseMemHelper(link.cflib)
+        results: queue.SimpleQueue[dict[int, Any]] = queue.SimpleQueue()
         found = []
         for what, read in (
             ("geometries", helper.read_all_geos),
             ("calibrations", helper.read_all_calibs),
         ):
-            pages = _wait(read, _READ_LIMIT)
-            if pages is None:
+            read(results.put)
+            try:
+                pages = results.get(timeout=_READ_LIMIT)
+            except queue.Empty:
                 raise NoReplyError(
                     f"the {what} of base stations were not read in {_READ_LIMIT:g} s"
-                )
+                ) from None
             found.append({number: page for number, page in pages.items() if page.valid})
         return found[0], found[1]
 
@@ -182,19 +178,17 @@ class Lighthouse(Subsystem):
 
         They are compensated by the calibration. Empty if no base station is seen.
         """
-        reader: LighthouseSweepAngleAverageReader
-
-        def start(on_result: Callable[[Any], None]) -> None:
-            nonlocal reader
-            reader = LighthouseSweepAngleAverageReader(self._current_link().cflib, on_result)
-            reader.start_angle_collection()
-
-        measured = _wait(start, _ANGLE_LIMIT)
-        if measured is None:
+        results: queue.SimpleQueue[dict[int, Any]] = queue.SimpleQueue()
+        reader = LighthouseSweepAngleAverageReader(self._current_link().cflib, results.put)
+        reader.start_angle_collection()
+        try:
+            measured = results.get(timeout=_ANGLE_LIMIT)
+        except queue.Empty:
             reader.stop_angle_collection()
+            return {}
         return {
             number: vectors
-            for number, (count, vectors) in sorted((measured or {}).items())
+            for number, (count, vectors) in sorted(measured.items())
             if count >= _FEWEST_ANGLES
         }
 
@@ -263,13 +257,3 @@ class Lighthouse(Subsystem):
         )
         if len(answer) < 2 or not answer[1]:
             raise RefusedError(f"{what}: the vehicle refuses it")
-
-
-def _wait(start, limit):
-    # Returns the result of a call of cflib that reports it later; None after the limit (s).
-    results: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    start(results.put)
-    try:
-        return results.get(timeout=limit)
-    except queue.Empty:
-        return None

@@ -70,63 +70,55 @@ class FirmwareParameters(Subsystem):
         try:
             answer = link.request(data, request)
         except NoReplyError as error:
-            return self._look_up(name, data[2:], error)
+            # Only the reply may have been lost; or the vehicle has kept another value.
+            try:
+                kept = self.read(name)
+            except NoReplyError:
+                raise error from None
+            if struct.pack(element.pytype, kept) != data[2:]:
+                (sent,) = struct.unpack(element.pytype, data[2:])
+                raise RefusedError(
+                    f"writing {name}: the vehicle keeps {kept:g} in the place of {sent:g}"
+                ) from None
+            return kept
         if answer != data:
             raise _refusal(request, answer)
         return self._keep(link, element, answer[2:])
 
     def store(self, name: str) -> None:
         """Store the present value of a persistent parameter, to survive a restart; blocks."""
-        self._persist(name, MISC_PERSISTENT_STORE, "storing")
+        self._ask_persistent(name, MISC_PERSISTENT_STORE, "storing")
 
     def clear(self, name: str) -> None:
         """Forget the stored value of a persistent parameter; blocks."""
-        self._persist(name, MISC_PERSISTENT_CLEAR, "clearing")
+        self._ask_persistent(name, MISC_PERSISTENT_CLEAR, "clearing")
 
     def stored(self, name: str) -> PersistentParamState:
         """Return is_stored, default_value and stored_value (or None) of a parameter; blocks."""
-        element, answer = self._ask_persistent(
-            name, MISC_PERSISTENT_GET_STATE, "reading the state of"
-        )
-        if answer[3] not in (0, 1) or len(answer) < 4 + struct.calcsize(element.pytype):
-            raise RefusedError(f"reading the state of {name}: the vehicle refuses it")
+        verb = "reading the state of"
+        element, answer = self._ask_persistent(name, MISC_PERSISTENT_GET_STATE, verb, good=(0, 1))
+        if len(answer) < 4 + struct.calcsize(element.pytype):
+            raise RefusedError(f"{verb} {name}: the vehicle refuses it")
         is_stored = answer[3] == 1
         kind = element.pytype.lstrip("<")
         default, *kept = struct.unpack(f"<{kind * (1 + is_stored)}", answer[4:])
         return PersistentParamState(is_stored, default, kept[0] if kept else None)
 
-    def _persist(self, name, command, verb):
-        _, answer = self._ask_persistent(name, command, verb)
-        if answer[3]:
-            raise RefusedError(
-                f"{verb} {name}: the vehicle refuses it ({os.strerror(answer[3])}, {answer[3]})"
-            )
-
-    def _ask_persistent(self, name, command, verb):
+    def _ask_persistent(self, name, command, verb, good=(0,)):
+        # Returns the parameter and the answer, whose fourth byte is the status.
         link = self._current_link()
         element = self._find(link, name)
         if not element.is_persistent():
             raise RefusedError(f"{verb} {name}: it is no persistent parameter")
         data = struct.pack("<BH", command, element.ident)
-        request = Request(CRTPPort.PARAM, MISC_CHANNEL, data, f"{verb} {name}")
-        answer = link.request(data, request)
+        answer = link.request(data, Request(CRTPPort.PARAM, MISC_CHANNEL, data, f"{verb} {name}"))
         if len(answer) < 4:
             raise RefusedError(f"{verb} {name}: the vehicle answers without a status")
-        return element, answer
-
-    def _look_up(self, name: str, expected: bytes, error: NoReplyError) -> int | float:
-        # Only the reply may have been lost; or the vehicle has kept another value.
-        element = self._find(self._current_link(), name)
-        try:
-            kept = self.read(name)
-        except NoReplyError:
-            raise error from None
-        if struct.pack(element.pytype, kept) != expected:
-            (value,) = struct.unpack(element.pytype, expected)
+        if answer[3] not in good:
             raise RefusedError(
-                f"writing {name}: the vehicle keeps {kept:g} in the place of {value:g}"
+                f"{verb} {name}: the vehicle refuses it ({os.strerror(answer[3])}, {answer[3]})"
             )
-        return kept
+        return element, answer
 
     @staticmethod
     def _find(link: Link, name: str) -> ParamTocElement:

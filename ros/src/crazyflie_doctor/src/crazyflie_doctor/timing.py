@@ -57,6 +57,22 @@ class TimingRecording:
     #: Address of a vehicle -> nodes whose diagnostics report it.
     reported: dict[str, set[str]] = field(default_factory=dict)
 
+    @property
+    def streams(self) -> dict[str, list[Transform]]:
+        """Child frame -> its transforms."""
+        found = defaultdict(list)
+        for t in self.transforms:
+            found[t.child].append(t)
+        return dict(sorted(found.items()))
+
+    def path_up(self, frame: str) -> list[str]:
+        """Return a frame and those above it; in a loop the last one comes twice."""
+        parent = {t.child: t.parent for t in self.transforms}
+        path = [frame]
+        while path[-1] in parent and path[-1] not in path[:-1]:
+            path.append(parent[path[-1]])
+        return path
+
 
 def check_clock(graph: Graph, recording: TimingRecording) -> Iterator[Finding]:
     """Check that all nodes use one clock, and that it advances."""
@@ -91,38 +107,24 @@ def check_clock(graph: Graph, recording: TimingRecording) -> Iterator[Finding]:
 
 def check_tf_tree(_: Graph, recording: TimingRecording) -> Iterator[Finding]:
     """Find frames with two parents or two publishers, and loops."""
-    parents, sources = defaultdict(set), defaultdict(set)
-    for t in recording.transforms:
-        parents[t.child].add(t.parent)
-        sources[t.child].add(t.node)
-    for child in sorted(parents):
-        if len(parents[child]) > 1:
+    for child, transforms in recording.streams.items():
+        parents, nodes = {t.parent for t in transforms}, {t.node for t in transforms}
+        if len(parents) > 1:
             yield error(
-                f"{child} has the parents {listed(parents[child])}, from {listed(sources[child])}",
+                f"{child} has the parents {listed(parents)}, from {listed(nodes)}",
                 "end one of them, or rename its frame: tf takes whichever came last",
             )
-        elif len(sources[child]) > 1:
-            is_static = any(t.is_static for t in recording.transforms if t.child == child)
+        elif len(nodes) > 1:
+            is_static = any(t.is_static for t in transforms)
             kind = "static transform" if is_static else "transform"
-            yield error(
-                f"the {kind} of {child} comes from {listed(sources[child])}", "end all but one"
-            )
-    for loop in _loops(parents):
-        yield error(f"tf has a loop: {' -> '.join(loop)}", "invert one of these transforms")
-
-
-def _loops(parents):
-    done: set[str] = set()
-    for start in sorted(parents):
-        path = [start]
-        while (parent := min(parents.get(path[-1], ()), default=None)) is not None:
-            if parent in path:
-                loop = path[path.index(parent) :]
-                if not done & set(loop):
-                    yield [*loop, parent]
-                done |= set(loop)
-                break
-            path.append(parent)
+            yield error(f"the {kind} of {child} comes from {listed(nodes)}", "end all but one")
+    looped: set[str] = set()
+    for child in recording.streams:
+        path = recording.path_up(child)
+        loop = path[path.index(path[-1]) :]
+        if len(loop) > 1 and looped.isdisjoint(loop):
+            looped.update(loop)
+            yield error(f"tf has a loop: {' -> '.join(loop)}", "invert one of these transforms")
 
 
 def check_frames(graph: Graph, recording: TimingRecording) -> Iterator[Finding]:
@@ -138,7 +140,7 @@ def check_frames(graph: Graph, recording: TimingRecording) -> Iterator[Finding]:
                 "correct its parameter or the child_frame_id of the rigid body; does motion "
                 "capture see it?",
             )
-        if not missing and _chain(recording, fixed, robot) is None:
+        if not missing and fixed not in recording.path_up(robot):
             yield error(
                 f"tf does not connect {fixed} and {robot}, which {node} needs",
                 "publish the missing transform between them",
@@ -159,29 +161,16 @@ def frames_of(graph: Graph) -> dict[str, tuple[str, str]]:
     return found
 
 
-def _chain(recording, fixed, robot):
-    """Return the frames from the vehicle up to the fixed frame; None without a connection."""
-    parent = {t.child: t.parent for t in recording.transforms}
-    path = [robot]
-    while path[-1] != fixed:
-        if (up := parent.get(path[-1])) is None or up in path:
-            return None
-        path.append(up)
-    return path
-
-
 def check_tf_rate(graph: Graph, recording: TimingRecording) -> Iterator[Finding]:
     """Check rate, pauses and age of the poses of every vehicle."""
-    streams = defaultdict(list)
-    for t in recording.transforms:
-        streams[t.child].append(t)
-    # The fastest transform between vehicle and fixed frame is the pose; the others may be constant:
-    # tf's static_transform_publisher repeats them ten times a second.
-    poses = {
-        max(chain[:-1], key=lambda child: _rate(streams[child]))
-        for fixed, robot in frames_of(graph).values()
-        if len(chain := _chain(recording, fixed, robot) or []) > 1
-    }
+    streams = recording.streams
+    poses = set()
+    for fixed, robot in frames_of(graph).values():
+        path = recording.path_up(robot)
+        if chain := path[: path.index(fixed)] if fixed in path else []:
+            # The fastest transform between vehicle and fixed frame is the pose; the others may be
+            # constant: tf's own static_transform_publisher repeats them ten times a second.
+            poses.add(max(chain, key=lambda child: _rate(streams[child])))
     for child in sorted(poses):
         yield from _check_stream(child, streams[child])
 

@@ -49,11 +49,11 @@ def test_a_takeoff_that_waits_to_be_sent(server, vehicle, service):
     assert begun.wait(LIMIT)
     vehicle.send(9, 1, b"\x81\x01\x01")
     # The takeoff is the next packet, and has not been sent.
-    wait_until(lambda: link._transmit_queue._commands, "the takeoff's packet")
+    wait_until(lambda: link._transmission._commands, "the takeoff's packet")
     request = EmptyRequest() if service == "emergency" else StopRequest()
     urgent = threading.Thread(target=server.call, args=(f"/cf1/{service}", request))
     urgent.start()
-    wait_until(lambda: len(link._transmit_queue._commands) >= 2, "the urgent packet")
+    wait_until(lambda: len(link._transmission._commands) >= 2, "the urgent packet")
     free.set()
     urgent.join(LIMIT)
     with pytest.raises(ServiceError, match="given up for"):
@@ -76,7 +76,7 @@ def test_a_hand_over_is_not_sent_without_its_command(hovering):
     assert begun.wait(LIMIT)
     vehicle.received.clear()
     go_to = server.process.call("/cf1/go_to", GoToRequest(duration=Duration(1)))
-    wait_until(lambda: link._transmit_queue._commands, "the packet")
+    wait_until(lambda: link._transmission._commands, "the packet")
     driven.jobs.supersede("something else")
     free.set()
     with pytest.raises(ServiceError, match="given up for something else"):

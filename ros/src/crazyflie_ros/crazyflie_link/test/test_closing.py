@@ -1,7 +1,7 @@
 """Links end with what they belong to, and within a limit."""
 
 import threading
-from unittest.mock import MagicMock, PropertyMock, patch
+from unittest.mock import MagicMock, patch
 
 import pytest
 from cflib.crtp.radiodriver import RadioManager
@@ -10,7 +10,7 @@ from crazyflie_link.address import Address
 from crazyflie_link.cflib_internals import SafeCrazyflie
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import LinkLostError
-from crazyflie_link.link import Link
+from crazyflie_link.link import Link, LinkHealth
 from crazyflie_utils.testing.programs import wait_until
 
 URI = "udp://127.0.0.1:1"
@@ -24,23 +24,24 @@ def link_class():
 
 
 def test_a_link_that_is_lost_at_the_moment_of_closing_is_closed(link_class):
-    """The thread that watches has taken it when `close` looks for it."""
+    """The thread that watches has found out when `close` comes."""
     link = link_class.return_value
     link.cflib = MagicMock()
-    vehicle = Crazyflie(URI)
+    states = []
+    vehicle = Crazyflie(URI, on_state=lambda state, _: states.append(state))
     taken = threading.Event()
 
     def fail():
-        # As `close` does, before it looks.
-        vehicle._closed.set()
+        vehicle.close()
         taken.set()
-        return LinkLostError("gone")
+        return LinkHealth.ENDED, "gone"
 
-    type(link).error = PropertyMock(side_effect=fail)
+    link.health.side_effect = fail
     vehicle.connect()
     assert taken.wait(LIMIT)
     wait_until(lambda: not vehicle._watcher.is_alive(), "the end of the watch")
     link.close.assert_called()
+    assert states[-1] is LinkState.DISCONNECTED
 
 
 def test_a_vehicle_that_is_closed_as_its_link_is_made_does_not_open_it(link_class):
@@ -63,14 +64,14 @@ def test_a_vehicle_that_is_closed_as_its_link_is_made_does_not_open_it(link_clas
 def test_a_vehicle_that_is_closed_as_its_link_is_lost_closes_it_once_and_waits(link_class):
     link = link_class.return_value
     link.cflib = MagicMock()
-    link.error = None
+    link.health.return_value = LinkHealth.ALIVE, "connected"
     vehicle = Crazyflie(URI)
     states = []
     vehicle._on_state = lambda state, _: (
         states.append(state) or (state is LinkState.LOST and vehicle.close())
     )
     vehicle.connect()
-    link.error = LinkLostError("gone")
+    link.health.return_value = LinkHealth.ENDED, "gone"
     wait_until(lambda: not vehicle._watcher.is_alive(), "the end of the watch")
     vehicle.close()
     link.close.assert_called()

@@ -44,8 +44,10 @@ class Mock:
 
 
 @pytest.fixture
-def mock():
-    return Mock()
+def mock(monkeypatch):
+    mock = Mock()
+    monkeypatch.setattr(module, "SafeCrazyflie", mock)
+    return mock
 
 
 @pytest.mark.parametrize(
@@ -56,7 +58,7 @@ def mock():
     ],
 )
 def test_a_driver_that_gives_up_ends_the_attempt(mock, text, error):
-    link = Link(Address.parse(URI), backend=mock)
+    link = Link(Address.parse(URI))
     mock.cflib.open_link.side_effect = lambda uri: mock.fail(text)
     with pytest.raises(error):
         link.open()
@@ -66,7 +68,7 @@ def test_a_driver_that_gives_up_ends_the_attempt(mock, text, error):
 
 def test_a_dongle_that_hangs_does_not_hang_us(mock):
     release = threading.Event()
-    link = Link(Address.parse(URI), LinkTimeouts(first_answer=0.3), backend=mock)
+    link = Link(Address.parse(URI), LinkTimeouts(first_answer=0.3))
     mock.cflib.open_link.side_effect = lambda uri: release.wait(60.0)
     with pytest.raises(NoAnswerError):
         link.open()
@@ -80,7 +82,7 @@ def test_a_dongle_that_hangs_does_not_hang_us(mock):
 
 
 def test_the_first_request_is_repeated(mock):
-    link = Link(Address.parse(URI), LinkTimeouts(first_answer=1.0), backend=mock)
+    link = Link(Address.parse(URI), LinkTimeouts(first_answer=1.0))
     with pytest.raises(NoAnswerError):
         link.open()
     assert mock.cflib.request_source.call_count >= 2
@@ -92,7 +94,7 @@ def test_the_first_request_is_not_repeated_at_once_or_after_its_answer(
 ):
     times = itertools.count(100.0, period)
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: next(times)))
-    link = Link(Address.parse(URI), LinkTimeouts(first_answer=limit), backend=mock)
+    link = Link(Address.parse(URI), LinkTimeouts(first_answer=limit))
     mock.cflib.platform.get_protocol_version.return_value = protocol
     with pytest.raises(NoAnswerError):
         link.open()
@@ -100,12 +102,12 @@ def test_the_first_request_is_not_repeated_at_once_or_after_its_answer(
 
 
 def test_a_link_ends_once_with_its_first_error(mock):
-    link = Link(Address.parse(URI), backend=mock)
+    link = Link(Address.parse(URI))
     link.close("first")
     link.close("second")
     assert str(link.error) == "first"
     mock.cflib.disconnect.assert_called_once_with()
-    link = Link(Address.parse(URI), backend=mock)
+    link = Link(Address.parse(URI))
     mock.fail("no driver found")
     link.close("closed")
     assert isinstance(link.error, NoAnswerError)
@@ -114,7 +116,7 @@ def test_a_link_ends_once_with_its_first_error(mock):
 def test_a_link_is_not_lost_by_a_slow_set_up(mock, monkeypatch):
     now = 0.0
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now))
-    link = Link(Address.parse(URI), backend=mock)
+    link = Link(Address.parse(URI))
     now = 10.0
     link._on_connected(URI)
     assert link.health() == (LinkHealth.ALIVE, "connected")
@@ -123,7 +125,7 @@ def test_a_link_is_not_lost_by_a_slow_set_up(mock, monkeypatch):
 
 
 def test_only_log_data_and_pings_show_that_a_vehicle_lives(mock):
-    link = Link(Address.parse(URI), backend=mock)
+    link = Link(Address.parse(URI))
     (receive,), _ = mock.cflib.packet_received.add_callback.call_args
     (send,), _ = mock.cflib.packet_sent.add_callback.call_args
     packets = [packet(5, 2, b"log"), packet(15, 0, b"ping"), packet(2, 1, b"x"), packet(15, 1, b"")]
@@ -142,7 +144,7 @@ def test_only_log_data_and_pings_show_that_a_vehicle_lives(mock):
 
 
 def test_an_error_in_flight_is_a_lost_link(mock):
-    link = Link(Address.parse(URI), backend=mock)
+    link = Link(Address.parse(URI))
     mock.cflib.is_connected.return_value = True
     link._on_connected(URI)
     link._on_complete(URI)

@@ -5,10 +5,10 @@ import threading
 import pytest
 
 from crazyflie_link.errors import LinkLostError, NoReplyError
-from crazyflie_link.transmission import Request, RequestReply
+from crazyflie_link.transmission import Request, Transmission
 
 
-class Requests(RequestReply):
+class Requests(Transmission):
     """Requests that are sent at once."""
 
     def request(self, send, request):
@@ -70,7 +70,7 @@ def test_what_must_not_be_done_twice_is_sent_once():
 
 
 def test_a_request_that_has_ended_is_withdrawn_from_the_queue():
-    requests, queue, sent = RequestReply(), [], []
+    requests, queue, sent = Transmission(), [], []
     request = Request(8, 0, b"", "the jump", resend=False, limit=0.01)
     with pytest.raises(NoReplyError):
         requests.request(lambda: sent.append(True), request, queue.append)

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from crazyflie_link.errors import LinkLostError
-from crazyflie_link.transmission import TransmitQueue
+from crazyflie_link.transmission import Transmission
 
 LIMIT = 60.0
 
@@ -14,7 +14,7 @@ class Radio:
     """A radio that sends nothing until it is let."""
 
     def __init__(self):
-        self.queue = TransmitQueue()
+        self.queue = Transmission()
         self.sent = []
         self.free = threading.Event()
         entered = threading.Event()
@@ -111,7 +111,7 @@ def test_what_waits_at_the_end_is_not_sent(radio):
 
 @pytest.mark.parametrize("reason", ["the vehicle has not been heard for 0.45 s", ""])
 def test_a_queue_that_is_closed_says_why(reason):
-    queue = TransmitQueue()
+    queue = Transmission()
     queue.close(reason)
     for put in (queue.put, lambda send: queue.put_latest("stream", send)):
         with pytest.raises(LinkLostError) as caught:

@@ -13,7 +13,7 @@ from crazyflie_link.address import Address
 from crazyflie_link.cflib_internals import RadioBroadcast, packet
 from crazyflie_link.limits import REPEAT_PERIOD, REPEATS
 from crazyflie_link.link import Link
-from crazyflie_link.transmission import TransmitQueue
+from crazyflie_link.transmission import Transmission
 
 #: Time limit from the first vehicle that is ready for a shared command to the last, s; after 0.2 s
 #: without an answer each is sent its own command.
@@ -47,7 +47,7 @@ class Broadcaster:
         self._links = links
         self._repeats, self._period = repeats, period
         self._radio = RadioBroadcast(address.uri) if address.is_radio else None
-        self._queue = TransmitQueue()
+        self._queue = Transmission()
         self.sent = 0  #: Packets that were broadcast.
 
     def send(
@@ -61,7 +61,7 @@ class Broadcaster:
         self._queue.put(partial(self._repeat, packets, end), urgent)
 
     def put_latest(self, stream: str, make: Callable[[], Sequence[CRTPPacket]]) -> None:
-        """Queue the packets that ``make()`` will return; see `TransmitQueue.put_latest`."""
+        """Queue the packets that ``make()`` will return; see `Transmission.put_latest`."""
         self._queue.put_latest(stream, lambda: self._transmit(make()))
 
     def close(self) -> None:

@@ -10,7 +10,6 @@ import importlib
 import logging
 import os
 import queue
-import re
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -27,6 +26,8 @@ from cflib.crtp.radiodriver import RadioDriver, RadioManager
 from cflib.drivers.crazyradio import Crazyradio
 from cflib.utils.callbacks import Caller
 from typing_extensions import override
+
+TESTED_VERSION = "cflib==0.1.34"  #: That of ros/requirements.txt.
 
 #: MODULE:CLASS.ATTRIBUTE; an attribute of the class, or one that its constructor sets.
 PRIVATE_NAMES = (
@@ -73,19 +74,8 @@ def check_private_names(names: Iterable[str] = PRIVATE_NAMES) -> None:
         if not hasattr(owner, attribute) and attribute not in set_there:
             raise ImportError(
                 f"cflib has no {name.replace(':', '.')}, which crazyflie_link uses: install the "
-                f"version it was tested with, {pinned_version()}"
+                f"version it was tested with, {TESTED_VERSION}"
             )
-
-
-def pinned_version() -> str:
-    """Return the version in ros/requirements.txt, such as "cflib==0.1.34"."""
-    for folder in Path(__file__).resolve().parents:
-        with contextlib.suppress(OSError):
-            text = (folder / "requirements.txt").read_text(encoding="utf-8")
-            if found := re.search(r"^cflib==[\w.]+", text, re.MULTILINE):
-                return found[0]
-    # In an installed workspace.
-    return "cflib of the workspace's ros/requirements.txt"
 
 
 def forget_dead_radios() -> None:
@@ -249,16 +239,6 @@ class _Guarded(Caller):
                 _log.warning("a packet could not be understood", exc_info=True)
 
 
-class _LogErrors(dict[int, str]):
-    """cflib's texts of the errors of log blocks, and one for those that it does not know.
-
-    Without a text its thread that receives drops the refusal.
-    """
-
-    def __missing__(self, code: int) -> str:
-        return f"error {code}"
-
-
 class SafeCrazyflie(CflibCrazyflie):
     """cflib's Crazyflie for a single connection; a new one is made for the next.
 
@@ -279,16 +259,11 @@ class SafeCrazyflie(CflibCrazyflie):
         guarded = _Guarded()
         guarded.callbacks = self.packet_received.callbacks
         self.packet_received = guarded
-        self.log._err_codes = _LogErrors(self.log._err_codes)
         self.link_established.add_callback(self._tune_udp)
 
     def request_source(self) -> None:
         """Send the first request of the set-up again: cflib does not."""
         self.send_packet(packet(CRTPPort.LINKCTRL, LINKSERVICE_SOURCE, b"\0"))
-
-    def log_error(self, code: int) -> str:
-        """Return the text of an error of a log block."""
-        return self.log._err_codes[code]
 
     def send_packet(
         self,

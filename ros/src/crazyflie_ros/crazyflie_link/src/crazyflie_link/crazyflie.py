@@ -161,7 +161,7 @@ class Crazyflie:
         self._on_state, self._on_packet = on_state, on_packet
         self._console = Console(on_console) if on_console is not None else None
         # The link may be silent or still being opened.
-        self._emergency = EmergencyStop(lambda: self._link or self._opening)
+        self._emergency = EmergencyStop(lambda: self._opening or self._link)
         link = self.link
         #: setpoints, high_level, trajectories, localization, lighthouse, parameters, log,
         #: supervisor: Parts of the firmware; see their classes.
@@ -175,12 +175,11 @@ class Crazyflie:
         self.supervisor = Supervisor(link, self._emergency)
         self._blocks: list[LogBlock] = []
         self._blocks_lock = threading.Lock()
-        # The link in use, and the one that is being opened.
+        # The latest link that was opened, and the one that is being opened.
         self._link: Link | None = None
         self._opening: Link | None = None
         self._silent_since: float | None = None
-        self._reason = "not connected yet"
-        self._reported: tuple[LinkState, str] | None = None
+        self._text = "not connected yet"
         self._closed = threading.Event()
         self._closing: threading.Thread | None = None
         self._watcher: threading.Thread | None = None
@@ -221,9 +220,10 @@ class Crazyflie:
     def link(self) -> Link:
         """Return the link on which the vehicle is heard; `LinkLostError` without a link."""
         link = self._link
-        if link is None or self._silent_since is not None:
-            raise LinkLostError(f"no link to the vehicle: {self._reason}")
-        return link
+        if link is not None and link.error is None and self._silent_since is None:
+            return link
+        reason = self._text if link is None else link.error or self._text
+        raise LinkLostError(f"no link to the vehicle: {reason}")
 
     def add_log_block(self, block: LogBlock) -> None:
         """Start a log block, now and after every reconnection; blocks.
@@ -265,7 +265,7 @@ class Crazyflie:
             raise RefusedError(
                 f"{uri}: only a radio link can restart a vehicle; switch it off and on instead"
             )
-        self._close_link("the vehicle is restarted")
+        self._close_links("the vehicle is restarted")
         init_drivers()
         try:
             with contextlib.closing(PowerSwitch(uri)) as switch:
@@ -278,10 +278,7 @@ class Crazyflie:
         """End the connection; safe to call twice and while connecting."""
         self._emergency.close()
         self._closed.set()
-        opening = self._opening
-        if opening is not None:
-            opening.close()
-        self._close_link(_CLOSED)
+        self._close_links(_CLOSED)
         watcher = self._watcher
         if watcher is not None and watcher is not threading.current_thread():
             watcher.join(timeout=_JOIN_LIMIT)
@@ -292,18 +289,15 @@ class Crazyflie:
     # The life of the link: opened by `connect`, then followed in a thread of its own.
 
     def _set_state(self, state, text):
-        self.state = state
-        self._reason = text
-        if (state, text) != self._reported:
-            self._reported = (state, text)
-            if self._on_state is not None:
-                self._on_state(state, text)
+        is_new = (state, text) != (self.state, self._text)
+        self.state, self._text = state, text
+        if is_new and self._on_state is not None:
+            self._on_state(state, text)
 
-    def _close_link(self, reason):
-        link, self._link = self._link, None
-        self._reason = reason
-        if link is not None:
-            link.close(reason)
+    def _close_links(self, reason):
+        for link in (self._opening, self._link):
+            if link is not None:
+                link.close(reason)
 
     def _open(self):
         folder = table_cache() if self._cache is None else self._cache
@@ -314,39 +308,31 @@ class Crazyflie:
             # `close` closes the link that it finds here; if it was called before, it found none.
             self._end_if_closed(link)
             link.open()
+            self._link, self._silent_since = link, None
         finally:
             self._opening = None
-        self._link = link
         self.connection_count += 1
         self._end_if_closed(link)
 
     def _end_if_closed(self, link):
         if self._closed.is_set():
-            self._link = None
             link.close(_CLOSED)
             raise LinkLostError("the link was closed while connecting")
 
     def _watch(self):
         while not self._closed.wait(CHECK_PERIOD):
             link = self._link
-            end = LinkLostError(self._reason) if link is None else link.error
-            why = str(end)
-            if link is not None and end is None:
-                health, why = link.health()
-                if self._is_usable(health, why):
-                    continue
-            # The loss is reported first: closing the link takes a moment.
-            self._link = None
-            self._silent_since = None
+            assert link is not None, "connect has opened one"
+            health, why = link.health()
+            if self._is_usable(health, why):
+                continue
             if self._closed.is_set():
-                # `close` may just have been called, and found no link.
-                if link is not None:
-                    link.close(_CLOSED)
                 return
+            # The loss is reported first: closing the link takes a moment.
+            self._silent_since = time.monotonic()
             self._set_state(LinkState.LOST, why)
-            if link is not None:
-                self._closing = threading.Thread(target=link.close, args=(why,), daemon=True)
-                self._closing.start()
+            self._closing = threading.Thread(target=link.close, args=(why,), daemon=True)
+            self._closing.start()
             if not self._reconnect or not self._connect_again():
                 return
 
@@ -358,7 +344,7 @@ class Crazyflie:
             if was_silent:
                 self._set_state(LinkState.CONNECTED, f"{self.address.uri} is heard again")
             return True
-        if health is LinkHealth.RESTARTED:
+        if health is not LinkHealth.SILENT:
             return False
         now = time.monotonic()
         if self._silent_since is None:
@@ -374,7 +360,7 @@ class Crazyflie:
                 self._open()
                 problems = self._start_blocks()
             except CrazyflieError as error:
-                self._close_link(str(error))
+                self._close_links(str(error))
                 if not self._closed.is_set():
                     self._set_state(LinkState.LOST, str(error))
             else:

@@ -8,7 +8,6 @@ blocks: so log data must also come.
 
 import copy
 import enum
-import logging
 import struct
 import threading
 import time
@@ -34,14 +33,12 @@ from crazyflie_link.errors import (
     ValueRangeError,
     explain,
 )
-from crazyflie_link.transmission import MaySend, Request, RequestReply, Send, TransmitQueue
+from crazyflie_link.transmission import MaySend, Request, Send, Transmission
 
 LOG_DATA = (CRTPPort.LOGGING, CHAN_LOGDATA)  #: Port and channel of log data.
 
 _PING = (CRTPPort.LINKCTRL, ECHO_CHANNEL)
-_SOURCE_PERIOD = 0.1
-
-_log = logging.getLogger(__name__)
+_SOURCE_PERIOD, _CHECK_PERIOD = 0.1, 0.05
 
 OnPacket = Callable[[int, int, bytes], None]  #: Is called with port, channel and data.
 
@@ -57,6 +54,8 @@ _LATEST, _FEW = 5, 3  #: Fraction of answered pings below which a link is poor.
 OLDEST_PROTOCOL = 4  #: First version of the protocol with tables of more than 255 items.
 
 _TABLES = {CRTPPort.LOGGING: "log table", CRTPPort.PARAM: "parameter table"}
+#: Steps whose packets are not counted: each is progress.
+_UNNUMBERED = _MEMORIES, _TYPES = "list of memories", "parameter types"
 
 
 @dataclass(frozen=True)
@@ -92,8 +91,10 @@ class LinkSetup:
 
     def receive(self, port: int, channel: int, data: bytes) -> None:
         """Follow the progress by a packet from the vehicle."""
-        if self._advances(port, channel, data) or not self._has_answered:
+        step = self._step_of(port, channel, data)
+        if step in _UNNUMBERED or step != self._step or not self._has_answered:
             self._progress_time = time.monotonic()
+        self._step = step
         self._has_answered = True
 
     def check(self, protocol: int) -> None:
@@ -125,35 +126,24 @@ class LinkSetup:
                 "is too slow; try another channel or a higher data rate"
             )
 
-    def _advances(self, port, channel, data):
-        if channel == TOC_CHANNEL and port in _TABLES and data:
-            return self._read_table(port, data)
+    def _step_of(self, port, channel, data):
+        size = self._sizes.get(port, 0)
         if port == CRTPPort.MEM:
-            self._step = "list of memories"
-            return True
+            return _MEMORIES
+        if (port, channel) == (CRTPPort.PARAM, MISC_CHANNEL):
+            return _TYPES
         if (port, channel) == (CRTPPort.PARAM, READ_CHANNEL):
             # A repeated value is not progress.
-            known = len(self._values)
             self._values.add(bytes(data[:2]))
-            total = self._sizes.get(port, 0)
-            self._step = f"parameter values, {len(self._values)} of {total}"
-            return len(self._values) > known
-        if (port, channel) == (CRTPPort.PARAM, MISC_CHANNEL):
-            self._step = "parameter types"
-            return True
-        return False
-
-    def _read_table(self, port, data):
-        if len(data) < 3 or data[0] not in (CMD_TOC_INFO_V2, CMD_TOC_ITEM_V2):
-            return False
-        (number,) = struct.unpack_from("<H", data, 1)
-        before, size = self._step, self._sizes.get(port, 0)
-        if data[0] == CMD_TOC_INFO_V2:
-            self._sizes[port] = number
-            self._step = f"{_TABLES[port]} of {number} items"
-        else:
-            self._step = f"{_TABLES[port]}, item {number + 1} of {size}"
-        return self._step != before
+            return f"parameter values, {len(self._values)} of {size}"
+        if channel == TOC_CHANNEL and port in _TABLES and len(data) > 2:
+            (number,) = struct.unpack_from("<H", data, 1)
+            if data[0] == CMD_TOC_INFO_V2:
+                self._sizes[port] = number
+                return f"{_TABLES[port]} of {number} items"
+            if data[0] == CMD_TOC_ITEM_V2:
+                return f"{_TABLES[port]}, item {number + 1} of {size}"
+        return self._step
 
 
 class LinkHealth(enum.Enum):
@@ -162,6 +152,7 @@ class LinkHealth(enum.Enum):
     ALIVE = "alive"
     SILENT = "silent"
     RESTARTED = "restarted"
+    ENDED = "ended"
 
 
 class LinkMonitor:
@@ -257,8 +248,7 @@ class Link:
     """A connection that is opened once and closed once.
 
     The cache is the folder of the tables; ``on_packet(port, channel, data)`` is called for every
-    packet, in cflib's thread; ``backend(cache, on_error)`` makes the object of cflib. For ``put``,
-    ``put_latest`` and ``discard`` see `TransmitQueue`.
+    packet, in cflib's thread. For ``put``, ``put_latest`` and ``discard`` see `Transmission`.
     """
 
     def __init__(
@@ -267,7 +257,6 @@ class Link:
         limits: LinkTimeouts | None = None,
         cache: str | None = None,
         on_packet: OnPacket | None = None,
-        backend: Callable[[str | None, Callable[[str], None]], SafeCrazyflie] = SafeCrazyflie,
     ):
         self.address = address
         self._limits = limits or LinkTimeouts()
@@ -275,18 +264,16 @@ class Link:
         self._setup = LinkSetup(address.uri, self._limits)
         #: Age of the vehicle's packets, since the link was set up.
         self.monitor = LinkMonitor(time.monotonic(), self._limits.lost)
-        self._changed = threading.Condition()
         self.error: CrazyflieError | None = None  #: Why the link has ended; None while it is open.
-        self._is_complete = False
+        self._lock = threading.Lock()
+        self._complete = threading.Event()
         self._radio_error = ""
-        self._closing = threading.Lock()
         self._is_closed = False
-        self._request_reply = RequestReply()
-        self._transmit_queue = TransmitQueue()
-        self.put = self._transmit_queue.put
-        self.put_latest = self._transmit_queue.put_latest
-        self.discard = self._transmit_queue.discard
-        self.cflib = backend(cache, self._fail)
+        self._transmission = Transmission()
+        self.put = self._transmission.put
+        self.put_latest = self._transmission.put_latest
+        self.discard = self._transmission.discard
+        self.cflib = SafeCrazyflie(cache, self._fail)
         self.cflib.packet_received.add_callback(self._on_received)
         self.cflib.packet_sent.add_callback(self._on_sent)
         self.cflib.connected.add_callback(self._on_connected)
@@ -301,26 +288,21 @@ class Link:
         Raises `CrazyflieError` with the reason and what to do; the link is closed then.
         """
         try:
-            self._open()
-        except BaseException as error:
-            self.close(str(error))
-            raise
-
-    def _open(self):
-        init_drivers()
-        self._setup.begin()
-        # A dongle that hangs, or the lookup of a host's name, may block.
-        threading.Thread(target=self._open_cflib, name="crazyflie-open", daemon=True).start()
-        asked = time.monotonic()
-        with self._changed:
-            while not self._is_complete:
-                self._changed.wait(0.05)
+            init_drivers()
+            self._setup.begin()
+            # A dongle that hangs, or the lookup of a host's name, may block.
+            threading.Thread(target=self._open_cflib, name="crazyflie-open", daemon=True).start()
+            asked = time.monotonic()
+            while not self._complete.wait(_CHECK_PERIOD):
                 if self.error is not None:
                     raise self.error
                 self._setup.check(self.protocol)
                 if self.protocol < 0 and time.monotonic() - asked > _SOURCE_PERIOD:
                     asked = time.monotonic()
                     self.put_latest("source", self.cflib.request_source)
+        except BaseException as error:
+            self.close(str(error))
+            raise
 
     def _open_cflib(self):
         forget_dead_radios()
@@ -336,9 +318,7 @@ class Link:
             self._on_complete(uri)
 
     def _on_complete(self, _):
-        with self._changed:
-            self._is_complete = True
-            self._changed.notify_all()
+        self._complete.set()
 
     # Operation.
 
@@ -348,7 +328,9 @@ class Link:
         return self.cflib.platform.get_protocol_version()
 
     def health(self) -> tuple[LinkHealth, str]:
-        """Return the health of an open link by the vehicle's packets, and the same in words."""
+        """Return the health of the link by the vehicle's packets, and the same in words."""
+        if self.error is not None:
+            return LinkHealth.ENDED, str(self.error)
         state = self.monitor.state(time.monotonic())
         if state is LinkHealth.ALIVE:
             return state, "connected"
@@ -368,17 +350,19 @@ class Link:
             )
         self.put(partial(self.cflib.send_packet, packet(port, channel, data)))
 
-    def request(self, send: Send | bytes, request: Request) -> bytes:
-        """Send a request and return the data of its answer; see `RequestReply.request`.
+    def request(
+        self, send: Send | bytes, request: Request, put: Callable[[Send], None] | None = None
+    ) -> bytes:
+        """Send a request and return the data of its answer; see `Transmission.request`.
 
-        ``send`` is a call, or data for the port and channel of the answer.
+        ``send`` is a call, or data for the port and channel of the answer. By default it is queued.
         """
         transmit = (
             partial(self.cflib.send_packet, packet(request.port, request.channel, send))
             if isinstance(send, bytes)
             else send
         )
-        return self._request_reply.request(transmit, request, self.put)
+        return self._transmission.request(transmit, request, put or self.put)
 
     def guarded(self, may_send: MaySend) -> Self:
         """Return the same open link, whose commands and requests go out only if ``may_send()``.
@@ -397,47 +381,41 @@ class Link:
 
     def close(self, reason: str = "the link was closed") -> None:
         """End the connection, once; pending requests fail with the reason."""
-        with self._closing:
+        with self._lock:
             if self._is_closed:
                 return
             self._is_closed = True
-        with self._changed:
             self.error = self.error or LinkLostError(reason)
-            self._changed.notify_all()
-        self._transmit_queue.close(reason)
-        self._request_reply.close(reason)
+        self._transmission.close(reason)
         self.cflib.disconnect()
 
     def _fail(self, text):
-        with self._changed:
-            if self.error is None:
-                cause = explain(self.address.uri, text)
-                if self._is_complete and UNANSWERED in text.lower():
-                    # The driver continues, and the vehicle may be heard again.
-                    self._radio_error = f" ({cause})"
-                    return
-                if self.cflib.is_connected():
-                    cause = LinkLostError(f"the link was lost: {cause}")
+        with self._lock:
+            if self.error is not None:
+                return
+            cause = explain(self.address.uri, text)
+            if self._complete.is_set() and UNANSWERED in text.lower():
+                # The driver continues, and the vehicle may be heard again.
+                self._radio_error = f" ({cause})"
+            elif self.cflib.is_connected():
+                self.error = LinkLostError(f"the link was lost: {cause}")
+            else:
                 self.error = cause
-            self._changed.notify_all()
 
-    # An exception in here would end cflib's receiving thread.
+    # cflib's thread goes on after an exception in here.
 
     def _on_received(self, received):
         self._radio_error = ""
         port, channel, data = received.port, received.channel, bytes(received.data)
-        if not self._is_complete:
+        if not self._complete.is_set():
             self._setup.receive(port, channel, data)
         if (port, channel) == LOG_DATA:
             self.monitor.log_received(time.monotonic())
         elif (port, channel) == _PING:
             self.monitor.ping_answered(data, time.monotonic())
-        self._request_reply.receive(port, channel, data)
+        self._transmission.receive(port, channel, data)
         if self._on_packet is not None:
-            try:
-                self._on_packet(port, channel, data)
-            except Exception:
-                _log.exception("the callback for packets failed")
+            self._on_packet(port, channel, data)
 
     def _on_sent(self, sent):
         if (sent.port, sent.channel) == _PING:

@@ -1,23 +1,21 @@
 """Log blocks: variables that the vehicle sends periodically."""
 
-import queue
+import errno
+import struct
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from cflib.crazyflie.log import LogConfig, LogTocElement
+from cflib.crazyflie import log as cflib_log
+from cflib.crazyflie.log import CHAN_SETTINGS, CMD_START_LOGGING, LogConfig
+from cflib.crtp.crtpstack import CRTPPort
 from cflib.utils.encoding import decompress_quaternion
 
-from crazyflie_link.errors import (
-    NoReplyError,
-    RefusedError,
-    ValueRangeError,
-    unknown_name,
-)
+from crazyflie_link.errors import RefusedError, ValueRangeError, unknown_name
 from crazyflie_link.limits import LONGEST_PERIOD_MS, PERIOD_STEP_MS, SHORTEST_PERIOD_MS
 from crazyflie_link.link import Link
 from crazyflie_link.subsystem import Subsystem, elements
-from crazyflie_link.transmission import REPLY_LIMIT
+from crazyflie_link.transmission import Request
 
 _STAMP_END = 4  #: A log packet begins with the number of its block and three bytes of time.
 _TICKS = 1 << 24  #: The vehicle's time in ms has 24 bits.
@@ -126,14 +124,12 @@ class Log(Subsystem):
             )
         if not block.variables:
             raise ValueRangeError(f"log block {block.name!r} has no variables")
-        known = self.variables()
+        known = elements(self._current_link().cflib.log.toc.toc)
         size = 0
         for variable in block.variables:
             if variable not in known:
                 raise unknown_name("log variable", variable, list(known))
-            size += LogTocElement.get_size_from_id(
-                LogTocElement.get_id_from_cstring(known[variable])
-            )
+            size += struct.calcsize(known[variable].pytype)
         if size > LogConfig.MAX_LEN:
             raise ValueRangeError(
                 f"log block {block.name!r}: its {len(block.variables)} variables take {size} "
@@ -144,16 +140,10 @@ class Log(Subsystem):
         """Start a block; blocks until the vehicle has confirmed it, or raises `CrazyflieError`."""
         self.check(block)
         link = self._current_link()
-        backend = link.cflib
+        what = f"log block {block.name!r}"
         config = LogConfig(block.name, block.period_ms)
         for variable in block.variables:
             config.add_variable(variable)
-        # Reasons of a refusal; empty for a start.
-        outcomes: queue.SimpleQueue[str] = queue.SimpleQueue()
-
-        def note_start(_, is_started):
-            # cflib reports a start that is refused here, too, and not as an error.
-            outcomes.put("" if is_started else backend.log_error(config.err_no))
 
         def deliver(time_ms, values, _):
             block.callback(
@@ -161,21 +151,22 @@ class Log(Subsystem):
                 tuple(values[variable] for variable in block.variables),
             )
 
-        config.error_cb.add_callback(lambda _, text: outcomes.put(text))
-        config.started_cb.add_callback(note_start)
+        def accepts(answer: bytes) -> bool:
+            # cflib has a block started once it is created, which it is after a repetition, too.
+            command, number, code = answer[:3] if len(answer) > 2 else (0, 0, 0)
+            is_end = command == CMD_START_LOGGING or code not in (0, errno.EEXIST)
+            return number == config.id and is_end
+
         config.data_received_cb.add_callback(deliver)
+        # cflib repeats what is lost.
+        request = Request(CRTPPort.LOGGING, CHAN_SETTINGS, b"", what, False, accepts=accepts)
         try:
-            backend.log.add_config(config)
-            config.start()
+            link.cflib.log.add_config(config)
+            # Sent by this thread: cflib raises here if the block exceeds its limits.
+            _, _, code, *_ = link.request(config.start, request, put=lambda send: send())
         except (AttributeError, KeyError) as error:
-            # cflib's own check of what fits on the vehicle.
-            raise RefusedError(f"log block {block.name!r}: {error}") from None
-        try:
-            refusal = outcomes.get(timeout=REPLY_LIMIT)
-        except queue.Empty:
-            raise NoReplyError(
-                f"log block {block.name!r}: the vehicle has not replied within {REPLY_LIMIT:g} s"
-            ) from None
-        if refusal:
-            raise RefusedError(f"log block {block.name!r}: the vehicle answers: {refusal}")
+            raise RefusedError(f"{what}: {error}") from None
+        if code:
+            reason = cflib_log.Log._err_codes.get(code, f"error {code}")
+            raise RefusedError(f"{what}: the vehicle answers: {reason}")
         link.monitor.expect_log(block.period_ms / 1000.0, time.monotonic())

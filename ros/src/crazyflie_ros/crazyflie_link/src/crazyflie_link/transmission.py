@@ -26,75 +26,6 @@ Send = Callable[[], None]  #: Sends something.
 MaySend = Callable[[], bool]
 
 
-class TransmitQueue:
-    """Packets to be sent: commands in their order, and the latest of each stream."""
-
-    def __init__(self) -> None:
-        self._commands: deque[Send] = deque()
-        self._streams: dict[str, Send] = {}
-        self._wake = threading.Condition()
-        self._closed: str | None = None
-        threading.Thread(target=self._run, name="crazyflie-transmit", daemon=True).start()
-
-    def put(self, send: Send, urgent: bool = False) -> None:
-        """Queue ``send()`` behind the commands before it.
-
-        An urgent one goes first, and discards all streams. `LinkLostError` if the queue is closed,
-        or full: the link is stuck.
-        """
-        with self._wake:
-            self._check_open()
-            if urgent:
-                self._streams.clear()
-                self._commands.appendleft(send)
-            elif len(self._commands) >= _MOST_COMMANDS:
-                raise LinkLostError(f"{_MOST_COMMANDS} packets wait to be sent: the link is stuck")
-            else:
-                self._commands.append(send)
-            self._wake.notify()
-
-    def put_latest(self, stream: str, send: Send) -> None:
-        """Queue ``send()`` in place of the one that still waits on this stream."""
-        with self._wake:
-            self._check_open()
-            self._streams[stream] = send
-            self._wake.notify()
-
-    def discard(self, stream: str) -> None:
-        """Remove the ``send`` that waits on a stream."""
-        with self._wake:
-            self._streams.pop(stream, None)
-
-    def close(self, reason: str = "the link is closed") -> None:
-        """Stop sending; discard the queue. Later calls fail with the reason."""
-        with self._wake:
-            self._closed = reason
-            self._wake.notify()
-
-    def _check_open(self):
-        if self._closed is not None:
-            raise LinkLostError(self._closed)
-
-    def _is_busy(self):
-        return self._closed is not None or self._commands or self._streams
-
-    def _run(self):
-        while True:
-            with self._wake:
-                self._wake.wait_for(self._is_busy)
-                if self._closed is not None:
-                    return
-                if self._commands:
-                    send = self._commands.popleft()
-                else:
-                    send = self._streams.pop(next(iter(self._streams)))
-            try:
-                send()
-            except Exception:
-                # Whatever cflib raises, the next command must go out.
-                _log.exception("a packet could not be sent")
-
-
 REPLY_LIMIT = 1.0  #: Time limit of a reply, s.
 RESEND_PERIOD = 0.2  #: Time after which a request is sent again, s; as cflib does.
 
@@ -122,23 +53,46 @@ class Request:
         return is_same and data.startswith(self.prefix) and self.accepts(data)
 
 
-class RequestReply:
-    """Pair answers with pending requests."""
+class Transmission:
+    """Packets to be sent: commands in their order, the latest of each stream; and requests."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        self._commands: deque[Send] = deque()
+        self._streams: dict[str, Send] = {}
         # The answers to come, in the order of their requests.
         self._pending: dict[Future[bytes], Request] = {}
+        self._changed = threading.Condition()
         self._closed: str | None = None
+        threading.Thread(target=self._run, name="crazyflie-transmit", daemon=True).start()
 
-    def receive(self, port: int, channel: int, data: bytes) -> None:
-        """Give a packet that arrived to the oldest request that it answers."""
-        with self._lock:
-            for answer, request in self._pending.items():
-                if request.is_answer(port, channel, data):
-                    del self._pending[answer]
-                    answer.set_result(data)
-                    return
+    def put(self, send: Send, urgent: bool = False) -> None:
+        """Queue ``send()`` behind the commands before it.
+
+        An urgent one goes first, and discards all streams. `LinkLostError` if this is closed, or
+        the queue is full: the link is stuck.
+        """
+        with self._changed:
+            self._check_open()
+            if urgent:
+                self._streams.clear()
+                self._commands.appendleft(send)
+            elif len(self._commands) >= _MOST_COMMANDS:
+                raise LinkLostError(f"{_MOST_COMMANDS} packets wait to be sent: the link is stuck")
+            else:
+                self._commands.append(send)
+            self._changed.notify()
+
+    def put_latest(self, stream: str, send: Send) -> None:
+        """Queue ``send()`` in place of the one that still waits on this stream."""
+        with self._changed:
+            self._check_open()
+            self._streams[stream] = send
+            self._changed.notify()
+
+    def discard(self, stream: str) -> None:
+        """Remove the ``send`` that waits on a stream."""
+        with self._changed:
+            self._streams.pop(stream, None)
 
     def request(self, send: Send, request: Request, put: Callable[[Send], None]) -> bytes:
         """Have ``put`` queue a request, and return the data of the answer; blocks.
@@ -147,9 +101,8 @@ class RequestReply:
         the limit, `LinkLostError` if the link ends meanwhile.
         """
         answer: Future[bytes] = Future()
-        with self._lock:
-            if self._closed is not None:
-                raise LinkLostError(f"{request.what}: {self._closed}")
+        with self._changed:
+            self._check_open(f"{request.what}: ")
             self._pending[answer] = request
 
         def send_while_pending() -> None:
@@ -169,13 +122,46 @@ class RequestReply:
                 + ("" if request.resend else "; it may or may not have been carried out")
             )
         finally:
-            with self._lock:
+            with self._changed:
                 self._pending.pop(answer, None)
 
-    def close(self, reason: str) -> None:
-        """Fail all pending requests, and later ones, with `LinkLostError`."""
-        with self._lock:
+    def receive(self, port: int, channel: int, data: bytes) -> None:
+        """Give a packet that arrived to the oldest request that it answers."""
+        with self._changed:
+            for answer, request in self._pending.items():
+                if request.is_answer(port, channel, data):
+                    del self._pending[answer]
+                    answer.set_result(data)
+                    return
+
+    def close(self, reason: str = "the link is closed") -> None:
+        """Stop sending, and discard the queue; requests, and later calls, fail with the reason."""
+        with self._changed:
             self._closed = reason
             closed, self._pending = self._pending, {}
+            self._changed.notify()
         for answer, request in closed.items():
             answer.set_exception(LinkLostError(f"{request.what}: {reason}"))
+
+    def _check_open(self, what=""):
+        if self._closed is not None:
+            raise LinkLostError(f"{what}{self._closed}")
+
+    def _is_busy(self):
+        return self._closed is not None or self._commands or self._streams
+
+    def _run(self):
+        while True:
+            with self._changed:
+                self._changed.wait_for(self._is_busy)
+                if self._closed is not None:
+                    return
+                if self._commands:
+                    send = self._commands.popleft()
+                else:
+                    send = self._streams.pop(next(iter(self._streams)))
+            try:
+                send()
+            except Exception:
+                # Whatever cflib raises, the next command must go out.
+                _log.exception("a packet could not be sent")

@@ -70,6 +70,7 @@ def test_what_is_stored_of_a_parameter(vehicle, link):
     for answer, text in (
         (state(2, 0.25), "refuses it"),
         (state(0, 0.25)[:-1], "refuses it"),
+        (state(1, 0.25), "refuses it"),
         (state(), "answers without a status"),
     ):
         vehicle.answers[where] = answer

@@ -97,11 +97,11 @@ class FirmwareParameters(Subsystem):
         """Return is_stored, default_value and stored_value (or None) of a parameter; blocks."""
         verb = "reading the state of"
         element, answer = self._ask_persistent(name, MISC_PERSISTENT_GET_STATE, verb, good=(0, 1))
-        if len(answer) < 4 + struct.calcsize(element.pytype):
-            raise RefusedError(f"{verb} {name}: the vehicle refuses it")
         is_stored = answer[3] == 1
-        kind = element.pytype.lstrip("<")
-        default, *kept = struct.unpack(f"<{kind * (1 + is_stored)}", answer[4:])
+        values = struct.Struct("<" + element.pytype.lstrip("<") * (1 + is_stored))
+        if len(answer) != 4 + values.size:
+            raise RefusedError(f"{verb} {name}: the vehicle refuses it")
+        default, *kept = values.unpack(answer[4:])
         return PersistentParamState(is_stored, default, kept[0] if kept else None)
 
     def _ask_persistent(self, name, command, verb, good=(0,)):

@@ -52,6 +52,16 @@ def test_a_valid_one_is_followed_again_and_the_next_hold_point_is_elsewhere():
     assert followed(reference, 14.0, np.ones(7)) == [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 
 
+def test_invalid_ones_also_end_a_distant_one():
+    reference = GuardedReference(6, 3.0)
+    reference.update([0.0, 50.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    reference.invalidate(10.0)
+    assert followed(reference, 10.1, np.zeros(7)) == pytest.approx(
+        [0.0, 3.0, 0.06] + [0.0] * 4, abs=0.01
+    )
+    assert followed(reference, 10.51) == REST_HERE
+
+
 # Priority among the sources of references.
 
 

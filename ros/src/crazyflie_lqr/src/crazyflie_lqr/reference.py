@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from crazyflie_lqr.linear_feedback import Components, at_rest
-from crazyflie_utils.last_valid import LastValid
+from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.timers import CLOCK_STEP
 
 #: Age of the last reference up to which its velocity is used (s).
@@ -93,17 +93,16 @@ class GuardedReference:
         self.max_speed = max_speed
         self._yaw_index = yaw_index
         self._report = report
-        self._last_valid: LastValid[Components] = LastValid()
-        self._hold_point: Components | None = None
-        self._near: Components | None = None
+        # What is followed; where that is a position at rest instead of a reference, it stays.
+        self._goal: Components | None = None
+        self._is_new = self._holds = False
+        self._expiry = math.inf  # When invalid references end the goal (s).
+        # The last reference that was followed, and that which was not, with what is instead of it.
         self._accepted: Components | None = None
         self._far: Components | None = None
-        self._rest: Components | None = None
+        self._near: Components = ()
         self._velocity_check = VelocityCheck()
-        self._time = 0.0
-        self._is_new = False
-        self._received = False
-        self._stamp = 0.0
+        self._time = self._stamp = 0.0
         self._descent: Components | None = None
         self._descent_time = 0.0
 
@@ -122,16 +121,14 @@ class GuardedReference:
             return False
         if stamp > 0.0:
             self._stamp = min(stamp, now)
-        self._last_valid.update(self._with_velocity(x_ref, time))
-        self._time = time
-        self._hold_point = self._rest = None
-        self._received = True
-        self._is_new = True
+        self._goal, self._time, self._expiry = self._with_velocity(x_ref, time), time, math.inf
+        self._is_new, self._holds = True, False
         return True
 
     def invalidate(self, time: float) -> None:
         """Record that an invalid reference came at ``time`` (s)."""
-        self._last_valid.invalidate(time)
+        if not self._holds:
+            self._expiry = min(self._expiry, time + HOLD_LIMIT)
 
     def descend(self, x_ref: Components, time: float) -> None:
         """Set the reference of a descent, x_dim components, at ``time`` (s)."""
@@ -145,20 +142,23 @@ class GuardedReference:
         """
         if self._descent is not None and 0.0 <= time - self._descent_time < DESCENT_LIMIT:
             return self._descent
-        x_ref = self._last_valid.value(time)
-        if x_ref is None:
-            return self._hold(x) if self._received else None
+        if self._goal is None:
+            return None
+        if time >= self._expiry:
+            self._goal, self._expiry = at_rest(x, self._yaw_index), math.inf
+            self._is_new, self._holds = False, True
         if self._is_new:
             self._is_new = False
-            x_ref = self._within_reach(x_ref, x)
-        if any(x_ref[3:6]) and not 0.0 <= time - self._time < VELOCITY_LIMIT:
-            return self._resting(x_ref)
-        return x_ref
-
-    def _hold(self, x):
-        if self._hold_point is None:
-            self._hold_point = at_rest(x, self._yaw_index)
-        return self._hold_point
+            self._goal = self._within_reach(self._goal, x)
+        if any(self._goal[3:6]) and not 0.0 <= time - self._time < VELOCITY_LIMIT:
+            self._goal = at_rest(self._goal, self._yaw_index)
+            # A landing ends a stream of references as it should.
+            if self._descent is None or self._descent_time < self._time:
+                self._report(
+                    f"the reference has a velocity and none has followed for {VELOCITY_LIMIT:g} "
+                    "s; stopping at its position"
+                )
+        return self._goal
 
     def _with_velocity(self, x_ref, time):
         """Return a reference with the velocity that is used."""
@@ -177,29 +177,16 @@ class GuardedReference:
         )
         return [*x_ref[:3], *limited(velocity, self.max_speed), *x_ref[6:]]
 
-    def _resting(self, x_ref):
-        if self._rest is None:
-            self._rest = at_rest(x_ref, self._yaw_index)
-            # A landing ends a stream of references as it should.
-            if self._descent is None or self._descent_time < self._time:
-                self._report(
-                    f"the reference has a velocity and none has followed for {VELOCITY_LIMIT:g} "
-                    "s; stopping at its position"
-                )
-        return self._rest
-
     def _within_reach(self, x_ref, x):
         distance = math.dist(x_ref[:3], x[:3])
         if distance <= self.max_jump:
-            self._near = self._far = None
-            self._accepted = x_ref
+            self._accepted, self._far = x_ref, None
             return x_ref
         self._report(
             f"the reference is {distance:.1f} m away; flying {self.max_jump:g} m in its direction"
         )
         # A distant reference that is repeated must not lead the vehicle there step by step.
-        is_repeated = self._far is not None and math.dist(x_ref[:3], self._far[:3]) < self.max_jump
-        if self._near is None or not is_repeated:
+        if self._far is None or math.dist(x_ref[:3], self._far[:3]) >= self.max_jump:
             self._far = x_ref
             self._near = at_rest(x_ref, self._yaw_index)
             goal, last = x_ref[:3], self._accepted
@@ -207,7 +194,6 @@ class GuardedReference:
             if last is not None and math.dist(last[:3], x[:3]) <= 2.0 * self.max_jump:
                 goal = _towards(goal, last[:3], self.max_jump)
             self._near[:3] = _towards(goal, x[:3], self.max_jump)
-        self._last_valid.update(self._near)
         return self._near
 
 
@@ -238,7 +224,7 @@ class StateAge:
     """
 
     def __init__(self) -> None:
-        self._offset: float | None = None
+        self._offset = math.inf  # Infinite if it is not known; 0 for this machine's clock.
         self._stamp = self._time = self._wall_offset = 0.0
 
     def update(self, stamp: float, now: float, time: float) -> float:
@@ -252,12 +238,11 @@ class StateAge:
         difference, elapsed = now - stamp, time - self._time
         # Simulated time was reset, or the wall clock was set.
         if elapsed < 0.0 or abs(now - time - self._wall_offset) > CLOCK_STEP:
-            self._offset = None
+            self._offset = math.inf
         if abs(difference) <= SAME_CLOCK:
             self._offset = 0.0
-        elif self._offset is None or (self._offset != 0.0 and stamp <= self._stamp):
-            self._offset = difference
         elif self._offset != 0.0:
-            self._offset = min(self._offset + _DRIFT * elapsed, difference)
+            usual = math.inf if stamp <= self._stamp else self._offset + _DRIFT * elapsed
+            self._offset = min(usual, difference)
         self._stamp, self._time, self._wall_offset = stamp, time, now - time
         return difference - self._offset

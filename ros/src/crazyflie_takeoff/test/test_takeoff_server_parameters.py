@@ -65,12 +65,12 @@ def test_values_at_the_end_of_a_range_are_accepted(values):
 
 def test_a_topic_has_its_own_name_or_that_of_another_with_a_suffix():
     class Topics:
-        own, base = None, "/in_flight"
-        topic = derived_topic("own", "base", "_state")
+        own_state_topic, in_flight_topic = None, "/in_flight"
+        state_topic = derived_topic("state", "in_flight", "_state")
 
     topics = Topics()
-    assert topics.topic == "/in_flight_state"
-    topics.own = "/cf1/state"
-    assert topics.topic == "/cf1/state"
-    topics.own = topics.base = None
-    assert topics.topic is None
+    assert topics.state_topic == "/in_flight_state"
+    topics.own_state_topic = "/cf1/state"
+    assert topics.state_topic == "/cf1/state"
+    topics.own_state_topic = topics.in_flight_topic = None
+    assert topics.state_topic is None

@@ -9,7 +9,7 @@ from dynamic_reconfigure.msg import Config
 
 from crazyflie_takeoff.limits import NO_BOX, Box
 from crazyflie_utils import NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.declaration import REQUIRED, group
 from crazyflie_utils.parameters.types import METRES, TOPIC
 
 DIAGNOSTICS_PERIOD = 1.0  #: Period of the diagnostics, as REP 107 recommends (s).
@@ -29,41 +29,40 @@ class CornerParameters(Parameters):
         return tuple(missing if value is None else value for value in (self.x, self.y, self.z))
 
 
-def derived_topic(own: str, base: str, suffix: str) -> Any:
-    """Return a property: the topic in ``own``, or else that in ``base`` with a suffix, or None."""
+def topic(name: str, help: str, default: Any = REQUIRED) -> Any:  # noqa: A002
+    """Declare the parameter topics/NAME, a topic; see `parameter`."""
+    return parameter(TOPIC, help, default, f"topics/{name}")
 
-    def topic(parameters: Parameters) -> str | None:
-        name = getattr(parameters, base)
-        return getattr(parameters, own) or (None if name is None else name + suffix)
 
-    return property(topic)
+def named_after(base: str, suffix: str, name: str = "") -> Any:
+    """Declare topics/NAME, by default the topic ``base`` with a suffix, which is ``_NAME``."""
+    return topic(name or suffix[1:], f"by default the name of {base} + `{suffix}`", None)
+
+
+def derived_topic(name: str, base: str, suffix: str) -> Any:
+    """Return a property: the topic in own_NAME_topic, or else BASE_topic with a suffix, or None."""
+
+    def derived(parameters: Parameters) -> str | None:
+        stem = getattr(parameters, f"{base}_topic")
+        return getattr(parameters, f"own_{name}_topic") or (None if stem is None else stem + suffix)
+
+    return property(derived)
 
 
 class FlightTopicParameters(Parameters):
     """Parameters that server and filter share."""
 
-    in_flight_topic: str = parameter(
-        TOPIC, "toggles between ground and flight", name="topics/in_flight"
-    )
-    own_filter_state_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_filter`", None, "topics/filter_state"
-    )
-    own_flight_status_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_flight_status`", None, "topics/flight_status"
-    )
-    own_filter_status_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_filter_status`", None, "topics/filter_status"
-    )
-    own_controller_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_controller`", None, "topics/controller"
-    )
+    in_flight_topic: str = topic("in_flight", "toggles between ground and flight")
+    own_filter_state_topic: str | None = named_after("in_flight", "_filter", "filter_state")
+    own_flight_status_topic: str | None = named_after("in_flight", "_flight_status")
+    own_filter_status_topic: str | None = named_after("in_flight", "_filter_status")
+    own_controller_topic: str | None = named_after("in_flight", "_controller")
 
-    box_topic: str | None = parameter(
-        TOPIC,
+    box_topic: str | None = topic(
+        "box",
         "the geofence's live parameters, whose box replaces box/min and "
         "box/max: the name of its node + `/parameter_updates`",
         None,
-        "topics/box",
     )
     lower: CornerParameters = group(CornerParameters, "box/min")
     upper: CornerParameters = group(CornerParameters, "box/max")
@@ -75,14 +74,10 @@ class FlightTopicParameters(Parameters):
             return NO_BOX
         return Box(self.lower.vector(-math.inf), self.upper.vector(math.inf))
 
-    filter_state_topic = derived_topic("own_filter_state_topic", "in_flight_topic", "_filter")
-    flight_status_topic = derived_topic(
-        "own_flight_status_topic", "in_flight_topic", "_flight_status"
-    )
-    filter_status_topic = derived_topic(
-        "own_filter_status_topic", "in_flight_topic", "_filter_status"
-    )
-    controller_topic = derived_topic("own_controller_topic", "in_flight_topic", "_controller")
+    filter_state_topic = derived_topic("filter_state", "in_flight", "_filter")
+    flight_status_topic = derived_topic("flight_status", "in_flight", "_flight_status")
+    filter_status_topic = derived_topic("filter_status", "in_flight", "_filter_status")
+    controller_topic = derived_topic("controller", "in_flight", "_controller")
 
 
 def follow_box(handle: NodeHandle, topic: str, callback: Callable[[Box], None]) -> None:

@@ -8,12 +8,12 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic
+from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic, named_after, topic
 from crazyflie_takeoff.limits import Box
 from crazyflie_takeoff.motion import MeasuredPosition
 from crazyflie_takeoff.server_table import FilterReport, ServerEvent, TakeoffPlan
 from crazyflie_utils import parameter
-from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
+from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, Number
 
 SLOWEST_DESCENT = 0.05  #: A slower descent would hardly ever end (m/s).
 FASTEST_DESCENT = 1.0  #: A vehicle meets the ground with the speed of its descent (m/s).
@@ -44,51 +44,34 @@ class DescentSpeed(Number):
 class TakeoffServerParameters(FlightTopicParameters):
     """Parameters of `TakeoffServerNode`."""
 
-    control_topic: str = parameter(
-        TOPIC, "thrust of takeoff and landing goes here", name="topics/control"
-    )
-    reference_topic: str = parameter(
-        TOPIC, "hover point and descent go here", name="topics/reference"
-    )
-    own_descent_topic: str | None = parameter(
-        TOPIC,
+    control_topic: str = topic("control", "thrust of takeoff and landing goes here")
+    reference_topic: str = topic("reference", "hover point and descent go here")
+    own_descent_topic: str | None = topic(
+        "descent_reference",
         "the descent goes here, too; by default the name of reference + `_descent`",
         None,
-        "topics/descent_reference",
     )
-    own_flight_state_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_state`", None, "topics/flight_state"
+    own_flight_state_topic: str | None = named_after("in_flight", "_state", "flight_state")
+    own_status_topic: str | None = named_after("in_flight", "_status")
+    state_topic: str | None = topic(
+        "state", "states of the vehicle; without them its position is unknown", None
     )
-    own_status_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_status`", None, "topics/status"
+    battery_topic: str | None = topic(
+        "battery", "voltage of the battery; without it the battery is not monitored", None
     )
-    state_topic: str | None = parameter(
-        TOPIC, "states of the vehicle; without them its position is unknown", None, "topics/state"
-    )
-    battery_topic: str | None = parameter(
-        TOPIC,
-        "voltage of the battery; without it the battery is not monitored",
-        None,
-        "topics/battery",
-    )
-    connected_topic: str | None = parameter(
-        TOPIC,
+    connected_topic: str | None = topic(
+        "connected",
         "whether the driver is connected; with it /takeoff is refused while it is not",
         None,
-        "topics/connected",
     )
-    own_vehicle_status_topic: str | None = parameter(
-        TOPIC,
+    own_vehicle_status_topic: str | None = topic(
+        "vehicle_status",
         "the vehicle's state; /takeoff of one that is locked, crashed or overturned is refused. "
         "By default `vehicle_status` next to topics/connected",
         None,
-        "topics/vehicle_status",
     )
-    inhibition_topic: str | None = parameter(
-        TOPIC,
-        "why another node refuses takeoffs; empty text if it does not",
-        None,
-        "topics/inhibition",
+    inhibition_topic: str | None = topic(
+        "inhibition", "why another node refuses takeoffs; empty text if it does not", None
     )
     takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
     land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
@@ -133,9 +116,9 @@ class TakeoffServerParameters(FlightTopicParameters):
         0.0,
     )
 
-    descent_topic = derived_topic("own_descent_topic", "reference_topic", "_descent")
-    flight_state_topic = derived_topic("own_flight_state_topic", "in_flight_topic", "_state")
-    status_topic = derived_topic("own_status_topic", "in_flight_topic", "_status")
+    descent_topic = derived_topic("descent", "reference", "_descent")
+    flight_state_topic = derived_topic("flight_state", "in_flight", "_state")
+    status_topic = derived_topic("status", "in_flight", "_status")
 
     @property
     def vehicle_status_topic(self) -> str | None:

@@ -17,14 +17,14 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_takeoff import flight_topics
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, LossTimeouts, Status
-from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic
+from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic, named_after, topic
 from crazyflie_takeoff.limits import Limits
 from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import SafeSetpoint
 from crazyflie_takeoff.transition_table import FlightState, flight_state
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
 from crazyflie_utils.parameters import vehicle_model
-from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
+from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, Number
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import stamped
@@ -45,23 +45,15 @@ REPETITION = 10.0  #: Shortest time between two such messages (s).
 class TakeoffControlFilterParameters(FlightTopicParameters):
     """Parameters of `TakeoffControlFilterNode`."""
 
-    takeoff_control_topic: str = parameter(
-        TOPIC, "the takeoff server's control", name="topics/takeoff_control"
+    takeoff_control_topic: str = topic("takeoff_control", "the takeoff server's control")
+    commanded_control_topic: str = topic("commanded_control", "the controller's control")
+    final_control_topic: str = topic("final_control", "the control that is passed on")
+    state_topic: str | None = topic(
+        "state", "where the vehicle is; without it the limits are not watched", None
     )
-    commanded_control_topic: str = parameter(
-        TOPIC, "the controller's control", name="topics/commanded_control"
-    )
-    final_control_topic: str = parameter(
-        TOPIC, "the control that is passed on", name="topics/final_control"
-    )
-    state_topic: str | None = parameter(
-        TOPIC, "where the vehicle is; without it the limits are not watched", None, "topics/state"
-    )
-    own_tilted_topic: str | None = parameter(
-        TOPIC, "by default the name of state + `_tilted`", None, "topics/tilted"
-    )
-    all_emergency_topic: str = parameter(
-        TOPIC, "stops the motors of all vehicles", "/all/emergency", "topics/all_emergency"
+    own_tilted_topic: str | None = named_after("state", "_tilted")
+    all_emergency_topic: str = topic(
+        "all_emergency", "stops the motors of all vehicles", "/all/emergency"
     )
     emergency_service: str = parameter(SERVICE, "stops the motors", "/emergency", "srv/emergency")
     reset_service: str = parameter(
@@ -106,7 +98,7 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
         "cf21",
     )
 
-    tilted_topic = derived_topic("own_tilted_topic", "state_topic", "_tilted")
+    tilted_topic = derived_topic("tilted", "state", "_tilted")
 
     def timeouts(self) -> LossTimeouts:
         """Return the timeouts of the filter after a loss."""

@@ -71,40 +71,6 @@ _EVENTS = {
 _LOG_WORDS = flight_status.WORDS | {FlightStatus.DESCENDING: "landing"}
 
 
-class Calls:
-    """Service calls that are answered at the end of a takeoff or a landing.
-
-    At most one call is under way. ``waiting`` are, in their order, the calls for which it is not
-    known yet whether they may begin.
-    """
-
-    def __init__(self) -> None:
-        self.waiting: list[tuple[ServerEvent, Future[EmptyResponse]]] = []
-        self._under_way: Future[EmptyResponse] = Future()
-
-    def begin(self, future: "Future[EmptyResponse]", reason: Exception) -> None:
-        """Start a call; one that is under way fails with a reason."""
-        self.fail(reason)
-        self._under_way = future
-
-    def finish(self) -> None:
-        """Answer the call that is under way, if there is one."""
-        if not self._under_way.done():
-            self._under_way.set_result(EmptyResponse())
-
-    def fail(self, reason: Exception) -> None:
-        """Fail the call that is under way, if there is one."""
-        if not self._under_way.done():
-            self._under_way.set_exception(reason)
-
-    def fail_all(self, reason: Exception) -> None:
-        """Fail all calls."""
-        self.fail(reason)
-        waiting, self.waiting = self.waiting, []
-        for _, future in waiting:
-            future.set_exception(reason)
-
-
 class StatusPublisher:
     """Publishes and logs the status of a flight when it changes."""
 
@@ -213,7 +179,10 @@ class TakeoffServerNode(Node):
     def __init__(self) -> None:
         # Whether nodes that were launched together may not be connected yet.
         self._is_starting = True
-        self._calls = Calls()
+        # Service calls are answered at the end of a takeoff or a landing. At most one is under way;
+        # of those that wait, in their order, it is not known yet whether they may begin.
+        self._under_way: Future[EmptyResponse] = Future()
+        self._waiting: list[tuple[ServerEvent, Future[EmptyResponse]]] = []
         self._positioning_since = 0.0
 
     @override
@@ -280,8 +249,7 @@ class TakeoffServerNode(Node):
     @override
     def prepare_shutdown(self) -> None:
         """Begin a landing, with a descent of at most `LEAVE_LIMIT`."""
-        reason = "the launch is to end"
-        self._land(reason, f"takeoff aborted: {self._handle.name} is to end")
+        self._land("the launch is to end", f"{self._handle.name} is to end")
         self._flight.limit_descent(LEAVE_LIMIT)
         self._set_pace()
 
@@ -290,8 +258,10 @@ class TakeoffServerNode(Node):
         """Abort a takeoff with a landing, continue a landing, and fail the calls."""
         if self._flight.flight_state is FlightState.TAKING_OFF:
             self._flight.handle(ServerEvent.LAND)
-        name = self._handle.name
-        self._calls.fail_all(ServiceError(f"{name} has failed or is shutting down; see its log"))
+        failure = f"{self._handle.name} has failed or is shutting down; see its log"
+        self._answer(failure)
+        while self._waiting:
+            self._waiting.pop(0)[1].set_exception(ServiceError(failure))
 
     # Services.
 
@@ -303,7 +273,7 @@ class TakeoffServerNode(Node):
 
     def _serve(self, event):
         future: Future[EmptyResponse] = Future()
-        self._calls.waiting.append((event, future))
+        self._waiting.append((event, future))
         self._serve_waiting()
         return future.result() if future.done() else future
 
@@ -311,10 +281,10 @@ class TakeoffServerNode(Node):
         if self._flight.state is ServerState.RECOVERING:
             return
         may_wait = self._is_starting and self._checks.may_become_complete(self._handle.time())
-        waiting, self._calls.waiting = self._calls.waiting, []
+        waiting, self._waiting = self._waiting, []
         for event, future in waiting:
             if event is ServerEvent.TAKEOFF and may_wait:
-                self._calls.waiting.append((event, future))
+                self._waiting.append((event, future))
             else:
                 self._begin(event, future)
         self._set_pace()
@@ -336,7 +306,17 @@ class TakeoffServerNode(Node):
         if takes_off:
             self._handle.set_param_later("~ground", self._flight.ground)
         self._status.reason = ""
-        self._calls.begin(future, ServiceError(f"takeoff aborted: {name} was called"))
+        self._answer(f"takeoff aborted: {name} was called")
+        self._under_way = future
+
+    def _answer(self, failure=""):
+        """Answer the call that is under way, if there is one; it fails if a failure is given."""
+        if self._under_way.done():
+            return
+        if failure:
+            self._under_way.set_exception(ServiceError(failure))
+        else:
+            self._under_way.set_result(EmptyResponse())
 
     def _end_start(self):
         self._start_timer.stop()
@@ -360,8 +340,7 @@ class TakeoffServerNode(Node):
             self._status.reason = report.reason
             takes_off = self._flight.flight_state is FlightState.TAKING_OFF
             if takes_off or report.event in STOPS:
-                why = f"the flight was ended by the filter: {report.reason}"
-                self._calls.fail(ServiceError(why))
+                self._answer(f"the flight was ended by the filter: {report.reason}")
         self._flight.set_filter(report)
         self._set_pace()
 
@@ -400,11 +379,10 @@ class TakeoffServerNode(Node):
     def _on_timer(self):
         if self._flight.state is ServerState.RECOVERING and self._has_all_evidence():
             self._recover()
-        if self._calls.waiting:
+        if self._waiting:
             self._serve_waiting()
         if self._flight.flight_state is not None:
-            self._watch_battery()
-            self._watch_positioning()
+            self._watch()
             self._tick(self._flight.flight_state)
         self._set_pace()
 
@@ -421,25 +399,19 @@ class TakeoffServerNode(Node):
         self._status.log_recovery(height)
         self._serve_waiting()
 
-    def _watch_battery(self):
-        now = self._handle.time()
-        charge = self._checks.battery.charge(now)
-        if charge not in (Charge.LOW, Charge.CRITICAL):
-            return
-        complaint = self._checks.battery_complaint(now)
-        self._handle.warn(complaint, throttle=30.0, key="battery")
-        if charge is Charge.CRITICAL:
-            self._land(complaint, f"takeoff aborted: {complaint}")
+    def _watch(self):
+        """Land for a battery, or a positioning, by which the vehicle cannot fly on."""
+        checks, now = self._checks, self._handle.time()
+        if complaint := checks.battery_complaint(now):
+            self._handle.warn(complaint, throttle=30.0, key="battery")
+            if checks.battery.charge(now) is Charge.CRITICAL:
+                self._land(complaint)
+        if checks.positioning and now - self._positioning_since > POSITIONING_PATIENCE:
+            self._land(checks.positioning)
 
-    def _watch_positioning(self):
-        if complaint := self._checks.positioning:
-            lasts = self._handle.time() - self._positioning_since
-            if lasts > POSITIONING_PATIENCE:
-                self._land(complaint, f"takeoff aborted: {complaint}")
-
-    def _land(self, reason, failure):
+    def _land(self, reason, failure=""):
         if self._flight.accepts(ServerEvent.LAND):
-            self._calls.fail(ServiceError(failure))
+            self._answer(f"takeoff aborted: {failure or reason}")
             self._flight.handle(ServerEvent.LAND)
             self._status.reason = reason
 
@@ -448,7 +420,7 @@ class TakeoffServerNode(Node):
         state = self._flight.flight_state
         if before is FlightState.TAKING_OFF and state is FlightState.LANDING:
             self._status.reason = "the vehicle has not lifted off"
-            self._calls.fail(ServiceError(f"takeoff aborted: {self._status.reason}; can it fly?"))
+            self._answer(f"takeoff aborted: {self._status.reason}; can it fly?")
         if state is not None and state is not self._status.state:
             self._status.publish_state(state)
         if output.toggle:
@@ -463,13 +435,13 @@ class TakeoffServerNode(Node):
             control = from_vector(Control, (0.0, 0.0, 0.0, output.thrust))
             self._control.publish(stamped(ControlStamped, self._handle.stamp(), control=control))
         if state in (FlightState.ON_GROUND, FlightState.FLYING):
-            self._calls.finish()
+            self._answer()
 
     def _set_pace(self):
         # Not before the state has been published.
         state = self._flight.flight_state
         period = TIME_STEP
-        if state is self._status.state and not self._calls.waiting:
+        if state is self._status.state and not self._waiting:
             if state is FlightState.FLYING:
                 period = CRUISE_TIME_STEP
             elif state is FlightState.ON_GROUND:

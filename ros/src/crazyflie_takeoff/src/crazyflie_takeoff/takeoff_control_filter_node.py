@@ -112,58 +112,6 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
         return Limits(box, self.outside, self.floor, self.climb, self.height, *ranges)
 
 
-class FilterStatusPublisher:
-    """Publishes the filter's status when it changes, and logs why."""
-
-    def __init__(self, handle: NodeHandle, parameters: TakeoffControlFilterParameters):
-        self._handle = handle
-        self._text_topic = handle.publisher(parameters.filter_state_topic, String, latch=True)
-        self._typed_topic = handle.publisher(
-            parameters.filter_status_topic, FilterStatus, latch=True
-        )
-        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
-        self._status: Status | None = None
-        self._text = ""
-        self._logged_explanation = ""
-
-    def publish(self, status: Status) -> None:
-        """Publish a status if it has changed."""
-        if status == self._status:
-            return
-        self._status = status
-        message = stamped(FilterStatus, self._handle.stamp(), **status._asdict())
-        message.flight_state = status.flight_state or FlightStatus.UNKNOWN
-        self._typed_topic.publish(message)
-        explanation = status.takeoff_refusal or status.reason
-        text = ": ".join(filter(None, (_words(status), explanation)))
-        if text == self._text:
-            return
-        self._text = text
-        self._text_topic.publish(String(text))
-        # Only once, however the flight state changes meanwhile.
-        if explanation not in ("", self._logged_explanation):
-            self._handle.warn(text)
-        self._logged_explanation = explanation
-
-    def publish_diagnostics(self, machine: FilterMachine[Any]) -> None:
-        """Publish diagnostics, if they are received."""
-        if not self._diagnostics.has_subscribers():
-            return
-        is_down = machine.state is FilterState.DOWN
-        is_acknowledged = machine.remembered is FlightState.ON_GROUND
-        if machine.state is FilterState.PASSING or (is_down and is_acknowledged):
-            level = flight_topics.OK
-        else:
-            is_over = machine.state.passes_nothing
-            level = flight_topics.ERROR if is_over else flight_topics.WARN
-        figures = {
-            "takeovers": str(machine.takeovers),
-            "hover thrust (m/s^2)": f"{machine.relay.hover:.2f}",
-            "age of the commanded control (s)": f"{max(machine.silence, 0.0):.2f}",
-        }
-        self._diagnostics.publish(flight_topics.report(self._handle, level, self._text, figures))
-
-
 class TakeoffControlFilterNode(Node):
     """Passes on takeoff controls always, and commanded controls in flight; see `FilterMachine`."""
 
@@ -177,6 +125,8 @@ class TakeoffControlFilterNode(Node):
         # Connection of the last commanded control; None if this process has sent it.
         self._connection: Any = self
         self._is_settled = False  # Whether the status of a nominal flight has been published.
+        self._status: Status | None = None  # As it was published last.
+        self._text = self._logged_explanation = ""
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -190,7 +140,11 @@ class TakeoffControlFilterNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._final = handle.publisher(parameters.final_control_topic, ControlStamped)
-        self._status = FilterStatusPublisher(handle, parameters)
+        self._text_status = handle.publisher(parameters.filter_state_topic, String, latch=True)
+        self._typed_status = handle.publisher(
+            parameters.filter_status_topic, FilterStatus, latch=True
+        )
+        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._controller = handle.publisher(parameters.controller_topic, Bool, latch=True)
         self._publish_state()
         self._advertise(handle, parameters.emergency_service, self._on_emergency)
@@ -402,10 +356,40 @@ class TakeoffControlFilterNode(Node):
         if self._is_fresh and status.is_commanded:
             # Commanded controls right after a launch do not prove a flight.
             status = status._replace(is_commanded=False)
-        self._status.publish(status)
+        if status == self._status:
+            return
+        self._status = status
+        message = stamped(FilterStatus, self._handle.stamp(), **status._asdict())
+        message.flight_state = status.flight_state or FlightStatus.UNKNOWN
+        self._typed_status.publish(message)
+        explanation = status.takeoff_refusal or status.reason
+        text = ": ".join(filter(None, (_words(status), explanation)))
+        if text == self._text:
+            return
+        self._text = text
+        self._text_status.publish(String(text))
+        # Only once, however the flight state changes meanwhile.
+        if explanation not in ("", self._logged_explanation):
+            self._handle.warn(text)
+        self._logged_explanation = explanation
 
     def _publish_diagnostics(self):
-        self._status.publish_diagnostics(self._filter)
+        if not self._diagnostics.has_subscribers():
+            return
+        machine = self._filter
+        is_down = machine.state is FilterState.DOWN
+        is_acknowledged = machine.remembered is FlightState.ON_GROUND
+        if machine.state is FilterState.PASSING or (is_down and is_acknowledged):
+            level = flight_topics.OK
+        else:
+            is_over = machine.state.passes_nothing
+            level = flight_topics.ERROR if is_over else flight_topics.WARN
+        figures = {
+            "takeovers": str(machine.takeovers),
+            "hover thrust (m/s^2)": f"{machine.relay.hover:.2f}",
+            "age of the commanded control (s)": f"{max(machine.silence, 0.0):.2f}",
+        }
+        self._diagnostics.publish(flight_topics.report(self._handle, level, self._text, figures))
 
 
 def _setpoint(message):

@@ -71,106 +71,6 @@ _EVENTS = {
 _LOG_WORDS = flight_status.WORDS | {FlightStatus.DESCENDING: "landing"}
 
 
-class StatusPublisher:
-    """Publishes and logs the status of a flight when it changes."""
-
-    def __init__(
-        self,
-        handle: NodeHandle,
-        parameters: TakeoffServerParameters,
-        flight: FlightStateMachine,
-        checks: TakeoffChecks,
-    ):
-        self._handle, self._flight, self._checks = handle, flight, checks
-        self._state = handle.publisher(parameters.flight_state_topic, String, latch=True)
-        self._status = handle.publisher(parameters.flight_status_topic, FlightStatus, latch=True)
-        self._text = handle.publisher(parameters.status_topic, String, latch=True)
-        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
-        self._inhibit_shutdown = handle.inhibit_shutdown()
-        self.state: FlightState | None = None  # The last state that was published.
-        self.reason = ""  # Why the last landing or abort began.
-        self._published: tuple[object, ...] | None = None
-        self._published_text = ""
-        self._logged_word = self._logged_reason = ""
-
-    def takeoff_refusal(self) -> str:
-        """Return why the vehicle must not take off from the ground; empty if it may."""
-        # Another vehicle of the process may be landing, and the process end with that flight.
-        if self._handle.is_ending:
-            return f"{self._handle.name} is to end"
-        return self._checks.refusal(self._handle.time(), self._flight.filter)
-
-    def log_recovery(self, height: float | None) -> None:
-        """Log the state in which the server begins, and the evidence; ``height`` in m or None."""
-        report, state = self._flight.filter, self._flight.flight_state
-        if state is None:
-            return
-        if report.event is ServerEvent.FILTER_SINKS:
-            evidence = "the filter brings the vehicle down"
-        elif report.event in TAKEOVERS:
-            evidence = "the filter has stopped the motors"
-        else:
-            remembered = "nothing" if report.remembered is None else report.remembered.word
-            seen = "not known" if height is None else f"{height:.2f} m"
-            evidence = f"{remembered} is remembered, the height is {seen}"
-        self._handle.info(f"begins {state.word}: {evidence}")
-        self._logged_word = _LOG_WORDS[state]
-
-    def publish_state(self, state: FlightState) -> None:
-        """Publish a new state; log it, with its reason if that is new."""
-        self.state = state
-        # The filter logs its own reasons.
-        reason = "" if self.reason == self._flight.filter.reason else self.reason
-        if (word := _LOG_WORDS[state]) != self._logged_word:
-            is_new = reason and reason != self._logged_reason
-            self._handle.info(f"{word}: {reason}" if is_new else word)
-            self._logged_word, self._logged_reason = word, reason
-        self._state.publish(String(state.word))
-        self._inhibit_shutdown(state is not FlightState.ON_GROUND)
-        self.publish()
-
-    def publish(self) -> None:
-        """Publish the status, typed and as text, if it has changed."""
-        content = self._content()
-        if content == self._published:
-            return
-        state, reason, refusal = content
-        # Not before the state's own topics, and nothing while it is not known.
-        if state is not None and state is self.state:
-            self._published = content
-            status = stamped(FlightStatus, self._handle.stamp(), state=state, reason=reason)
-            status.takeoff_refusal, status.ground = refusal, self._flight.ground
-            self._status.publish(status)
-        if (text := _text(*content)) != self._published_text:
-            self._published_text = text
-            self._text.publish(String(text))
-
-    def publish_diagnostics(self) -> None:
-        """Publish diagnostics, if they are received."""
-        if not self._diagnostics.has_subscribers():
-            return
-        checks, event = self._checks, self._flight.filter.event
-        text = _text(*self._content())
-        level = flight_topics.WARN if ": " in text else flight_topics.OK
-        if event in (ServerEvent.FILTER_SINKS, ServerEvent.FILTER_EMERGENCY):
-            level = flight_topics.ERROR
-        figures = {
-            "state is fresh": str(checks.position.value(self._handle.time()) is not None),
-            "controller": str(checks.has_controller),
-            "battery (V)": f"{checks.battery.voltage:.2f}",
-        }
-        self._diagnostics.publish(flight_topics.report(self._handle, level, text, figures))
-
-    def _content(self):
-        """Return flight state, reason, and why a takeoff is refused."""
-        state, report = self._flight.flight_state, self._flight.filter
-        if state is not FlightState.ON_GROUND:
-            is_held = report.event is ServerEvent.FILTER_HOLDS and state is not None
-            reasons = (self.reason, report.reason if is_held else "")
-            return state, "; ".join(filter(None, reasons)), REFUSALS[state]
-        return state, self.reason, self.takeoff_refusal()
-
-
 class TakeoffServerNode(Node):
     """Node with the services for takeoff and landing."""
 
@@ -183,6 +83,11 @@ class TakeoffServerNode(Node):
         # of those that wait, in their order, it is not known yet whether they may begin.
         self._under_way: Future[EmptyResponse] = Future()
         self._waiting: list[tuple[ServerEvent, Future[EmptyResponse]]] = []
+        self._state: FlightState | None = None  # The last state that was published.
+        self._reason = ""  # Why the last landing or abort began.
+        self._published: tuple[object, ...] | None = None
+        self._published_text = ""
+        self._logged_word = self._logged_reason = ""
         self._positioning_since = 0.0
 
     @override
@@ -206,7 +111,11 @@ class TakeoffServerNode(Node):
         )
         self._descent = handle.publisher(parameters.descent_topic, PositionVelocityStateStamped)
         self._in_flight = handle.publisher(parameters.in_flight_topic, Empty)
-        self._status = StatusPublisher(handle, parameters, self._flight, checks)
+        self._state_topic = handle.publisher(parameters.flight_state_topic, String, latch=True)
+        self._status = handle.publisher(parameters.flight_status_topic, FlightStatus, latch=True)
+        self._text = handle.publisher(parameters.status_topic, String, latch=True)
+        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
+        self._inhibit_shutdown = handle.inhibit_shutdown()
         handle.advertise_service(parameters.takeoff_service, EmptyService, self._on_takeoff)
         handle.advertise_service(parameters.land_service, EmptyService, self._on_land)
         handle.subscribe(parameters.filter_status_topic, FilterStatus, self._on_filter_status)
@@ -238,13 +147,9 @@ class TakeoffServerNode(Node):
         # Connections are made in real time, also where time is simulated.
         self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover, steady=True)
         self._start_timer = handle.timer(START_LIMIT, self._end_start, steady=True)
-        handle.timer(STATUS_PERIOD, self._status.publish, steady=True, stagger=True)
-        handle.timer(
-            flight_topics.DIAGNOSTICS_PERIOD,
-            self._status.publish_diagnostics,
-            steady=True,
-            stagger=True,
-        )
+        handle.timer(STATUS_PERIOD, self._publish_status, steady=True, stagger=True)
+        period = flight_topics.DIAGNOSTICS_PERIOD
+        handle.timer(period, self._publish_diagnostics, steady=True, stagger=True)
 
     @override
     def prepare_shutdown(self) -> None:
@@ -297,7 +202,7 @@ class TakeoffServerNode(Node):
         )
         try:
             is_next = takes_off and self._flight.accepts(event)
-            if is_next and (reason := self._status.takeoff_refusal()):
+            if is_next and (reason := self._takeoff_refusal()):
                 raise RefusalError(reason)
             self._flight.request(event)
         except RefusalError as reason:
@@ -305,7 +210,7 @@ class TakeoffServerNode(Node):
             return
         if takes_off:
             self._handle.set_param_later("~ground", self._flight.ground)
-        self._status.reason = ""
+        self._reason = ""
         self._answer(f"takeoff aborted: {name} was called")
         self._under_way = future
 
@@ -337,7 +242,7 @@ class TakeoffServerNode(Node):
             )
             return
         if report.event in TAKEOVERS and self._flight.accepts(report.event):
-            self._status.reason = report.reason
+            self._reason = report.reason
             takes_off = self._flight.flight_state is FlightState.TAKING_OFF
             if takes_off or report.event in STOPS:
                 self._answer(f"the flight was ended by the filter: {report.reason}")
@@ -395,8 +300,7 @@ class TakeoffServerNode(Node):
         self._recovery_timer.stop()
         flight, position = self._flight, self._measured_position()
         flight.recover(position, self._parameters.ground)
-        height = None if position is None else position[2] - flight.ground
-        self._status.log_recovery(height)
+        self._log_recovery(None if position is None else position[2] - flight.ground)
         self._serve_waiting()
 
     def _watch(self):
@@ -413,16 +317,16 @@ class TakeoffServerNode(Node):
         if self._flight.accepts(ServerEvent.LAND):
             self._answer(f"takeoff aborted: {failure or reason}")
             self._flight.handle(ServerEvent.LAND)
-            self._status.reason = reason
+            self._reason = reason
 
     def _tick(self, before):
         output = self._flight.tick(self._handle.time(), self._measured_position())
         state = self._flight.flight_state
         if before is FlightState.TAKING_OFF and state is FlightState.LANDING:
-            self._status.reason = "the vehicle has not lifted off"
-            self._answer(f"takeoff aborted: {self._status.reason}; can it fly?")
-        if state is not None and state is not self._status.state:
-            self._status.publish_state(state)
+            self._reason = "the vehicle has not lifted off"
+            self._answer(f"takeoff aborted: {self._reason}; can it fly?")
+        if state is not None and state is not self._state:
+            self._publish_state(state)
         if output.toggle:
             self._in_flight.publish(Empty())
         if output.reference is not None:
@@ -441,12 +345,90 @@ class TakeoffServerNode(Node):
         # Not before the state has been published.
         state = self._flight.flight_state
         period = TIME_STEP
-        if state is self._status.state and not self._waiting:
+        if state is self._state and not self._waiting:
             if state is FlightState.FLYING:
                 period = CRUISE_TIME_STEP
             elif state is FlightState.ON_GROUND:
                 period = GROUND_TIME_STEP
         self._timer.set_period(period)
+
+    # The status.
+
+    def _takeoff_refusal(self):
+        """Return why the vehicle must not take off from the ground; empty if it may."""
+        # Another vehicle of the process may be landing, and the process end with that flight.
+        if self._handle.is_ending:
+            return f"{self._handle.name} is to end"
+        return self._checks.refusal(self._handle.time(), self._flight.filter)
+
+    def _log_recovery(self, height):
+        """Log the state in which the server begins, and the evidence; ``height`` in m or None."""
+        report, state = self._flight.filter, self._flight.flight_state
+        if state is None:
+            return
+        if report.event is ServerEvent.FILTER_SINKS:
+            evidence = "the filter brings the vehicle down"
+        elif report.event in TAKEOVERS:
+            evidence = "the filter has stopped the motors"
+        else:
+            remembered = "nothing" if report.remembered is None else report.remembered.word
+            seen = "not known" if height is None else f"{height:.2f} m"
+            evidence = f"{remembered} is remembered, the height is {seen}"
+        self._handle.info(f"begins {state.word}: {evidence}")
+        self._logged_word = _LOG_WORDS[state]
+
+    def _publish_state(self, state):
+        """Publish a new state; log it, with its reason if that is new."""
+        self._state = state
+        # The filter logs its own reasons.
+        reason = "" if self._reason == self._flight.filter.reason else self._reason
+        if (word := _LOG_WORDS[state]) != self._logged_word:
+            is_new = reason and reason != self._logged_reason
+            self._handle.info(f"{word}: {reason}" if is_new else word)
+            self._logged_word, self._logged_reason = word, reason
+        self._state_topic.publish(String(state.word))
+        self._inhibit_shutdown(state is not FlightState.ON_GROUND)
+        self._publish_status()
+
+    def _publish_status(self):
+        """Publish the status, typed and as text, if it has changed."""
+        content = self._content()
+        if content == self._published:
+            return
+        state, reason, refusal = content
+        # Not before the state's own topics, and nothing while it is not known.
+        if state is not None and state is self._state:
+            self._published = content
+            status = stamped(FlightStatus, self._handle.stamp(), state=state, reason=reason)
+            status.takeoff_refusal, status.ground = refusal, self._flight.ground
+            self._status.publish(status)
+        if (text := _text(*content)) != self._published_text:
+            self._published_text = text
+            self._text.publish(String(text))
+
+    def _publish_diagnostics(self):
+        if not self._diagnostics.has_subscribers():
+            return
+        checks, event = self._checks, self._flight.filter.event
+        text = _text(*self._content())
+        level = flight_topics.WARN if ": " in text else flight_topics.OK
+        if event in (ServerEvent.FILTER_SINKS, ServerEvent.FILTER_EMERGENCY):
+            level = flight_topics.ERROR
+        figures = {
+            "state is fresh": str(checks.position.value(self._handle.time()) is not None),
+            "controller": str(checks.has_controller),
+            "battery (V)": f"{checks.battery.voltage:.2f}",
+        }
+        self._diagnostics.publish(flight_topics.report(self._handle, level, text, figures))
+
+    def _content(self):
+        """Return flight state, reason, and why a takeoff is refused."""
+        state, report = self._flight.flight_state, self._flight.filter
+        if state is not FlightState.ON_GROUND:
+            is_held = report.event is ServerEvent.FILTER_HOLDS and state is not None
+            reasons = (self._reason, report.reason if is_held else "")
+            return state, "; ".join(filter(None, reasons)), REFUSALS[state]
+        return state, self._reason, self._takeoff_refusal()
 
 
 def report_of(message: FilterStatus) -> FilterReport:

@@ -171,6 +171,7 @@ MAX_VOLTAGE_AGE = 5.0  #: Age at which a voltage is unknown (s); the driver send
 MAX_CONNECTION_AGE = 3.0  #: Age at which a status of the driver is unknown (s); one comes a second.
 _LONGEST_STEP = 1.5  #: Longest time between two voltages that is added to a duration (s).
 _NOT_LOWER = -math.inf  # Duration below a level of a voltage that is not below it (s).
+_NO_CONTROLLER = "no commanded controls come; is the controller running?"
 
 
 class Charge(enum.Enum):
@@ -305,13 +306,14 @@ class TakeoffChecks:
             return report.reason
         if report.event is ServerEvent.FILTER_EMERGENCY:
             return f"emergency, {report.reason}; reset it first"
+        topic = self.parameters.state_topic
         return (
             hover_complaint(self.parameters.hover, self.box)
             or self._driver_refusal(now)
             or self.driver.cannot_fly(now)
             or self.positioning
-            or self._position_refusal(now)
-            or self._controller_refusal()
+            or (topic and self.position.explanation(now, self._resolve(topic)))
+            or ("" if self.has_controller else _NO_CONTROLLER)
             or self.inhibition
             or self.battery_complaint(now)
         )
@@ -325,12 +327,3 @@ class TakeoffChecks:
     def _driver_refusal(self, now):
         topic = self.parameters.connected_topic
         return "" if topic is None else self.driver.refusal(now, self._resolve(topic))
-
-    def _position_refusal(self, now):
-        topic = self.parameters.state_topic
-        return "" if topic is None else self.position.explanation(now, self._resolve(topic))
-
-    def _controller_refusal(self):
-        return (
-            "" if self.has_controller else "no commanded controls come; is the controller running?"
-        )

@@ -149,12 +149,25 @@ class TakeoffControlFilterNode(Node):
         self._publish_state()
         self._advertise(handle, parameters.emergency_service, self._on_emergency)
         self._advertise(handle, parameters.reset_service, self._on_reset)
-        handle.subscribe(parameters.all_emergency_topic, Empty, self._on_all_emergency)
+        handle.subscribe(
+            parameters.all_emergency_topic, Empty, lambda _: self._stop("all vehicles were stopped")
+        )
         self._server = handle.subscribe(
             parameters.flight_status_topic, FlightStatus, self._on_flight_status
         )
         handle.subscribe(parameters.in_flight_topic, Empty, self._on_toggle)
-        self._subscribe_measurements(handle)
+        if parameters.state_topic is not None:
+            handle.subscribe(
+                parameters.state_topic,
+                PositionVelocityYawStateStamped,
+                self._on_measured_state,
+                finite="state",
+                latest_only=True,
+            )
+        if parameters.tilted_topic is not None:
+            handle.subscribe(parameters.tilted_topic, Bool, self._on_tilted)
+        if parameters.box_topic is not None:
+            flight_topics.follow_box(handle, parameters.box_topic, self._filter.set_box)
         self._takeoffs = handle.subscribe(
             parameters.takeoff_control_topic,
             ControlStamped,
@@ -167,7 +180,14 @@ class TakeoffControlFilterNode(Node):
             self._on_commanded_control,
             finite="control",
         )
-        self._register_timers(handle)
+        self._timer = handle.varying_timer(TIME_STEP, self._on_timer)
+        # Connections are made in real time, also where time is simulated.
+        self._listening_timer = handle.timer(LISTENING_TIME, self._stop_listening, steady=True)
+        self._server_timer = handle.timer(SERVER_LIMIT, self._stop_waiting, steady=True)
+        self._fresh_timer = handle.timer(FRESH_TIME, self._end_freshness, steady=True)
+        handle.timer(CONTROLLER_POLL_PERIOD, self._publish_controller, steady=True, stagger=True)
+        period = flight_topics.DIAGNOSTICS_PERIOD
+        handle.timer(period, self._publish_diagnostics, steady=True, stagger=True)
 
     def _advertise(self, handle, service, callback):
         name = handle.resolve(service)
@@ -182,31 +202,6 @@ class TakeoffControlFilterNode(Node):
         except ServiceError:
             # There are two vehicles in this process; /all/emergency stops both.
             handle.warn(f"{name} stops another vehicle, not this one")
-
-    def _subscribe_measurements(self, handle):
-        parameters = self._parameters
-        if parameters.state_topic is not None:
-            handle.subscribe(
-                parameters.state_topic,
-                PositionVelocityYawStateStamped,
-                self._on_measured_state,
-                finite="state",
-                latest_only=True,
-            )
-        if parameters.tilted_topic is not None:
-            handle.subscribe(parameters.tilted_topic, Bool, self._on_tilted)
-        if parameters.box_topic is not None:
-            flight_topics.follow_box(handle, parameters.box_topic, self._filter.set_box)
-
-    def _register_timers(self, handle):
-        self._timer = handle.varying_timer(TIME_STEP, self._on_timer)
-        # Connections are made in real time, also where time is simulated.
-        self._listening_timer = handle.timer(LISTENING_TIME, self._stop_listening, steady=True)
-        self._server_timer = handle.timer(SERVER_LIMIT, self._stop_waiting, steady=True)
-        self._fresh_timer = handle.timer(FRESH_TIME, self._end_freshness, steady=True)
-        handle.timer(CONTROLLER_POLL_PERIOD, self._publish_controller, steady=True, stagger=True)
-        period = flight_topics.DIAGNOSTICS_PERIOD
-        handle.timer(period, self._publish_diagnostics, steady=True, stagger=True)
 
     # Inputs.
 
@@ -272,9 +267,6 @@ class TakeoffControlFilterNode(Node):
     def _on_emergency(self, _):
         self._stop(f"{self._handle.resolve(self._parameters.emergency_service)} was called")
         return EmptyResponse()
-
-    def _on_all_emergency(self, _):
-        self._stop("all vehicles were stopped")
 
     def _stop(self, reason):
         self._filter.stop(reason)
@@ -377,13 +369,11 @@ class TakeoffControlFilterNode(Node):
         if not self._diagnostics.has_subscribers():
             return
         machine = self._filter
-        is_down = machine.state is FilterState.DOWN
+        level = flight_topics.ERROR if machine.state.passes_nothing else flight_topics.WARN
         is_acknowledged = machine.remembered is FlightState.ON_GROUND
+        is_down = machine.state is FilterState.DOWN
         if machine.state is FilterState.PASSING or (is_down and is_acknowledged):
             level = flight_topics.OK
-        else:
-            is_over = machine.state.passes_nothing
-            level = flight_topics.ERROR if is_over else flight_topics.WARN
         figures = {
             "takeovers": str(machine.takeovers),
             "hover thrust (m/s^2)": f"{machine.relay.hover:.2f}",

@@ -144,24 +144,12 @@ def predict(values: Array, kind: QuadrotorParameters, thrust: float, part: Recor
 
 def _held(part, times):
     """Return the mean commands of the steps that begin at these times, shape (4, len(times))."""
-    edges = part.command_times
-    areas = np.zeros((len(edges), 4))
-    areas[1:] = np.cumsum(part.commands[:-1] * np.diff(edges)[:, None], axis=0)
-    # The first command also holds before its time, the last one also after.
     ends = np.append(times, times[-1] + STEP)
-    late = np.maximum(ends - edges[-1], 0.0)
-    early = np.minimum(ends - edges[0], 0.0)
-    return np.array(
-        [
-            np.diff(
-                np.interp(ends, edges, areas[:, k])
-                + late * part.commands[-1, k]
-                + early * part.commands[0, k]
-            )
-            / STEP
-            for k in range(4)
-        ]
-    )
+    edges, held = part.command_times, np.vstack([part.commands[:1], part.commands])
+    # The first command also holds before its time, the last one also after.
+    edges = np.hstack([min(ends[0], edges[0]) - STEP, edges, max(ends[-1], edges[-1]) + STEP])
+    areas = np.vstack([np.zeros(4), np.cumsum(held * np.diff(edges)[:, None], axis=0)])
+    return np.array([np.diff(np.interp(ends, edges, column)) / STEP for column in areas.T])
 
 
 def _lagged(command, lag):

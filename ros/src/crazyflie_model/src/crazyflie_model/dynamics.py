@@ -119,13 +119,21 @@ class Dynamics(ABC):
 
 
 class SevenDimensional(Dynamics):
-    """Common base of the models with this state."""
+    """Common base of the models with this state; the yaw rate is commanded."""
 
     x_dim = 7
 
     def __init_subclass__(cls) -> None:
         # A model that is derived from one with a formula may have other rates.
-        cls.has_exact_steps = "_flight" in vars(cls)
+        cls.has_exact_steps = "acceleration" in vars(cls)
+
+    def acceleration(self, u: Sequence[Number], yaw: Number) -> Vector[Number]:
+        """Return the acceleration, m/s^2, fixed frame, with a control at a yaw (rad)."""
+        raise NotImplementedError
+
+    def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
+        """See `Dynamics.rates`."""
+        return x[3:6] + self.acceleration(u, x[6]) + [u[2]]
 
     def initial_state(self, position: Sequence[Number]) -> Vector[Number]:
         """See `Dynamics.initial_state`; yaw is 0."""
@@ -191,9 +199,11 @@ class SevenDimensional(Dynamics):
     def _flight(self, x, u):
         """Return ``flown(duration, x)``: the state after a duration (s) in the air.
 
-        Only models with `has_exact_steps` have it. They turn by at most `_MAX_TURN` meanwhile.
+        Only for models with `has_exact_steps`, which turn by at most `_MAX_TURN` meanwhile. A model
+        whose acceleration changes with the yaw overrides this.
         """
-        raise NotImplementedError
+        acceleration, yaw_dot = self.acceleration(u, x[6]), u[2]
+        return lambda duration, x: _accelerate(duration, x, acceleration, duration * yaw_dot)
 
 
 def _accelerate(
@@ -217,42 +227,24 @@ def _accelerate(
 class NearHover(SevenDimensional):
     """Small angles about hover, independent yaw: tilt does not reduce lift."""
 
-    def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
-        """See `Dynamics.rates`.
-
-        x_ddot = g tan(pitch), y_ddot = -g tan(roll), z_ddot = thrust - g, and
-        the yaw rate is commanded.
-        """
-        _, _, _, x_dot, y_dot, z_dot, _ = x
-        roll, pitch, yaw_dot, thrust = u
+    def acceleration(self, u: Sequence[Number], yaw: Number) -> Vector[Number]:
+        """Return x_ddot = g tan(pitch), y_ddot = -g tan(roll), z_ddot = thrust - g."""
+        roll, pitch, _, thrust = u
         tan = functions(roll).tan
-        return [
-            x_dot,
-            y_dot,
-            z_dot,
-            GRAVITY * tan(pitch),
-            -GRAVITY * tan(roll),
-            thrust - GRAVITY,
-            yaw_dot,
-        ]
-
-    def _flight(self, x, u):
-        *_, ax, ay, az, yaw_dot = self.rates(0.0, x, u)
-        return lambda duration, x: _accelerate(duration, x, [ax, ay, az], duration * yaw_dot)
+        return [GRAVITY * tan(pitch), -GRAVITY * tan(roll), thrust - GRAVITY]
 
 
 class Coupled7D(SevenDimensional):
     """Tilt in the heading frame, which reduces lift: thrust, tilt and yaw are coupled."""
 
-    def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
-        """See `Dynamics.rates` and `coupled_acceleration`; the yaw rate is commanded."""
-        return x[3:6] + coupled_acceleration(u, x[6]) + [u[2]]
+    def acceleration(self, u: Sequence[Number], yaw: Number) -> Vector[Number]:
+        """See `coupled_acceleration`."""
+        return coupled_acceleration(u, yaw)
 
     def _flight(self, x, u):
         yaw_dot = u[2]
         if nowhere((yaw_dot < 0.0) | (yaw_dot > 0.0)):
-            acceleration = coupled_acceleration(u, x[6])
-            return lambda duration, x: _accelerate(duration, x, acceleration, 0.0)
+            return super()._flight(x, u)
         forward, left, az = _heading_acceleration(u)
 
         def flown(duration, x):

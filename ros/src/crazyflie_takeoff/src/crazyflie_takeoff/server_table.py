@@ -7,7 +7,6 @@ backwards; if it is reset, a takeoff or a landing continues from there.
 import enum
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 from crazyflie_model.units import GRAVITY
@@ -53,32 +52,19 @@ REFUSALS = {
 class ServerState(enum.Enum):
     """State of the takeoff server."""
 
-    RECOVERING = enum.auto()  # Sends nothing until it knows the state of the flight.
-    ON_GROUND = enum.auto()  # Repeats zero thrust.
-    LIFTING_OFF = enum.auto()  # Sends the open-loop thrust.
-    CLIMBING = enum.auto()  # The controller flies to the hover point.
-    FLYING = enum.auto()
-    DESCENDING = enum.auto()  # Sends references that sink.
-    RAMPING_DOWN = enum.auto()  # Sends a thrust that decreases.
-    TOUCHING_DOWN = enum.auto()  # Repeats zero thrust until the vehicle is on the ground.
-    YIELDED = enum.auto()  # The filter brings the vehicle down.
+    RECOVERING = 1, None  # Sends nothing until it knows the state of the flight.
+    ON_GROUND = 2, FlightState.ON_GROUND  # Repeats zero thrust.
+    LIFTING_OFF = 3, FlightState.TAKING_OFF  # Sends the open-loop thrust.
+    CLIMBING = 4, FlightState.TAKING_OFF  # The controller flies to the hover point.
+    FLYING = 5, FlightState.FLYING
+    DESCENDING = 6, FlightState.DESCENDING  # Sends references that sink.
+    RAMPING_DOWN = 7, FlightState.LANDING  # Sends a thrust that decreases.
+    TOUCHING_DOWN = 8, FlightState.LANDING  # Repeats zero thrust until the vehicle is down.
+    YIELDED = 9, FlightState.LANDING  # The filter brings the vehicle down.
 
-    @cached_property
-    def flight_state(self) -> FlightState | None:
-        """The flight state that is published meanwhile; None if no state is published."""
-        return _FLIGHT_STATES.get(self)
-
-
-_FLIGHT_STATES = {
-    ServerState.ON_GROUND: FlightState.ON_GROUND,
-    ServerState.LIFTING_OFF: FlightState.TAKING_OFF,
-    ServerState.CLIMBING: FlightState.TAKING_OFF,
-    ServerState.FLYING: FlightState.FLYING,
-    ServerState.DESCENDING: FlightState.DESCENDING,
-    ServerState.RAMPING_DOWN: FlightState.LANDING,
-    ServerState.TOUCHING_DOWN: FlightState.LANDING,
-    ServerState.YIELDED: FlightState.LANDING,
-}
+    def __init__(self, _: int, flight_state: FlightState | None):
+        #: The flight state that is published meanwhile; None if no state is published.
+        self.flight_state = flight_state
 
 
 class ServerEvent(enum.Enum):

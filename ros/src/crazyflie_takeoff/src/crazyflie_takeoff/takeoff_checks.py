@@ -216,50 +216,6 @@ class BatteryCheck:
         return Charge.LOW if low else Charge.GOOD
 
 
-class DriverConnection:
-    """The last status that the driver has published; times are s of one clock."""
-
-    def __init__(self) -> None:
-        self._is_connected = False
-        self._time: float | None = None
-        self._state, self._state_time = SupervisorState(0), -math.inf
-        self._is_emergency = False
-
-    def update(self, now: float, is_connected: bool) -> None:
-        """Record whether the driver is connected to the vehicle."""
-        self._time, self._is_connected = now, is_connected
-
-    def update_state(self, now: float, state: SupervisorState, is_emergency: bool) -> None:
-        """Record the vehicle's state, and whether the driver's emergency stop is latched."""
-        self._state_time, self._state, self._is_emergency = now, state, is_emergency
-
-    def cannot_fly(self, now: float) -> str:
-        """Return why the vehicle cannot take off; empty if it can, or nothing is known."""
-        if now - self._state_time > MAX_CONNECTION_AGE:
-            return ""
-        if self._is_emergency:
-            return "the vehicle was stopped by emergency; remove it, restart it and add it again"
-        if self._state.faults:
-            return f"the vehicle cannot fly, its state is: {self._state.words()}; restart it"
-        return ""
-
-    def refusal(self, now: float, topic: str) -> str:
-        """Return why nothing can be sent to the vehicle; empty if it can.
-
-        ``topic`` is its absolute name, below the vehicle's namespace.
-        """
-        is_recent = self._time is not None and now - self._time <= MAX_CONNECTION_AGE
-        if is_recent and self._is_connected:
-            return ""
-        prefix = topic.rpartition("/")[0].strip("/")
-        text = "false" if is_recent else "nothing"
-        return (
-            f"the driver is not connected to the vehicle, {text} on {topic}; is the vehicle on? "
-            "It is added by: roslaunch crazyflie_driver crazyflie_add.launch uri:=ADDRESS "
-            f"tf_prefix:={prefix}"
-        )
-
-
 class TakeoffChecks:
     """Facts about estimator, controller, driver, battery and geofence, and refusals by them.
 
@@ -271,7 +227,10 @@ class TakeoffChecks:
         self.parameters = parameters
         self.box = parameters.box
         self.position = MeasuredPosition()
-        self.driver = DriverConnection()
+        #: When the driver has published its last status (s), and whether it is connected.
+        self.connection = -math.inf, False
+        #: The same time of the vehicle's state, that state, and whether an emergency is latched.
+        self.vehicle = -math.inf, SupervisorState(0), False
         self.battery = BatteryCheck(
             parameters.battery_low, parameters.battery_critical, parameters.battery_duration
         )
@@ -310,7 +269,7 @@ class TakeoffChecks:
         return (
             hover_complaint(self.parameters.hover, self.box)
             or self._driver_refusal(now)
-            or self.driver.cannot_fly(now)
+            or self._vehicle_refusal(now)
             or self.positioning
             or (topic and self.position.explanation(now, self._resolve(topic)))
             or ("" if self.has_controller else _NO_CONTROLLER)
@@ -325,5 +284,25 @@ class TakeoffChecks:
         return ""
 
     def _driver_refusal(self, now):
-        topic = self.parameters.connected_topic
-        return "" if topic is None else self.driver.refusal(now, self._resolve(topic))
+        (time, is_connected), topic = self.connection, self.parameters.connected_topic
+        is_recent = now - time <= MAX_CONNECTION_AGE
+        if topic is None or (is_recent and is_connected):
+            return ""
+        topic = self._resolve(topic)
+        prefix = topic.rpartition("/")[0].strip("/")
+        text = "false" if is_recent else "nothing"
+        return (
+            f"the driver is not connected to the vehicle, {text} on {topic}; is the vehicle on? "
+            "It is added by: roslaunch crazyflie_driver crazyflie_add.launch uri:=ADDRESS "
+            f"tf_prefix:={prefix}"
+        )
+
+    def _vehicle_refusal(self, now):
+        time, state, is_emergency = self.vehicle
+        if now - time > MAX_CONNECTION_AGE:
+            return ""
+        if is_emergency:
+            return "the vehicle was stopped by emergency; remove it, restart it and add it again"
+        if state.faults:
+            return f"the vehicle cannot fly, its state is: {state.words()}; restart it"
+        return ""

@@ -250,11 +250,11 @@ class TakeoffServerNode(Node):
         self._set_pace()
 
     def _on_connected(self, message):
-        self._checks.driver.update(self._handle.time(), message.data)
+        self._checks.connection = self._handle.time(), message.data
 
     def _on_vehicle_status(self, message):
         state = SupervisorState(message.supervisor)
-        self._checks.driver.update_state(self._handle.time(), state, message.is_emergency)
+        self._checks.vehicle = self._handle.time(), state, message.is_emergency
 
     def _on_inhibition(self, message):
         self._checks.inhibition = message.data

@@ -343,7 +343,8 @@ class IntegralStateFeedback(LinearFeedback):
             integral = previous._integral[axis]
             if now != 0.0:
                 integral = before * integral / now
-            self._integral[axis] = self._within_limit(axis, integral)
+            limit = self._integrator_limit[axis]
+            self._integral[axis] = clip(integral, -limit, limit)
         self._time = previous._time
         self._integrates = previous._integrates
         self._climb = previous._climb
@@ -373,9 +374,9 @@ class IntegralStateFeedback(LinearFeedback):
         if climb is None:
             return x_ref, 0.0
         climb.advance(dt, x[2], x[5], x_ref[2], self._thrust - self._u_ref[THRUST])
-        k = self._integrator_k[2]
+        k, limit = self._integrator_k[2], self._integrator_limit[2]
         if climb.disturbance != 0.0 and k != 0.0:
-            self._integral[2] = self._within_limit(2, -climb.disturbance / k)
+            self._integral[2] = clip(-climb.disturbance / k, -limit, limit)
         if climb.has_arrived:
             self._climb = None
             return x_ref, 0.0
@@ -392,10 +393,6 @@ class IntegralStateFeedback(LinearFeedback):
             k, limit = self._integrator_k[axis], self._integrator_limit[axis]
             integral = self._integral[axis]
             self._integral[axis] = integrate(axis, integral, error[axis], dt, linear, k, limit)
-
-    def _within_limit(self, axis, integral):
-        limit = self._integrator_limit[axis]
-        return min(max(integral, -limit), limit)
 
 
 def _floats(vector):

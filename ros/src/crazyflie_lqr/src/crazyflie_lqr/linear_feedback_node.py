@@ -154,7 +154,7 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             self.reference_type,
             self._on_reference,
             finite="state",
-            on_invalid=self._on_invalid_reference,
+            on_invalid=lambda: self._reference.invalidate(handle.time()),
         )
         handle.subscribe(
             parameters.descent_topic, self.reference_type, self._on_descent, finite="state"
@@ -195,12 +195,8 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             return [float(each) for each in self.complete_reference(to_vector(message.state))]
         return [*to_tuple(message.state), *self.reference_tail]
 
-    def _on_invalid_reference(self):
-        self._reference.invalidate(self._handle.time())
-
     def _on_descent(self, message):
-        x_ref = self._completed(message)
-        self._reference.descend(x_ref, self._handle.time())
+        self._reference.descend(self._completed(message), self._handle.time())
 
     def _on_flight_status(self, status):
         if status.state in (self._flight_state, FlightStatus.UNKNOWN):
@@ -232,7 +228,10 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
         if x_ref is None:
             return
         if self._flight_state == FlightStatus.UNKNOWN:
-            self._guess_flight(x, x_ref)
+            if self._ground_guess.is_flying(x[2], x_ref[2], now):
+                self._controller.enable_integrator()
+            else:
+                self._controller.reset_integrator()
         u = self._law(x, x_ref, time)
         if not math.isfinite(sum(u)):
             self._handle.warn(
@@ -260,12 +259,6 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             key="old state",
         )
         return True
-
-    def _guess_flight(self, x, x_ref):
-        if self._ground_guess.is_flying(x[2], x_ref[2], self._handle.time()):
-            self._controller.enable_integrator()
-        else:
-            self._controller.reset_integrator()
 
     def _warn_of_reference(self, text):
         # The last reference of every descent has a velocity.

@@ -66,6 +66,7 @@ _EVENTS = {
     FilterStatus.DOWN: ServerEvent.FILTER_DOWN,
     FilterStatus.EMERGENCY: ServerEvent.FILTER_EMERGENCY,
 }
+_IDLE = (ServerEvent.FILTER_PASSES, ServerEvent.FILTER_DOWN)  # In them, it may refuse a takeoff.
 
 # For an operator, both parts of a landing are one.
 _LOG_WORDS = flight_status.WORDS | {FlightStatus.DESCENDING: "landing"}
@@ -231,7 +232,7 @@ class TakeoffServerNode(Node):
 
     def _on_filter_status(self, message):
         try:
-            report = report_of(message)
+            event, remembered = _EVENTS[message.state], flight_state(message.flight_state)
         except (KeyError, ValueError):
             self._handle.warn(
                 f"ignoring state {message.state}, flight_state {message.flight_state} on "
@@ -241,12 +242,14 @@ class TakeoffServerNode(Node):
                 key="filter status",
             )
             return
-        if report.event in TAKEOVERS and self._flight.accepts(report.event):
-            self._reason = report.reason
-            takes_off = self._flight.flight_state is FlightState.TAKING_OFF
-            if takes_off or report.event in STOPS:
-                self._answer(f"the flight was ended by the filter: {report.reason}")
-        self._flight.set_filter(report)
+        reason = message.reason
+        if message.takeoff_refusal and event in _IDLE:
+            event, reason = ServerEvent.FILTER_REFUSES, message.takeoff_refusal
+        if event in TAKEOVERS and self._flight.accepts(event):
+            self._reason = reason
+            if event in STOPS or self._flight.flight_state is FlightState.TAKING_OFF:
+                self._answer(f"the flight was ended by the filter: {reason}")
+        self._flight.set_filter(FilterReport(event, remembered, message.is_commanded, reason))
         self._set_pace()
 
     def _on_connected(self, message):
@@ -429,17 +432,6 @@ class TakeoffServerNode(Node):
             reasons = (self._reason, report.reason if is_held else "")
             return state, "; ".join(filter(None, reasons)), REFUSALS[state]
         return state, self._reason, self._takeoff_refusal()
-
-
-def report_of(message: FilterStatus) -> FilterReport:
-    """Return the report in a status message of the filter.
-
-    KeyError or ValueError: the message has a state that does not exist.
-    """
-    event, reason = _EVENTS[message.state], message.reason
-    if message.takeoff_refusal and event in (ServerEvent.FILTER_PASSES, ServerEvent.FILTER_DOWN):
-        event, reason = ServerEvent.FILTER_REFUSES, message.takeoff_refusal
-    return FilterReport(event, flight_state(message.flight_state), message.is_commanded, reason)
 
 
 def _text(state, reason, refusal):

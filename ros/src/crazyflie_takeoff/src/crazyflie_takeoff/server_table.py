@@ -147,158 +147,6 @@ class TakeoffPlan:
     descent_speed: float  # m/s; 0 for a landing without a descent, by the ramp alone.
 
 
-# Actions.
-
-
-def _begin(flight):
-    flight.begun = flight.descent = flight.ramp_height = None
-    flight.descent_speed = flight.plan.descent_speed
-    flight.descent_end = math.inf
-    flight.zero_sent = -math.inf
-
-
-def _begin_at_once(flight):
-    _begin(flight)
-    flight.begun = flight.time
-
-
-def _descend_further(flight):
-    _begin_at_once(flight)
-    flight.ground_is_known = False
-    flight.descent = Descent(0.0, flight.measured, None, flight.descent_speed)
-
-
-def _send_hover_point(flight):
-    flight.reference = (*flight.plan.hover, 0.0, 0.0, 0.0)
-
-
-# Guards.
-
-
-def _filter_sinks(flight):
-    return flight.filter.event is ServerEvent.FILTER_SINKS
-
-
-def _filter_has_stopped_motors(flight):
-    return flight.filter.event in (ServerEvent.FILTER_DOWN, *STOPS)
-
-
-def _high_and_commanded_but_not_remembered(flight):
-    is_high = flight.measured is not None and flight.measured[2] > FLYING_HEIGHT
-    return flight.filter.remembered is None and is_high and flight.filter.is_commanded
-
-
-def _no_flight_remembered(flight):
-    return flight.filter.remembered in (None, FlightState.ON_GROUND)
-
-
-def _flying_remembered(flight):
-    return flight.filter.remembered is FlightState.FLYING
-
-
-def _down(flight):
-    return flight.is_down
-
-
-def _seen_and_landings_have_a_descent(flight):
-    return flight.measured is not None and _landings_have_a_descent(flight)
-
-
-def _landings_have_a_descent(flight):
-    return flight.plan.descent_speed > 0.0
-
-
-def _open_loop_over(flight):
-    return flight.elapsed + ROUNDING >= flight.plan.open_loop
-
-
-def _takeoff_over(flight):
-    return flight.elapsed + ROUNDING >= flight.plan.open_loop + flight.plan.settle
-
-
-def _takeoff_over_but_still_down(flight):
-    return _takeoff_over(flight) and flight.plan.settle >= LIFT_OFF_TIME and flight.is_down
-
-
-def _down_or_descent_over(flight):
-    if flight.descent is None or flight.descent.is_over(flight.elapsed):
-        return True
-    return flight.ground_is_known and flight.is_down
-
-
-def _still_sinks(flight):
-    is_known = flight.measured is not None and flight.ramp_height is not None
-    drops = is_known and flight.measured[2] < flight.ramp_height - RAMP_DROP
-    return drops and flight.descent_speed > 0.0
-
-
-def _ramp_over(flight):
-    return flight.elapsed + ROUNDING >= RAMP_DURATION
-
-
-def _down_or_not_seen_or_too_late(flight):
-    is_late = flight.elapsed + ROUNDING > RAMP_DURATION + TOUCHDOWN_LIMIT
-    # The motors are off already: without a height there is nothing to wait for.
-    return flight.measured is None or flight.is_down or is_late
-
-
-def _filter_too_late(flight):
-    return flight.elapsed + ROUNDING >= FILTER_LIMIT
-
-
-_S, _E = ServerState, ServerEvent
-_TAKEOFF = (_S.LIFTING_OFF, _S.CLIMBING)
-_AIRBORNE_OR_LANDING = (_S.FLYING, _S.DESCENDING, _S.RAMPING_DOWN, _S.TOUCHING_DOWN)
-
-TABLE: Table[ServerState, "FlightStateMachine"] = (
-    # In doubt the vehicle is flying: the controller keeps it, and the operator can land.
-    Transition(_S.RECOVERING, _E.RECOVER, _filter_sinks, _S.YIELDED),
-    Transition(_S.RECOVERING, _E.RECOVER, _filter_has_stopped_motors, _S.ON_GROUND),
-    Transition(_S.RECOVERING, _E.RECOVER, _high_and_commanded_but_not_remembered, _S.FLYING),
-    Transition(_S.RECOVERING, _E.RECOVER, _no_flight_remembered, _S.ON_GROUND),
-    Transition(_S.RECOVERING, _E.RECOVER, _flying_remembered, _S.FLYING),
-    # The caller of an interrupted takeoff or landing got an error, and expects safety.
-    Transition(_S.RECOVERING, _E.RECOVER, _down, _S.RAMPING_DOWN, _begin),
-    Transition(_S.RECOVERING, _E.RECOVER, _seen_and_landings_have_a_descent, _S.DESCENDING, _begin),
-    Transition(_S.RECOVERING, _E.RECOVER, None, _S.FLYING),
-    Transition(_S.ON_GROUND, _E.TAKEOFF, None, _S.LIFTING_OFF, _begin),
-    Transition(_S.LIFTING_OFF, _E.TICK, _open_loop_over, _S.CLIMBING, _send_hover_point),
-    Transition(_S.CLIMBING, _E.TICK, _takeoff_over_but_still_down, _S.RAMPING_DOWN, _begin),
-    Transition(_S.CLIMBING, _E.TICK, _takeoff_over, _S.FLYING),
-    *(
-        row
-        for state in (*_TAKEOFF, _S.FLYING)
-        for row in (
-            Transition(state, _E.LAND, _landings_have_a_descent, _S.DESCENDING, _begin),
-            Transition(state, _E.LAND, None, _S.RAMPING_DOWN, _begin),
-        )
-    ),
-    Transition(_S.DESCENDING, _E.TICK, _down_or_descent_over, _S.RAMPING_DOWN, _begin_at_once),
-    # The ground may be lower than at the takeoff, for example next to a table.
-    Transition(_S.RAMPING_DOWN, _E.TICK, _still_sinks, _S.DESCENDING, _descend_further),
-    Transition(_S.RAMPING_DOWN, _E.TICK, _ramp_over, _S.TOUCHING_DOWN),
-    Transition(_S.TOUCHING_DOWN, _E.TICK, _down_or_not_seen_or_too_late, _S.ON_GROUND, _begin),
-    *(
-        Transition(state, _E.FILTER_SINKS, None, _S.YIELDED, _begin)
-        for state in (*_TAKEOFF, *_AIRBORNE_OR_LANDING)
-    ),
-    Transition(_S.YIELDED, _E.FILTER_SINKS, None, _S.YIELDED),
-    Transition(_S.YIELDED, _E.FILTER_PASSES, None, _S.RAMPING_DOWN, _begin),
-    Transition(_S.YIELDED, _E.FILTER_HOLDS, None, _S.RAMPING_DOWN, _begin),
-    Transition(_S.YIELDED, _E.TICK, _filter_too_late, _S.ON_GROUND, _begin),
-    # At the beginning of a takeoff the filter may still be down from the last flight.
-    *(
-        Transition(state, _E.FILTER_DOWN, None, _S.ON_GROUND, _begin)
-        for state in (*_AIRBORNE_OR_LANDING, _S.YIELDED)
-    ),
-    *(
-        Transition(state, event, None, _S.ON_GROUND, _begin)
-        for state in (*_TAKEOFF, *_AIRBORNE_OR_LANDING, _S.YIELDED)
-        for event in STOPS
-    ),
-)
-
-
 @dataclass(frozen=True)
 class Output:
     """Messages to publish after a tick."""
@@ -318,17 +166,20 @@ class FlightStateMachine:
         self.ground = 0.0  #: Height (z) of the ground where the vehicle took off (m).
         self.ground_is_known = True  # False where the vehicle has sunk further.
         self.time = -math.inf  # Time of the last tick (s).
-        self.begun: float | None = None  # Begin of the present state (s); None until the next tick.
         self.measured: Position | None = None  # Present position (m); None if it is not known.
         self.reference: tuple[float, ...] | None = None  # See `Output`.
-        self.descent: Descent | None = None
-        self.descent_speed = 0.0  # Planned speed when the present state began (m/s).
-        self.descent_end = math.inf  # Latest end of a descent, s after it began.
-        self.ramp_height: float | None = None  # First height measured in the ramp of a landing (m).
-        self.zero_sent = -math.inf  # When zero thrust was sent last (s).
         # The last known position, in a descent also by dead reckoning.
         self._position: Position | None = None
         self._in_flight = self._is_in_flight()  # As in_flight has been toggled.
+        self._begin()
+
+    def _begin(self):
+        self.begun: float | None = None  # Begin of the present state (s); None until the next tick.
+        self.descent: Descent | None = None
+        self.descent_speed = self.plan.descent_speed  # Planned speed (m/s).
+        self.descent_end = math.inf  # Latest end of a descent, s after it began.
+        self.ramp_height: float | None = None  # First height measured in the ramp of a landing (m).
+        self.zero_sent = -math.inf  # When zero thrust was sent last (s).
 
     @property
     def flight_state(self) -> FlightState | None:
@@ -339,11 +190,6 @@ class FlightStateMachine:
     def elapsed(self) -> float:
         """Time since the present state began, s."""
         return 0.0 if self.begun is None else self.time - self.begun
-
-    @property
-    def is_down(self) -> bool:
-        """Whether the vehicle is seen as low as the ground from which it took off."""
-        return self.measured is not None and self.measured[2] - self.ground < TOUCHDOWN_HEIGHT
 
     def set_filter(self, report: FilterReport) -> None:
         """Set the status of the filter."""
@@ -443,3 +289,134 @@ class FlightStateMachine:
             self.begun += time - self.time
             self.zero_sent += time - self.time
         self.time = time
+
+    # Actions.
+
+    def _begin_at_once(self):
+        self._begin()
+        self.begun = self.time
+
+    def _descend_further(self):
+        self._begin_at_once()
+        self.ground_is_known = False
+        self._plan_descent(is_seen_again=False)
+
+    def _send_hover_point(self):
+        self.reference = (*self.plan.hover, 0.0, 0.0, 0.0)
+
+    # Guards.
+
+    def _filter_sinks(self):
+        return self.filter.event is ServerEvent.FILTER_SINKS
+
+    def _filter_has_stopped_motors(self):
+        return self.filter.event in (ServerEvent.FILTER_DOWN, *STOPS)
+
+    def _high_and_commanded_but_not_remembered(self):
+        is_high = self.measured is not None and self.measured[2] > FLYING_HEIGHT
+        return self.filter.remembered is None and is_high and self.filter.is_commanded
+
+    def _no_flight_remembered(self):
+        return self.filter.remembered in (None, FlightState.ON_GROUND)
+
+    def _flying_remembered(self):
+        return self.filter.remembered is FlightState.FLYING
+
+    def _down(self):
+        """Return whether the vehicle is seen as low as the ground from which it took off."""
+        return self.measured is not None and self.measured[2] - self.ground < TOUCHDOWN_HEIGHT
+
+    def _seen_and_landings_have_a_descent(self):
+        return self.measured is not None and self._landings_have_a_descent()
+
+    def _landings_have_a_descent(self):
+        return self.plan.descent_speed > 0.0
+
+    def _open_loop_over(self):
+        return self.elapsed + ROUNDING >= self.plan.open_loop
+
+    def _takeoff_over(self):
+        return self.elapsed + ROUNDING >= self.plan.open_loop + self.plan.settle
+
+    def _takeoff_over_but_still_down(self):
+        return self._takeoff_over() and self.plan.settle >= LIFT_OFF_TIME and self._down()
+
+    def _down_or_descent_over(self):
+        if self.descent is None or self.descent.is_over(self.elapsed):
+            return True
+        return self.ground_is_known and self._down()
+
+    def _still_sinks(self):
+        if self.measured is None or self.ramp_height is None:
+            return False
+        return self.measured[2] < self.ramp_height - RAMP_DROP and self.descent_speed > 0.0
+
+    def _ramp_over(self):
+        return self.elapsed + ROUNDING >= RAMP_DURATION
+
+    def _down_or_not_seen_or_too_late(self):
+        is_late = self.elapsed + ROUNDING > RAMP_DURATION + TOUCHDOWN_LIMIT
+        # The motors are off already: without a height there is nothing to wait for.
+        return self.measured is None or self._down() or is_late
+
+    def _filter_too_late(self):
+        return self.elapsed + ROUNDING >= FILTER_LIMIT
+
+
+_S, _E, _M = ServerState, ServerEvent, FlightStateMachine
+_TAKEOFF = (_S.LIFTING_OFF, _S.CLIMBING)
+_AIRBORNE_OR_LANDING = (_S.FLYING, _S.DESCENDING, _S.RAMPING_DOWN, _S.TOUCHING_DOWN)
+
+TABLE: Table[ServerState, FlightStateMachine] = (
+    # In doubt the vehicle is flying: the controller keeps it, and the operator can land.
+    Transition(_S.RECOVERING, _E.RECOVER, _M._filter_sinks, _S.YIELDED),
+    Transition(_S.RECOVERING, _E.RECOVER, _M._filter_has_stopped_motors, _S.ON_GROUND),
+    Transition(_S.RECOVERING, _E.RECOVER, _M._high_and_commanded_but_not_remembered, _S.FLYING),
+    Transition(_S.RECOVERING, _E.RECOVER, _M._no_flight_remembered, _S.ON_GROUND),
+    Transition(_S.RECOVERING, _E.RECOVER, _M._flying_remembered, _S.FLYING),
+    # The caller of an interrupted takeoff or landing got an error, and expects safety.
+    Transition(_S.RECOVERING, _E.RECOVER, _M._down, _S.RAMPING_DOWN, _M._begin),
+    Transition(
+        _S.RECOVERING, _E.RECOVER, _M._seen_and_landings_have_a_descent, _S.DESCENDING, _M._begin
+    ),
+    Transition(_S.RECOVERING, _E.RECOVER, None, _S.FLYING),
+    Transition(_S.ON_GROUND, _E.TAKEOFF, None, _S.LIFTING_OFF, _M._begin),
+    Transition(_S.LIFTING_OFF, _E.TICK, _M._open_loop_over, _S.CLIMBING, _M._send_hover_point),
+    Transition(_S.CLIMBING, _E.TICK, _M._takeoff_over_but_still_down, _S.RAMPING_DOWN, _M._begin),
+    Transition(_S.CLIMBING, _E.TICK, _M._takeoff_over, _S.FLYING),
+    *(
+        row
+        for state in (*_TAKEOFF, _S.FLYING)
+        for row in (
+            Transition(state, _E.LAND, _M._landings_have_a_descent, _S.DESCENDING, _M._begin),
+            Transition(state, _E.LAND, None, _S.RAMPING_DOWN, _M._begin),
+        )
+    ),
+    Transition(
+        _S.DESCENDING, _E.TICK, _M._down_or_descent_over, _S.RAMPING_DOWN, _M._begin_at_once
+    ),
+    # The ground may be lower than at the takeoff, for example next to a table.
+    Transition(_S.RAMPING_DOWN, _E.TICK, _M._still_sinks, _S.DESCENDING, _M._descend_further),
+    Transition(_S.RAMPING_DOWN, _E.TICK, _M._ramp_over, _S.TOUCHING_DOWN),
+    Transition(
+        _S.TOUCHING_DOWN, _E.TICK, _M._down_or_not_seen_or_too_late, _S.ON_GROUND, _M._begin
+    ),
+    *(
+        Transition(state, _E.FILTER_SINKS, None, _S.YIELDED, _M._begin)
+        for state in (*_TAKEOFF, *_AIRBORNE_OR_LANDING)
+    ),
+    Transition(_S.YIELDED, _E.FILTER_SINKS, None, _S.YIELDED),
+    Transition(_S.YIELDED, _E.FILTER_PASSES, None, _S.RAMPING_DOWN, _M._begin),
+    Transition(_S.YIELDED, _E.FILTER_HOLDS, None, _S.RAMPING_DOWN, _M._begin),
+    Transition(_S.YIELDED, _E.TICK, _M._filter_too_late, _S.ON_GROUND, _M._begin),
+    # At the beginning of a takeoff the filter may still be down from the last flight.
+    *(
+        Transition(state, _E.FILTER_DOWN, None, _S.ON_GROUND, _M._begin)
+        for state in (*_AIRBORNE_OR_LANDING, _S.YIELDED)
+    ),
+    *(
+        Transition(state, event, None, _S.ON_GROUND, _M._begin)
+        for state in (*_TAKEOFF, *_AIRBORNE_OR_LANDING, _S.YIELDED)
+        for event in STOPS
+    ),
+)

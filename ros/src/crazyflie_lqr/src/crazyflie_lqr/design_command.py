@@ -34,12 +34,22 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     model = MODELS[options.model]()
     try:
-        weights = _weights(options, model)
+        x_dim, u_dim = model.x_dim, model.u_dim
+        Q, R = _matrix("Q", options.Q, x_dim, x_dim), _matrix("R", options.R, u_dim, u_dim)
+        N = np.zeros((x_dim, u_dim))
+        if options.N is not None:
+            N = _matrix("N", options.N, x_dim, u_dim)
+        weights = Weights(Q, R, N)
         design = design_gains(model, weights, options.sample_time, options.delay)
         print(report(model, design))
         loops = _flown_margins(options, model, design)
         print(flown_report(loops, options))
-        _check_delay(loops, options)
+        least = min(margins.delay for margins in loops)
+        if least < LEAST_DELAY and not options.force:
+            raise DesignError(
+                f"flown, these gains tolerate {1e3 * least:.1f} ms of delay; expected at least "
+                f"{1e3 * LEAST_DELAY:g} ms: raise R or lower Q, or add --force"
+            )
         if options.out:
             save_matrix(options.out, design.K, _comment(model, weights, options))
             print(f"wrote {options.out}")
@@ -75,7 +85,8 @@ def report(model: LinearModel, design: Design) -> str:
 
 def flown_report(loops: Sequence[Margins], options: argparse.Namespace) -> str:
     """Return the margins of the loops as they are flown as text."""
-    lines = [f"flown with {_plant(options)}, a control every {1e3 * _period(options):g} ms:"]
+    plant, period = options.plant or options.model, options.sample_time or FLOWN_PERIOD
+    lines = [f"flown with {plant}, a control every {1e3 * period:g} ms:"]
     lines += ["loop      delay (ms)   modulus margin"]
     lines += [
         f"{control:8}{_number(1e3 * margins.delay):>12}{margins.modulus:>17.2f}"
@@ -85,28 +96,11 @@ def flown_report(loops: Sequence[Margins], options: argparse.Namespace) -> str:
 
 
 def _flown_margins(options, model, design):
-    plant = MODELS[_plant(options)]()
+    plant, period = MODELS[options.plant or options.model](), options.sample_time or FLOWN_PERIOD
     missing = [name for name in model.states if name not in plant.states]
     if missing:
         raise DesignError(f"{plant.name} has no {', '.join(missing)}; expected a --plant that has")
-    return all_margins(flown(design.K, model.states, plant, _period(options), options.delay))
-
-
-def _plant(options):
-    return options.plant or options.model
-
-
-def _period(options):
-    return options.sample_time or FLOWN_PERIOD
-
-
-def _check_delay(loops, options):
-    least = min(margins.delay for margins in loops)
-    if least < LEAST_DELAY and not options.force:
-        raise DesignError(
-            f"flown, these gains tolerate {1e3 * least:.1f} ms of delay; expected at least "
-            f"{1e3 * LEAST_DELAY:g} ms: raise R or lower Q, or add --force"
-        )
+    return all_margins(flown(design.K, model.states, plant, period, options.delay))
 
 
 def _parser():
@@ -154,15 +148,6 @@ class _NumberList:
         except ValueError:
             return False
         return True
-
-
-def _weights(options, model):
-    x_dim, u_dim = model.x_dim, model.u_dim
-    return Weights(
-        _matrix("Q", options.Q, x_dim, x_dim),
-        _matrix("R", options.R, u_dim, u_dim),
-        np.zeros((x_dim, u_dim)) if options.N is None else _matrix("N", options.N, x_dim, u_dim),
-    )
 
 
 def _matrix(name, words, rows, columns):

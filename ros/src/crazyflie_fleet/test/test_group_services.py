@@ -148,6 +148,20 @@ def test_a_fleet_of_which_one_would_refuse_stays_on_the_ground(swarm, age, waits
     assert swarm.heights() == [0.0, 0.0, 0.0]
 
 
+def test_a_fault_of_a_takeoff_that_waits_is_one_of_the_node(swarm, monkeypatch):
+    status(swarm.process, "cf2", "the battery is low")
+    answer = swarm.process.call("/takeoff_all", EmptyRequest())
+    node, aborted = swarm.nodes["/fleet"], []
+    monkeypatch.setattr(node._lander, "abort", lambda: aborted.append(True))
+    monkeypatch.setattr(node, "_takeoff_refusals", lambda: {}["a bug"])
+    swarm.process.advance(0.5)
+    with pytest.raises(ServiceError, match="/fleet: KeyError"):
+        answer.result(0)
+    assert aborted
+    (said,) = swarm.process.logged("error")
+    assert "Traceback" in said and "a bug" in said
+
+
 def test_if_one_refuses_against_its_word_the_others_land_again(swarm):
     swarm.call("/cf3/emergency")
     swarm.process.advance(0.5)

@@ -1,11 +1,10 @@
 """ROS interface of the services for all vehicles of a fleet."""
 
 from concurrent.futures import Future
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from std_srvs.srv import Empty, EmptyResponse
+from std_srvs.srv import Empty
 from typing_extensions import override
 
 from crazyflie_driver import srv
@@ -17,14 +16,8 @@ from crazyflie_fleet.references_node import VehicleStates
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.refusal import refusals_text
+from crazyflie_utils.steps import follow
 
-_HIGH_LEVEL_SERVICES = {
-    "land": srv.Land,
-    "stop": srv.Stop,
-    "go_to": srv.GoTo,
-    "start_trajectory": srv.StartTrajectory,
-    "notify_setpoints_stop": srv.NotifySetpointsStop,
-}
 #: Time after the start of this node in which a takeoff waits for vehicles that refuse it (s of the
 #: machine's clock): the nodes of a hundred vehicles need a while to find each other.
 START_LIMIT = 60.0
@@ -33,17 +26,6 @@ _PERIOD = 0.2  #: Period of the checks of the vehicles meanwhile (s).
 
 _FLYING = (FlightStatus.TAKING_OFF, FlightStatus.FLYING)
 _NOT_BEGUN = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
-
-
-@dataclass
-class _Call:
-    """A call of a service for all; a takeoff waits until no vehicle refuses it."""
-
-    service: str
-    service_type: Any
-    request: Any
-    answer: "Future[Any]" = field(default_factory=Future)
-    begin: float = 0.0  # Age of the node at the call (s).
 
 
 class FleetServicesNode(Node):
@@ -60,8 +42,8 @@ class FleetServicesNode(Node):
     def __init__(self, fleet: FleetConfig, states: VehicleStates):
         self._fleet = fleet
         self._states = states
-        self._takeoffs: list[_Call] = []
         self._age = 0.0
+        self._tick: Future[None] = Future()  # Done at the next check.
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -71,24 +53,20 @@ class FleetServicesNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._lander = Lander(handle, self._fleet, self._states)
-        for service, call in (
-            ("takeoff", partial(self._on_takeoff, "takeoff", Empty)),
-            ("land", self._on_land),
+        for service, service_type, steps, *others in (
+            ("takeoff", Empty, self._take_off, "/takeoff_all"),
+            ("land", Empty, self._land, "/land_all"),
+            ("go_to", srv.GoTo, self._go_to),
+            (f"{HIGH_LEVEL}/takeoff", srv.Takeoff, self._take_off),
+            (f"{HIGH_LEVEL}/land", srv.Land, self._command),
+            (f"{HIGH_LEVEL}/stop", srv.Stop, self._command),
+            (f"{HIGH_LEVEL}/go_to", srv.GoTo, self._go_to),
+            (f"{HIGH_LEVEL}/start_trajectory", srv.StartTrajectory, self._command, START_TOPIC),
+            (f"{HIGH_LEVEL}/notify_setpoints_stop", srv.NotifySetpointsStop, self._command),
         ):
-            handle.advertise_service(f"/all/{service}", Empty, call)
-            handle.advertise_service(f"/{service}_all", Empty, call)
-        handle.advertise_service("/all/go_to", srv.GoTo, partial(self._on_go_to, "go_to"))
-        path = f"{HIGH_LEVEL}/takeoff"
-        takeoff = partial(self._on_takeoff, path, srv.Takeoff)
-        handle.advertise_service(f"/all/{path}", srv.Takeoff, takeoff)
-        for name, service_type in _HIGH_LEVEL_SERVICES.items():
-            path = f"{HIGH_LEVEL}/{name}"
-            call = partial(self._call_all, path, service_type)
-            if name == "go_to":
-                call = partial(self._on_go_to, path)
-            handle.advertise_service(f"/all/{path}", service_type, call)
-            if name == "start_trajectory":
-                handle.advertise_service(START_TOPIC, service_type, call)
+            answer = partial(self._answer, steps, service, service_type)
+            for name in (f"/all/{service}", *others):
+                handle.advertise_service(name, service_type, answer)
         self._missions = MissionWatch(handle, self._on_lost_mission)
         handle.timer(_PERIOD, self._on_timer, steady=True)
 
@@ -96,115 +74,131 @@ class FleetServicesNode(Node):
     def enter_safe_state(self) -> None:
         """Answer the callers of landings; each vehicle has services of its own."""
         self._lander.abort()
-        takeoffs, self._takeoffs = self._takeoffs, []
-        for takeoff in takeoffs:
-            takeoff.answer.set_exception(
-                ServiceError("no vehicle takes off: the services node has failed; see the log")
-            )
-
-    # Takeoffs.
-
-    def _on_takeoff(self, service, service_type, request):
-        if getattr(request, "groupMask", 0):
-            # Only the nodes of the vehicles know their groups.
-            return self._call_all(service, service_type, request)
-        takeoff = _Call(service, service_type, request, begin=self._age)
-        if not self._begin(takeoff):
-            waiting = self._takeoff_refusals()
-            self._handle.info(
-                f"takeoff waits for vehicles, {TAKEOFF_WAIT:g} s at most: {self._text(waiting)}"
-            )
-            self._takeoffs.append(takeoff)
-        return takeoff.answer
+        tick, self._tick = self._tick, Future()
+        tick.set_exception(
+            ServiceError("no vehicle takes off: the services node has failed; see the log")
+        )
 
     def _on_timer(self):
         self._age += _PERIOD
-        self._takeoffs = [each for each in self._takeoffs if not self._begin(each)]
+        tick, self._tick = self._tick, Future()
+        tick.set_result(None)
 
-    def _takeoff_refusals(self):
-        """Return why vehicles that do not fly yet refuse to take off: name to reason."""
-        reasons = {
-            name: self._states.takeoff_refusals[self._states.numbers[name]]
-            for name in self._fleet.names
-            if self._states.flight_state(name) not in _FLYING
-        }
-        return {name: reason for name, reason in reasons.items() if reason}
+    def _answer(self, steps, service, service_type, request):
+        """Begin the steps of a service; an error that is no refusal is a fault of this node."""
 
-    def _begin(self, takeoff):
-        """Take off, or refuse; return False if the call is to wait."""
-        if refusals := self._takeoff_refusals():
-            if self._age < min(takeoff.begin + TAKEOFF_WAIT, START_LIMIT):
-                return False
-            text = f"no vehicle takes off: {self._text(refusals)}"
-            takeoff.answer.set_exception(ServiceError(text))
-            return True
+        def guarded():
+            try:
+                return (yield from steps(service, service_type, request))
+            except ServiceError:
+                raise
+            except Exception as error:
+                self._handle.report_fault(steps, error)
+                raise ServiceError(f"{self._handle.name}: {error!r}") from None
+
+        return follow(guarded())
+
+    # The steps of the services; ``service`` is that of each vehicle.
+
+    def _take_off(self, service, service_type, request):
+        if getattr(request, "groupMask", 0):
+            # Only the nodes of the vehicles know their groups.
+            return (yield from self._command(service, service_type, request))
+        end = min(self._age + TAKEOFF_WAIT, START_LIMIT)
+        if self._age < end and (waiting := self._takeoff_refusals()):
+            self._handle.info(
+                f"takeoff waits for vehicles, {TAKEOFF_WAIT:g} s at most: {self._text(waiting)}"
+            )
+        while refusals := self._takeoff_refusals():
+            if self._age >= end:
+                raise ServiceError(f"no vehicle takes off: {self._text(refusals)}")
+            yield self._tick
         names = self._fleet.names
         # Vehicles in flight refuse /NAME/takeoff; they go to the height of the firmware's takeoff.
         flying = [name for name in names if self._states.flight_state(name) in _FLYING]
-        if flying and takeoff.service_type is Empty:
+        if flying and service_type is Empty:
             names = tuple(name for name in names if name not in flying)
             if not names:
-                takeoff.answer.set_exception(
-                    ServiceError("refused: all vehicles are flying already")
-                )
-                return True
+                raise ServiceError("refused: all vehicles are flying already")
             rest = ", ".join(names)
             self._handle.info(f"flying already: {', '.join(flying)}; taking off: {rest}")
-        self._call_each(takeoff, names, is_takeoff=True)
-        return True
+        refusals = yield self._call(names, service, service_type, request, is_takeoff=True)
+        if idle := self._have_not_begun(refusals):
+            yield from self._abort(refusals, [name for name in names if name not in idle])
+        return self._response(service_type, refusals)
 
-    def _call_each(self, call, names, is_takeoff=False):
-        """Call the services of vehicles; if one refuses a takeoff, those that have begun land."""
-        open_calls = {*names}
-        begun: list[str] = []
-        refusals: dict[str, str] = {}
-        is_aborted = False
+    def _have_not_begun(self, names):
+        return [name for name in names if self._states.flight_state(name) in _NOT_BEGUN]
 
-        def on_answer(name, done):
-            nonlocal is_aborted
-            if is_aborted:
-                return
-            if done.exception() is not None:
-                refusals[name] = str(done.exception())
-                if is_takeoff and self._states.flight_state(name) in _NOT_BEGUN:
-                    is_aborted = True
-                    self._abort(call, [each for each in begun if each != name], refusals)
-                    return
-            open_calls.discard(name)
-            if not open_calls:
-                self._reply(call.answer, refusals, call.service_type._response_class())
+    def _takeoff_refusals(self):
+        """Return why vehicles that do not fly yet refuse to take off: name to reason."""
+        return {
+            name: reason
+            for name in self._fleet.names
+            if self._states.flight_state(name) not in _FLYING
+            and (reason := self._states.takeoff_refusals[self._states.numbers[name]])
+        }
 
-        for name in names:
-            if is_aborted:
-                break
-            begun.append(name)
-            self._lander.call(name, call.service, call.service_type, call.request, on_answer)
-
-    def _abort(self, takeoff, begun, refusals):
+    def _abort(self, refusals, begun):
+        """Land the vehicles that have begun to take off; raise `ServiceError`."""
         text = f"no vehicle takes off: {self._text(refusals)}"
         if begun:
             self._handle.error(f"{text}; landing {', '.join(begun)}")
             text = f"{text}; those that had begun have landed"
+        # A vehicle that has not begun refuses to land, too.
+        failures = {
+            name: reason
+            for name, reason in (yield self._lander.land(begun)).items()
+            if self._states.flight_state(name) != FlightStatus.ON_GROUND
+        }
+        raise ServiceError(text + (f"; MAY STILL FLY: {self._text(failures)}" if failures else ""))
 
-        def on_landed(done):
-            # A vehicle that has not begun refuses to land, too.
-            failures = {
-                name: reason
-                for name, reason in done.result().items()
-                if self._states.flight_state(name) != FlightStatus.ON_GROUND
-            }
-            left = f"; MAY STILL FLY: {self._text(failures)}" if failures else ""
-            takeoff.answer.set_exception(ServiceError(text + left))
+    def _land(self, _, service_type, __):
+        refusals = yield self._lander.land(self._fleet.names)
+        return self._response(service_type, refusals)
 
-        self._lander.land(begun).add_done_callback(on_landed)
+    def _go_to(self, service, service_type, request):
+        if not request.relative and len(self._fleet.vehicles) > 1:
+            raise ServiceError(
+                f"/all/{service} refused: all vehicles cannot go to one place; expected relative: "
+                "true"
+            )
+        return (yield from self._command(service, service_type, request))
 
-    # Landings, and all else.
+    def _command(self, service, service_type, request):
+        refusals = yield self._call(self._fleet.names, service, service_type, request)
+        return self._response(service_type, refusals)
 
-    def _on_land(self, _):
-        answer: Future[Any] = Future()
-        landing = self._lander.land(self._fleet.names)
-        landing.add_done_callback(lambda done: self._reply(answer, done.result(), EmptyResponse()))
-        return answer
+    def _call(self, names, service, service_type, request, is_takeoff=False):
+        """Call the services of vehicles; return the future of their refusals.
+
+        It does not wait for all answers if one on the ground refuses a takeoff.
+        """
+        outcome: Future[Refusals] = Future()
+        refusals: dict[str, str] = {}
+        waiting = {*names}
+
+        def on_answer(name, done):
+            waiting.discard(name)
+            if done.exception() is not None:
+                refusals[name] = str(done.exception())
+            is_enough = not waiting or (is_takeoff and self._have_not_begun(refusals))
+            if is_enough and not outcome.done():
+                outcome.set_result(refusals)
+
+        for name in names:
+            self._lander.call(name, service, service_type, request, on_answer)
+        return outcome
+
+    def _response(self, service_type: Any, refusals: Refusals) -> Any:
+        if refusals:
+            raise ServiceError(self._text(refusals))
+        return service_type._response_class()
+
+    def _text(self, refusals: Refusals) -> str:
+        return refusals_text(refusals, len(self._fleet.vehicles))
+
+    # Missions that have died.
 
     def _on_lost_mission(self, names):
         flying = self._states.flying() & {*names}
@@ -220,25 +214,3 @@ class FleetServicesNode(Node):
     def _log_refusals(self, done):
         if done.result():
             self._handle.error(f"MAY STILL FLY: {self._text(done.result())}")
-
-    def _reply(self, answer: Future[Any], refusals: Refusals, response: Any) -> None:
-        if refusals:
-            answer.set_exception(ServiceError(self._text(refusals)))
-        else:
-            answer.set_result(response)
-
-    def _text(self, refusals: Refusals) -> str:
-        return refusals_text(refusals, len(self._fleet.vehicles))
-
-    def _on_go_to(self, service, request):
-        if not request.relative and len(self._fleet.vehicles) > 1:
-            raise ServiceError(
-                f"/all/{service} refused: all vehicles cannot go to one place; expected relative: "
-                "true"
-            )
-        return self._call_all(service, srv.GoTo, request)
-
-    def _call_all(self, service, service_type, request):
-        call = _Call(service, service_type, request)
-        self._call_each(call, self._fleet.names)
-        return call.answer

@@ -7,6 +7,7 @@ import rospy
 from geometry_msgs.msg import Point
 from std_msgs.msg import Float64MultiArray
 
+from crazyflie_driver.msg import Position
 from crazyflie_driver.srv import GoToRequest
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.high_level_node import HighLevelNode
@@ -306,6 +307,35 @@ def test_a_way_back_is_open_also_for_a_vehicle_that_has_not_come_to_rest(flight)
     # The way back begins at the place where it is held, not nearer to the other vehicle.
     assert max(references) <= 0.8
     assert references[-1] == pytest.approx(0.0)
+
+
+def test_setpoints_after_a_move_are_followed_again_after_a_hold(flight):
+    flight.go_to(goal=(0.0, 0.1, 1.0), seconds=1.0)
+    flight.process.advance(1.1)
+    flight.see("cf1", 0.8)
+    for _ in range(5):
+        flight.process.publish("/cf1/high_level/cmd_position", Position(y=0.9, z=1.0))
+        flight.process.advance(0.1)
+    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    flight.see("cf2", 3.0)
+    flight.process.publish("/cf1/high_level/cmd_position", Position(y=0.9, z=1.0))
+    flight.process.advance(0.1)
+    assert flight.process.published("/fleet/waiting")[-1].data == ""
+    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.9)
+    assert flight.process.logged("error") == []
+
+
+def test_a_refused_command_during_a_hold_changes_nothing(flight):
+    flight.go_to(goal=(0.0, 0.9, 1.0), seconds=4.0)
+    flight.process.advance(2.6)
+    flight.see("cf1", 0.8)
+    flight.process.advance(0.06)
+    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    with pytest.raises(ServiceError, match="one of the numbers is nan"):
+        flight.go_to(goal=(math.nan, 0.0, 1.0))
+    flight.see("cf2", 3.0)
+    flight.process.advance(3.0)
+    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.9)
 
 
 def test_a_way_of_a_vehicle_that_is_elsewhere_begins_with_its_velocity(flight):

@@ -18,7 +18,7 @@ from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_model.trajectory import Trajectory
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
-from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils import NodeHandle
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import to_tuple
 
@@ -42,19 +42,16 @@ class PlanMarker:
         self._publisher = handle.publisher(topic, MarkerArray, latch=True)
         self._is_shown = False
 
-    def show(self, trajectory: Trajectory) -> None:
-        """Publish a trajectory; it replaces the last one."""
-        count = min(_POINTS * len(trajectory.pieces), _MAX_POINTS)
-        times = (trajectory.duration * k / count for k in range(count + 1))
-        points = [Point(*trajectory.evaluate(time).position) for time in times]
-        self._publish(Marker.ADD, points)
-        self._is_shown = True
-
-    def clear(self) -> None:
-        """Remove the trajectory, if there is one."""
-        if self._is_shown:
+    def show(self, trajectory: Trajectory | None) -> None:
+        """Publish a trajectory, which replaces the last one; None removes it."""
+        if trajectory is not None:
+            count = min(_POINTS * len(trajectory.pieces), _MAX_POINTS)
+            times = (trajectory.duration * k / count for k in range(count + 1))
+            points = [Point(*trajectory.evaluate(time).position) for time in times]
+            self._publish(Marker.ADD, points)
+        elif self._is_shown:
             self._publish(Marker.DELETE, [])
-            self._is_shown = False
+        self._is_shown = trajectory is not None
 
     def _publish(self, action, points):
         marker = Marker(ns=self._namespace, type=Marker.LINE_STRIP, action=action, points=points)
@@ -79,11 +76,7 @@ class CommandedReferences:
         self._handle = handle
         self._parameters = parameters
         self.follower = CommandFollower()
-        self._is_moving = False
-        # The command is not a trajectory, which other vehicles may fly at the same time.
-        self._is_move = False
-        # When the last setpoint came; None without a stream.
-        self._setpoint_time: float | None = None
+        # Ends the timer, which runs while the goal moves and while setpoints come.
         self._stop_timer: Callable[[], None] | None = None
         self._state: Goal[float] | None = None
         self._state_time = 0.0
@@ -97,11 +90,11 @@ class CommandedReferences:
             handle.subscribe(parameters.state_topic, state_type, self._on_state, finite="state")
 
     def present(self) -> Goal[float]:
-        """Return the present state of the vehicle; raises `ServiceError` if it is not known."""
+        """Return the present state of the vehicle; raises `RefusalError` if it is not known."""
         measured = self._measured()
         if measured is None:
             topic = self._handle.resolve(self._parameters.state_topic)
-            raise ServiceError(f"no state has come on {topic} for {MAX_POSITION_AGE:g} s")
+            raise RefusalError(f"no state has come on {topic} for {MAX_POSITION_AGE:g} s")
         return measured
 
     def adopt(self, goal: Goal[float] | None) -> None:
@@ -116,36 +109,27 @@ class CommandedReferences:
         A move that is held stands still at its beginning, which may be nearer to the other vehicle
         than this one is: whether it may go on depends on where it ends.
         """
-        if self._is_move and self._present_hold() is not None:
+        if self._stop_timer is None or self.follower.setpoint:
+            return None
+        if self.follower.is_move and self._present_hold() is not None:
             time = math.inf
         goal = self.follower.goal(self._handle.time() + time)
-        return goal.position if goal is not None and self._is_moving else None
+        return None if goal is None else goal.position
 
     def begin(self, command: Callable[..., None], *arguments: Any) -> None:
-        """Begin a command of `CommandFollower`; raises `ServiceError` if it is refused."""
-        self._command(self.follower, command, arguments)
-        self._setpoint_time = None
-        self._is_moving = True
-        self._is_move = command is CommandFollower.go_to
-        if self.follower.trajectory is not None:
-            self._plan.show(self.follower.trajectory)
-        self._set_timer()
+        """Begin a command of `CommandFollower`; raises `RefusalError`."""
+        self.follower = self.planned(command, *arguments)
+        self._run()
 
-    def checked(self, command: Callable[..., None], *arguments: Any) -> tuple[Any, ...]:
-        """Return a command for later; raises `ServiceError` if it would be refused now."""
-        self._command(copy.copy(self.follower), command, arguments)
-        return (command, *arguments)
-
-    def _command(self, follower, command, arguments):
-        present = self.present()
+    def planned(self, command: Callable[..., None], *arguments: Any) -> CommandFollower:
+        """Return the follower as a command of `CommandFollower` would make it."""
+        present, follower = self.present(), copy.copy(self.follower)
         if (place := self._present_hold()) is not None:
             # Its present reference is there, at rest, and not at its goal.
             follower.forget()
             present = at_rest(place, present.yaw)
-        try:
-            command(follower, self._handle.time(), present, *arguments)
-        except RefusalError as reason:
-            raise ServiceError(str(reason)) from None
+        command(follower, self._handle.time(), present, *arguments)
+        return follower
 
     def take(self, setpoint: Goal[float] | Velocity, ground: float) -> None:
         """Follow a setpoint; heights of a velocity are above ``ground``, m."""
@@ -154,20 +138,18 @@ class CommandedReferences:
             self.follower.take_setpoint(now, setpoint)
         else:
             self.follower.take_velocity(now, self.present(), setpoint, ground)
-        self._is_moving = False
-        self._setpoint_time = now
-        self._set_timer()
+        self._run()
         self.publish()
 
     def end_setpoints(self) -> None:
         """Hover at the goal of the last setpoint, if there are setpoints."""
-        last = self.follower.goal(self._handle.time())
-        if self._setpoint_time is None or last is None:
+        last = self.follower.setpoint
+        if self._stop_timer is None or last is None:
             return
         self.forget()
         try:
             self.begin(CommandFollower.go_to, last.position, last.yaw, _HOLD_DURATION)
-        except ServiceError as reason:
+        except RefusalError as reason:
             # The last reference has a velocity, which the controller continues.
             self._handle.warn(
                 f"setpoints have stopped, and {reason}: the vehicle stays at the last one"
@@ -177,15 +159,13 @@ class CommandedReferences:
     def rest(self) -> None:
         """Publish a reference at rest, if the controller follows one that moves."""
         goal = self.follower.goal(self._handle.time())
-        if (self._is_moving or self._setpoint_time is not None) and goal is not None:
+        if self._stop_timer is not None and goal is not None:
             self.publish(at_rest(goal.position, goal.yaw))
 
     def forget(self) -> None:
         """End references; uploaded trajectories stay."""
         self.follower.forget()
-        self._is_moving = False
-        self._setpoint_time = None
-        self._set_timer()
+        self._end()
 
     def publish(self, goal: Goal[float] | None = None) -> None:
         """Publish a goal as reference, by default the present one."""
@@ -199,40 +179,43 @@ class CommandedReferences:
         message.header.stamp = self._handle.stamp()
         self._publisher.publish(message)
 
-    def _set_timer(self):
-        """Run the timer only while there are references to publish: a fleet has many vehicles."""
-        if not self._is_moving:
-            self._plan.clear()
-        is_needed = self._is_moving or self._setpoint_time is not None
-        if is_needed and self._stop_timer is None:
-            period = self._parameters.time_step
-            if self._vehicle is None:
-                self._stop_timer = self._handle.timer(period, self._on_timer).stop
-            else:
-                on_timer = self._handle.guard(self._on_timer)
-                self._stop_timer = self._vehicle.timer(period, on_timer)
-        elif not is_needed and self._stop_timer is not None:
+    def _run(self):
+        """Show the plan, and start the timer: a fleet has many vehicles, most of them at rest."""
+        self._plan.show(self.follower.trajectory)
+        if self._stop_timer is not None:
+            return
+        period = self._parameters.time_step
+        if self._vehicle is None:
+            self._stop_timer = self._handle.timer(period, self._on_timer).stop
+        else:
+            self._stop_timer = self._vehicle.timer(period, self._handle.guard(self._on_timer))
+
+    def _end(self):
+        self._plan.show(None)
+        if self._stop_timer is not None:
             self._stop_timer()
             self._stop_timer = None
 
     def _on_timer(self):
         now = self._handle.time()
-        last = self._setpoint_time
-        if last is not None and not 0.0 <= now - last < LEVEL_AGE:
+        if self.follower.setpoint and not 0.0 <= now - self.follower.start_time < LEVEL_AGE:
             self.end_setpoints()
+        if self.follower.setpoint:
+            return
         place = self._present_hold()
-        if self._is_move and place is not None and place is not self._held_at:
+        is_move = self.follower.is_move
+        if is_move and place is not None and place is not self._held_at:
             # In the middle of the move, its speed would pull the vehicle towards the other one.
             self._held_at = place
             self.follower.restart_move(now, place)
             self.publish()
-        elif self._is_move and (place is not None or self._measured() is None):
+        elif is_move and (place is not None or self._measured() is None):
             self.follower.delay(self._parameters.time_step)
-        elif self._is_moving:
+        else:
             # The last one, at rest, is published, too.
-            self._is_moving = self.follower.is_moving(now)
             self.publish()
-            self._set_timer()
+            if not self.follower.is_moving(now):
+                self._end()
 
     def _on_state(self, message):
         x, y, z, vx, vy, vz, yaw = to_tuple(message.state)

@@ -39,19 +39,21 @@ class CommandFollower:
 
     def __init__(self) -> None:
         self._uploads: dict[int, Pieces] = {}
-        #: The present command's trajectory, from its beginning; None without one or in a stream.
+        #: The present command's trajectory, from its beginning; None without one.
         self.trajectory: Trajectory | None = None
-        self._setpoint: Goal[float] | None = None
-        self._begin = 0.0
+        self.is_move = False  #: Whether it is a move, which may be interrupted.
+        self.setpoint: Goal[float] | None = None  #: The last setpoint; None after a command.
+        self.start_time = 0.0  #: Time of the command or setpoint (s).
 
     def forget(self) -> None:
         """Delete the goal; uploaded trajectories stay."""
-        self.trajectory = self._setpoint = None
+        self.trajectory = self.setpoint = None
+        self.is_move = False
 
     def take_setpoint(self, time: float, goal: Goal[float]) -> None:
         """Replace any command by the goal of a setpoint."""
-        self.trajectory, self._setpoint = None, goal
-        self._begin = time
+        self.forget()
+        self.setpoint, self.start_time = goal, time
 
     def take_velocity(
         self, time: float, measured: Goal[float], setpoint: Velocity, ground: float
@@ -60,39 +62,39 @@ class CommandFollower:
 
         ``ground`` is the height (z) of the ground, above which the setpoint's height is given, m.
         """
-        start = self._start(time, measured)
-        passed = 0.0 if self._setpoint is None else min(max(time - self._begin, 0.0), _MAX_STEP)
+        start, age = self._start(time, measured), time - self.start_time
+        passed = 0.0 if self.setpoint is None else min(max(age, 0.0), _MAX_STEP)
         x, y, z = (p + v * passed for p, v in zip(start.position, start.velocity, strict=True))
         yaw = start.yaw + start.yaw_rate * passed
         vx, vy, vz = setpoint.velocity
         if setpoint.height is not None:
             z = ground + setpoint.height
             vx, vy = rotate_by_yaw(vx, vy, yaw)
-        still = (0.0, 0.0, 0.0)
-        self.take_setpoint(time, Goal((x, y, z), (vx, vy, vz), still, yaw, setpoint.yaw_rate))
+        goal = Goal((x, y, z), (vx, vy, vz), (0.0,) * 3, yaw, setpoint.yaw_rate)
+        self.take_setpoint(time, goal)
 
     def delay(self, duration: float) -> None:
         """Continue a move, which has been interrupted for a duration (s)."""
-        self._begin += duration
+        self.start_time += duration
 
     def restart_move(self, time: float, position: Triple) -> None:
         """Begin the rest of a move at ``time`` (s) at rest at a position (m)."""
         assert self.trajectory is not None
         end = self.trajectory.evaluate(self.trajectory.duration)
-        start = at_rest(position, self.trajectory.evaluate(time - self._begin).yaw)
-        left = self._begin + self.trajectory.duration - time
+        start = at_rest(position, self.trajectory.evaluate(time - self.start_time).yaw)
+        left = self.start_time + self.trajectory.duration - time
         duration = max(left, shortest_duration(math.dist(position, end.position), 0.0))
-        self._fly(time, Trajectory(move(start, end.position, end.yaw, duration)))
+        self._move(time, start, end.position, end.yaw, duration)
 
     def is_moving(self, time: float) -> bool:
         """Return whether a move or a trajectory has not ended."""
-        return self.trajectory is not None and time < self._begin + self.trajectory.duration
+        return self.trajectory is not None and time < self.start_time + self.trajectory.duration
 
     def goal(self, time: float) -> Goal[float] | None:
         """Return the goal at ``time`` (s), at rest after the end; None before any command."""
         if self.trajectory is None:
-            return self._setpoint
-        return self.trajectory.evaluate(time - self._begin)
+            return self.setpoint
+        return self.trajectory.evaluate(time - self.start_time)
 
     def go_to(
         self,
@@ -129,7 +131,7 @@ class CommandFollower:
                 f"{distance:.2f} m in {duration:g} s; expected a duration of at least "
                 f"{needed:.2f} s (at most {MAX_SPEED:g} m/s and {MAX_ACCELERATION:g} m/s^2)"
             )
-        self._fly(time, Trajectory(move(start, position, yaw, duration)))
+        self._move(time, start, position, yaw, duration)
 
     def upload(self, number: int, pieces: Pieces) -> None:
         """Store a trajectory under a number."""
@@ -166,9 +168,13 @@ class CommandFollower:
             return measured
         return present
 
+    def _move(self, time, start, position, yaw, duration):
+        self._fly(time, Trajectory(move(start, position, yaw, duration)))
+        self.is_move = True
+
     def _fly(self, time, trajectory):
-        self.trajectory, self._setpoint = trajectory, None
-        self._begin = time
+        self.forget()
+        self.trajectory, self.start_time = trajectory, time
 
 
 def _check(*numbers):

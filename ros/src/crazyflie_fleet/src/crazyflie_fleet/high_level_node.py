@@ -24,7 +24,7 @@ from crazyflie_fleet.high_level_services import (
 from crazyflie_fleet.references_node import TrackedVehicle
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import FlightStatus
-from crazyflie_utils import Node, NodeHandle, ServiceError
+from crazyflie_utils import Node, NodeHandle
 from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.refusal import RefusalError
@@ -119,72 +119,63 @@ class HighLevelNode(Node[HighLevelParameters]):
 
     def _on_flight_status(self, status):
         before, self._status = self._status.state, status
-        state = status.state
-        if state == before:
+        if status.state == before:
             return
-        if state == FlightStatus.FLYING:
-            self._on_flying()
-        else:
-            self._references.forget()
-            if state != FlightStatus.TAKING_OFF and before == FlightStatus.TAKING_OFF:
-                # A command during an aborted takeoff must not take effect after the next one.
-                self._forget_takeoff()
-        if state in (FlightStatus.DESCENDING, FlightStatus.LANDING):
+        if status.state == FlightStatus.FLYING:
+            self._take_over()
+            self._takeoff = None
+            return
+        self._references.forget()
+        if before == FlightStatus.TAKING_OFF:
+            # A command during an aborted takeoff must not take effect after the next one.
+            self._forget_takeoff()
+        if status.state in (FlightStatus.DESCENDING, FlightStatus.LANDING):
             landings, self._landings = self._landings, []
             for answer in landings:
                 if not answer.done():
                     answer.set_result(srv.LandResponse())
-
-    def _on_flying(self):
-        if self._takeoff is not None and not self._takeoff.is_followed:
-            self._climb(self._takeoff)
-        self._takeoff = None
-        self._begin_next()
 
     def _on_reference(self):
         # When it sends the hover point, the server hands the vehicle over to the controller.
         takeoff = self._takeoff
         if takeoff is None or takeoff.handover or self._status.state != FlightStatus.TAKING_OFF:
             return
-        takeoff.handover = self._handle.timer(HOLD_LIMIT, self._on_handover)
+        takeoff.handover = self._handle.timer(HOLD_LIMIT, self._take_over)
         x, y, _ = takeoff.hover.position
         try:
             height = self._references.present().position[2]
-        except ServiceError:
+        except RefusalError:
             height = takeoff.hover.position[2]
         self._references.publish(at_rest((x, y, height), takeoff.hover.yaw))
 
-    def _on_handover(self):
+    def _take_over(self):
+        """Begin the references of a takeoff by this node, and the command for its end."""
         takeoff = self._takeoff
         if takeoff is not None and not takeoff.is_followed:
-            self._climb(self._takeoff)
-            self._begin_next()
+            takeoff.is_followed = True
+            self._climb(takeoff)
+        command, self._next = self._next, None
+        if command is not None:
+            self._begin_or_log(*command)
 
     def _climb(self, takeoff):
-        references = self._references
-        takeoff.is_followed = True
         if takeoff.handover is not None:
             takeoff.handover.stop()
-        (x, y, height), yaw = takeoff.hover.position, takeoff.hover.yaw
+        references, hover = self._references, takeoff.hover
         try:
-            way = height - references.present().position[2]
+            way = hover.position[2] - references.present().position[2]
             left = takeoff.end - self._handle.time()
             duration = max(left, abs(way) / CLIMB_SPEED, self._parameters.time_step)
-            references.begin(CommandFollower.go_to, (x, y, height), yaw, duration)
+            references.begin(CommandFollower.go_to, hover.position, hover.yaw, duration)
             references.publish()
-        except ServiceError as reason:
+        except RefusalError as reason:
             self._handle.warn(f"takeoff: {reason}")
-            references.publish(takeoff.hover)
+            references.publish(hover)
 
     def _forget_takeoff(self):
         if self._takeoff is not None and self._takeoff.handover is not None:
             self._takeoff.handover.stop()
         self._takeoff = self._next = None
-
-    def _begin_next(self):
-        command, self._next = self._next, None
-        if command is not None:
-            self._begin_or_log(*command)
 
     def _is_followed(self):
         """Return whether the controller follows the references of this node."""
@@ -208,14 +199,14 @@ class HighLevelNode(Node[HighLevelParameters]):
     def _on_takeoff(self, request):
         duration = request.duration.to_sec()
         if not (request.height > 0.0 and math.isfinite(request.height) and duration > 0.0):
-            raise ServiceError(
+            raise RefusalError(
                 f"height and duration are {request.height:g} m and {duration:g} s; expected "
                 "more than 0"
             )
         start = self._references.present()
         x, y, ground = start.position
         if request.height <= ground:
-            raise ServiceError(
+            raise RefusalError(
                 f"height is {request.height:g} m, and the vehicle is at {ground:.2f} m; expected "
                 "a greater height"
             )
@@ -249,7 +240,7 @@ class HighLevelNode(Node[HighLevelParameters]):
 
     def _on_stop(self, _):
         if self._status.state in (FlightStatus.FLYING, FlightStatus.TAKING_OFF):
-            raise ServiceError(
+            raise RefusalError(
                 f"the vehicle is {WORDS[self._status.state]}; expected it to have landed: stop "
                 "would let it fall; for that, call emergency"
             )
@@ -263,14 +254,14 @@ class HighLevelNode(Node[HighLevelParameters]):
         move = self._move(request)
         try:
             self._go(CommandFollower.go_to, *move, True)
-        except ServiceError as reason:
-            raise ServiceError(f"{self._handle.resolve('go_to')} refused: {reason}") from None
+        except RefusalError as reason:
+            raise RefusalError(f"{self._handle.resolve('go_to')} refused: {reason}") from None
         return srv.GoToResponse()
 
     def _move(self, request):
         """Return the arguments of `CommandFollower.go_to`."""
         if request.yaw and not self._parameters.has_yaw and not math.isnan(request.yaw):
-            raise ServiceError(
+            raise RefusalError(
                 f"yaw is {request.yaw:g} rad, and the controller keeps the heading 0; expected 0"
             )
         yaw = None if math.isnan(request.yaw) else request.yaw
@@ -279,16 +270,12 @@ class HighLevelNode(Node[HighLevelParameters]):
     def _on_upload(self, request):
         turns = any(any(piece.poly_yaw) for piece in request.pieces)
         if turns and not self._parameters.has_yaw:
-            raise ServiceError(
+            raise RefusalError(
                 f"trajectory {request.trajectoryId} has a yaw, and the controller keeps the "
                 "heading 0; expected coefficients 0"
             )
-        try:
-            self._references.follower.upload(
-                request.trajectoryId, [from_message(p) for p in request.pieces]
-            )
-        except RefusalError as reason:
-            raise ServiceError(str(reason)) from None
+        pieces = [from_message(piece) for piece in request.pieces]
+        self._references.follower.upload(request.trajectoryId, pieces)
         return srv.UploadTrajectoryResponse()
 
     def _on_start(self, request):
@@ -310,7 +297,7 @@ class HighLevelNode(Node[HighLevelParameters]):
 
     def _execute(self, command, *arguments):
         if self._vehicle is not None and self._vehicle.is_to_land:
-            raise ServiceError("the fleet is landing the vehicle; it takes no commands")
+            raise RefusalError("the fleet is landing the vehicle; it takes no commands")
         self._go(command, *arguments)
 
     def _go(self, command, *arguments):
@@ -319,14 +306,15 @@ class HighLevelNode(Node[HighLevelParameters]):
                 self._references.adopt(self._vehicle.commanded())
             self._references.begin(command, *arguments)
         elif self._status.state == FlightStatus.TAKING_OFF:
-            self._next = self._references.checked(command, *arguments)
+            self._references.planned(command, *arguments)
+            self._next = (command, *arguments)
         else:
-            raise ServiceError(f"the vehicle is {WORDS[self._status.state]}; expected it to fly")
+            raise RefusalError(f"the vehicle is {WORDS[self._status.state]}; expected it to fly")
 
     def _begin_or_log(self, command, *arguments):
         try:
             self._references.begin(command, *arguments)
-        except ServiceError as reason:
+        except RefusalError as reason:
             self._handle.error(f"not done: {reason}")
 
     # Setpoints of the driver; in its messages the yaw rate is clockwise, in deg/s.
@@ -362,5 +350,5 @@ class HighLevelNode(Node[HighLevelParameters]):
         if self._is_followed() and not is_to_land:
             try:
                 self._references.take(setpoint, self._status.ground)
-            except ServiceError as reason:
+            except RefusalError as reason:
                 self._handle.warn(f"ignoring a setpoint: {reason}", throttle=1.0)

@@ -34,12 +34,8 @@ class Flight:
 
     def __init__(self, own=2, vectorized=None, has_yaw=True):
         self.process = FakeProcess()
-        node = ReferencesNode(
-            fleet_file.grid(2).vehicles[:own],
-            fleet_file.grid(2).vehicles[own:],
-            "world",
-            vectorized,
-        )
+        fleet = fleet_file.grid(2)
+        node = ReferencesNode(fleet, fleet.names[:own], "world", vectorized)
         assert self.process.launch(node, "/fleet/references")
         self.vehicles = node.vehicles
         for vehicle in node.vehicles:
@@ -158,7 +154,7 @@ def test_a_way_begins_where_the_vehicle_was(flight):
 
 def test_a_vehicle_that_was_never_seen_is_reported():
     process = FakeProcess()
-    assert process.launch(ReferencesNode(fleet_file.grid(1).vehicles, (), "world"), "/references")
+    assert process.launch(ReferencesNode(fleet_file.grid(1), ("cf1",), "world"), "/references")
     process.publish("/cf1/in_flight_flight_status", flight_status("TAKING_OFF"))
     process.advance(0.1)
     (text,) = process.logged("warn")

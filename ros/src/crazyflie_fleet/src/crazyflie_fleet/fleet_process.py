@@ -9,8 +9,6 @@ from crazyflie_fleet.fleet_parameters import FlyParameters
 from crazyflie_fleet.fleet_services_node import FleetServicesNode
 from crazyflie_fleet.high_level_node import HighLevelNode
 from crazyflie_fleet.high_level_services import HIGH_LEVEL
-from crazyflie_fleet.lander import SafeDescentsNode
-from crazyflie_fleet.placement_node import PlacementNode
 from crazyflie_fleet.references_node import ReferencesNode
 from crazyflie_fleet.vectorized_simulator_node import (
     ALL_STATES,
@@ -54,8 +52,8 @@ class _NodeFactory:
         vectorized: dict[str, tuple[VehicleConfig, ...]] = {}
         fleet = config.fleet()
         self._places = {name: place for place, name in enumerate(fleet.names)}
-        vehicles = tuple(fleet[name] for name in config.own_names(fleet))
-        others = tuple(each for each in fleet.vehicles if each not in vehicles)
+        own_names = config.own_names(fleet)
+        vehicles = tuple(fleet[name] for name in own_names)
         for model in MODELS if config.is_simulated and config.is_vectorized else ():
             of_model = tuple(each for each in vehicles if each.dynamics == model)
             if of_model:
@@ -63,21 +61,11 @@ class _NodeFactory:
         self._unplaced = {name for pair in fleet.unplaced for name in pair}
         for vehicle in vehicles:
             self._add_vehicle(vehicle)
-        references = ReferencesNode(
-            vehicles, others, config.fixed_frame, vectorized, self._unplaced
-        )
-        buffers = [vehicle.buffer for vehicle in (*vehicles, *others)]
+        references = ReferencesNode(fleet, own_names, config.fixed_frame, vectorized)
         # This node comes first, since the others answer the same references of the takeoff servers.
         self.nodes[f"{handle.name}/references"] = references
         for vehicle, tracked in zip(vehicles, references.vehicles, strict=True):
             self._add_high_level(vehicle, tracked)
-        self.nodes[f"{handle.name}/descents"] = SafeDescentsNode(
-            vehicles, references.states, buffers
-        )
-        if self._unplaced:
-            self.nodes[f"{handle.name}/placement"] = PlacementNode(
-                [vehicle.name for vehicle in vehicles], fleet, references.states
-            )
         if not config.is_simulated:
             self.nodes[f"{handle.name}/battery_report"] = BatteryReportNode(vehicles)
         if vehicles[0] is fleet.vehicles[0]:

@@ -1,4 +1,4 @@
-"""Landings of a fleet by ROS: in rounds, and next to vehicles beneath."""
+"""Landings of a fleet by ROS, in rounds."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
@@ -13,28 +13,20 @@ from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
 from crazyflie_driver.srv import GoTo, GoToRequest
-from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
+from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_fleet.high_level_services import KEEP_HEADING
 from crazyflie_fleet.landing import (
     SIDE_SPEED,
     LandingSide,
     Place,
-    SafeDescents,
     Situation,
     land_in_rounds,
 )
 from crazyflie_fleet.references_node import LANDING_TOPIC, VehicleStates
 from crazyflie_fleet.separation import RELEASE_RATIO
-from crazyflie_fleet.vehicle_nodes import DESCENT, SAFE_DESCENT
 from crazyflie_model.planner import shortest_duration
-from crazyflie_msgs.msg import (
-    FlightStatus,
-    PositionVelocityStateStamped,
-    PositionVelocityYawState,
-    PositionVelocityYawStateStamped,
-)
-from crazyflie_utils import Node, NodeHandle
-from crazyflie_utils.vectors import to_tuple
+from crazyflie_msgs.msg import FlightStatus
+from crazyflie_utils import NodeHandle
 
 SERVICE_TIMEOUT = 60.0  #: Timeout of takeoffs and landings (s of the machine's clock).
 _PERIOD = 0.1  #: Period of the updates of a landing (s).
@@ -46,53 +38,6 @@ _SHORTEST_MOVE = 2.0  #: Shortest duration of a move to a free place (s).
 _UP = (FlightStatus.FLYING, FlightStatus.TAKING_OFF)
 
 Refusals = Mapping[str, str]
-
-
-class SafeDescentsNode(Node):
-    """Passes on the references of descents, moved away from vehicles that are beneath.
-
-    ``vehicles`` are flown in this process; ``states`` and collision ``buffers`` (m) are those of
-    all vehicles, these first.
-    """
-
-    needed_in_flight = True
-
-    def __init__(
-        self, vehicles: tuple[VehicleConfig, ...], states: VehicleStates, buffers: list[float]
-    ):
-        self._vehicles = vehicles
-        self._states = states
-        self._descents = SafeDescents(buffers)
-        self._headings: dict[int, float] = {}  # Number to heading at the beginning (rad).
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        pass
-
-    @override
-    def register_callbacks(self, handle: NodeHandle) -> None:
-        for number, vehicle in enumerate(self._vehicles):
-            top = f"/{vehicle.name}/"
-            publisher = handle.publisher(top + SAFE_DESCENT, PositionVelocityYawStateStamped)
-            on_descent = partial(self._on_descent, number, publisher)
-            handle.subscribe(top + DESCENT, PositionVelocityStateStamped, on_descent)
-
-    def _on_descent(self, number, publisher, message):
-        now, states = self._handle.time(), self._states
-        if not self._descents.is_under_way(number, now):
-            is_descending = states.flight_states == FlightStatus.DESCENDING
-            is_landing = is_descending | ~states.are_in_flight()
-            distance = self._descents.begin(number, now, states.positions, is_landing)
-            self._headings[number] = float(np.nan_to_num(states.headings[number]))
-            if distance > 0.0:
-                self._handle.warn(
-                    f"{states.names[number]} lands {distance:.2f} m aside: another vehicle is "
-                    "beneath it"
-                )
-        aside = self._descents.reference(number, now, message.state.z, message.state.z_dot)
-        numbers = to_tuple(message.state) if aside is None else aside
-        state = PositionVelocityYawState(*numbers, self._headings[number])
-        publisher.publish(PositionVelocityYawStateStamped(message.header, state))
 
 
 class Lander(LandingSide):

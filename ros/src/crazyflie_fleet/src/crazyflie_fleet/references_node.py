@@ -1,6 +1,7 @@
 """The vehicles of a fleet: their states, and their references, which keep them apart."""
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 
@@ -8,18 +9,27 @@ import numpy as np
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray, Header, String
-from tf2_msgs.msg import TFMessage
 from typing_extensions import override
 
-from crazyflie_fleet.fleet_config import VehicleConfig
+from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig, close_pairs
 from crazyflie_fleet.high_level_services import reference_message
+from crazyflie_fleet.landing import SafeDescents
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_fleet.vehicle_nodes import FLIGHT_STATUS, REFERENCE, SAFE_REFERENCE, STATE
+from crazyflie_fleet.vehicle_nodes import (
+    DESCENT,
+    FLIGHT_STATUS,
+    INHIBITION,
+    REFERENCE,
+    SAFE_DESCENT,
+    SAFE_REFERENCE,
+    STATE,
+)
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import (
     FlightStatus,
     PositionVelocityStateStamped,
+    PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped as Reference
@@ -56,21 +66,11 @@ class VehicleStates:
         self._vectorized = vectorized
         self._states = np.full((len(vehicles), 7), np.nan)
         self._times = np.full(len(vehicles), -np.inf)
-
-    @property
-    def positions(self) -> NDArray[np.float64]:
-        """Last positions, shape (n, 3), m, fixed frame; NaN before the first."""
-        return self._states[:, :3]
-
-    @property
-    def velocities(self) -> NDArray[np.float64]:
-        """Last velocities, shape (n, 3), m/s, fixed frame; NaN before the first."""
-        return self._states[:, 3:6]
-
-    @property
-    def headings(self) -> NDArray[np.float64]:
-        """Last headings, shape (n,), rad; NaN before the first."""
-        return self._states[:, 6]
+        #: positions, velocities, headings: Shapes (n, 3), (n, 3) and (n,), m, m/s and rad, fixed
+        #: frame; NaN before the first.
+        self.positions: NDArray[np.float64] = self._states[:, :3]
+        self.velocities: NDArray[np.float64] = self._states[:, 3:6]
+        self.headings: NDArray[np.float64] = self._states[:, 6]
 
     def subscribe(self, handle: NodeHandle) -> None:
         """Subscribe to the topics of all vehicles through the handle of a node."""
@@ -134,6 +134,7 @@ class VehicleStates:
 
 #: Topic with the names of vehicles that only the fleet moves, until they land.
 LANDING_TOPIC = "/fleet/landing"
+_START_PERIOD = 0.2  #: Period of the checks of vehicles with one start point (s).
 SILENCE_PERIOD = 5.0  #: Period of warnings about a vehicle whose states do not come (s).
 
 
@@ -146,49 +147,44 @@ class ReferencesParameters(Parameters):
     )
 
 
-class SharedTimer:
-    """One timer with callbacks of many vehicles; it runs while there are any."""
+class SharedTimers:
+    """Timers with callbacks of many vehicles: one of each period, which runs while it has any."""
 
-    def __init__(self, handle: NodeHandle, period: float):
-        self._handle = handle
-        self._period = period
-        self._callbacks: dict[object, Callable[[], None]] = {}
-        self._timer: Timer | None = None
+    def __init__(self) -> None:
+        self._callbacks: dict[float, list[Callable[[], None]]] = defaultdict(list)
+        self._timers: dict[float, Timer] = {}
 
-    def add(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call ``callback()`` at each tick from now on; return a function that ends this."""
-        key = object()
-        self._callbacks[key] = callback
-        if self._timer is None:
-            self._timer = self._handle.timer(self._period, self._on_timer)
-        return partial(self._remove, key)
+    def add(
+        self, handle: NodeHandle, period: float, callback: Callable[[], None]
+    ) -> Callable[[], None]:
+        """Call ``callback()`` every ``period`` (s) from now on; return a function that ends it."""
+        callbacks = self._callbacks[period]
+        callbacks.append(callback)
+        if len(callbacks) == 1:
+            self._timers[period] = handle.timer(period, partial(_call_all, callbacks))
+        return partial(self._remove, period, callback)
 
-    def _remove(self, key):
-        self._callbacks.pop(key, None)
-        if not self._callbacks and self._timer is not None:
-            self._timer.stop()
-            self._timer = None
+    def _remove(self, period, callback):
+        self._callbacks[period].remove(callback)
+        if not self._callbacks[period]:
+            self._timers.pop(period).stop()
 
-    def _on_timer(self):
-        for callback in [*self._callbacks.values()]:
-            callback()
+
+def _call_all(callbacks):
+    for callback in [*callbacks]:
+        callback()
 
 
 class TrackedVehicle:
     """A vehicle whose references pass through `ReferencesNode`; its `HighLevelNode` gives some."""
 
     def __init__(
-        self,
-        number: int,
-        config: VehicleConfig,
-        states: VehicleStates,
-        timers: dict[float, SharedTimer],
-        is_unplaced: bool,
+        self, config: VehicleConfig, states: VehicleStates, timers: SharedTimers, is_unplaced: bool
     ):
-        self.number = number
-        self._timers = timers  # Timers, by their periods (s).
         self.name = config.name
-        self.buffer = config.buffer
+        self.number = states.numbers[config.name]
+        self._buffer = config.buffer
+        self._timers = timers
         #: Place where it is kept, m, as another one is too near; None while it follows references.
         self.held_at: Triple | None = None
         self.is_to_land = False  #: Whether only the fleet moves it, until it lands.
@@ -202,7 +198,8 @@ class TrackedVehicle:
         self.hover_point = config.hover_point if is_unplaced else None
         self._states = states
         self._commanded: Goal[float] | None = None
-        self._heading: float | None = None  # Heading commanded in this flight (rad).
+        #: Heading that was commanded, or measured, in this flight (rad); None before.
+        self.heading: float | None = None
         # Own references that this node has not received yet, by their identity.
         self._own: dict[int, PositionVelocityStateStamped] = {}
 
@@ -211,6 +208,8 @@ class TrackedVehicle:
         top, message_type = f"/{self.name}/", PositionVelocityStateStamped
         self._handle, self._frame = handle, frame
         self._safe: Publisher = handle.publisher(top + SAFE_REFERENCE, Reference)
+        #: Topic of its descents, see `ReferencesNode`.
+        self.safe_descent: Publisher = handle.publisher(top + SAFE_DESCENT, Reference)
         self._public: Publisher = handle.publisher(top + REFERENCE, message_type)
         handle.subscribe(top + REFERENCE, message_type, self._on_reference)
 
@@ -221,13 +220,13 @@ class TrackedVehicle:
     def commanded(self) -> Goal[float] | None:
         """Return the last reference of any node; None if the vehicle is not near it."""
         goal, measured = self._commanded, self._states.positions[self.number]
-        is_near = goal is not None and math.dist(goal.position, measured) < self.buffer
+        is_near = goal is not None and math.dist(goal.position, measured) < self._buffer
         return goal if is_near else None
 
     def follow(self, goal: Goal[float]) -> None:
         """Make the vehicle follow a goal, which is published as a reference, too."""
         header = Header(0, self._handle.stamp(), self._frame)
-        self._heading = goal.yaw
+        self.heading = goal.yaw
         self._command(goal, header)
         if self._public.has_subscribers(excluding=1):
             message = reference_message(goal, has_yaw=False)
@@ -236,13 +235,8 @@ class TrackedVehicle:
             self._public.publish(message)
 
     def timer(self, period: float, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call ``callback()`` every ``period`` seconds, by one timer of all vehicles.
-
-        Return a function that ends this.
-        """
-        if period not in self._timers:
-            self._timers[period] = SharedTimer(self._handle, period)
-        return self._timers[period].add(callback)
+        """Call ``callback()`` every ``period`` (s), see `SharedTimers`; the result ends this."""
+        return self._timers.add(self._handle, period, callback)
 
     def destination(self, time: float) -> Triple | None:
         """Return the position of the references after a time (s), m; None without references.
@@ -279,10 +273,6 @@ class TrackedVehicle:
             # With a new stamp: a controller ignores what is older than the hold.
             self._publish(self._commanded)
 
-    def forget_heading(self) -> None:
-        """Keep the measured heading in the next flight."""
-        self._heading = None
-
     def _on_reference(self, message):
         # It may come after later ones were published.
         is_own = self._own.pop(id(message), None) is not None
@@ -314,56 +304,74 @@ class TrackedVehicle:
 
     def _present_heading(self):
         """Return the heading that references without one keep, rad."""
-        if self._heading is None:
+        if self.heading is None:
             heading = float(self._states.headings[self.number])
             if not math.isfinite(heading):
                 return 0.0
-            self._heading = heading
-        return self._heading
+            self.heading = heading
+        return self.heading
 
 
 class ReferencesNode(Node[ReferencesParameters]):
     """Passes on the references of vehicles, unless they lead one too near to another.
 
-    ``vehicles`` are flown in this process and keep apart from ``others``, flown elsewhere, too.
-    ``vectorized`` are topics with the states of several vehicles in one message. The attribute
-    ``states`` has those of all. Vehicles named in ``unplaced`` take off from where they are seen.
+    Those named in ``names`` are flown in this process, and keep apart from all others of the fleet.
+    References of descents are moved away from vehicles that are beneath. Vehicles with one start
+    point in the fleet file must not take off until they have been measured apart, once, and take
+    off from where they are seen. ``vectorized`` are topics with the states of several vehicles in
+    one message. The attribute ``states`` has those of all, the vehicles of this process first.
     """
 
     needed_in_flight = True
 
     def __init__(
         self,
-        vehicles: tuple[VehicleConfig, ...],
-        others: tuple[VehicleConfig, ...],
+        fleet: FleetConfig,
+        names: Collection[str],
         fixed_frame: str,
         vectorized: Mapping[str, tuple[VehicleConfig, ...]] | None = None,
-        unplaced: Collection[str] = (),
     ):
-        self._configs = vehicles
         self._fixed_frame = fixed_frame
-        # The vehicles of this process come first.
-        all_vehicles = (*vehicles, *others)
-        self.states = VehicleStates(all_vehicles, vectorized or {})
-        self._separation = Separation([vehicle.buffer for vehicle in all_vehicles])
-        timers: dict[float, SharedTimer] = {}
+        self._configs = [each for each in fleet.vehicles if each.name in names]
+        others = [each for each in fleet.vehicles if each.name not in names]
+        everyone = [*self._configs, *others]
+        self.states = VehicleStates(everyone, vectorized or {})
+        self._buffers = [each.buffer for each in everyone]
+        self._separation = Separation(self._buffers)
+        self._descents = SafeDescents(self._buffers)
+        self._descent_headings: dict[int, float] = {}  # Number to heading at the beginning (rad).
+        self._close_starts = list(fleet.unplaced)
+        unplaced = {name for pair in fleet.unplaced for name in pair}
+        timers = SharedTimers()
         #: The vehicles of this process.
         self.vehicles = [
-            TrackedVehicle(number, vehicle, self.states, timers, vehicle.name in unplaced)
-            for number, vehicle in enumerate(vehicles)
+            TrackedVehicle(each, self.states, timers, each.name in unplaced)
+            for each in self._configs
         ]
-        self._published_held = ""
+        # Topic to the text that was published last.
+        self._published: dict[Publisher, str] = {}
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._held = handle.publisher(parameters.held_topic, String, latch=True)
+        self._inhibitions = {
+            each.name: handle.publisher(f"/{each.name}/{INHIBITION}", String, latch=True)
+            for each in self.vehicles
+            if each.hover_point is not None
+        }
         self._publish_mocap_frames(handle)
         for tracked in self.vehicles:
             tracked.register(handle, self._fixed_frame)
+            on_descent = partial(self._on_descent, tracked)
+            topic = f"/{tracked.name}/{DESCENT}"
+            handle.subscribe(topic, PositionVelocityStateStamped, on_descent)
         self.states.subscribe(handle)
         handle.subscribe(LANDING_TOPIC, String, self._on_landing)
         handle.timer(parameters.watch_period, self._on_watch_timer)
+        if self._inhibitions:
+            self._check_starts()
+            handle.timer(_START_PERIOD, self._check_starts)
 
     def _publish_mocap_frames(self, handle):
         # The frame of motion capture is the frame of the vehicle, by another name.
@@ -374,8 +382,12 @@ class ReferencesNode(Node[ReferencesParameters]):
             if vehicle.mocap_frame != vehicle.name
         ]
         if transforms:
-            static = handle.publisher("/tf_static", TFMessage, latch=True)
-            static.publish(TFMessage(transforms))
+            handle.broadcast_static_transforms()(transforms)
+
+    def _publish(self, publisher, text):
+        if self._published.get(publisher, "") != text:
+            self._published[publisher] = text
+            publisher.publish(String(text))
 
     def _on_landing(self, message):
         names = message.data.split()
@@ -400,18 +412,13 @@ class ReferencesNode(Node[ReferencesParameters]):
             self._warn_of_pair(pair)
         for tracked in self.vehicles:
             if not in_flight[tracked.number]:
-                tracked.forget_heading()
+                tracked.heading = None
             if held[tracked.number] and tracked.held_at is None:
                 tracked.hold()
             elif tracked.held_at is not None and not held[tracked.number]:
                 tracked.release()
-        self._publish_held()
-
-    def _publish_held(self):
-        held = " ".join(tracked.name for tracked in self.vehicles if tracked.held_at is not None)
-        if held != self._published_held:
-            self._published_held = held
-            self._held.publish(String(held))
+        waiting = [tracked.name for tracked in self.vehicles if tracked.held_at is not None]
+        self._publish(self._held, " ".join(waiting))
 
     def _warn_of_pair(self, pair):
         first, second = (self.states.names[k] for k in (pair.first, pair.second))
@@ -434,3 +441,39 @@ class ReferencesNode(Node[ReferencesParameters]):
             throttle=SILENCE_PERIOD,
             key=("silence", name),
         )
+
+    # Starts and landings.
+
+    def _check_starts(self):
+        reasons = {pair: self._takeoff_refusal(pair) for pair in self._close_starts}
+        self._close_starts = [pair for pair, reason in reasons.items() if reason]
+        for name, publisher in self._inhibitions.items():
+            text = next((reasons[pair] for pair in self._close_starts if name in pair), "")
+            self._publish(publisher, text)
+
+    def _takeoff_refusal(self, pair):
+        """Return why the vehicles of a pair must not take off; empty if they are apart."""
+        numbers = [self.states.numbers[name] for name in pair]
+        what = f"{pair[0]} and {pair[1]} start at one place by the fleet file"
+        if not self.states.are_fresh()[numbers].all():
+            return f"{what}, and the positions of both are not known"
+        buffers = [self._buffers[number] for number in numbers]
+        for _, _, distance, limit in close_pairs(self.states.positions[numbers], buffers):
+            return f"{what}, and are {distance:.2f} m apart; expected at least {limit:.2f} m"
+        return ""
+
+    def _on_descent(self, tracked, message):
+        now, states, number = self._handle.time(), self.states, tracked.number
+        if not self._descents.is_under_way(number, now):
+            is_descending = states.flight_states == FlightStatus.DESCENDING
+            is_landing = is_descending | ~states.are_in_flight()
+            distance = self._descents.begin(number, now, states.positions, is_landing)
+            self._descent_headings[number] = float(np.nan_to_num(states.headings[number]))
+            if distance > 0.0:
+                self._handle.warn(
+                    f"{tracked.name} lands {distance:.2f} m aside: another vehicle is beneath it"
+                )
+        aside = self._descents.reference(number, now, message.state.z, message.state.z_dot)
+        numbers = to_tuple(message.state) if aside is None else aside
+        state = PositionVelocityYawState(*numbers, self._descent_headings[number])
+        tracked.safe_descent.publish(Reference(message.header, state))

@@ -3,7 +3,6 @@
 import pytest
 
 from crazyflie_fleet import fleet_file
-from crazyflie_fleet.placement_node import PlacementNode
 from crazyflie_fleet.references_node import ReferencesNode
 from crazyflie_msgs.msg import (
     PositionVelocityState,
@@ -22,10 +21,8 @@ FLEET = fleet_file.parse(
 class Scene:
     def __init__(self):
         self.process = FakeProcess()
-        references = ReferencesNode(FLEET.vehicles, (), "world", unplaced=("a", "b"))
-        assert self.process.launch(references, "/fleet/references")
-        node = PlacementNode(FLEET.names, FLEET, references.states)
-        assert self.process.launch(node, "/fleet/placement")
+        node = ReferencesNode(FLEET, FLEET.names, "world")
+        assert self.process.launch(node, "/fleet/references")
 
     def see(self, **places):
         for name, (x, y) in places.items():

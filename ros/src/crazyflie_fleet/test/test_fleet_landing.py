@@ -183,7 +183,7 @@ def test_a_vehicle_that_cannot_leave_stays_in_the_air_and_is_named():
 def test_a_landing_that_fails_is_answered(monkeypatch):
     swarm = Swarm(fleet={"n": 2})
     swarm.call("/all/takeoff")
-    monkeypatch.setattr(landing, "next_round", lambda *_: {}["a bug"])
+    monkeypatch.setattr(landing.Scene, "next_round", lambda _: {}["a bug"])
     with pytest.raises(
         ServiceError, match="2 of 2 vehicles: cf1, cf2: the landing of the fleet has f"
     ):

@@ -6,9 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
 
-from crazyflie_fleet.landing import MAX_DETOUR, _Scene, free_place, next_round
+from crazyflie_fleet.landing import MAX_DETOUR, Scene
 
 SCALE = np.array([1.0, 1.0, 0.5])
+
+
+def landing_place(i, places, is_down, limits):
+    """Return where vehicle i lands, which descends already."""
+    return Scene(places, np.arange(len(places)) == i, is_down, limits).landing_place(i)
 
 
 def rounds(places, limit=0.3, half_width=np.inf, lands=None):
@@ -24,7 +29,7 @@ def rounds(places, limit=0.3, half_width=np.inf, lands=None):
     lower, upper = np.full((n, 2), -half_width), np.full((n, 2), half_width)
     found, least = [], np.inf
     while lands.any():
-        chosen = next_round(places, lands, stands, np.full((n, n), limit), lower, upper)
+        chosen = Scene(places, lands, stands, np.full((n, n), limit), lower, upper).next_round()
         assert chosen
         assert lands[[*chosen]].all()
         numbers = [*chosen]
@@ -117,7 +122,7 @@ def test_buffers_may_differ():
     limits = squareform([0.3, 0.9, 0.9])
     places = np.array([(0.0, 0.0, 1.0), (0.5, 0.0, 1.0), (0.0, 0.8, 2.0)])
     all_land, box = np.ones(3, dtype=bool), np.full((3, 2), np.inf)
-    found = next_round(places, all_land, ~all_land, limits, -box, box)
+    found = Scene(places, all_land, ~all_land, limits, -box, box).next_round()
     assert found == {0: pytest.approx((0.0, 0.0)), 1: pytest.approx((0.5, 0.0))}
 
 
@@ -127,7 +132,7 @@ def test_moves_are_reachable_if_no_vehicle_comes_near(seed):
     n, limit = 6, 0.3
     places = draw.uniform((-0.6, -0.6, 0.8), (0.6, 0.6, 1.2), (n, 3))
     flags, box = np.zeros(n, dtype=bool), np.full((n, 2), np.inf)
-    scene = _Scene(places, ~flags, flags, np.full((n, n), limit), -box, box)
+    scene = Scene(places, ~flags, flags, np.full((n, n), limit), -box, box)
     goals = draw.uniform(-1.0, 1.0, (20, 2))
     chosen = {1: (0.5, 0.0), 4: (-0.5, 0.2)}
     for goal, is_clear in zip(goals, scene.are_reachable(0, goals, chosen), strict=True):
@@ -151,26 +156,26 @@ def test_a_place_behind_another_vehicle_is_the_last_resort():
     flags = np.array([True, False, False])
     box = np.array([[-2.0, -0.02]] * 3), np.array([[2.0, 0.02]] * 3)
     stands, limits = np.array([False, True, False]), np.full((3, 3), 0.3)
-    found = next_round(places, flags, stands, limits, *box)
+    found = Scene(places, flags, stands, limits, *box).next_round()
     assert found == {0: pytest.approx((-0.45, 0.0))}
     box = np.array([[-0.4, -0.02]] * 3), np.array([[2.0, 0.02]] * 3)
     # Only behind the other one there is room: it is the place, though the way is not clear.
-    found = next_round(places, flags, stands, limits, *box)
+    found = Scene(places, flags, stands, limits, *box).next_round()
     assert found == {0: pytest.approx((0.75, 0.0))}
 
 
 def test_who_descends_already_lands_where_it_is_or_beside_what_is_beneath():
     places = np.array([(0.0, 0.0, 2.0), (0.1, 0.0, 1.0), (2.0, 0.0, 0.0)])
     stands, limits = np.array([False, False, True]), np.full((3, 3), 0.3)
-    assert free_place(1, places, stands, limits) == (0.1, 0.0)
-    x, y = free_place(0, places, stands, limits)
+    assert landing_place(1, places, stands, limits) == (0.1, 0.0)
+    x, y = landing_place(0, places, stands, limits)
     assert 0.3 < np.hypot(x - 0.1, y) < 0.5
     # Between others on all sides it cannot leave.
     angles = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     ring = np.stack([0.35 * np.cos(angles), 0.35 * np.sin(angles), np.full(12, 2.0)], axis=-1)
     places = np.vstack([places[:2], ring])
     stands, limits = np.zeros(14, dtype=bool), np.full((14, 14), 0.3)
-    assert free_place(0, places, stands, limits) == (0.0, 0.0)
+    assert landing_place(0, places, stands, limits) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("direction", [(1, 0), (-1, 0), (0, 1), (0, -1)])
@@ -184,18 +189,18 @@ def test_a_descent_at_once_goes_only_so_far_aside(direction, spacing, steps):
     places = np.vstack([[(0.0, 0.0, 2.0)], floor])
     stands, limits = np.arange(len(places)) > 0, np.full((len(places),) * 2, 0.3)
     expected = hole if spacing * steps <= MAX_DETOUR else np.zeros(2)
-    assert free_place(0, places, stands, limits) == pytest.approx(tuple(expected))
+    assert landing_place(0, places, stands, limits) == pytest.approx(tuple(expected))
 
 
 def test_a_descent_at_once_goes_straight_down_beside_a_vehicle():
     places = np.array([(0.0, 0.0, 2.0), (0.305, 0.0, 0.0)])
-    assert free_place(0, places, np.array([False, True]), np.full((2, 2), 0.3)) == (0.0, 0.0)
+    assert landing_place(0, places, np.array([False, True]), np.full((2, 2), 0.3)) == (0.0, 0.0)
 
 
 def test_without_a_vehicle_to_land_none_lands():
     none, box = np.zeros(2, dtype=bool), np.full((2, 2), np.inf)
     places = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 2.0)])
-    assert next_round(places, none, none, np.full((2, 2), 0.3), -box, box) == {}
+    assert Scene(places, none, none, np.full((2, 2), 0.3), -box, box).next_round() == {}
 
 
 def test_a_small_vehicle_above_many_large_ones_finds_a_place_beside_them():
@@ -204,7 +209,7 @@ def test_a_small_vehicle_above_many_large_ones_finds_a_place_beside_them():
     places = np.vstack([[(0.0, 0.0, 2.0)], floor])
     radii = np.array([0.15, *[0.9] * 25])
     is_down, box = np.arange(26) > 0, np.full((26, 2), np.inf)
-    found = next_round(places, ~is_down, is_down, radii[:, None] + radii, -box, box)
+    found = Scene(places, ~is_down, is_down, radii[:, None] + radii, -box, box).next_round()
     assert np.hypot(*(floor[:, :2] - found[0]).T).min() >= 1.05
 
 
@@ -214,7 +219,7 @@ def test_a_place_below_a_vehicle_that_hovers_above_may_be_nearer(x, is_free):
     places = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (x, 0.0, 1.48)])
     lands, is_down = np.array([True, False, False]), np.array([False, True, False])
     box = np.array([[-0.4, -0.02]] * 3), np.array([[2.0, 0.02]] * 3)
-    found = next_round(places, lands, is_down, np.full((3, 3), 0.3), *box)
+    found = Scene(places, lands, is_down, np.full((3, 3), 0.3), *box).next_round()
     assert (found[0] == pytest.approx((0.45, 0.0))) == is_free
 
 
@@ -232,5 +237,5 @@ def test_a_place_below_a_vehicle_that_hovers_above_may_be_nearer(x, is_free):
 def test_a_goal_is_reachable_if_the_way_to_it_is(other, goal, is_reachable):
     places = np.array([(0.0, 0.0, 1.0), (*other, 1.0)])
     flags, box = np.zeros(2, dtype=bool), np.full((2, 2), np.inf)
-    scene = _Scene(places, ~flags, flags, np.full((2, 2), 0.3), -box, box)
+    scene = Scene(places, ~flags, flags, np.full((2, 2), 0.3), -box, box)
     assert scene.are_reachable(0, np.array([goal]), {}).tolist() == [is_reachable]

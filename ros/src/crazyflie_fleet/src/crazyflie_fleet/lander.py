@@ -19,7 +19,7 @@ from crazyflie_fleet.landing import (
     SIDE_SPEED,
     LandingSide,
     Place,
-    Situation,
+    Scene,
     land_in_rounds,
 )
 from crazyflie_fleet.references_node import LANDING_TOPIC, VehicleStates
@@ -123,20 +123,15 @@ class Lander(LandingSide):
         return bool(self._calls) or not (is_late or bool((speeds < _SLOW).all()))
 
     @override
-    def situation(self) -> Situation:
+    def scene(self) -> tuple[Sequence[str], Scene]:
         positions = self._states.positions
         known = np.flatnonzero(np.isfinite(positions).all(axis=1))
-        everyone = [self._states.names[number] for number in known]
-        everywhere = np.full((len(known), 2), np.inf)
-        return (
-            everyone,
-            positions[known],
-            # A vehicle that descends is treated as one on the ground.
-            np.array([not self._is_up(name) for name in everyone]),
-            self._limits[np.ix_(known, known)],
-            -everywhere,
-            everywhere,
-        )
+        names = [self._states.names[number] for number in known]
+        lands = np.array([name in self._left for name in names])
+        # A vehicle that descends is treated as one on the ground.
+        is_down = np.array([not self._is_up(name) for name in names])
+        limits = self._limits[np.ix_(known, known)]
+        return names, Scene(positions[known], lands, is_down, limits)
 
     @override
     def distance(self, name: str, goal: Place) -> float:

@@ -27,9 +27,6 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Place = tuple[float, float, float]  #: x, y, z (m).
 
-#: Names of the vehicles whose positions are known, and the arguments of `next_round` but ``lands``.
-Situation = tuple[Sequence[str], Array, Flags, Array, Array, Array]
-
 SIDE_SPEED = 0.5  #: Mean speed at which vehicles fly to free places (m/s).
 MAX_DETOUR = 3.0  #: Largest move along x and y of a vehicle that descends already (m).
 
@@ -66,8 +63,8 @@ class LandingSide(Protocol):
     def is_busy(self) -> bool:
         """Return whether vehicles descend, or are too fast for a round."""
 
-    def situation(self) -> Situation:
-        """Return the positions of all vehicles."""
+    def scene(self) -> "tuple[Sequence[str], Scene]":
+        """Return the names of the vehicles whose positions are known, and these vehicles."""
 
     def distance(self, name: str, goal: Place) -> float:
         """Return the distance of a vehicle from a goal (m), m; infinite if it is not known."""
@@ -87,16 +84,15 @@ def land_in_rounds(side: LandingSide) -> Iterator[None]:
     while True:
         while side.is_busy():
             yield
-        if not (left := side.left()):
+        if not side.left():
             return
-        situation = side.situation()
-        names, places = situation[:2]
-        lands = np.array([name in left for name in names])
+        names, scene = side.scene()
         goals, aside = {}, {}
-        for k, (x, y) in next_round(places, lands, *situation[2:]).items():
-            goal = goals[names[k]] = (x, y, float(places[k, 2]))
-            if (x, y) != _pair(places[k]):
-                aside[names[k]] = goal
+        for k, (x, y) in scene.next_round().items():
+            here = scene.places[k]
+            goals[names[k]] = x, y, float(here[2])
+            if (x, y) != _pair(here):
+                aside[names[k]] = goals[names[k]]
         if aside:
             yield from _go_aside(side, aside)
         if down := [name for name in side.left() if name in goals]:
@@ -123,74 +119,21 @@ def _go_aside(side, goals):
             side.refuse(name, f"stays in the air: its distance from {place} is {far}")
 
 
-def next_round(
-    places: Array, lands: Flags, is_down: Flags, limits: Array, lower: Array, upper: Array
-) -> dict[int, tuple[float, float]]:
-    """Return which vehicles land next, and above which points they do.
+class Scene:
+    """The vehicles at one moment.
 
     Parameters
     ----------
     places : ndarray, shape (n, 3)
-        Where vehicles are, m.
+        Where they are, m.
     lands, is_down : ndarray of bool, shape (n,)
-        Which of them are in flight and to land, and which are on the ground. The others are in
-        flight and stay where they are.
+        Which of them are in flight and to land, and which are on the ground, or descend to where
+        they are. The others are in flight and stay where they are.
     limits : ndarray, shape (n, n)
         Distances that each two must keep, m; heights are divided by `DOWNWASH`.
-    lower, upper : ndarray, shape (n, 2)
+    lower, upper : ndarray, shape (n, 2), or float
         Corners x, y of the box that each may land in, m.
-
-    Returns
-    -------
-    dict of int to tuple
-        Number to x, y in m: where the vehicle is, or a free place, to which all of the round can
-        fly straight and at the same time. At least one vehicle, if any is to land. If no path is
-        free, one vehicle gets a free place; if no place is free, its own.
     """
-    scene = _Scene(places, lands, is_down, np.array(limits, dtype=float), lower, upper)
-    straight = np.flatnonzero(scene.is_lowest & ~scene.is_obstructed)
-    if straight.size:
-        return {int(i): _pair(places[i]) for i in straight}
-    lowest = np.flatnonzero(scene.is_lowest)
-    chosen: dict[int, tuple[float, float]] = {}
-    for i in lowest[np.argsort(places[lowest, 2], kind="stable")].tolist():
-        free = scene.free_places(i, chosen)
-        reachable = free[:_MAX_CANDIDATES][scene.are_reachable(i, free[:_MAX_CANDIDATES], chosen)]
-        if len(reachable):
-            chosen[i] = _pair(reachable[0])
-    if not chosen and lowest.size:
-        i = int(lowest[places[lowest, 2].argmin()])
-        chosen[i] = _pair([*scene.free_places(i, {}), places[i]][0])
-    return chosen
-
-
-def free_place(i: int, places: Array, is_down: Flags, limits: Array) -> tuple[float, float]:
-    """Return the landing place of a vehicle that descends already.
-
-    Parameters
-    ----------
-    i : int
-        Its number.
-    places, is_down, limits
-        As for `next_round`; descending vehicles are on the ground, at their landing places.
-
-    Returns
-    -------
-    x, y : float
-        m. Its own position if nothing is beneath, or if no free place within `MAX_DETOUR` can be
-        reached on a straight line.
-    """
-    lands = np.arange(len(places)) == i
-    everywhere = np.full((len(places), 2), np.inf)
-    scene = _Scene(places, lands, is_down & ~lands, limits, -everywhere, everywhere)
-    if not scene.is_obstructed[i]:
-        return _pair(places[i])
-    free = scene.free_places(i, {}, MAX_DETOUR)[:_MAX_CANDIDATES]
-    return _pair([*free[scene.are_reachable(i, free, {})], places[i]][0])
-
-
-class _Scene:
-    """The vehicles at one moment; see `next_round`."""
 
     def __init__(
         self,
@@ -198,30 +141,67 @@ class _Scene:
         lands: Flags,
         is_down: Flags,
         limits: Array,
-        lower: Array,
-        upper: Array,
+        lower: Array | float = -math.inf,
+        upper: Array | float = math.inf,
     ) -> None:
+        self.places = places
         self._xy, self._z = places[:, :2], places[:, 2]
         self._is_down = is_down
         self._limits = limits
-        self._box = lower, upper
+        self._lower, self._upper = (np.broadcast_to(c, self._xy.shape) for c in (lower, upper))
         order = np.lexsort((np.arange(len(places)), self._z)).argsort()
         is_below = order[None, :] < order[:, None]
         is_near = cdist(self._xy, self._xy) < limits - _ROUNDING
         beneath = is_near & is_below
         # A vehicle above, on a table, obstructs a landing as well.
-        self.is_obstructed = (is_near & is_down | beneath & ~lands & ~is_down).any(axis=1)
-        self.is_lowest = lands & ~(beneath & lands).any(axis=1)
+        self._is_obstructed = (is_near & is_down | beneath & ~lands & ~is_down).any(axis=1)
+        self._is_lowest = lands & ~(beneath & lands).any(axis=1)
 
-    def free_places(self, i, chosen, reach=math.inf):
+    def next_round(self) -> dict[int, tuple[float, float]]:
+        """Return which vehicles land next, and above which points they do.
+
+        Returns
+        -------
+        dict of int to tuple
+            Number to x, y in m: where the vehicle is, or a free place, to which all of the round
+            can fly straight and at the same time. At least one vehicle, if any is to land. If no
+            path is free, one vehicle gets a free place; if no place is free, its own.
+        """
+        straight = np.flatnonzero(self._is_lowest & ~self._is_obstructed)
+        if straight.size:
+            return {int(i): _pair(self.places[i]) for i in straight}
+        lowest = np.flatnonzero(self._is_lowest)
+        lowest = lowest[np.argsort(self._z[lowest], kind="stable")]
+        chosen: dict[int, tuple[float, float]] = {}
+        for i in lowest.tolist():
+            if len(reachable := self._reachable_places(i, chosen)):
+                chosen[i] = _pair(reachable[0])
+        if not chosen and lowest.size:
+            i = int(lowest[0])
+            chosen[i] = _pair([*self._free_places(i, {}), self.places[i]][0])
+        return chosen
+
+    def landing_place(self, i: int) -> tuple[float, float]:
+        """Return where vehicle i, which descends already, lands: x, y in m.
+
+        Its own position if nothing is beneath, or if no free place within `MAX_DETOUR` can be
+        reached on a straight line.
+        """
+        free = self._reachable_places(i, {}, MAX_DETOUR) if self._is_obstructed[i] else []
+        return _pair([*free, self.places[i]][0])
+
+    def _reachable_places(self, i, chosen, reach=math.inf):
+        free = self._free_places(i, chosen, reach)[:_MAX_CANDIDATES]
+        return free[self.are_reachable(i, free, chosen)]
+
+    def _free_places(self, i, chosen, reach=math.inf):
         """Return places to land for vehicle i, the nearest first, shape (m, 2)."""
         step = _PITCH * self._limits[i].max()
         count = math.ceil(min(2.0 * (math.sqrt(len(self._z)) + 1.0) / _PITCH, reach / step))
         axis = step * np.arange(-count, count + 1)
         grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
         grid = self._xy[i] + grid[np.hypot(*grid.T).argsort(kind="stable")]
-        lower, upper = self._box[0][i], self._box[1][i]
-        grid = grid[((grid >= lower) & (grid <= upper)).all(axis=1)]
+        grid = grid[((grid >= self._lower[i]) & (grid <= self._upper[i])).all(axis=1)]
         # Vehicles that fly above the start of the landing may be nearer.
         above = np.where(self._is_down, 0.0, np.maximum(self._z - self._z[i], 0.0)) / DOWNWASH
         needed = np.sqrt(np.maximum((_MARGIN * self._limits[i]) ** 2 - above**2, 0.0))
@@ -232,13 +212,18 @@ class _Scene:
             is_free &= (cdist(grid, np.array([*chosen.values()])) >= limits).all(axis=1)
         return grid[is_free]
 
-    def are_reachable(self, i, goals, chosen):
-        """Return whether vehicle i can fly straight to each goal; shapes (m, 2) and (m,)."""
+    def are_reachable(
+        self, i: int, goals: Array, chosen: Mapping[int, tuple[float, float]]
+    ) -> Flags:
+        """Return whether vehicle i can fly straight to each goal, shape (m, 2); shape (m,).
+
+        At the same time others fly to the places that are ``chosen`` for them.
+        """
         others = np.arange(len(self._z)) != i
         ends = self._xy.copy()
         for j, place in chosen.items():
             ends[j] = place
-        # Relative to vehicle i; others move at the same time, or hover.
+        # Relative to vehicle i.
         begin = self._xy[others] - self._xy[i]
         way = (ends[others] - goals[:, None]) - begin
         lengths = np.maximum((way**2).sum(axis=-1), 1e-12)
@@ -306,8 +291,10 @@ class SafeDescents:
         known = np.asarray(np.isfinite(places).all(axis=1))
         place = start[:2]
         if known[number]:
-            index, limits = int(known[:number].sum()), self._limits[np.ix_(known, known)]
-            place = np.array(free_place(index, places[known], is_landing[known], limits))
+            lands = np.arange(len(known)) == number
+            is_down, limits = is_landing & ~lands, self._limits[np.ix_(known, known)]
+            scene = Scene(places[known], lands[known], is_down[known], limits)
+            place = np.array(scene.landing_place(int(known[:number].sum())))
         distance = float(np.nan_to_num(np.linalg.norm(place - start[:2])))
         duration = _SIDE_DURATION * max(
             MINIMUM_JERK_SPEED * distance / MAX_SPEED,

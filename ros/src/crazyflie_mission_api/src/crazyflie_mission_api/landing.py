@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from typing_extensions import override
 
-from crazyflie_fleet.landing import LandingSide, Place, Situation, land_in_rounds
+from crazyflie_fleet.landing import LandingSide, Place, Scene, land_in_rounds
 from crazyflie_mission_api.group_state import GroupState
 from crazyflie_mission_api.limits import EVERYWHERE
 from crazyflie_mission_api.mission_vehicle import Move, never
@@ -103,8 +103,8 @@ class _Landing(LandingSide):
         return bool(self._descending)
 
     @override
-    def situation(self) -> Situation:
-        group = self._group
+    def scene(self) -> tuple[Sequence[str], Scene]:
+        group, left = self._group, self.left()
         obstacles = group.obstacles()
         places = group._places()
         places |= {name: o.position for name, o in obstacles.items() if o.position is not None}
@@ -114,9 +114,9 @@ class _Landing(LandingSide):
             EVERYWHERE if name in obstacles else group._all_vehicles[name].bounds for name in known
         ]
         fences = [fence.within(group.rules.bounds) for fence in fences]
-        return (
-            known,
+        return known, Scene(
             np.array([*places.values()]),
+            np.array([name in left for name in known]),
             np.array([name not in in_flight for name in known]),
             group.rules.clearance.limits(known),
             np.array([fence.lower[:2] for fence in fences]),

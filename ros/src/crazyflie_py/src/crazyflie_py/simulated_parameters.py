@@ -2,14 +2,13 @@
 
 import functools
 import logging
-import math
 from collections.abc import Mapping
 
 from crazyflie_model.angles import Triple
 from crazyflie_py.swarm import DEFAULT_COLOR, SwarmVehicle
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.firmware import Firmware
-from crazyflie_virtual.parameters import Parameter, parameter_specs
+from crazyflie_virtual.parameters import NO_LIMITS, Parameter, parameter_specs
 from crazyflie_virtual.settings import VehicleSettings, switches
 
 _log = logging.getLogger(__name__)
@@ -36,38 +35,19 @@ class SimulatedParameters:
 
     def update(self, values: Mapping[str, float]) -> None:
         """Set parameters; those that the virtual vehicle lacks are stored, with a warning."""
+        where = f"{self._vehicle.name}.setParam"
         for key, value in values.items():
             if key == "hlCommander.groupmask":
                 self._vehicle.set_group_mask(int(value))
-            elif key not in self._said and key not in _defaults():
+            if (parameter := _known().get(key)) is not None:
+                if expected := _expected(parameter.spec, value):
+                    text = "%s: %s is %g; expected %s: a real vehicle refuses it"
+                    _log.warning(text, where, key, value, expected)
+            elif key not in self._said:
                 self._said.add(key)
-                _log.warning(
-                    "%s.setParam: the simulation has no parameter %s; it is stored without effect",
-                    self._vehicle.name,
-                    key,
-                )
-            self._check(key, value)
+                text = "%s: the simulation has no parameter %s; it is stored without effect"
+                _log.warning(text, where, key)
             self._values[key] = value
-
-    def _check(self, key, value):
-        spec = _specs().get(key)
-        if spec is None:
-            return
-        low, high = spec.limits
-        kind = spec.number_type
-        if spec.limits != (-math.inf, math.inf) and not low <= value <= high:
-            expected = f"{low:g} to {high:g}"
-        elif not kind.is_float and kind.convert(value) != value:
-            expected = f"a {kind.name}"
-        else:
-            return
-        _log.warning(
-            "%s.setParam: %s is %g; expected %s: a real vehicle refuses it",
-            self._vehicle.name,
-            key,
-            value,
-            expected,
-        )
 
     def __getitem__(self, key: str) -> float:
         """Return a value; ValueError for a name that is not known and was not set."""
@@ -75,11 +55,12 @@ class SimulatedParameters:
             return self._vehicle.groups
         if key in self._values:
             return self._values[key]
-        if key in _defaults():
-            return _defaults()[key]
+        if key in _known():
+            return _known()[key].default
         group = key.partition(".")[0]
-        known = [name for name in _defaults() if name.startswith(f"{group}.")]
-        expected = ", ".join(known) if known else f"no group {group}; there are {_groups()}"
+        same = [name for name in _known() if name.startswith(f"{group}.")]
+        groups = dict.fromkeys(name.partition(".")[0] for name in _known())
+        expected = ", ".join(same) or f"no group {group}; there are {', '.join(groups)}"
         raise ValueError(f"{self._vehicle.name}.getParam: name is {key}; expected {expected}")
 
     @property
@@ -91,18 +72,18 @@ class SimulatedParameters:
         return red, green, blue
 
 
-@functools.cache
-def _specs():
-    return {f"{spec.group}.{spec.name}": spec for spec in parameter_specs()}
+def _expected(spec, value):
+    """Return what a real vehicle expects in place of a value; empty if it accepts that."""
+    (low, high), kind = spec.limits, spec.number_type
+    if spec.limits != NO_LIMITS and not low <= value <= high:
+        return f"{low:g} to {high:g}"
+    return "" if kind.is_float or kind.convert(value) == value else f"a {kind.name}"
 
 
 @functools.cache
-def _defaults():
+def _known():
+    """Return the parameters of a virtual vehicle by their names."""
     settings = VehicleSettings.from_mapping({})
     firmware = Firmware(Physics(), switches(settings), settings)
-    parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
-    return {parameter.full_name: parameter.default for parameter in parameters}
-
-
-def _groups():
-    return ", ".join(dict.fromkeys(name.partition(".")[0] for name in _defaults()))
+    parameters = (Parameter(spec, firmware) for spec in parameter_specs())
+    return {parameter.full_name: parameter for parameter in parameters}

@@ -4,10 +4,9 @@ import logging
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_mission_api.dry_run import IdealVehicle
@@ -24,14 +23,12 @@ from crazyflie_mission_api.mission_vehicle import (
 from crazyflie_model.angles import Triple, rotate_by_yaw
 from crazyflie_model.collision_avoidance import AvoidanceSettings, CollisionAvoidance
 from crazyflie_model.limits import LEVEL_AGE
-from crazyflie_model.polynomials import Goal
+from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_model.units import GRAVITY
 from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.simulated_parameters import SimulatedParameters
 from crazyflie_py.swarm import STATUS_FIELDS, ScriptState
 from crazyflie_py.util import clamp_norm
-
-Array = NDArray[np.float64]
 
 _log = logging.getLogger(__name__)
 
@@ -39,19 +36,18 @@ _log = logging.getLogger(__name__)
 _FALL_HEIGHT = 0.1
 
 
-class SimulatedMotion(NamedTuple):
-    """Position (m), velocity (m/s), acceleration (m/s^2), each (3,), and yaw (rad)."""
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-    yaw: float
+_STILL: Triple = (0.0, 0.0, 0.0)
 
 
-def attitude(acceleration: Array, yaw: float) -> Triple:
+def _triple(vector):
+    x, y, z = map(float, vector)
+    return x, y, z
+
+
+def attitude(acceleration: Triple, yaw: float) -> Triple:
     """Return roll, pitch and yaw (rad) of a multirotor that accelerates, by differential flatness.
 
-    Its thrust is along its z axis, its x axis above the heading. Acceleration of shape (3,), m/s^2.
+    Its thrust is along its z axis, its x axis above the heading. The acceleration is in m/s^2.
     """
     ax, ay, az = acceleration
     (ahead, left), up = rotate_by_yaw(ax, ay, -yaw), az + GRAVITY
@@ -89,7 +85,7 @@ class SimulatedVehicle(IdealVehicle):
         self.config = vehicle
         self.parameters = SimulatedParameters(self, said)
         #: Position and motion, which the swarm sets in steps.
-        self.motion = SimulatedMotion(np.array(vehicle.position), np.zeros(3), np.zeros(3), 0.0)
+        self.motion = at_rest(vehicle.position)
         self._max_speed = max_speed
         self._disturbance = disturbance
         self._avoidance: CollisionAvoidance | None = None
@@ -117,9 +113,7 @@ class SimulatedVehicle(IdealVehicle):
     def planned(self) -> Goal[float]:
         if self.is_active:
             return super().planned()
-        *vectors, yaw = self.motion
-        position, velocity, _ = (vector.tolist() for vector in vectors)
-        return Goal(tuple(position), tuple(velocity), (0.0, 0.0, 0.0), yaw, 0.0)
+        return self.motion._replace(acceleration=_STILL, yaw_rate=0.0)
 
     @override
     def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int = 0) -> "Future[Any]":
@@ -173,10 +167,8 @@ class SimulatedVehicle(IdealVehicle):
 
     def state(self) -> ScriptState:
         """Return position, velocity, acceleration and attitude."""
-        *vectors, yaw = self.motion
-        (x, y, z), (vx, vy, vz), (ax, ay, az) = (vector.tolist() for vector in vectors)
-        rpy = attitude(self.motion.acceleration, yaw)
-        return ScriptState((x, y, z), (vx, vy, vz), (ax, ay, az), rpy)
+        position, velocity, acceleration, yaw, _ = self.motion
+        return ScriptState(position, velocity, acceleration, attitude(acceleration, yaw))
 
     def status(self) -> dict[str, Any]:
         """Return the status with the keys of crazyswarm2's Crazyflie.get_status."""
@@ -192,7 +184,7 @@ class SimulatedVehicle(IdealVehicle):
             **dict.fromkeys(STATUS_FIELDS, 0),
         }
 
-    def next_motion(self, dt: float) -> SimulatedMotion:
+    def next_motion(self, dt: float) -> Goal[float]:
         """Return the motion at the present time, ``dt`` (s) after `motion`."""
         now = self._time()
         if now > self._expiry:
@@ -206,60 +198,47 @@ class SimulatedVehicle(IdealVehicle):
             return self._at_setpoint(self._setpoint, dt)
         # Also at the end of a landing.
         if self._flies or now - dt < self.trajectory.end:
-            return self._tracked(self.trajectory.goal(now), dt)
-        return self._stopped()
+            return self._limited(self.trajectory.goal(now), dt)
+        return at_rest(self.motion.position, self.motion.yaw)
 
-    def _stopped(self) -> SimulatedMotion:
-        """Return the motion of a vehicle that stays at its place."""
-        return SimulatedMotion(self.motion.position, np.zeros(3), np.zeros(3), self.motion.yaw)
-
-    def _tracked(self, goal: Goal[float] | FullStateSetpoint, dt: float) -> SimulatedMotion:
-        """Return the motion ``dt`` (s) from now, towards the goal, as far as limits permit."""
-        vectors = (goal.position, goal.velocity, goal.acceleration)
-        position, velocity, acceleration = map(np.array, vectors)
-        return self._limited(SimulatedMotion(position, velocity, acceleration, goal.yaw), dt)
-
-    def _at_setpoint(self, setpoint: Setpoint, dt: float) -> SimulatedMotion:
+    def _at_setpoint(self, setpoint: Setpoint, dt: float) -> Goal[float]:
         """Return the motion ``dt`` (s) from now; an attitude keeps the vehicle in place."""
+        position, yaw = self.motion.position, self.motion.yaw
         if isinstance(setpoint, FullStateSetpoint):
-            return self._tracked(setpoint, dt)
+            vectors = (setpoint.position, setpoint.velocity, setpoint.acceleration)
+            return self._limited(Goal(*vectors, setpoint.yaw, 0.0), dt)
         if isinstance(setpoint, PositionSetpoint):
-            zero = np.zeros(3)
-            goal = SimulatedMotion(np.array(setpoint.position), zero, zero, setpoint.yaw)
-            return self._approached(self._limited(goal, dt), dt)
+            return self._approached(self._limited(at_rest(*setpoint), dt), dt)
         if isinstance(setpoint, VelocityWorldSetpoint):
-            return self._at_velocity(np.array(setpoint.velocity), setpoint.yaw_rate, dt)
+            return self._at_velocity(setpoint.velocity, setpoint.yaw_rate, dt)
         if isinstance(setpoint, HoverSetpoint):
-            climb = (setpoint.height - self.motion.position[2]) / dt
-            horizontal = rotate_by_yaw(setpoint.vx, setpoint.vy, self.motion.yaw)
-            velocity = np.array([*horizontal, climb])
+            climb = (setpoint.height - position[2]) / dt
+            velocity = (*rotate_by_yaw(setpoint.vx, setpoint.vy, yaw), climb)
             return self._at_velocity(velocity, setpoint.yaw_rate, dt)
-        return self._stopped()
+        return at_rest(position, yaw)
 
     def _limited(self, goal, dt):
+        """Return the motion ``dt`` (s) from now, towards a goal, as far as limits permit."""
+        here, position = np.array(self.motion.position), np.array(goal.position)
         if self._avoidance is not None:
             position, velocity = self._avoidance.position_setpoint(
-                self.motion.position, self._other_positions(), goal.position, goal.velocity
+                here, self._other_positions(), position, np.array(goal.velocity)
             )
-            if np.array_equal(position, goal.position):
-                goal = goal._replace(velocity=velocity)
-            else:
-                goal = self._approached(goal._replace(position=position), dt)
-        way = goal.position - self.motion.position
-        reach = self._max_speed * dt
-        if np.linalg.norm(way) <= reach:
+            goal = goal._replace(velocity=_triple(velocity))
+        step, reach = position - here, self._max_speed * dt
+        if np.linalg.norm(step) > reach:
+            position = here + clamp_norm(step, reach)
+        if np.array_equal(position, goal.position):
             return goal
-        return self._approached(
-            goal._replace(position=self.motion.position + clamp_norm(way, reach)), dt
-        )
+        return self._approached(goal._replace(position=_triple(position)), dt)
 
     def _approached(self, goal, dt):
         """Return a goal with the velocity at which it is reached."""
-        velocity = (goal.position - self.motion.position) / dt
-        return goal._replace(velocity=velocity, acceleration=np.zeros(3))
+        step = np.array(goal.position) - self.motion.position
+        return goal._replace(velocity=_triple(step / dt), acceleration=_STILL)
 
     def _at_velocity(self, velocity, yaw_rate, dt):
-        position = self.motion.position
+        position, velocity = np.array(self.motion.position), np.array(velocity)
         if self._avoidance is not None:
             others = self._other_positions()
             velocity = self._avoidance.velocity_setpoint(position, others, velocity)
@@ -267,7 +246,7 @@ class SimulatedVehicle(IdealVehicle):
         if self._disturbance:
             velocity = velocity + self._disturbance * np.random.normal(size=3)
         yaw = self.motion.yaw + math.radians(yaw_rate) * dt
-        return SimulatedMotion(position + dt * velocity, velocity, np.zeros(3), yaw)
+        return Goal(_triple(position + dt * velocity), _triple(velocity), _STILL, yaw, 0.0)
 
     def _other_positions(self):
         return np.array([other.motion.position for other in self._others]).reshape(-1, 3)

@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 
 from crazyflie_fleet.fleet_config import SINGLE_MARKER, FleetConfig, VehicleConfig
-from crazyflie_fleet.fleet_parser import FleetParser, close_vehicles, entry_at
+from crazyflie_fleet.fleet_parser import FleetParser, close_vehicles
 from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.declaration import Complaints
@@ -103,8 +103,12 @@ def _type(entry, types):
 
 def _points(types, configuration):
     """Return the number of points of a marker configuration; 0 without one."""
-    points = entry_at(types, f"markerConfigurations/{configuration}/points")
-    return 0 if points is None else len(points.entries())
+    entry = types
+    for key in ("markerConfigurations", configuration, "points"):
+        if key not in entry:
+            return 0
+        entry = entry[key]
+    return len(entry.entries())
 
 
 def _mapping(parts: Mapping[str, yaml.Node], place: yaml.Node) -> yaml.MappingNode:

@@ -2,11 +2,11 @@
 
 import dataclasses
 import difflib
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections import ChainMap, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
 
 from crazyflie_fleet.fleet_config import (
     DEFAULT_TOPICS,
@@ -39,11 +39,9 @@ _SIMILAR = 0.8
 _TOP = ("robots", "robot_types", "all", "machines", "fileversion")
 _FIRMWARE = ("firmware_params", "firmware_logging")
 _LOGGING = ("enabled", "default_topics", "custom_topics")
-_WITHOUT_EFFECT = [
-    declaration.name
-    for declaration in VehicleConfig.declarations()
-    if declaration.help == WITHOUT_EFFECT
-]
+_DECLARATIONS = [*VehicleConfig.declarations()]
+_WITHOUT_EFFECT = [each.name for each in _DECLARATIONS if each.help == WITHOUT_EFFECT]
+_GROUPS = {each.name.partition("/")[0] for each in _DECLARATIONS if "/" in each.name}
 
 
 class Remarks:
@@ -51,8 +49,9 @@ class Remarks:
 
     def __init__(self) -> None:
         self._texts: dict[object, str] = {}
-        self._unknown: dict[str, list[int]] = {}
-        self._idle: dict[str, list[int]] = {}
+        # Lines of keys.
+        self._unknown: dict[str, dict[int, None]] = defaultdict(dict)
+        self._idle: dict[str, dict[int, None]] = defaultdict(dict)
         self._file: object = ""
 
     def add(self, text: str, key: object = None) -> None:
@@ -71,34 +70,33 @@ class Remarks:
         words = {word for name in known for word in name.split("/")}
         if meant := difflib.get_close_matches(key, words, 1, _SIMILAR):
             raise entry.error(f"is not known; expected {meant[0]}")
-        self._note(self._unknown, key, entry)
+        self._file = entry.file
+        self._unknown[key][entry.line] = None
 
     def idle(self, entry: Entry, key: str) -> None:
         """Add an entry with a known key that has no effect."""
-        self._note(self._idle, key, entry)
+        self._file = entry.file
+        self._idle[key][entry.line] = None
 
     def texts(self) -> tuple[str, ...]:
         """Return all remarks."""
-        texts = [*self._texts.values()]
-        if self._unknown:
-            texts.append(
-                f"{self._file}: ignored, since they are not known here: {_listed(self._unknown)}"
-            )
-        texts += [
-            f"{self._file}: {_listed({key: lines})} has no effect here"
-            for key, lines in self._idle.items()
-        ]
-        return tuple(texts)
-
-    def _note(self, found, key, entry):
-        self._file = entry.file
-        lines = found.setdefault(key, [])
-        if entry.line not in lines:
-            lines.append(entry.line)
+        unknown = "; ".join(_listed(*each) for each in self._unknown.items())
+        texts = [f"ignored, since they are not known here: {unknown}"] if unknown else []
+        texts += [f"{_listed(*each)} has no effect here" for each in self._idle.items()]
+        return (*self._texts.values(), *(f"{self._file}: {text}" for text in texts))
 
 
-def _listed(found):
-    return "; ".join(f"{key} (line {', '.join(map(str, lines))})" for key, lines in found.items())
+def _listed(key, lines):
+    return f"{key} (line {', '.join(map(str, lines))})"
+
+
+class _Layer(NamedTuple):
+    """What a vehicle, its type or ``all`` contains, by names."""
+
+    settings: dict[str, Entry]
+    firmware_params: dict[str, float]
+    standard_topics: dict[str, Entry]
+    log_topics: dict[str, LogTopicSettings]
 
 
 class FleetParser:
@@ -119,30 +117,33 @@ class FleetParser:
             )
         self._check_keys(self._parts, _TOP)
         robots = self._parts["robots"].entries()
-        types = _entries(self._parts, "robot_types")
-        common = self._parts.get("all")
         machines = {
             name: self._read(entry, MachineSettings)
             for name, entry in _entries(self._parts, "machines").items()
         }
-        # Inherited settings are checked where they are given: once, and not for each vehicle.
-        for entry in types.values():
-            self._check(entry)
-        if common is not None:
-            self._check(common, "broadcasts")
-        broadcasts = self._broadcasts(common)
+        # Settings are checked where they are given: once, and not for each vehicle.
+        types = {
+            name: self._layer(entry) for name, entry in _entries(self._parts, "robot_types").items()
+        }
+        common = self._layer(self._parts.get("all"), "broadcasts")
+        broadcasts = self._broadcasts(common.settings)
+        own = {name: self._layer(entry) for name, entry in robots.items()}
         for name, entry in robots.items():
             self._check_type(VEHICLE_NAME, name, entry)
-            self._check(entry)
-            self._check_choice(entry, "type", types)
-        for entry in (*robots.values(), *types.values(), *([common] if common else [])):
-            self._check_choice(entry, "machine", (LOCAL, *machines))
+            self._check_choice(own[name], "type", types)
+        for layer in (*own.values(), *types.values(), common):
+            self._check_choice(layer, "machine", (LOCAL, *machines))
         self._errors.raise_any()
         # Combinations of settings are checked for each vehicle.
-        vehicles = [self._vehicle(name, entry, types, common) for name, entry in robots.items()]
+        vehicles = []
+        for name, entry in robots.items():
+            layers = [own[name], common]
+            if chosen := own[name].settings.get("type"):
+                layers.insert(1, types[chosen.value])
+            vehicles.append(self._vehicle(name, entry, layers))
         self._errors.raise_any()
         enabled = [vehicle for vehicle in vehicles if vehicle.enabled]
-        self._check_apart(enabled, robots)
+        self._check_apart(enabled, robots, own)
         self._errors.raise_any()
         disabled = [vehicle.name for vehicle in vehicles if not vehicle.enabled]
         if not enabled:
@@ -165,26 +166,6 @@ class FleetParser:
         with self._errors:
             return entry.read(settings, extra_keys, on_unknown)
 
-    def _check(self, entry, *extra_keys):
-        if self._read(entry, Settings, *_FIRMWARE, *extra_keys) is None:
-            return
-        for key in _WITHOUT_EFFECT:
-            if (idle := entry_at(entry, key)) is not None:
-                self.remarks.idle(idle, key)
-        with self._errors:
-            self._firmware(entry)
-
-    def _broadcasts(self, common):
-        if common is None or "broadcasts" not in common:
-            return {}
-        given = self._read(common["broadcasts"], BroadcastSettings)
-        if given is None:
-            return {}
-        return {
-            "broadcast/repeats": given.repeats,
-            "broadcast/repeat_period": given.period_ms / 1000.0,
-        }
-
     def _check_keys(self, entries, known):
         for key, entry in entries.items():
             if key not in known:
@@ -198,34 +179,33 @@ class FleetParser:
             self._error(entry, f"is {shown(value)}; expected {expected}")
             return None
 
-    def _check_choice(self, entry, key, known):
-        if isinstance(entry.node, yaml.MappingNode) and key in entry:
-            chosen = entry[key]
-            if chosen.value and chosen.value not in list(known):
-                expected = (
-                    f"one of {shortened(', '.join(known))}"
-                    if known
-                    else f"none, as there are no {key}s"
-                )
-                self._error(chosen, f"is {shown(chosen.value)}; expected {expected}")
+    def _check_choice(self, layer, key, known):
+        chosen = layer.settings.get(key)
+        if chosen is not None and chosen.value and chosen.value not in list(known):
+            names = shortened(", ".join(known))
+            expected = f"one of {names}" if known else f"none, as there are no {key}s"
+            self._error(chosen, f"is {shown(chosen.value)}; expected {expected}")
 
-    def _check_apart(self, vehicles, robots):
+    def _check_apart(self, vehicles, robots, own):
         """Check that no two vehicles have one address, or one frame of motion capture."""
+
+        def given(name, key):
+            return own[name].settings.get(key, robots[name])
+
         uris: dict[str, str] = {}
         # Two with one frame would both fly by the pose of one body.
         frames = {vehicle.name: vehicle.name for vehicle in vehicles}
         for vehicle in vehicles:
-            name, robot, frame = vehicle.name, robots[vehicle.name], vehicle.mocap_frame
+            name, frame = vehicle.name, vehicle.mocap_frame
             if vehicle.uri and (other := uris.setdefault(vehicle_key(vehicle.uri), name)) != name:
-                line = (entry_at(robots[other], "uri") or robots[other]).line
                 self._error(
-                    entry_at(robot, "uri") or robot,
-                    f"is {vehicle.uri}, which is also that of {other} in line {line}; expected "
-                    "an address of its own",
+                    given(name, "uri"),
+                    f"is {vehicle.uri}, which is also that of {other} in line "
+                    f"{given(other, 'uri').line}; expected an address of its own",
                 )
             if (other := frames.setdefault(frame, name)) != name:
                 self._error(
-                    entry_at(robot, "motion_capture/frame") or robot,
+                    given(name, "motion_capture/frame"),
                     f"has the frame {frame} of motion capture, which is that of {other}; expected "
                     "a frame of its own",
                 )
@@ -242,28 +222,79 @@ class FleetParser:
             )
         return tuple(pairs)
 
-    # Vehicles.
+    # Parts of the file.
 
-    def _vehicle(self, name, robot, types, common):
-        layers = [common, types.get(robot["type"].value) if "type" in robot else None, robot]
-        node = _merged([layer.node for layer in layers if layer is not None])
-        merged = Entry(robot.name, node)
-        vehicle = self._read(merged, VehicleConfig, *_FIRMWARE, "broadcasts")
-        if vehicle is None:
-            return None
-        self._check_voltages(merged, vehicle)
-        model = self._model(merged, vehicle.model)
-        params, default_topics, log_topics = self._firmware(merged)
-        return dataclasses.replace(
-            vehicle,
-            name=name,
-            model=model,
-            firmware_params=params,
-            default_topics=default_topics,
-            log_topics=log_topics,
-        )
+    def _broadcasts(self, settings):
+        if (entry := settings.get("broadcasts")) is None:
+            return {}
+        if (given := self._read(entry, BroadcastSettings)) is None:
+            return {}
+        return {
+            "broadcast/repeats": given.repeats,
+            "broadcast/repeat_period": given.period_ms / 1000.0,
+        }
 
-    def _model(self, merged, model):
+    def _layer(self, entry, *extra_keys):
+        layer = _Layer({}, {}, {}, {})
+        if entry is None:
+            return layer
+        with self._errors:
+            layer.settings.update(_leaves(entry))
+        if self._read(entry, Settings, *_FIRMWARE, *extra_keys) is None:
+            return layer
+        for name, inner in layer.settings.items():
+            if name in _WITHOUT_EFFECT:
+                self.remarks.idle(inner, name)
+        with self._errors:
+            for group, inner in _entries(layer.settings, "firmware_params").items():
+                for key, value in inner.entries().items():
+                    number = self._check_type(FIRMWARE_NUMBER, value.value, value)
+                    layer.firmware_params[f"{group}.{key}"] = number
+            self._read_logging(_entries(layer.settings, "firmware_logging"), layer)
+        return layer
+
+    def _read_logging(self, parts, layer):
+        self._check_keys(parts, _LOGGING)
+        if "enabled" in parts:
+            layer.settings["firmware_logging/enabled"] = parts["enabled"]
+            self._check_type(BOOLEAN, parts["enabled"].value, parts["enabled"])
+        default_topics = _entries(parts, "default_topics")
+        self._check_keys(default_topics, DEFAULT_TOPICS)
+        for key, entry in default_topics.items():
+            if DEFAULT_TOPICS.get(key) == "":
+                remark = entry.error("is not offered by the driver, and is ignored")
+                self.remarks.add(str(remark), entry.line)
+            elif key in DEFAULT_TOPICS and self._read(entry, DefaultTopicSettings) is not None:
+                layer.standard_topics[DEFAULT_TOPICS[key]] = entry
+                if "frequency" in entry:
+                    self.remarks.idle(entry["frequency"], "frequency of a default topic")
+        for name, entry in _entries(parts, "custom_topics").items():
+            layer.log_topics[name] = self._read(entry, LogTopicSettings)
+            self._check_type(VEHICLE_NAME, name, entry)
+
+    def _vehicle(self, name, robot, layers):
+        """Return a vehicle of the layers, the nearest first."""
+        settings, params, standard_topics, log_topics = map(ChainMap, *layers)
+
+        def place(key: str) -> str:
+            return f"{shortened(f'{robot.name}/{key}')} ({robot.file}:{robot.line})"
+
+        with self._errors:
+            vehicle = VehicleConfig.read(lambda key: settings[key].value, place)
+            self._check_voltages(settings, vehicle)
+            if (enabled := settings.get("firmware_logging/enabled")) and not enabled.value:
+                standard_topics = log_topics = ChainMap()
+            return dataclasses.replace(
+                vehicle,
+                name=name,
+                model=self._model(settings, vehicle.model),
+                firmware_params=dict(params),
+                # For safety, the battery is always monitored.
+                default_topics=tuple(dict.fromkeys(["battery", *standard_topics])),
+                log_topics=dict(log_topics),
+            )
+
+    def _model(self, settings, model):
         """Return a model; the path of a model file is relative to this one."""
         if model in DYNAMICS or model in TYPES:
             return model
@@ -271,76 +302,33 @@ class FleetParser:
         try:
             load(path)
         except ParameterError as error:
-            for each in error.complaints:
-                self._error(merged["model"], each)
+            self._errors += [str(settings["model"].error(each)) for each in error.complaints]
         return path
 
-    def _check_voltages(self, merged, settings):
+    def _check_voltages(self, settings, vehicle):
         # Only here is it known whether each comes from the robot, its type or ``all``.
-        critical, warning = settings.voltage_critical, settings.voltage_warning
+        critical, warning = vehicle.voltage_critical, vehicle.voltage_warning
         if critical <= warning:
             return
-        given = merged["battery"].entries()
-        if "voltage_critical" in given:
-            entry, text = given["voltage_critical"], f"is {critical:g}; expected not more than"
-            other = f"voltage_warning, {warning:g} (V)"
-        else:
-            entry, text = given["voltage_warning"], f"is {warning:g}; expected not less than"
-            other = f"voltage_critical, {critical:g} (V)"
+        key, text = "voltage_critical", f"not more than voltage_warning, {warning:g} (V)"
+        if f"battery/{key}" not in settings:
+            key, text = "voltage_warning", f"not less than voltage_critical, {critical:g} (V)"
         # Without the robot's name: an inherited error is reported once.
-        name = entry.name.removeprefix(f"{merged.name}/")
-        self._error(Entry(name, entry.node), f"{text} {other}")
+        entry = Entry(f"battery/{key}", settings[f"battery/{key}"].node)
+        self._error(entry, f"is {getattr(vehicle, key):g}; expected {text}")
 
-    def _firmware(self, entry):
-        parts = entry.entries()
-        params = {
-            f"{group}.{key}": self._check_type(FIRMWARE_NUMBER, value.value, value)
-            for group, inner in _entries(parts, "firmware_params").items()
-            for key, value in inner.entries().items()
-        }
-        if "firmware_logging" not in parts:
-            return params, ("battery",), {}
-        return params, *self._logging(parts["firmware_logging"])
 
-    def _logging(self, entry):
-        parts = entry.entries()
-        self._check_keys(parts, _LOGGING)
-        default_topics = _entries(parts, "default_topics")
-        self._check_keys(default_topics, DEFAULT_TOPICS)
-        standard = []
-        for key, inner in default_topics.items():
-            if DEFAULT_TOPICS.get(key) == "":
-                remark = inner.error("is not offered by the driver, and is ignored")
-                self.remarks.add(str(remark), inner.line)
-            elif key in DEFAULT_TOPICS and self._read(inner, DefaultTopicSettings) is not None:
-                standard.append(DEFAULT_TOPICS[key])
-                if "frequency" in inner:
-                    self.remarks.idle(inner["frequency"], "frequency of a default topic")
-        custom = {}
-        for key, inner in _entries(parts, "custom_topics").items():
-            topic = self._read(inner, LogTopicSettings)
-            self._check_type(VEHICLE_NAME, key, inner)
-            if topic is not None:
-                custom[key] = topic
-        enabled = "enabled" not in parts or self._check_type(
-            BOOLEAN, parts["enabled"].value, parts["enabled"]
-        )
-        # For safety, the battery is always monitored.
-        names = ("battery", *standard) if enabled else ("battery",)
-        return tuple(dict.fromkeys(names)), custom if enabled else {}
+def _leaves(entry: Entry, prefix: str = "") -> Iterator[tuple[str, Entry]]:
+    """Yield settings by their names, those of groups, too."""
+    for key, inner in entry.entries().items():
+        if key in _GROUPS and not prefix:
+            yield from _leaves(inner, f"{key}/")
+        else:
+            yield prefix + key, inner
 
 
 def _entries(parts, key):
     return parts[key].entries() if key in parts else {}
-
-
-def entry_at(entry: Entry, path: str) -> Entry | None:
-    """Return the entry at a path, such as motion_capture/marker, or None."""
-    for key in path.split("/"):
-        if key not in entry:
-            return None
-        entry = entry[key]
-    return entry
 
 
 def close_vehicles(
@@ -349,18 +337,3 @@ def close_vehicles(
     """Return the pairs of vehicles whose start points are too close; see `close_pairs`."""
     positions = np.array([vehicle.position for vehicle in vehicles])
     return sorted(close_pairs(positions, [vehicle.buffer for vehicle in vehicles]))
-
-
-def _merged(nodes):
-    """Return a mapping with the values of all, the last one's first; each keeps its line."""
-    if not all(isinstance(node, yaml.MappingNode) for node in nodes):
-        return nodes[-1]
-    values: dict[str, list[yaml.Node]] = {}
-    keys = {}
-    for node in nodes:
-        for key, value in node.value:
-            keys[key.value] = key
-            values.setdefault(key.value, []).append(value)
-    merged = [(keys[name], _merged(layers)) for name, layers in values.items()]
-    last = nodes[-1]
-    return yaml.MappingNode(last.tag, merged, last.start_mark, last.end_mark)

@@ -9,7 +9,7 @@ from std_msgs.msg import Empty
 
 from crazyflie_driver import srv
 from crazyflie_driver.msg import Hover, Position, VelocityWorld
-from crazyflie_fleet.high_level_services import full_state_message, setpoint_goal, to_message
+from crazyflie_fleet.high_level_services import full_state_message, setpoint_of, to_message
 from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_utils import ServiceError
@@ -28,12 +28,12 @@ def test_a_full_state_has_the_heading_of_its_goal():
     message = full_state_message(at_rest((0.5, 0.0, 1.0), math.pi / 2.0))
     q = message.pose.orientation
     assert (q.x, q.y, q.z, q.w) == pytest.approx((0.0, 0.0, 0.7071068, 0.7071068))
-    assert setpoint_goal(message).yaw == pytest.approx(1.5707963)
+    assert setpoint_of(message).yaw == pytest.approx(1.5707963)
 
 
 def test_setpoints_are_followed_until_they_stop(bench):
     goal = Goal((0.5, 0.0, 1.0), (0.2, 0.0, 0.0), (0.0, 0.0, 0.0), 0.3, 0.0)
-    assert setpoint_goal(full_state_message(goal)).yaw == pytest.approx(0.3)
+    assert setpoint_of(full_state_message(goal)).yaw == pytest.approx(0.3)
     bench.process.publish(f"{TOP}/cmd_full_state", full_state_message(goal))
     assert bench.references()[-1] == pytest.approx([0.5, 0.0, 1.0, 0.2, 0.0, 0.0])
     bench.see((0.5, 0.0, 1.0))

@@ -7,12 +7,13 @@ import rospy
 from geometry_msgs.msg import Point
 from std_msgs.msg import Float64MultiArray
 
-from crazyflie_driver.msg import Position
+from crazyflie_driver.msg import Hover, Position
 from crazyflie_driver.srv import GoToRequest
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.high_level_node import HighLevelNode
+from crazyflie_fleet.high_level_services import full_state_message
 from crazyflie_fleet.references_node import ReferencesNode
-from crazyflie_model.polynomials import at_rest
+from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import (
     FlightStatus,
     PositionVelocityState,
@@ -419,6 +420,20 @@ def test_a_vehicle_whose_model_has_no_yaw_refuses_one():
     with pytest.raises(ServiceError, match="yaw is 1 rad, and the controller keeps the heading 0"):
         flight.go_to(yaw=1.0)
     flight.go_to(yaw=math.nan)
+
+
+def test_a_vehicle_whose_model_has_no_yaw_keeps_its_heading_by_setpoints():
+    flight = Flight(has_yaw=False)
+    for setpoint in (
+        full_state_message(Goal((0.0, 0.1, 1.0), (0.0,) * 3, (0.0,) * 3, 0.5, 0.5)),
+        Position(y=0.2, z=1.0, yaw=30.0),
+        Hover(yawrate=20.0, zDistance=1.0),
+    ):
+        name = type(setpoint).__name__
+        topic = {"FullState": "full_state"}.get(name, name.lower())
+        flight.process.publish(f"/cf1/high_level/cmd_{topic}", setpoint)
+        assert flight.followed("cf1")[-1].state.yaw == 0.0
+    assert len(flight.followed("cf1")) == 3
 
 
 def test_both_services_fly_the_same_move():

@@ -14,12 +14,12 @@ from typing_extensions import override
 from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
 from crazyflie_fleet.commanded_references import CommandedReferences
-from crazyflie_fleet.follower import CommandFollower, Velocity
+from crazyflie_fleet.follower import CommandFollower
 from crazyflie_fleet.high_level_services import (
     HighLevelParameters,
     from_message,
     relay,
-    setpoint_goal,
+    setpoint_of,
 )
 from crazyflie_fleet.references_node import TrackedVehicle
 from crazyflie_model.polynomials import Goal, at_rest
@@ -99,14 +99,14 @@ class HighLevelNode(Node[HighLevelParameters]):
             self._vehicle.ahead = self._references.ahead
             handle.advertise_service("go_to", srv.GoTo, self._on_limited_go_to)
         handle.subscribe(parameters.start_topic, String, self._on_start_all)
-        for name, message_type, callback in (
-            ("full_state", FullState, self._on_position_setpoint),
-            ("position", Position, self._on_position_setpoint),
-            ("velocity_world", VelocityWorld, self._on_velocity_setpoint),
-            ("hover", Hover, self._on_hover_setpoint),
-            ("stop", EmptyMessage, self._on_stop_setpoint),
+        for name, message_type in (
+            ("full_state", FullState),
+            ("position", Position),
+            ("velocity_world", VelocityWorld),
+            ("hover", Hover),
         ):
-            handle.subscribe(f"~cmd_{name}", message_type, callback)
+            handle.subscribe(f"~cmd_{name}", message_type, self._on_setpoint)
+        handle.subscribe("~cmd_stop", EmptyMessage, self._on_stop_setpoint)
 
     @override
     def enter_safe_state(self) -> None:
@@ -317,35 +317,26 @@ class HighLevelNode(Node[HighLevelParameters]):
         except RefusalError as reason:
             self._handle.error(f"not done: {reason}")
 
-    # Setpoints of the driver; in its messages the yaw rate is clockwise, in deg/s.
-
-    def _on_position_setpoint(self, message):
-        goal = setpoint_goal(message)
-        self._take(goal, (*goal.position, *goal.velocity), goal.yaw)
-
-    def _on_velocity_setpoint(self, message):
-        velocity: Any = to_tuple(message.vel)
-        self._take(Velocity(velocity, self._yaw_rate(message.yawRate)), velocity, message.yawRate)
-
-    def _on_hover_setpoint(self, message):
-        numbers = (message.vx, message.vy, message.zDistance)
-        rate = self._yaw_rate(message.yawrate)
-        setpoint = Velocity((message.vx, message.vy, 0.0), rate, message.zDistance)
-        self._take(setpoint, numbers, message.yawrate)
+    # Setpoints of the driver.
 
     def _on_stop_setpoint(self, _):
         self._handle.warn("ignoring cmd_stop: a vehicle in flight would fall", throttle=1.0)
 
-    def _yaw_rate(self, clockwise):
-        return -math.radians(clockwise) if self._parameters.has_yaw else 0.0
-
-    def _take(self, setpoint, numbers, turn):
-        if not all(map(math.isfinite, (*numbers, turn))):
+    def _on_setpoint(self, message):
+        setpoint = straight = setpoint_of(message)
+        if isinstance(setpoint, Goal):
+            numbers = [*setpoint.position, *setpoint.velocity, setpoint.yaw]
+            straight = setpoint._replace(yaw=0.0, yaw_rate=0.0)
+        else:
+            numbers = [*setpoint.velocity, setpoint.yaw_rate, setpoint.height or 0.0]
+            straight = setpoint._replace(yaw_rate=0.0)
+        if not all(map(math.isfinite, numbers)):
             self._handle.warn("ignoring a setpoint that is not finite", throttle=1.0)
             return
-        if turn and not self._parameters.has_yaw:
+        if setpoint != straight and not self._parameters.has_yaw:
             text = "the controller keeps the heading 0: yaw and yaw rate of setpoints are ignored"
             self._handle.warn(text, throttle=10.0)
+            setpoint = straight
         is_to_land = self._vehicle is not None and self._vehicle.is_to_land
         if self._is_followed() and not is_to_land:
             try:

@@ -8,7 +8,8 @@ import genpy
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from std_srvs.srv import Empty, EmptyRequest
 
-from crazyflie_driver.msg import FullState, Position, TrajectoryPolynomialPiece
+from crazyflie_driver import msg
+from crazyflie_fleet.follower import Velocity
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_model.polynomials import Goal, PolynomialPiece, at_rest
 from crazyflie_msgs.msg import (
@@ -24,12 +25,14 @@ from crazyflie_utils.parameters.types import BOOLEAN, FRAME, SERVICE, TIME_STEP,
 from crazyflie_utils.vectors import to_tuple
 
 
-def to_message(piece: PolynomialPiece) -> TrajectoryPolynomialPiece:
+def to_message(piece: PolynomialPiece) -> msg.TrajectoryPolynomialPiece:
     """Return a piece for the service upload_trajectory."""
-    return TrajectoryPolynomialPiece(*piece.padded_axes, genpy.Duration.from_sec(piece.duration))
+    return msg.TrajectoryPolynomialPiece(
+        *piece.padded_axes, genpy.Duration.from_sec(piece.duration)
+    )
 
 
-def from_message(message: TrajectoryPolynomialPiece) -> PolynomialPiece:
+def from_message(message: msg.TrajectoryPolynomialPiece) -> PolynomialPiece:
     """Return an uploaded piece."""
     axes = (message.poly_x, message.poly_y, message.poly_z, message.poly_yaw)
     return PolynomialPiece(message.duration.to_sec(), *axes)
@@ -45,9 +48,9 @@ def reference_message(
     return PositionVelocityStateStamped(state=PositionVelocityState(*goal.position, *goal.velocity))
 
 
-def full_state_message(goal: Goal[float], frame: str = "world") -> FullState:
+def full_state_message(goal: Goal[float], frame: str = "world") -> msg.FullState:
     """Return the driver's setpoint in the fixed frame, without a stamp."""
-    message = FullState(
+    message = msg.FullState(
         pose=Pose(Point(*goal.position), Quaternion(*quaternion_from_rpy(0.0, 0.0, goal.yaw))),
         twist=Twist(Vector3(*goal.velocity), Vector3(0.0, 0.0, goal.yaw_rate)),
         acc=Vector3(*goal.acceleration),
@@ -61,10 +64,18 @@ def heading(x: float, y: float, z: float, w: float) -> float:
     return math.remainder(2.0 * math.atan2(z, w), 2.0 * math.pi)
 
 
-def setpoint_goal(message: FullState | Position) -> Goal[float]:
-    """Return the goal of a setpoint of position."""
-    if isinstance(message, Position):
+def setpoint_of(
+    message: msg.FullState | msg.Position | msg.VelocityWorld | msg.Hover,
+) -> Goal[float] | Velocity:
+    """Return the setpoint of a message, whose yaw rate is clockwise, in deg/s."""
+    if isinstance(message, msg.Position):
         return at_rest((message.x, message.y, message.z), math.radians(message.yaw))
+    if isinstance(message, msg.VelocityWorld):
+        velocity: Any = to_tuple(message.vel)
+        return Velocity(velocity, -math.radians(message.yawRate))
+    if isinstance(message, msg.Hover):
+        ahead, rate = (message.vx, message.vy, 0.0), -math.radians(message.yawrate)
+        return Velocity(ahead, rate, message.zDistance)
     pose, twist = message.pose, message.twist
     motion = map(to_tuple, (pose.position, twist.linear, message.acc))
     goal: Any = (*motion, heading(*to_tuple(pose.orientation)), twist.angular.z)

@@ -44,20 +44,18 @@ class PlanMarker:
 
     def show(self, trajectory: Trajectory | None) -> None:
         """Publish a trajectory, which replaces the last one; None removes it."""
-        if trajectory is not None:
-            count = min(_POINTS * len(trajectory.pieces), _MAX_POINTS)
-            times = (trajectory.duration * k / count for k in range(count + 1))
-            points = [Point(*trajectory.evaluate(time).position) for time in times]
-            self._publish(Marker.ADD, points)
-        elif self._is_shown:
-            self._publish(Marker.DELETE, [])
+        if trajectory is None and not self._is_shown:
+            return
         self._is_shown = trajectory is not None
-
-    def _publish(self, action, points):
-        marker = Marker(ns=self._namespace, type=Marker.LINE_STRIP, action=action, points=points)
+        marker = Marker(ns=self._namespace, type=Marker.LINE_STRIP, action=Marker.DELETE)
         marker.header.frame_id = self._frame
         marker.pose.orientation.w = 1.0
         marker.scale.x, marker.color = _WIDTH, _COLOUR
+        if trajectory is not None:
+            marker.action = Marker.ADD
+            count = min(_POINTS * len(trajectory.pieces), _MAX_POINTS)
+            times = (trajectory.duration * k / count for k in range(count + 1))
+            marker.points = [Point(*trajectory.evaluate(time).position) for time in times]
         self._publisher.publish(MarkerArray([marker]))
 
 

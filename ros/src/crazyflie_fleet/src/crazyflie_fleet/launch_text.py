@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from xml.etree import ElementTree
 
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import LOCAL
@@ -22,19 +22,15 @@ def launch_text(path: str | Path) -> str:
     path = Path(path).absolute()
     fleet = fleet_file.load(path)
     used = dict.fromkeys(vehicle.machine for vehicle in fleet.vehicles)
-    lines = ["<launch>"]
+    launch = ElementTree.Element("launch")
     for name in used:
-        if name == LOCAL:
-            continue
-        machine = fleet.machines[name]
-        attributes = {
-            "name": name,
-            "address": machine.address,
-            "env-loader": machine.env_loader,
-            **({"user": machine.user} if machine.user else {}),
-        }
-        words = " ".join(f"{key}={quoteattr(value)}" for key, value in attributes.items())
-        lines.append(f"  <machine {words} />")
+        if name != LOCAL:
+            machine = fleet.machines[name]
+            attributes = {"name": name, "address": machine.address}
+            attributes["env-loader"] = machine.env_loader
+            if machine.user:
+                attributes["user"] = machine.user
+            ElementTree.SubElement(launch, "machine", attributes)
     for name in used:
         is_local = name == LOCAL
         arguments = {
@@ -44,13 +40,12 @@ def launch_text(path: str | Path) -> str:
             "host": "" if is_local else name,
             "rviz": "false",
         }
-        lines.append('  <include file="$(find crazyflie_examples)/launch/sw_swarm.launch">')
-        lines += [
-            f"    <arg name={quoteattr(key)} value={quoteattr(value)} />"
-            for key, value in arguments.items()
-        ]
-        lines.append("  </include>")
-    return "\n".join([*lines, "</launch>", ""])
+        file = "$(find crazyflie_examples)/launch/sw_swarm.launch"
+        include = ElementTree.SubElement(launch, "include", file=file)
+        for key, value in arguments.items():
+            ElementTree.SubElement(include, "arg", name=key, value=value)
+    ElementTree.indent(launch)
+    return ElementTree.tostring(launch, "unicode") + "\n"
 
 
 def main() -> int:

@@ -1,7 +1,7 @@
 """crazyswarm2's motion_capture.yaml and server.yaml as parameters of the nodes here."""
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from crazyflie_fleet.fleet_parser import Remarks
 from crazyflie_utils import Parameters, parameter
@@ -23,12 +23,7 @@ _LINK = "warnings/communication/"
 _SHARE = Number("", minimum=0.0, maximum=1.0)
 #: Settings without effect here, because the driver's diagnostics come once a second, with the
 #: figures of each link; it reads all parameters; and a simulation has a launch file of its own.
-_WITHOUT_EFFECT = (
-    "warnings/frequency",
-    _LINK + "publish_stats",
-    "firmware_params",
-    "sim",
-)
+_WITHOUT_EFFECT = ("warnings/frequency", _LINK + "publish_stats", "firmware_params", "sim")
 
 
 class MotionCaptureSettings(Parameters):
@@ -58,15 +53,15 @@ def load_motion_capture(path: str | Path) -> dict[str, Any]:
     node = node_parameters(path)
     # Here, their topics and rigid bodies follow from the fleet file.
     settings = node.read(MotionCaptureSettings, _CONFIGURATIONS, lambda entry, known: None)
-    backend = _BACKENDS[settings.type]
-    is_natnet = backend == "natnet"
-    address = "optitrack_config/server_address" if is_natnet else "motioncapture_config/hostname"
+    address, backend = "motioncapture_config/hostname", _BACKENDS[settings.type]
+    if backend == "natnet":
+        address = "optitrack_config/server_address"
     given = {key: node[key].value for key in _CONFIGURATIONS if key in node}
     return {"backend": backend, address: settings.hostname, **given}
 
 
 class ServerSettings(Parameters):
-    """Thresholds of the warnings of crazyswarm2's server."""
+    """Thresholds of the warnings of crazyswarm2's server, named as the driver's of a link."""
 
     rate_limits: tuple[float, float] | None = parameter(
         ListOf(Number("Hz", minimum=0.0), 2),
@@ -77,7 +72,7 @@ class ServerSettings(Parameters):
     max_latency: float | None = parameter(
         Number("ms", above=0.0), "of a link", None, _LINK + "max_unicast_latency"
     )
-    min_ack_rate: float | None = parameter(
+    min_quality: float | None = parameter(
         _SHARE, "of packets", None, _LINK + "min_unicast_ack_rate"
     )
     min_unicast_rate: float | None = parameter(
@@ -88,16 +83,8 @@ class ServerSettings(Parameters):
     )
 
 
-class ServerFile(NamedTuple):
-    """Content of server.yaml: parameters of the driver and of mocap_node, and remarks."""
-
-    driver: dict[str, Any]
-    motion_capture: dict[str, Any]
-    remarks: tuple[str, ...]
-
-
-def load_server(path: str | Path) -> ServerFile:
-    """Return the content of a file.
+def load_server(path: str | Path) -> tuple[dict[str, Any], dict[str, Any], tuple[str, ...]]:
+    """Return the content of server.yaml: parameters of the driver and of mocap_node, and remarks.
 
     Raises
     ------
@@ -114,17 +101,10 @@ def load_server(path: str | Path) -> ServerFile:
         else:
             remarks.unknown(entry, known)
 
-    settings = node.read(ServerSettings, on_unknown=on_unknown)
-    latency = settings.max_latency
-    driver = {
-        "link/max_latency": None if latency is None else latency / 1000.0,
-        "link/min_quality": settings.min_ack_rate,
-        "link/min_unicast_rate": settings.min_unicast_rate,
-        "link/min_broadcast_rate": settings.min_broadcast_rate,
-    }
-    limits = settings.rate_limits
-    return ServerFile(
-        {key: value for key, value in driver.items() if value is not None},
-        {} if limits is None else {"rate_limits": list(limits)},
-        remarks.texts(),
-    )
+    settings = vars(node.read(ServerSettings, on_unknown=on_unknown))
+    given = {name: value for name, value in settings.items() if value is not None}
+    motion_capture = {"rate_limits": [*given.pop("rate_limits")]} if "rate_limits" in given else {}
+    if "max_latency" in given:
+        given["max_latency"] /= 1000.0
+    driver = {f"link/{name}": value for name, value in given.items()}
+    return driver, motion_capture, remarks.texts()

@@ -29,9 +29,9 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     config = handle.load(DriverFleetParameters)
     given = config.fleet().broadcasts
     if config.server:
-        server = load_server(config.server)
-        given = {**given, **server.driver}
-        for remark in server.remarks:
+        limits, _, remarks = load_server(config.server)
+        given = {**given, **limits}
+        for remark in remarks:
             handle.warn(remark)
     for key, value in given.items():
         handle.set_param(f"{handle.name}/{key}", value)

@@ -111,7 +111,8 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     config = handle.load(MocapFleetParameters)
     given = load_motion_capture(config.motion_capture) if config.motion_capture else {}
     if config.server:
-        given |= load_server(config.server).motion_capture
+        _, limits, _ = load_server(config.server)
+        given |= limits
     for key, value in given.items():
         handle.set_param(f"{handle.name}/{key}", value)
     fleet, kind = config.fleet(), NODE_PARAMETERS

@@ -26,10 +26,6 @@ class VirtualFleetParameters(FleetParameters):
     attitude_noise: float = parameter(Number("rad", minimum=0.0), "of motion capture", 0.001)
 
 
-#: Positioning of a vehicle -> that of the virtual vehicle, where the names differ.
-DECKS = {name: name for name in (FLOW, LIGHTHOUSE, LOCO)}
-
-
 def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     """Return all nodes of the process by name, and set the parameters that they will load.
 
@@ -43,50 +39,39 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
         raise ParameterError(f"parameter {handle.name}/fleet/virtual_port is 0; expected a port")
     nodes: dict[str, Node] = {}
     fleet = config.fleet()
-    single_markers = []
     for number, vehicle in enumerate(fleet.vehicles):
         x, y, z = vehicle.position
         if z != 0.0:
             handle.warn(f"{vehicle.name} starts on the ground, and not at a height of {z:g} m")
         name = f"{handle.name}/{vehicle.name}"
-        handle.set_param(
-            name,
-            {
-                "port": config.virtual_port + number,
-                "init": {"x": x, "y": y},
-                "model": vehicle.vehicle_model,
-                "mass_error": config.mass_error,
-                "thrust_error": config.thrust_error,
-                "seed": number,
-                "topics": {"true_pose": f"/{vehicle.name}/true_pose"},
-                "positioning": DECKS.get(vehicle.positioning, DECK),
-                "observer": {
-                    "port": config.observer_port,
-                    "name": vehicle.name,
-                    "id": number + 1,
-                },
-            },
-        )
+        observer = {"port": config.observer_port, "name": vehicle.name, "id": number + 1}
+        has_deck = vehicle.positioning in (FLOW, LIGHTHOUSE, LOCO)
+        parameters = {
+            "port": config.virtual_port + number,
+            "init": {"x": x, "y": y},
+            "model": vehicle.vehicle_model,
+            "mass_error": config.mass_error,
+            "thrust_error": config.thrust_error,
+            "seed": number,
+            "topics": {"true_pose": f"/{vehicle.name}/true_pose"},
+            "positioning": vehicle.positioning if has_deck else DECK,
+            "observer": observer,
+        }
+        handle.set_param(name, parameters)
         nodes[name] = VirtualCrazyflieNode()
-        if vehicle.has_single_marker:
-            single_markers.append(str(number + 1))
-    seen = bodies(fleet, config.fixed_frame)
-    if not seen:
+    if not (seen := bodies(fleet, config.fixed_frame)):
         # All vehicles use their decks for positioning.
         return nodes
     ports = {"command_port": config.command_port, "data_port": config.data_port}
-    noise = {"position": config.position_noise, "attitude": config.attitude_noise}
-    own = {**ports, "observer": {"port": config.observer_port}, "noise": noise}
-    seen_as = {"single_markers": ",".join(single_markers)}
-    handle.set_param(f"{handle.name}/mocap", {**own, **seen_as})
-    nodes[f"{handle.name}/mocap"] = VirtualMocapNode()
-    local = {"server_address": "127.0.0.1", "local_address": "127.0.0.1"}
-    client = {
-        "backend": "natnet",
-        "up_axis": "z",
-        **seen,
-        "optitrack_config": {**ports, **local},
+    single = [str(k) for k, vehicle in enumerate(fleet.vehicles, 1) if vehicle.has_single_marker]
+    mocap = {
+        **ports,
+        "observer": {"port": config.observer_port},
+        "noise": {"position": config.position_noise, "attitude": config.attitude_noise},
+        "single_markers": ",".join(single),
     }
+    local = {"server_address": "127.0.0.1", "local_address": "127.0.0.1"}
+    client = {"backend": "natnet", "up_axis": "z", **seen, "optitrack_config": {**ports, **local}}
+    handle.set_param(f"{handle.name}/mocap", mocap)
     handle.set_param("/mocap_node", client)
-    nodes["/mocap_node"] = MocapNode()
-    return nodes
+    return {**nodes, f"{handle.name}/mocap": VirtualMocapNode(), "/mocap_node": MocapNode()}

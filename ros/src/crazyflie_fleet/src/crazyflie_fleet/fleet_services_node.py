@@ -187,7 +187,8 @@ class FleetServicesNode(Node):
                 outcome.set_result(refusals)
 
         for name in names:
-            self._lander.call(name, service, service_type, request, on_answer)
+            call = self._lander.call(name, service, service_type, request)
+            call.add_done_callback(partial(on_answer, name))
         return outcome
 
     def _response(self, service_type: Any, refusals: Refusals) -> Any:

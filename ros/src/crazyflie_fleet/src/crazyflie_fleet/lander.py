@@ -1,6 +1,6 @@
 """Landings of a fleet by ROS, in rounds."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
 from typing import Any
@@ -57,16 +57,16 @@ class Lander(LandingSide):
         # Vehicles whose landing service has not answered.
         self._calls: set[str] = set()
         self._refusals: dict[str, str] = {}
-        self._answers: list[Future[Refusals]] = []
+        self._answer: Future[Refusals] | None = None  # Of all landings that have not ended.
         self._rounds: Iterator[None] = iter(())
         handle.timer(_PERIOD, self._on_timer)
 
     def land(self, names: Iterable[str]) -> "Future[Refusals]":
         """Land vehicles; return, when all are down, name to reason of those that did not land."""
-        answer: Future[Refusals] = Future()
-        if not self._answers:
+        answer = self._answer
+        if answer is None:
+            answer = self._answer = Future()
             self._rounds = land_in_rounds(self)
-        self._answers.append(answer)
         self._begin = self.time()
         for name in names:
             position = self._states.positions[self._states.numbers[name]]
@@ -87,14 +87,14 @@ class Lander(LandingSide):
         self._finish()
 
     def _on_timer(self):
-        if self._answers and next(self._rounds, self) is self:
+        if self._answer is not None and next(self._rounds, self) is self:
             self._finish()
 
     def _finish(self):
         self._publish_left()
-        answers, self._answers = self._answers, []
+        answer, self._answer = self._answer, None
         refusals, self._refusals = self._refusals, {}
-        for answer in answers:
+        if answer is not None:
             answer.set_result(refusals)
 
     def _publish_left(self):
@@ -145,7 +145,8 @@ class Lander(LandingSide):
             request = GoToRequest(
                 0, False, Point(*goal), KEEP_HEADING, genpy.Duration.from_sec(duration)
             )
-            self.call(name, "go_to", GoTo, request, self._note_refusal)
+            call = self.call(name, "go_to", GoTo, request)
+            call.add_done_callback(partial(self._note_refusal, name))
         return self.time() + duration
 
     @override
@@ -159,22 +160,15 @@ class Lander(LandingSide):
         self._refusals[name] = reason
         self._left = [each for each in self._left if each != name]
 
+    def call(self, name: str, service: str, service_type: Any, request: Any) -> "Future[Any]":
+        """Call a service of a vehicle."""
+        service = f"/{name}/{service}"
+        return self._handle.call_service(service, service_type, request, SERVICE_TIMEOUT)
+
     def _call_land(self, name):
         self._calls.add(name)
-        self.call(name, "land", Empty, EmptyRequest(), self._on_landed)
-
-    def call(
-        self,
-        name: str,
-        service: str,
-        service_type: Any,
-        request: Any,
-        on_answer: Callable[[str, "Future[Any]"], None],
-    ) -> None:
-        """Call a service of a vehicle, and then ``on_answer(name, answer)``."""
-        service = f"/{name}/{service}"
-        call = self._handle.call_service(service, service_type, request, SERVICE_TIMEOUT)
-        call.add_done_callback(partial(on_answer, name))
+        call = self.call(name, "land", Empty, EmptyRequest())
+        call.add_done_callback(partial(self._on_landed, name))
 
     def _on_landed(self, name, done):
         self._calls.discard(name)

@@ -5,14 +5,15 @@ import math
 import pytest
 import rospy
 from geometry_msgs.msg import Point
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 
 from crazyflie_driver.msg import Hover, Position
-from crazyflie_driver.srv import GoToRequest
+from crazyflie_driver.srv import GoToRequest, UploadTrajectoryRequest
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.high_level_node import HighLevelNode
-from crazyflie_fleet.high_level_services import full_state_message
+from crazyflie_fleet.high_level_services import full_state_message, to_message
 from crazyflie_fleet.references_node import ReferencesNode
+from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import (
     FlightStatus,
@@ -371,6 +372,30 @@ def test_a_landing_ends_a_way(flight):
     count = len(flight.followed("cf1"))
     flight.process.advance(1.0)
     assert len(flight.followed("cf1")) == count
+
+
+def test_a_vehicle_that_the_fleet_lands_starts_no_trajectory(flight):
+    piece = to_message(smooth_piece(at_rest((0.0, 0.0, 1.0)), (0.0, 0.5, 1.0), 0.0, 2.0))
+    upload = UploadTrajectoryRequest(0, 0, [piece])
+    flight.process.call("/cf1/high_level/upload_trajectory", upload)
+    flight.process.publish("/fleet/landing", String("cf1"))
+    flight.process.publish("/all/start_trajectory", String("/cf1/high_level"))
+    flight.process.advance(1.0)
+    assert flight.followed("cf1")[-1].state.y == 0.0
+    assert flight.process.logged("error") == [
+        "/cf1/high_level: not done: the fleet is landing the vehicle; it takes no commands"
+    ]
+
+
+def test_a_vehicle_that_the_fleet_lands_forgets_what_was_to_follow_its_takeoff(flight):
+    flight.process.publish("/cf1/in_flight_flight_status", flight_status("TAKING_OFF"))
+    flight.process.call(
+        "/cf1/high_level/go_to", GoToRequest(0, False, Point(0, 0.5, 1), 0.0, rospy.Duration(2))
+    )
+    flight.process.publish("/fleet/landing", String("cf1"))
+    flight.process.publish("/cf1/in_flight_flight_status", flight_status("FLYING"))
+    flight.process.advance(1.0)
+    assert flight.followed("cf1") == []
 
 
 def test_go_to_is_refused(flight):

@@ -295,9 +295,16 @@ class HighLevelNode(Node[HighLevelParameters]):
         self._references.end_setpoints()
         return srv.NotifySetpointsStopResponse()
 
-    def _execute(self, command, *arguments):
-        if self._vehicle is not None and self._vehicle.is_to_land:
+    def _is_to_land(self):
+        """Return whether only the fleet moves the vehicle."""
+        return self._vehicle is not None and self._vehicle.is_to_land
+
+    def _refuse_if_to_land(self):
+        if self._is_to_land():
             raise RefusalError("the fleet is landing the vehicle; it takes no commands")
+
+    def _execute(self, command, *arguments):
+        self._refuse_if_to_land()
         self._go(command, *arguments)
 
     def _go(self, command, *arguments):
@@ -313,6 +320,7 @@ class HighLevelNode(Node[HighLevelParameters]):
 
     def _begin_or_log(self, command, *arguments):
         try:
+            self._refuse_if_to_land()
             self._references.begin(command, *arguments)
         except RefusalError as reason:
             self._handle.error(f"not done: {reason}")
@@ -337,8 +345,7 @@ class HighLevelNode(Node[HighLevelParameters]):
             text = "the controller keeps the heading 0: yaw and yaw rate of setpoints are ignored"
             self._handle.warn(text, throttle=10.0)
             setpoint = straight
-        is_to_land = self._vehicle is not None and self._vehicle.is_to_land
-        if self._is_followed() and not is_to_land:
+        if self._is_followed() and not self._is_to_land():
             try:
                 self._references.take(setpoint, self._status.ground)
             except RefusalError as reason:

@@ -3,8 +3,9 @@
 import pytest
 
 from mocap_optitrack.bodies import RIGID_BODIES
+from mocap_optitrack.frame_times import FrameOrder
 from mocap_optitrack.frames import SeenBody
-from mocap_optitrack.health import ERROR, OK, WARN, FrameEvent, Health
+from mocap_optitrack.health import ERROR, OK, WARN, Health
 
 BODIES = RIGID_BODIES({"1": {"pose": "one"}, "cf7": {"pose": "seven"}})
 ONE, SEVEN = BODIES
@@ -83,6 +84,14 @@ def test_a_connection_that_ended(health):
     assert one[1:3] == (ERROR, "no frames")
 
 
+def test_a_connection_that_is_made_again_between_two_reports(health):
+    stream(health, 0.0, 0.5, ONE)
+    health.disconnected("the cable is out")
+    health.connected("a server")
+    stream_status, one, _ = health.report(1.0)
+    assert stream_status[1:3] == one[1:3] == (ERROR, "no frames")
+
+
 def test_a_connection_that_is_silent(health):
     stream(health, 0.0, 1.0, ONE)
     health.report(1.0)
@@ -96,12 +105,12 @@ def test_a_connection_that_is_silent(health):
 
 
 def test_while_the_clock_is_learned(health):
-    health.count(FrameEvent.LEARNING)
+    health.count(FrameOrder.LEARNING)
     assert health.report(1.0)[0][1:3] == (WARN, "learning the server's clock")
 
 
 def test_stale_frames_only(health):
-    health.count(FrameEvent.STALE)
+    health.count(FrameOrder.STALE)
     stream_status = health.report(1.0)[0]
     assert stream_status.level == ERROR
     assert "all frames are stale" in stream_status.message
@@ -110,11 +119,11 @@ def test_stale_frames_only(health):
 
 def test_a_clock_that_jumps_once_is_no_fault_but_again_and_again_is(health):
     stream(health, 0.0, 1.0, ONE)
-    health.count(FrameEvent.CLOCK_SET)
+    health.count(FrameOrder.RESTART)
     assert health.report(1.0)[0].level == OK
     stream(health, 1.0, 2.0, ONE)
-    health.count(FrameEvent.CLOCK_SET)
-    health.count(FrameEvent.CLOCK_SET)
+    health.count(FrameOrder.RESTART)
+    health.count(FrameOrder.RESTART)
     level, message = health.report(2.0)[0][1:3]
     assert level == ERROR
     assert "two servers" in message
@@ -124,7 +133,7 @@ def test_a_clock_that_jumps_once_is_no_fault_but_again_and_again_is(health):
 def test_frames_of_two_servers(health, foreign, level):
     stream(health, 0.0, 1.0, ONE)
     for _ in range(foreign):
-        health.count(FrameEvent.FOREIGN)
+        health.count(FrameOrder.FOREIGN)
     assert health.report(1.0)[0].level == level
 
 

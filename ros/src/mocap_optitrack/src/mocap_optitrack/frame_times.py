@@ -1,5 +1,6 @@
 """Times of exposure or arrival of frames, for streams with and without time stamps."""
 
+import math
 from collections import deque
 from enum import Enum
 from statistics import median
@@ -29,13 +30,15 @@ _CONTRADICTION_LIMIT = 10
 
 
 class FrameOrder(Enum):
-    """Order of a message among those before it, by its times."""
+    """What a message is among those before it, by its times."""
 
     NEW = "new"  #: It was sent after all others.
     OLD = "old"  #: It was sent with or before one that has come already: duplicated, or overtaken.
     FOREIGN = "foreign"  #: It was stamped by another clock: too old, or later than its arrival.
     #: One of the clocks was set; learning restarts with this message.
     RESTART = "restart"
+    LEARNING = "learning"  #: It is new, but its time by the local clock is not known yet.
+    STALE = "stale"  #: It is new, but too old to be used.
 
 
 class ClockOffset:
@@ -51,13 +54,16 @@ class ClockOffset:
     clock been set, or the server been restarted, and learning restarts.
     """
 
-    _offset: float | None
-    _newest: float | None
-    _updated: float
-    _contradictions: int
-
     def __init__(self) -> None:
         self._reset()
+
+    def _reset(self) -> None:
+        # Begin and smallest difference of each bucket.
+        self._window: deque[tuple[float, float]] = deque(maxlen=_BUCKETS)
+        self._offset: float | None = None
+        self._updated = 0.0
+        self._newest = -math.inf
+        self._contradictions = 0
 
     @property
     def is_settled(self) -> bool:
@@ -77,10 +83,8 @@ class ClockOffset:
             self._contradictions += sent != self._newest
             if self._contradictions < _CONTRADICTION_LIMIT:
                 return order
+        if order is not FrameOrder.NEW or self._has_lagged():
             order = FrameOrder.RESTART
-        elif self._has_lagged():
-            order = FrameOrder.RESTART
-        if order is FrameOrder.RESTART:
             self._reset()
         self._contradictions = 0
         self._newest = sent
@@ -103,20 +107,10 @@ class ClockOffset:
             raise ValueError("the offset of the server's clock has not settled yet")
         return moment + self._offset
 
-    def _reset(self):
-        # Begin and smallest difference of each bucket.
-        self._window: deque[tuple[float, float]] = deque(maxlen=_BUCKETS)
-        self._offset = None
-        self._updated = 0.0
-        self._newest = None
-        self._contradictions = 0
-
     def _shortest(self):
-        return min(smallest for _, smallest in self._window)
+        return min((smallest for _, smallest in self._window), default=-math.inf)
 
     def _classify(self, sent, difference):
-        if self._newest is None:
-            return FrameOrder.NEW
         if sent < self._newest - _RESTART or difference < self._shortest() - _JUMP:
             return FrameOrder.FOREIGN
         return FrameOrder.OLD if sent <= self._newest else FrameOrder.NEW
@@ -127,11 +121,10 @@ class ClockOffset:
 
     def _is_plausible(self):
         # The last bucket is still open, and its value preliminary.
-        *closed, _ = self._window
-        if len(closed) < 2:
-            return False
-        (_, before), (_, last) = closed[-2:]
-        return abs(last - before) < _AGREEMENT or len(self._window) == _BUCKETS
+        closed = [smallest for _, smallest in self._window][:-1]
+        return len(closed) >= 2 and (
+            abs(closed[-1] - closed[-2]) < _AGREEMENT or len(self._window) == _BUCKETS
+        )
 
     def _collect(self, arrival, difference):
         if not self._window or arrival - self._window[-1][0] >= _BUCKET:
@@ -169,14 +162,12 @@ class ArrivalTimes:
 
         The result is at most ``moment``; None when it is unknown.
         """
-        last_read, self._last_read = self._last_read, moment
-        if last_read is None:
+        interval = None if self._last_read is None else moment - self._last_read
+        self._last_read = moment
+        if interval is None or len(self._intervals) < _LEARNING:
             self._time = moment
-            return moment
-        interval = moment - last_read
-        if len(self._intervals) < _LEARNING:
-            self._intervals.append(interval)
-            self._time = moment
+            if interval is not None:
+                self._intervals.append(interval)
             return moment
         period = median(self._intervals)
         was_long, self._is_long = self._is_long, interval > _STALL * period
@@ -186,10 +177,7 @@ class ArrivalTimes:
                 self._intervals.append(interval)
             self._time += period
             return None
-        if interval > 0.5 * period:
-            self._time = moment
-        else:
-            self._time = min(moment, self._time + period)
+        self._time = moment if interval > 0.5 * period else min(moment, self._time + period)
         if self._time == moment:
             # Frames from a buffer give no information about the rate.
             self._intervals.append(interval)

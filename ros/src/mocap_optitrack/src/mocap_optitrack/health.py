@@ -3,10 +3,10 @@
 import math
 from collections import Counter
 from collections.abc import Sequence
-from enum import Enum
 from typing import NamedTuple
 
 from mocap_optitrack.bodies import Body
+from mocap_optitrack.frame_times import FrameOrder
 from mocap_optitrack.frames import SeenBody
 
 OK, WARN, ERROR = range(3)  #: Levels, as in diagnostic_msgs/DiagnosticStatus.
@@ -18,16 +18,6 @@ _GRACE = 2.0
 _MOST_OTHERS = 10
 
 _TWO_SERVERS = "the server's clock keeps jumping: do two servers send to the same address?"
-
-
-class FrameEvent(Enum):
-    """Events that are counted, apart from good frames."""
-
-    LEARNING = "a frame came before the server's clock was known"
-    CLOCK_SET = "the server's clock has jumped"
-    STALE = "a frame was too old"
-    REPEATED = "a frame had come already, or was overtaken on its way"
-    FOREIGN = "the time of a frame does not fit the server's clock"
 
 
 class Status(NamedTuple):
@@ -55,48 +45,22 @@ class Health:
         rate_limits: tuple[float, float] | None = None,
     ):
         self._rate_limits = rate_limits or (0.0, math.inf)
-        self._bodies = {body.key: _BodyCount(body.component) for body in bodies}
+        self._bodies = {body.key: body for body in bodies}
         self.stale_after = stale_after  #: Used from the next report on.
+        self._silence = "no frames"
+        self._last: dict[str, float] = {}  # Time at which each body was tracked last, s.
+        self._why: dict[str, str] = {}
+        self._begin = now
+        self.disconnected("not connected so far")
+
+    def disconnected(self, failure: str) -> None:
+        """Record why there is no connection: earlier observations are dropped."""
         self._server: str | None = None
-        self._failure = "not connected so far"
-        self._silence = "no frames"
+        self._failure = failure
+        self._stream_begin = math.inf
         self._last_frame: float | None = None
-        self._stream_begin: float | None = None
-        self._others: dict[tuple[int | None, str | None], SeenBody] = {}
-        self._begin_period(now)
-
-    def add(self, body: Body) -> None:
-        """Also report on a body."""
-        self._bodies[body.key] = _BodyCount(body.component)
-        self._others.pop((None, body.key), None)
-
-    def count(self, event: FrameEvent) -> None:
-        """Count an event."""
-        self._events[event] += 1
-
-    def frame(self, now: float, latency: float) -> None:
-        """Count a good frame and its latency from exposure to arrival (s)."""
-        if self._last_frame is not None:
-            self._longest_gap = max(self._longest_gap, now - self._last_frame)
-        if self._stream_begin is None:
-            self._stream_begin = now
-        self._last_frame = now
-        self._silence = "no frames"
-        self._latencies.append(latency)
-
-    def body(self, body: Body, now: float, is_tracked: bool, why: str = "") -> None:
-        """Count a configured body in a good frame; ``why`` is the reason if it is not tracked."""
-        count = self._bodies[body.key]
-        count.why = why
-        count.frames += 1
-        if is_tracked:
-            count.tracked += 1
-            count.last = now
-
-    def other(self, body: SeenBody) -> None:
-        """Record a `SeenBody` in a good frame that is not configured."""
-        if len(self._others) < _MOST_OTHERS:
-            self._others[body.body_id, body.name] = body
+        self._others: dict[tuple[int | None, str | None], None] = {}
+        self._clear_counts()
 
     def connected(self, server: str) -> None:
         """Record a new connection."""
@@ -106,33 +70,56 @@ class Health:
         """Record why a connection has no frames; the next frame ends that."""
         self._silence = text
 
-    def disconnected(self, failure: str) -> None:
-        """Record why there is no connection: earlier observations are dropped."""
-        self._server = None
-        self._failure = failure
-        self._stream_begin = None
-        self._last_frame = None
-        self._others.clear()
-        for count in self._bodies.values():
-            count.begin_period()
+    def add(self, body: Body) -> None:
+        """Also report on a body."""
+        self._bodies[body.key] = body
+        self._others.pop((None, body.key), None)
+
+    def count(self, order: FrameOrder) -> None:
+        """Count a frame that is dropped."""
+        self._dropped[order] += 1
+
+    def frame(self, now: float, latency: float) -> None:
+        """Count a good frame and its latency from exposure to arrival (s)."""
+        if self._last_frame is None:
+            self._stream_begin = now
+        else:
+            self._longest_gap = max(self._longest_gap, now - self._last_frame)
+        self._last_frame = now
+        self._silence = "no frames"
+        self._latencies.append(latency)
+
+    def body(self, body: Body, now: float, is_tracked: bool, why: str = "") -> None:
+        """Count a configured body in a good frame; ``why`` is the reason if it is not tracked."""
+        self._why[body.key] = why
+        self._frames[body.key] += 1
+        if is_tracked:
+            self._tracked[body.key] += 1
+            self._last[body.key] = now
+
+    def other(self, body: SeenBody) -> None:
+        """Record a `SeenBody` in a good frame that is not configured."""
+        if len(self._others) < _MOST_OTHERS:
+            self._others[body.body_id, body.name] = None
 
     def report(self, now: float) -> list[Status]:
         """Return the state of the stream, then of every body, since the last report.
 
         Counting starts again at ``now`` (s).
         """
-        bodies = [self._body_status(count, now) for count in self._bodies.values()]
+        bodies = [self._body_status(body, now) for body in self._bodies.values()]
         statuses = [self._stream_status(now), *bodies]
-        self._begin_period(now)
+        self._begin = now
+        self._clear_counts()
         return statuses
 
-    def _begin_period(self, now):
-        self._begin = now
+    def _clear_counts(self) -> None:
         self._latencies: list[float] = []
         self._longest_gap = 0.0
-        self._events: Counter[FrameEvent] = Counter()
-        for count in self._bodies.values():
-            count.begin_period()
+        self._dropped: Counter[FrameOrder] = Counter()
+        # Of each body: frames that should have it, and those in which it was tracked.
+        self._frames: Counter[str] = Counter()
+        self._tracked: Counter[str] = Counter()
 
     def _stream_status(self, now):
         period = now - self._begin
@@ -145,9 +132,9 @@ class Health:
             "server": self._server or "none",
             "rate (Hz)": f"{rate:.1f}",
             "longest gap (ms)": _milliseconds(gap),
-            "stale frames": str(self._events[FrameEvent.STALE]),
-            "repeated frames": str(self._events[FrameEvent.REPEATED]),
-            "frames of another clock": str(self._events[FrameEvent.FOREIGN]),
+            "stale frames": str(self._dropped[FrameOrder.STALE]),
+            "repeated frames": str(self._dropped[FrameOrder.OLD]),
+            "frames of another clock": str(self._dropped[FrameOrder.FOREIGN]),
         }
         if frames:
             mean = math.fsum(self._latencies) / frames
@@ -157,15 +144,16 @@ class Health:
         return Status("stream", level, message, values)
 
     def _stream_assessment(self, values, gap, rate):
+        dropped = self._dropped
         if self._server is None:
             return ERROR, self._failure
-        foreign = self._events[FrameEvent.FOREIGN]
-        if self._events[FrameEvent.CLOCK_SET] > 1 or foreign > len(self._latencies):
+        foreign = dropped[FrameOrder.FOREIGN]
+        if dropped[FrameOrder.RESTART] > 1 or foreign > len(self._latencies):
             return ERROR, _TWO_SERVERS
         if not self._latencies:
-            if self._events[FrameEvent.LEARNING]:
+            if dropped[FrameOrder.LEARNING] or dropped[FrameOrder.RESTART]:
                 return WARN, "learning the server's clock"
-            if self._events[FrameEvent.STALE]:
+            if dropped[FrameOrder.STALE]:
                 return ERROR, "all frames are stale: is the server paused or playing a recording?"
             return ERROR, self._silence
         if foreign > 1:
@@ -180,52 +168,41 @@ class Health:
             f"{values['rate (Hz)']} frames per second, {values['latency, mean (ms)']} ms old"
         )
 
-    def _body_status(self, count, now):
-        values = {"frames": str(count.frames), "tracked": str(count.tracked)}
-        if count.last is not None:
-            values["last seen (s ago)"] = f"{now - count.last:.2f}"
-        level, message = self._body_assessment(count, now)
-        return Status(count.component, level, message, values)
+    def _body_status(self, body, now):
+        frames, tracked = self._frames[body.key], self._tracked[body.key]
+        values = {"frames": str(frames), "tracked": str(tracked)}
+        if body.key in self._last:
+            values["last seen (s ago)"] = f"{now - self._last[body.key]:.2f}"
+        level, message = self._body_assessment(body.key, now)
+        return Status(body.component, level, message, values)
 
-    def _body_assessment(self, count, now):
+    def _body_assessment(self, key, now):
         if self._last_frame is None or now - self._last_frame > self.stale_after:
             return ERROR, "no frames"
-        if count.why and (count.last is None or now - count.last > self.stale_after):
-            return ERROR, count.why
-        if count.last is None or count.last < self._stream_begin:
-            is_early = now - self._stream_begin < _GRACE
-            level = WARN if is_early else ERROR
-            if count.frames:
+        frames, tracked = self._frames[key], self._tracked[key]
+        last = self._last.get(key, -math.inf)
+        is_missing = now - last > self.stale_after
+        if is_missing and self._why.get(key):
+            return ERROR, self._why[key]
+        if last < self._stream_begin:
+            level = WARN if now - self._stream_begin < _GRACE else ERROR
+            if frames:
                 return level, "in the stream, but not tracked so far"
             return level, f"not in the stream so far; {self._other_bodies()}"
-        if now - count.last > self.stale_after:
-            return ERROR, f"not tracked for {now - count.last:.1f} s"
-        if count.tracked < count.frames:
-            return WARN, f"tracked in {count.tracked} of {count.frames} frames"
+        if is_missing:
+            return ERROR, f"not tracked for {now - last:.1f} s"
+        if tracked < frames:
+            return WARN, f"tracked in {tracked} of {frames} frames"
         return OK, "tracked"
 
     def _other_bodies(self):
         if not self._others:
             return "it shows no others that are not configured"
-        names = [_describe(body) for body in self._others.values()]
+        names = [
+            f"{number} ({name})" if None not in (number, name) else str(name or number)
+            for number, name in self._others
+        ]
         return "it shows others that are not configured: " + ", ".join(names)
-
-
-class _BodyCount:
-    def __init__(self, component: str):
-        self.component = component
-        self.last: float | None = None
-        self.why = ""
-        self.begin_period()
-
-    def begin_period(self):
-        self.frames = 0
-        self.tracked = 0
-
-
-def _describe(body):
-    parts = [str(part) for part in (body.body_id, body.name) if part is not None]
-    return f"{parts[0]} ({parts[1]})" if len(parts) == 2 else "".join(parts)
 
 
 def _milliseconds(seconds):

@@ -8,18 +8,12 @@ from crazyflie_model.angles import Quaternion, Triple
 from mocap_optitrack.bodies import Body, SingleMarker
 from mocap_optitrack.frame_times import ClockOffset, FrameOrder
 from mocap_optitrack.frames import Frame, normalized, to_z_up
-from mocap_optitrack.health import FrameEvent, Health
+from mocap_optitrack.health import Health
 from mocap_optitrack.marker_tracker import MarkerTracker
 
 #: Largest time of a stamp ahead of its arrival (s): the offset of the server's clock is known to a
 #: millisecond or two.
 _LEAD = 0.005
-
-_EVENTS = {
-    FrameOrder.OLD: FrameEvent.REPEATED,
-    FrameOrder.FOREIGN: FrameEvent.FOREIGN,
-    FrameOrder.RESTART: FrameEvent.CLOCK_SET,
-}
 
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
@@ -57,18 +51,23 @@ class Tracker:
         self._markers = [body for body in bodies if isinstance(body, SingleMarker)]
         vehicles = [marker.vehicle for marker in self._markers]
         self._marker_tracker = MarkerTracker(vehicles, hold_time, log) if vehicles else None
-        bodies = [body for body in bodies if not isinstance(body, SingleMarker)]
-        self._by_number = {str(int(body.key)): body for body in bodies if body.name is None}
-        self._by_name = {body.name: body for body in bodies if body.name is not None}
+        self._by_number: dict[str, Body] = {}
+        self._by_name: dict[str, Body] = {}
+        for body in bodies:
+            if not isinstance(body, SingleMarker):
+                self.add(body)
         self._up_axis = up_axis
         self.stale_after = stale_after  #: Used from the next frame on.
         self._health = health
         self._newest = self._arrival = -math.inf
-        self._clock = ClockOffset()
+        self.restart()
 
     def add(self, body: Body) -> None:
-        """Also find a body by its name."""
-        self._by_name[body.key] = body
+        """Also find a body, by its name or its number."""
+        if body.name is None:
+            self._by_number[str(int(body.key))] = body
+        else:
+            self._by_name[body.name] = body
 
     def restart(self) -> None:
         """Learn the clock of another server."""
@@ -86,18 +85,14 @@ class Tracker:
         if frame.arrival < self._arrival - _RESET:
             # Simulated time was restarted.
             self._newest = -math.inf
-            self._clock = ClockOffset()
+            self.restart()
         self._arrival = frame.arrival
-        time = self._time_of(frame)
-        if time is None:
-            return []
-        age = frame.arrival - time
-        fault = self._fault(time, age)
-        if fault is not None:
-            self._health.count(fault)
+        order, time = self._time_of(frame)
+        if order is not FrameOrder.NEW:
+            self._health.count(order)
             return []
         self._newest = time
-        self._health.frame(frame.arrival, age)
+        self._health.frame(frame.arrival, frame.arrival - time)
         poses = []
         for body in frame.bodies:
             configured = self._configured(body)
@@ -125,25 +120,22 @@ class Tracker:
                 poses.append(BodyPose(marker, time, (x, y, z), None))
         return poses
 
-    def _fault(self, time, age):
-        if time <= self._newest:
-            return FrameEvent.REPEATED
-        if age < -_LEAD:
-            return FrameEvent.FOREIGN
-        return FrameEvent.STALE if age > self.stale_after else None
-
     def _time_of(self, frame):
-        if frame.exposure is None:
-            return frame.arrival - frame.waited
-        order = self._clock.update(frame.sent, frame.arrival)
-        if order in _EVENTS:
-            self._health.count(_EVENTS[order])
-        if order in (FrameOrder.OLD, FrameOrder.FOREIGN):
-            return None
-        if not self._clock.is_settled:
-            self._health.count(FrameEvent.LEARNING)
-            return None
-        return self._clock.to_local(frame.exposure)
+        # What a frame is, and if it is new, its time by the local clock (s).
+        time = frame.arrival - frame.waited
+        if frame.exposure is not None:
+            order = self._clock.update(frame.sent, frame.arrival)
+            if order is not FrameOrder.NEW:
+                return order, time
+            if not self._clock.is_settled:
+                return FrameOrder.LEARNING, time
+            time = self._clock.to_local(frame.exposure)
+        age = frame.arrival - time
+        if time <= self._newest:
+            return FrameOrder.OLD, time
+        if age < -_LEAD:
+            return FrameOrder.FOREIGN, time
+        return FrameOrder.STALE if age > self.stale_after else FrameOrder.NEW, time
 
     def _configured(self, body):
         # In systems without numbers, a body may be named "1".

@@ -9,7 +9,7 @@ from virtual_bench import Bench
 
 from crazyflie_virtual.crtp import Port
 from crazyflie_virtual.parameters import parameter_specs
-from crazyflie_virtual.toc import FLOAT, PARAMETER_CODES, U8
+from crazyflie_virtual.toc import FLOAT, U8
 
 TABLE, READ, WRITE, MISC = 0, 1, 2, 3
 READ_ONLY, EXTENDED = 0x40, 0x10
@@ -122,7 +122,7 @@ def test_errors(bench):
 def test_set_by_name(bench):
     def by_name(group, name, number_type, value):
         names = b"\0" + group + b"\0" + name + b"\0"
-        data = names + bytes([PARAMETER_CODES[number_type]]) + number_type.pack(value)
+        data = names + bytes([number_type.parameter_code]) + number_type.pack(value)
         answer = bench.ask_one(Port.PARAMETERS, MISC, data)
         assert answer[:-1] == names
         return answer[-1]

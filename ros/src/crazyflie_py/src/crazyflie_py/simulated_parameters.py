@@ -8,7 +8,7 @@ from crazyflie_model.angles import Triple
 from crazyflie_py.swarm import DEFAULT_COLOR, SwarmVehicle
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.firmware import Firmware
-from crazyflie_virtual.parameters import NO_LIMITS, Parameter, parameter_specs
+from crazyflie_virtual.parameters import NO_LIMITS, ParameterPort, parameter_specs
 from crazyflie_virtual.settings import VehicleSettings, switches
 
 _log = logging.getLogger(__name__)
@@ -39,8 +39,9 @@ class SimulatedParameters:
         for key, value in values.items():
             if key == "hlCommander.groupmask":
                 self._vehicle.set_group_mask(int(value))
-            if (parameter := _known().get(key)) is not None:
-                if expected := _expected(parameter.spec, value):
+            if key in _known():
+                spec, _ = _known()[key]
+                if expected := _expected(spec, value):
                     text = "%s: %s is %g; expected %s: a real vehicle refuses it"
                     _log.warning(text, where, key, value, expected)
             elif key not in self._said:
@@ -56,7 +57,7 @@ class SimulatedParameters:
         if key in self._values:
             return self._values[key]
         if key in _known():
-            return _known()[key].default
+            return _known()[key][1]
         group = key.partition(".")[0]
         same = [name for name in _known() if name.startswith(f"{group}.")]
         groups = dict.fromkeys(name.partition(".")[0] for name in _known())
@@ -82,8 +83,8 @@ def _expected(spec, value):
 
 @functools.cache
 def _known():
-    """Return the parameters of a virtual vehicle by their names."""
+    """Return the parameters of a virtual vehicle by their names, each with its default."""
     settings = VehicleSettings.from_mapping({})
     firmware = Firmware(Physics(), switches(settings), settings)
-    parameters = (Parameter(spec, firmware) for spec in parameter_specs())
-    return {parameter.full_name: parameter for parameter in parameters}
+    defaults = ParameterPort(firmware, {}).defaults
+    return {spec.full_name: (spec, defaults[spec.full_name]) for spec in parameter_specs()}

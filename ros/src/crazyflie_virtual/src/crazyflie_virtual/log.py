@@ -17,7 +17,6 @@ from crazyflie_virtual.toc import (
     I8,
     I16,
     I32,
-    LOG_CODES,
     LOG_TYPES,
     RATE_PIDS,
     U8,
@@ -65,8 +64,8 @@ def _of(owner: str, *names: str) -> dict[str, str]:
 
 
 def _pids(owner, suffixes, **pids):
-    outputs = dict(zip(suffixes, ("out_p", "out_i", "out_d", "out_ff"), strict=True))
-    return _rows(FLOAT, **dict(pid_paths(owner, pids, outputs)))
+    outputs = ("out_p", "out_i", "out_d", "out_ff")
+    return _rows(FLOAT, **pid_paths(owner, pids, suffixes, outputs))
 
 
 def _range(side: str) -> Read:
@@ -256,7 +255,7 @@ class LogPort:
     def __init__(self, firmware: Firmware, variables: Sequence[LogVariable]):
         self._firmware = firmware
         self._variables = variables
-        entries = [(v.group, v.name, LOG_CODES[v.number_type]) for v in self._variables]
+        entries = [(v.group, v.name, v.number_type.log_code) for v in self._variables]
         self.table = Table(entries, bytes([MAX_BLOCKS, MAX_VARIABLES]))
         self._blocks: dict[int, _Block] = {}
         self._once: list[_Block] = []

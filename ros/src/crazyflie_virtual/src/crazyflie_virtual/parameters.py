@@ -9,7 +9,6 @@ import errno
 import math
 import struct
 from operator import attrgetter
-from types import SimpleNamespace
 from typing import NamedTuple
 
 from crazyflie_virtual.crtp import MAX_DATA
@@ -19,7 +18,6 @@ from crazyflie_virtual.toc import (
     ATTITUDE_PIDS,
     FLOAT,
     I8,
-    PARAMETER_CODES,
     PARAMETER_TYPES,
     RATE_PIDS,
     U8,
@@ -47,6 +45,18 @@ class ParameterSpec(NamedTuple):
     #: Smallest and largest value; a write of any other value has no effect.
     limits: tuple[float, float] = NO_LIMITS
 
+    @property
+    def full_name(self) -> str:
+        """The name with its group."""
+        return f"{self.group}.{self.name}"
+
+    @property
+    def code(self) -> int:
+        """Type and flags in the table."""
+        extended = _EXTENDED if self.persistent else 0
+        access = _READ_ONLY if self.read_only else _CORE
+        return self.number_type.parameter_code | extended | access
+
 
 def parameter_specs() -> list[ParameterSpec]:
     """Return all parameters, in the order of their numbers."""
@@ -72,8 +82,7 @@ def _limited(number_type, low, high, **sources):
 
 
 def _gains(owner, suffixes, **pids):
-    gains = dict(zip(suffixes, ("kp", "ki", "kd", "kff"), strict=True))
-    return _persistent(FLOAT, **dict(pid_paths(owner, pids, gains)))
+    return _persistent(FLOAT, **pid_paths(owner, pids, suffixes, ("kp", "ki", "kd", "kff")))
 
 
 _ATTITUDE_GAINS = ("_kp", "_ki", "_kd", "_kff")
@@ -275,42 +284,6 @@ _EXTENDED, _CORE, _READ_ONLY = 0x10, 0x20, 0x40  #: Flags in the byte of the typ
 _NO_ENTRY = bytes([errno.ENOENT])
 
 
-class Parameter:
-    """A parameter of a running firmware."""
-
-    def __init__(self, spec: ParameterSpec, firmware: Firmware):
-        self.spec = spec
-        self.full_name = f"{spec.group}.{spec.name}"
-        #: Whether the value has an effect on the vehicle.
-        self.has_effect = isinstance(spec.source, str)
-        self._owner: object = SimpleNamespace(value=spec.source)
-        self._attribute = "value"
-        if isinstance(spec.source, str):
-            path, _, self._attribute = spec.source.rpartition(".")
-            self._owner = attrgetter(path)(firmware) if path else firmware
-        self.default = self.value
-
-    @property
-    def value(self) -> float:
-        """The present value."""
-        return getattr(self._owner, self._attribute)
-
-    def set(self, value: float) -> None:
-        """Change the value; ValueError if it is out of its limits."""
-        low, high = self.spec.limits
-        if not low <= value <= high and self.spec.limits != NO_LIMITS:
-            raise ValueError(f"is {low:g} to {high:g}, not {value:g}")
-        setattr(self._owner, self._attribute, value)
-
-    @property
-    def code(self) -> int:
-        """Type and flags in the table."""
-        spec = self.spec
-        extended = _EXTENDED if spec.persistent else 0
-        access = _READ_ONLY if spec.read_only else _CORE
-        return PARAMETER_CODES[spec.number_type] | extended | access
-
-
 class ParameterPort:
     """Reads and writes parameters, and stores the persistent ones.
 
@@ -319,13 +292,18 @@ class ParameterPort:
     """
 
     def __init__(self, firmware: Firmware, stored: dict[str, float]):
-        self._parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
-        self._by_name = {parameter.full_name: parameter for parameter in self._parameters}
+        self._firmware = firmware
+        self._specs = parameter_specs()
+        self._by_name = {spec.full_name: spec for spec in self._specs}
+        # Values without effect on the vehicle that were set.
+        self._without_effect: dict[str, float] = {}
+        #: Initial values, by full name.
+        self.defaults = {name: self._value(spec) for name, spec in self._by_name.items()}
         self._stored = stored
         self._warn = firmware.warn
         for name, value in stored.items():
-            self._by_name[name].set(value)
-        self.table = Table([(p.spec.group, p.spec.name, p.code) for p in self._parameters])
+            self._assign(self._by_name[name], value)
+        self.table = Table([(spec.group, spec.name, spec.code) for spec in self._specs])
 
     def handle(self, channel: int, data: bytes) -> bytes | None:
         """Return the data of the answer; None for no answer."""
@@ -339,101 +317,96 @@ class ParameterPort:
 
     def _find(self, data, at=0):
         (index,) = struct.unpack_from("<H", data, at)
-        return self._parameters[index] if index < len(self._parameters) else None
+        return self._specs[index] if index < len(self._specs) else None
+
+    def _value(self, spec):
+        if isinstance(spec.source, str):
+            return attrgetter(spec.source)(self._firmware)
+        return self._without_effect.get(spec.full_name, spec.source)
+
+    def _assign(self, spec, value):
+        if isinstance(spec.source, str):
+            path, _, attribute = f"_firmware.{spec.source}".rpartition(".")
+            setattr(attrgetter(path)(self), attribute, value)
+        else:
+            self._without_effect[spec.full_name] = value
 
     def _read(self, data):
-        parameter = self._find(data)
-        if parameter is None:
+        spec = self._find(data)
+        if spec is None:
             return data[:2] + _NO_ENTRY
-        return data[:2] + b"\0" + parameter.spec.number_type.pack(parameter.value)
+        return data[:2] + b"\0" + spec.number_type.pack(self._value(spec))
 
     def _write(self, data):
-        parameter = self._find(data)
-        if parameter is None:
+        spec = self._find(data)
+        if spec is None:
             self._warn("parameter", f"PARAM: no parameter has the number {data[:2].hex()}")
             return data[:2] + _NO_ENTRY
-        if parameter.spec.read_only:
-            self._warn(parameter.full_name, f"PARAM: {parameter.full_name} is read-only")
+        if spec.read_only:
+            self._warn(spec.full_name, f"PARAM: {spec.full_name} is read-only")
             return None
-        self._set(parameter, data[2:])
+        self._set(spec, data[2:])
         # The answer is as long as the request, whatever the value's size.
-        value = parameter.spec.number_type.pack(parameter.value).ljust(_WORD, b"\0")
+        value = spec.number_type.pack(self._value(spec)).ljust(_WORD, b"\0")
         return data[:2] + (value[: len(data) - 2] + data[2 + len(value) :])
 
-    def _set(self, parameter, data):
-        number_type = parameter.spec.number_type
+    def _set(self, spec, data):
+        name, number_type, (low, high) = spec.full_name, spec.number_type, spec.limits
         value = number_type.unpack(data[: number_type.size].ljust(number_type.size, b"\0"))
-        name = parameter.full_name
-        if not parameter.has_effect and value != parameter.value:
+        if not isinstance(spec.source, str) and value != self._value(spec):
             self._warn(name, f"PARAM: {name} is stored, but has no effect on a virtual vehicle")
-        try:
-            parameter.set(value)
-        except ValueError as error:
-            self._warn(name, f"PARAM: {name} {error}")
+        if low <= value <= high or spec.limits == NO_LIMITS:
+            self._assign(spec, value)
+        else:
+            self._warn(name, f"PARAM: {name} is {low:g} to {high:g}, not {value:g}")
 
     def _misc(self, data):
         if not data:
             return None
-        if data[0] == _SET_BY_NAME:
+        command = data[0]
+        if command == _SET_BY_NAME:
             return self._set_by_name(data)
-        if data[0] not in _MISC_HANDLERS or len(data) < 3:
+        if not _EXTENDED_TYPE <= command <= _DEFAULT_2 or len(data) < 3:
             self._warn("parameter command", f"PARAM: unknown command {data.hex()}")
             return None
-        parameter = self._find(data, 1)
-        status, handler = _MISC_HANDLERS[data[0]]
-        answer = None if parameter is None else handler(self, parameter)
-        return data[:3] + (_NO_ENTRY if answer is None else status + answer)
+        spec = self._find(data, 1)
+        answer = None if spec is None else self._answer(command, spec)
+        if answer is None:
+            return data[:3] + _NO_ENTRY
+        # Only the newer commands tell success.
+        return data[:3] + (b"\0" if command in (_EXTENDED_TYPE_2, _DEFAULT_2) else b"") + answer
 
     def _set_by_name(self, data):
         parts = data[1:].split(b"\0", 2)
         if len(parts) < 3 or not parts[2]:
             return None
-        parameter = self._by_name.get(b".".join(parts[:2]).decode("latin1"))
+        spec = self._by_name.get(b".".join(parts[:2]).decode("latin1"))
         error = 0
-        if parameter is None:
+        if spec is None:
             error = errno.ENOENT
-        elif PARAMETER_TYPES.get(parts[2][0]) is not parameter.spec.number_type:
+        elif PARAMETER_TYPES.get(parts[2][0]) is not spec.number_type:
             error = errno.EINVAL
-        elif parameter.spec.read_only:
+        elif spec.read_only:
             error = errno.EACCES
         else:
-            self._set(parameter, parts[2][1:])
+            self._set(spec, parts[2][1:])
         names = data[: 1 + len(parts[0]) + 1 + len(parts[1]) + 1]
         return (names + bytes([error]))[:MAX_DATA]
 
-    # Answers to the other commands; None if the parameter does not have the requested property.
-
-    def _extended_type(self, parameter):
-        return bytes([_PERSISTENT]) if parameter.spec.persistent else None
-
-    def _default(self, parameter):
-        spec = parameter.spec
-        return None if spec.read_only else spec.number_type.pack(parameter.default)
-
-    def _store(self, parameter):
-        if not parameter.spec.persistent:
-            return None
-        self._stored[parameter.full_name] = parameter.value
-        return b"\0"
-
-    def _clear(self, parameter):
-        return None if self._stored.pop(parameter.full_name, None) is None else b"\0"
-
-    def _state(self, parameter):
-        number_type = parameter.spec.number_type
-        default = number_type.pack(parameter.default)
-        if parameter.full_name not in self._stored:
-            return b"\0" + default
-        return b"\1" + default + number_type.pack(self._stored[parameter.full_name])
-
-
-#: Command -> what precedes an answer that is no error, and the answer.
-_MISC_HANDLERS = {
-    _EXTENDED_TYPE: (b"", ParameterPort._extended_type),
-    _STORE: (b"", ParameterPort._store),
-    _STATE: (b"", ParameterPort._state),
-    _CLEAR: (b"", ParameterPort._clear),
-    _DEFAULT: (b"", ParameterPort._default),
-    _EXTENDED_TYPE_2: (b"\0", ParameterPort._extended_type),
-    _DEFAULT_2: (b"\0", ParameterPort._default),
-}
+    def _answer(self, command, spec):
+        # Answer to another command; None if the parameter does not have the requested property.
+        name, pack = spec.full_name, spec.number_type.pack
+        if command in (_EXTENDED_TYPE, _EXTENDED_TYPE_2) and spec.persistent:
+            return bytes([_PERSISTENT])
+        if command in (_DEFAULT, _DEFAULT_2) and not spec.read_only:
+            return pack(self.defaults[name])
+        if command == _STATE:
+            is_stored = name in self._stored
+            stored = pack(self._stored[name]) if is_stored else b""
+            return bytes([is_stored]) + pack(self.defaults[name]) + stored
+        if command == _STORE and spec.persistent:
+            self._stored[name] = self._value(spec)
+            return b"\0"
+        if command == _CLEAR and self._stored.pop(name, None) is not None:
+            return b"\0"
+        return None

@@ -45,8 +45,7 @@ READ_ONLY, EXTENDED = 0x40, 0x10
 
 _OTHER_MEMORY = 0x18  #: Type of the memory that precedes that of trajectories.
 
-_LOG_TYPES = {each.format: each for each in LOG_TYPES.values()}
-_PARAMETER_CODES = {each.format: code for code, each in PARAMETER_TYPES.items()}
+_TYPES = {each.format: each for each in (*LOG_TYPES.values(), *PARAMETER_TYPES.values())}
 
 _EMERGENCY_STOP = 0x03
 _RESET_LOGS = (Port.LOG, 1, b"\x05")
@@ -318,7 +317,7 @@ class FakeVehicle(Server, contextlib.AbstractContextManager["FakeVehicle"]):
     def forget_logs(self) -> None:
         """Send no log data any more, as after a restart between two pings."""
         variables = [
-            LogVariable(group, variable, _LOG_TYPES[form], partial(self._value, name))
+            LogVariable(group, variable, _TYPES[form], partial(self._value, name))
             for name, (form, _) in self.log.items()
             for group, variable in [name.split(".")]
         ]
@@ -336,7 +335,7 @@ class FakeVehicle(Server, contextlib.AbstractContextManager["FakeVehicle"]):
 
     def _on_2_0(self, data):
         entries = [
-            (group, parameter, _PARAMETER_CODES[form] | flags)
+            (group, parameter, _TYPES[form].parameter_code | flags)
             for name, (form, _, flags) in self.parameters.items()
             for group, parameter in [name.split(".")]
         ]

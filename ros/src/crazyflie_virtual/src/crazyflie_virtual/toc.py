@@ -4,15 +4,17 @@ import math
 import struct
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class NumberType:
+class NumberType(NamedTuple):
     """A number's type."""
 
     name: str  #: As in C.
     format: str  #: As in the module struct, without byte order.
+    #: log_code, parameter_code: On the wire, of log variables and parameters; -1 for none.
+    log_code: int
+    parameter_code: int
 
     @property
     def is_float(self) -> bool:
@@ -46,33 +48,20 @@ class NumberType:
 
 _LARGEST = {"f": 3.4028234e38, "e": 65504.0}
 
-U8 = NumberType("uint8_t", "B")
-U16 = NumberType("uint16_t", "H")
-U32 = NumberType("uint32_t", "I")
-I8 = NumberType("int8_t", "b")
-I16 = NumberType("int16_t", "h")
-I32 = NumberType("int32_t", "i")
-FLOAT = NumberType("float", "f")
-FP16 = NumberType("FP16", "e")
-U64 = NumberType("uint64_t", "Q")
+U8 = NumberType("uint8_t", "B", 1, 0x8)
+U16 = NumberType("uint16_t", "H", 2, 0x9)
+U32 = NumberType("uint32_t", "I", 3, 0xA)
+I8 = NumberType("int8_t", "b", 4, 0x0)
+I16 = NumberType("int16_t", "h", 5, 0x1)
+I32 = NumberType("int32_t", "i", 6, 0x2)
+FLOAT = NumberType("float", "f", 7, 0x6)
+FP16 = NumberType("FP16", "e", 8, -1)
+U64 = NumberType("uint64_t", "Q", -1, 0xB)
 
-#: Code of a log variable on the wire -> type.
-LOG_TYPES = {1: U8, 2: U16, 3: U32, 4: I8, 5: I16, 6: I32, 7: FLOAT, 8: FP16}
-
-#: Code of a parameter on the wire -> type.
-PARAMETER_TYPES = {
-    0x8: U8,
-    0x9: U16,
-    0xA: U32,
-    0xB: U64,
-    0x0: I8,
-    0x1: I16,
-    0x2: I32,
-    0x6: FLOAT,
-}
-
-LOG_CODES = {number_type: code for code, number_type in LOG_TYPES.items()}
-PARAMETER_CODES = {number_type: code for code, number_type in PARAMETER_TYPES.items()}
+_TYPES = (U8, U16, U32, I8, I16, I32, FLOAT, FP16, U64)
+#: LOG_TYPES, PARAMETER_TYPES: Code on the wire -> type.
+LOG_TYPES = {each.log_code: each for each in _TYPES if each is not U64}
+PARAMETER_TYPES = {each.parameter_code: each for each in _TYPES if each is not FP16}
 
 
 _ITEM, _INFO = 2, 3
@@ -114,13 +103,16 @@ RATE_PIDS = {axis: f"{axis}_rate" for axis in ATTITUDE_PIDS}
 
 
 def pid_paths(
-    owner: str, pids: Mapping[str, str], attributes: Mapping[str, str]
-) -> Iterable[tuple[str, str]]:
-    """Yield (name, path from the `Firmware`) of attributes of PID controllers.
+    owner: str, pids: Mapping[str, str], suffixes: Iterable[str], attributes: Iterable[str]
+) -> dict[str, str]:
+    """Return name -> path from the `Firmware` of attributes of PID controllers.
 
     ``owner`` is the path to the object that has the controllers. Prefixes of names lead to the
-    owner's attributes (``pids``), suffixes to the controller's (``attributes``).
+    owner's attributes (``pids``), suffixes to the controller's ``attributes``.
     """
-    for prefix, pid in pids.items():
-        for suffix, attribute in attributes.items():
-            yield prefix + suffix, f"{owner}.{pid}.{attribute}"
+    pairs = list(zip(suffixes, attributes, strict=True))
+    return {
+        prefix + suffix: f"{owner}.{pid}.{attribute}"
+        for prefix, pid in pids.items()
+        for suffix, attribute in pairs
+    }

@@ -2,9 +2,6 @@
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
 from crazyflie_model import angles
 from crazyflie_model.angles import Quaternion
 
@@ -25,24 +22,6 @@ def product(p: Quaternion, q: Quaternion) -> Quaternion:
     The rotation by twice (a, b, c), small, rad, is (a, b, c, 1).
     """
     return normalized(*angles.product(p, q))
-
-
-def from_matrix(rotation: npt.NDArray[np.float64]) -> Quaternion:
-    """Return the unit quaternion of a rotation matrix, (3, 3).
-
-    Source: I. Y. Bar-Itzhack, New method for extracting the quaternion from a rotation matrix,
-    Journal of Guidance, Control, and Dynamics 23 (2000).
-    """
-    (a, b, c), (d, e, f), (g, h, i) = rotation
-    matrix = [
-        [a - e - i, b + d, c + g, h - f],
-        [b + d, e - a - i, f + h, c - g],
-        [c + g, f + h, i - a - e, d - b],
-        [h - f, c - g, d - b, a + e + i],
-    ]
-    # The eigenvector of the largest eigenvalue.
-    x, y, z, w = map(float, np.linalg.eigh(matrix)[1][:, 3])
-    return x, y, z, w
 
 
 def compress_quaternion(quaternion: Quaternion) -> int:

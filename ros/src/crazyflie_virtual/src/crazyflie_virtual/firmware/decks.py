@@ -17,7 +17,7 @@ from crazyflie_model.angles import Quaternion, Triple, rotate
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.memory import LighthouseMemory
-from crazyflie_virtual.quaternions import from_matrix, product
+from crazyflie_virtual.quaternions import product
 from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO, VehicleSettings
 
 _POSITION_DEVIATION = 0.003  #: Deviation of the deck that knows the true pose (m).
@@ -83,8 +83,11 @@ def _frame(station: int, page: bytes) -> tuple[Quaternion, Triple] | None:
     rotation = np.reshape(values[3:12], (3, 3)) @ np.reshape(true[3:12], (3, 3)).T
     if not values[-1] or abs(np.linalg.det(rotation) - 1.0) > 0.01:
         return None
+    # It takes as long to import as all the rest.
+    from scipy.spatial.transform import Rotation
+
     x, y, z = map(float, np.array(values[:3]) - rotation @ true[:3])
-    return from_matrix(rotation), (x, y, z)
+    return tuple(Rotation.from_matrix(rotation).as_quat().tolist()), (x, y, z)
 
 
 @dataclass(eq=False)

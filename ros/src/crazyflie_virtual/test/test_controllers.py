@@ -143,6 +143,16 @@ def test_mellinger_turns_the_vehicle_to_its_setpoint():
     assert nose_up[front_left] == nose_up[front_right] > nose_up[back_left]
 
 
+def test_mellingers_attitude_has_the_firmwares_signs():
+    stabilizer = Stabilizer()
+    stabilizer.controller = MELLINGER
+    manual = Modes(roll=ABSOLUTE, pitch=ABSOLUTE, yaw=ABSOLUTE)
+    setpoint = Setpoint(mode=manual, roll=3.0, pitch=5.0, yaw=7.0, thrust=30000.0)
+    stabilizer.update(setpoint, Estimate(), Sensors(noise=False), False, True)
+    attitude = (stabilizer.roll, stabilizer.pitch, stabilizer.yaw)
+    assert attitude == pytest.approx((3.0, 5.0, 7.0))
+
+
 def test_motors_set_by_parameter():
     stabilizer = Stabilizer()
     override = stabilizer.override

@@ -10,7 +10,14 @@ Angles are in rad here, axes are forward, left and up: positive pitch is nose do
 
 import math
 
-from crazyflie_model.angles import Triple, quaternion_from_zyx, rotate, zyx_from_quaternion
+from crazyflie_model.angles import (
+    Quaternion,
+    Triple,
+    product,
+    quaternion_from_zyx,
+    rotate,
+    zyx_from_quaternion,
+)
 from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.body import Sensors
@@ -18,8 +25,6 @@ from crazyflie_virtual.firmware.controllers import constrain
 from crazyflie_virtual.firmware.states import ABSOLUTE, DISABLED, VELOCITY, Estimate, Setpoint
 
 TORQUE_LIMIT = 32000.0  #: Largest output about an axis, PWM.
-
-_AXES: tuple[Triple, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class MellingerController:
@@ -36,7 +41,7 @@ class MellingerController:
         self.kR_xy, self.kw_xy, self.ki_m_xy, self.i_range_m_xy = 70000.0, 20000.0, 0.0, 1.0
         self.kR_z, self.kw_z, self.ki_m_z, self.i_range_m_z = 60000.0, 12000.0, 500.0, 1500.0
         self.kd_omega_rp = 200.0
-        self.attitude: Triple = (0.0, 0.0, 0.0)  #: Desired roll, pitch and yaw (deg).
+        self.attitude: Triple = (0.0, 0.0, 0.0)  #: Desired roll, pitch (nose up) and yaw (deg).
         self._last_slip: Triple | None = None
         self.reset()
 
@@ -46,26 +51,28 @@ class MellingerController:
 
     def update(self, setpoint: Setpoint, estimate: Estimate, sensors: Sensors) -> tuple[float, ...]:
         """Return the thrust and the outputs about forward, left and up, PWM."""
-        body = tuple(rotate(estimate.quaternion, axis) for axis in _AXES)
         force = self._force(setpoint, estimate)
-        mode = setpoint.mode
+        mode, yaw = setpoint.mode, math.radians(estimate.yaw)
         is_manual = mode.z == DISABLED and mode.roll == mode.pitch == ABSOLUTE
-        thrust = self.mass_thrust * _dot(force, body[2])
-        if mode.z == DISABLED:
-            thrust = setpoint.thrust
-        if mode.x == ABSOLUTE:
-            wanted = _axes_along(force, _heading(setpoint, estimate))
-        elif is_manual:
-            wanted = _manual_axes(setpoint, _heading(setpoint, estimate))
+        if mode.x == ABSOLUTE or is_manual:
+            yaw = _heading(setpoint, estimate)
+        if mode.x != ABSOLUTE and is_manual:
+            roll, pitch = math.radians(setpoint.roll), -math.radians(setpoint.pitch)
+            desired = quaternion_from_zyx(roll, pitch, yaw)
         else:
-            wanted = _axes_along(force, math.radians(estimate.yaw))
-        (cp_cy, cp_sy, minus_sp), left, up = wanted
-        self.attitude = (
-            math.degrees(math.atan2(left[2], up[2])),
-            math.degrees(math.asin(constrain(minus_sp, -1.0, 1.0))),
-            math.degrees(math.atan2(cp_sy, cp_cy)),
-        )
-        outputs = self._torques(_attitude_error(body, wanted), setpoint, sensors)
+            desired = _attitude_along(force, yaw)
+        roll, pitch, yaw = zyx_from_quaternion(desired)
+        self.attitude = math.degrees(roll), -math.degrees(pitch), math.degrees(yaw)
+        # The error is that of rotation matrices, equation (10) of the paper without the half, from
+        # the rotation from the desired attitude to the estimated one.
+        a, b, c, d = desired
+        x, y, z, w = product((-a, -b, -c, d), estimate.quaternion)
+        error = 4.0 * w * x, 4.0 * w * y, 4.0 * w * z
+        outputs = self._torques(error, setpoint, sensors)
+        thrust = setpoint.thrust
+        if mode.z != DISABLED:
+            up = rotate(estimate.quaternion, (0.0, 0.0, 1.0))
+            thrust = self.mass_thrust * (force[0] * up[0] + force[1] * up[1] + force[2] * up[2])
         if not thrust > 0.0:
             self.reset()
             return (0.0,) * 4
@@ -131,25 +138,14 @@ def _heading(setpoint: Setpoint, estimate: Estimate) -> float:
     return 0.0
 
 
-def _manual_axes(setpoint: Setpoint, yaw: float) -> tuple[Triple, ...]:
-    roll, pitch = math.radians(setpoint.roll), -math.radians(setpoint.pitch)
-    attitude = quaternion_from_zyx(roll, pitch, yaw)
-    return tuple(rotate(attitude, axis) for axis in _AXES)
-
-
-def _axes_along(force: Triple, yaw: float) -> tuple[Triple, ...]:
+def _attitude_along(force: Triple, yaw: float) -> Quaternion:
     # The up axis is along the force; the forward axis is as near to the heading as that permits.
-    up = _unit(force)
-    left = _unit(_cross(up, (math.cos(yaw), math.sin(yaw), 0.0)))
-    return _cross(left, up), left, up
-
-
-def _attitude_error(body: tuple[Triple, ...], wanted: tuple[Triple, ...]) -> Triple:
-    # (Rd' R - R' Rd) as a vector, equation (10) of the paper without the half.
-    def part(i, j):
-        return _dot(wanted[i], body[j]) - _dot(body[i], wanted[j])
-
-    return part(2, 1), part(0, 2), part(1, 0)
+    c, s = math.cos(yaw), math.sin(yaw)
+    x, y, z = force[0] * c + force[1] * s, force[1] * c - force[0] * s, force[2]
+    roll, pitch = math.atan2(-y, z), math.atan2(x, math.hypot(y, z))
+    # The pitch is about the left axis that the roll has tilted.
+    tilt = (0.0, math.sin(pitch / 2.0), 0.0, math.cos(pitch / 2.0))
+    return product(quaternion_from_zyx(roll, 0.0, yaw), tilt)
 
 
 def _integrated(integral: Triple, error: Triple, limits: Triple) -> Triple:
@@ -158,20 +154,3 @@ def _integrated(integral: Triple, error: Triple, limits: Triple) -> Triple:
         for i, e, limit in zip(integral, error, limits, strict=True)
     )
     return x, y, z
-
-
-def _dot(a: Triple, b: Triple) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Triple, b: Triple) -> Triple:
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
-
-
-def _unit(a: Triple) -> Triple:
-    length = math.sqrt(_dot(a, a)) or 1.0
-    return a[0] / length, a[1] / length, a[2] / length

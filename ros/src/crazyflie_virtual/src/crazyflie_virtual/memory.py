@@ -4,32 +4,20 @@ import errno
 import struct
 import zlib
 from collections.abc import Iterable
-from typing import NamedTuple
 
 from typing_extensions import override
 
 from crazyflie_virtual import settings
 from crazyflie_virtual.crtp import FirmwareAssertionError, Warn
 
-_SIZE = 112  #: Size of a one-wire memory (bytes).
-_BITCRAZE = 0xBC  #: Vendor.
-_FAMILY = 0x0D  #: First byte of the serial numbers of this kind of memory.
-
-_HEADER_MARK, _NAME, _REVISION = 0xEB, 1, 2
-
-
 EEPROM, ONE_WIRE, LED_RING, TRAJECTORY, LIGHTHOUSE = 0x00, 0x01, 0x10, 0x12, 0x14
 TESTER, LED_TIMINGS, DECKS = 0x15, 0x17, 0x19  #: Types.
 
-NO_SERIAL = bytes(8)
-
-EEPROM_SERIAL = bytes(7) + b"\x50"  #: The I2C address, in place of a serial number.
-
-_TESTER_SIZE = 4096
-_EEPROM_SIZE = 8191
-
 LED_RING_SIZE = 24  #: Twelve colours of 16 bits.
 LED_TIMINGS_SIZE = 40  #: Ten steps of 4 bytes.
+_TESTER_SIZE, _EEPROM_SIZE, _ONE_WIRE_SIZE = 4096, 8191, 112
+
+_EEPROM_SERIAL = bytes(7) + b"\x50"  #: The I2C address, in place of a serial number.
 
 
 class Memory:
@@ -42,7 +30,7 @@ class Memory:
         self,
         memory_type: int,
         buffer: bytes | bytearray,
-        serial: bytes = NO_SERIAL,
+        serial: bytes = bytes(8),
         size: int | None = None,
     ):
         self.type = memory_type
@@ -52,16 +40,22 @@ class Memory:
 
     def read(self, address: int, count: int) -> bytes | None:
         """Return ``count`` bytes; None if an address does not exist."""
-        end = address + count
-        return bytes(self._buffer[address:end]) if end <= len(self._buffer) else None
+        buffer, start = self._place(address)
+        end = start + count
+        return bytes(buffer[start:end]) if end <= len(buffer) else None
 
     def write(self, address: int, data: bytes) -> bool:
         """Write data; return whether the addresses exist."""
-        end = address + len(data)
-        if isinstance(self._buffer, bytes) or end > len(self._buffer):
+        buffer, start = self._place(address)
+        end = start + len(data)
+        if isinstance(buffer, bytes) or end > len(buffer):
             return False
-        self._buffer[address:end] = data
+        buffer[start:end] = data
         return True
+
+    def _place(self, address: int) -> tuple[bytes | bytearray, int]:
+        # Buffer, and index in it, of an address.
+        return self._buffer, address
 
 
 class MemoryTester(Memory):
@@ -110,82 +104,56 @@ class LighthouseMemory(Memory):
         self._stored = stored
         sizes = ((0, self._GEOMETRY_SIZE), (self.CALIBRATION_PAGE, self._CALIBRATION_SIZE))
         self._pages = {
-            first + i: Memory(LIGHTHOUSE, bytearray(stored.get(first + i, bytes(size))))
+            first + i: bytearray(stored.get(first + i, bytes(size)))
             for first, size in sizes
             for i in range(self.STATIONS)
         }
 
     def store(self, geometries: int, calibrations: int) -> bool:
         """Store the pages that two bit masks select; return whether all exist."""
-        masks = ((0, geometries), (self.CALIBRATION_PAGE, calibrations))
-        marked = [first + i for first, mask in masks for i in range(16) if mask >> i & 1]
-        pages = {number: self._pages[number] for number in marked if number in self._pages}
-        for number in pages:
-            self._stored[number] = self.page(number)
-        return len(pages) == len(marked)
+        marked = geometries | calibrations << self.CALIBRATION_PAGE
+        numbers = {number for number in range(marked.bit_length()) if marked >> number & 1}
+        self._stored |= {number: self.page(number) for number in numbers & self._pages.keys()}
+        return numbers <= self._pages.keys()
 
     def page(self, number: int) -> bytes:
         """Return a geometry or a calibration, whose last byte tells whether it is valid."""
-        page = self._pages[number]
-        return page.read(0, page.size) or b""
+        return bytes(self._pages[number])
 
     @override
-    def read(self, address: int, count: int) -> bytes | None:
+    def _place(self, address: int) -> tuple[bytes | bytearray, int]:
         page, start = divmod(address, self._PAGE_SIZE)
-        return self._pages.get(page, _NO_PAGE).read(start, count)
-
-    @override
-    def write(self, address: int, data: bytes) -> bool:
-        page, start = divmod(address, self._PAGE_SIZE)
-        return self._pages.get(page, _NO_PAGE).write(start, data)
+        return self._pages.get(page, b""), start
 
 
-_NO_PAGE = Memory(LIGHTHOUSE, b"")
-
-
-class Deck(NamedTuple):
-    """A deck."""
-
-    name: str  #: Name of the deck, and of its parameter in the group ``deck``.
-    product: int
-    revision: str
-
-    def memory(self) -> Memory:
-        """Return its memory, as it leaves the factory.
-
-        Header: mark, pins, vendor, product; elements: version, size, and each as
-        number, size, text; after both the low byte of their CRC-32.
-        """
-        header = struct.pack("<BIBB", _HEADER_MARK, 0, _BITCRAZE, self.product)
-        texts = ((_NAME, self.name), (_REVISION, self.revision))
-        elements = b"".join(bytes([n, len(text)]) + text.encode() for n, text in texts)
-        elements = bytes([0, len(elements)]) + elements
-        content = b"".join(part + bytes([zlib.crc32(part) & 0xFF]) for part in (header, elements))
-        serial = bytes([_FAMILY, self.product, 0, 0, 0, 0, 0, 0])
-        return Memory(ONE_WIRE, bytearray(content.ljust(_SIZE, b"\xff")), serial)
-
-
-LED_RING_DECK = Deck("bcLedRing", 0x01, "D1")
-MULTIRANGER_DECK = Deck("bcMultiranger", 0x0C, "D")
-FLOW_DECK = Deck("bcFlow2", 0x0F, "C")
-LIGHTHOUSE_DECK = Deck("bcLighthouse4", 0x10, "D")
-LOCO_DECK = Deck("bcDWM1000", 0x06, "B")
-
+#: Positioning system -> its decks: name, product and revision.
 _POSITIONING_DECKS = {
-    settings.DECK: (FLOW_DECK, LIGHTHOUSE_DECK),
-    settings.FLOW: (FLOW_DECK,),
-    settings.LIGHTHOUSE: (LIGHTHOUSE_DECK,),
-    settings.LOCO: (LOCO_DECK,),
+    settings.DECK: (("bcFlow2", 0x0F, "C"), ("bcLighthouse4", 0x10, "D")),
+    settings.FLOW: (("bcFlow2", 0x0F, "C"),),
+    settings.LIGHTHOUSE: (("bcLighthouse4", 0x10, "D"),),
+    settings.LOCO: (("bcDWM1000", 0x06, "B"),),
 }
 
 
-def decks(positioning: str, has_multiranger: bool) -> list[Deck]:
-    """Return the decks of a vehicle with a positioning system of its settings."""
-    return [
-        LED_RING_DECK,
-        *_POSITIONING_DECKS.get(positioning, ()),
-        *((MULTIRANGER_DECK,) if has_multiranger else ()),
-    ]
+def one_wire(positioning: str, has_multiranger: bool) -> list[Memory]:
+    """Return the memories of the decks of a vehicle with a positioning system of its settings."""
+    multiranger = (("bcMultiranger", 0x0C, "D"),) if has_multiranger else ()
+    decks = (("bcLedRing", 0x01, "D1"), *_POSITIONING_DECKS.get(positioning, ()), *multiranger)
+    return [_one_wire(*deck) for deck in decks]
+
+
+def _one_wire(name: str, product: int, revision: str) -> Memory:
+    # As it leaves the factory. Header: mark, pins, vendor (Bitcraze), product; elements: version,
+    # size, and each as number, size, text; after both the low byte of their CRC-32.
+    header = struct.pack("<BIBB", 0xEB, 0, 0xBC, product)
+    elements = b"".join(
+        bytes([number, len(text)]) + text.encode() for number, text in ((1, name), (2, revision))
+    )
+    elements = bytes([0, len(elements)]) + elements
+    content = b"".join(part + bytes([zlib.crc32(part) & 0xFF]) for part in (header, elements))
+    # The first byte is that of all memories of this kind.
+    serial = bytes([0x0D, product, 0, 0, 0, 0, 0, 0])
+    return Memory(ONE_WIRE, bytearray(content.ljust(_ONE_WIRE_SIZE, b"\xff")), serial)
 
 
 def decks_firmware() -> Memory:
@@ -205,7 +173,7 @@ def eeprom(radio_address: int) -> Memory:
         "<BBBffBI", 1, 80, 2, 0.0, 0.0, radio_address >> 32, radio_address & 0xFFFFFFFF
     )
     content += bytes([sum(content) & 0xFF])
-    return Memory(EEPROM, bytearray(content.ljust(_EEPROM_SIZE, b"\0")), EEPROM_SERIAL)
+    return Memory(EEPROM, bytearray(content.ljust(_EEPROM_SIZE, b"\0")), _EEPROM_SERIAL)
 
 
 _INFO, _READ, _WRITE = 0, 1, 2
@@ -218,50 +186,41 @@ class MemoryPort:
     """Reads and writes memories, in the order of their numbers; for ``warn`` see `Console.warn`."""
 
     def __init__(self, memories: Iterable[Memory], warn: Warn):
-        self._memories = tuple(memories)
+        self._memories = dict(enumerate(memories))
         self._warn = warn
 
     def handle(self, channel: int, data: bytes) -> bytes | None:
         """Return the data of the answer; None for no answer."""
-        handlers = {_INFO: self._info, _READ: self._read, _WRITE: self._write}
-        return handlers.get(channel, self._unknown)(data)
-
-    def _info(self, data):
-        if data[:1] == bytes([_COUNT]):
+        if channel == _READ:
+            return self._read(data) if len(data) >= 6 else None
+        if channel == _WRITE:
+            return self._write(data) if len(data) >= 5 else None
+        if channel == _INFO and data[:1] == bytes([_COUNT]):
             return bytes([_COUNT, len(self._memories)])
-        if data[:1] == bytes([_DETAILS]) and len(data) >= 2:
-            if data[1] >= len(self._memories):
+        if channel == _INFO and data[:1] == bytes([_DETAILS]) and len(data) >= 2:
+            memory = self._memories.get(data[1])
+            if memory is None:
                 return data[:2]
-            memory = self._memories[data[1]]
             return data[:2] + struct.pack("<BI8s", memory.type, memory.size, memory.serial)
-        return self._unknown(data)
-
-    def _unknown(self, data):
         self._warn("memory", f"MEM: unknown request {data[:1].hex()}")
         return None
 
     def _read(self, data):
-        if len(data) < 6:
-            return None
         number, address, count = struct.unpack_from("<BIB", data)
         if count > _MOST:
             raise FirmwareAssertionError(f"a read of {count} bytes of memory, of {_MOST} at most")
-        content = None
-        if number < len(self._memories):
-            content = self._memories[number].read(address, count)
+        memory = self._memories.get(number)
+        content = None if memory is None else memory.read(address, count)
         if content is None:
-            self._warn(
-                "memory", f"MEM: memory {number} does not have {count} bytes at {address:#x}"
-            )
+            text = f"MEM: memory {number} does not have {count} bytes at {address:#x}"
+            self._warn("memory", text)
             return data[:5] + bytes([errno.EIO])
         return data[:5] + b"\0" + content
 
     def _write(self, data):
-        if len(data) < 5:
-            return None
-        number, address = struct.unpack_from("<BI", data)
-        content = data[5:]
-        done = number < len(self._memories) and self._memories[number].write(address, content)
+        (number, address), content = struct.unpack_from("<BI", data), data[5:]
+        memory = self._memories.get(number)
+        done = memory is not None and memory.write(address, content)
         if not done:
             text = f"MEM: {number} has no {len(content)} bytes at {address:#x} to write"
             self._warn("memory", text)

@@ -26,8 +26,7 @@ class Storage:
 
     def __init__(self, settings: VehicleSettings):
         self.eeprom = memory.eeprom(_ADDRESS_PREFIX | settings.address)
-        carried = memory.decks(settings.positioning, settings.multiranger)
-        self.one_wire = [deck.memory() for deck in carried]
+        self.one_wire = memory.one_wire(settings.positioning, settings.multiranger)
         self.lighthouse = lighthouse_pages(settings)
         self.parameters: dict[str, float] = {}
 

@@ -39,25 +39,22 @@ def handle_attitude(firmware: Firmware, channel: int, data: bytes) -> None:
     f = firmware
     if channel != _SETPOINT:
         f.warn("setpoint", f"CMD: unknown channel {channel}")
-        return
-    setpoint = f.attitude_decoder.decode(data, f.commander.priority, f.time)
-    if setpoint is None:
+    elif setpoint := f.attitude_decoder.decode(data, f.commander.priority, f.time):
+        f.stream(setpoint)
+        if f.attitude_decoder.is_locked:
+            f.warn("thrust", "CMD: thrust is locked until a setpoint without thrust comes")
+    else:
         f.warn("setpoint", "CMD: an attitude setpoint of less than 14 bytes")
-        return
-    f.stream(setpoint)
-    if f.attitude_decoder.is_locked:
-        f.warn("thrust", "CMD: thrust is locked until a setpoint without thrust comes")
 
 
 def handle_generic(firmware: Firmware, channel: int, data: bytes) -> None:
     """Process a setpoint of another type or the end of streaming; there is no answer."""
     f = firmware
     if channel == _SETPOINT:
-        setpoint = decode_generic(data, f.time)
-        if setpoint is None:
-            f.warn("setpoint", f"CMD: unknown type of setpoint {data[:1].hex()}")
-        else:
+        if setpoint := decode_generic(data, f.time):
             f.stream(setpoint)
+        else:
+            f.warn("setpoint", f"CMD: unknown type of setpoint {data[:1].hex()}")
     elif channel == _META and data[:1] == _SETPOINTS_STOP:
         f.commander.relax_priority(f.estimate)
     else:
@@ -75,12 +72,11 @@ def handle_supervisor(firmware: Firmware, channel: int, data: bytes) -> bytes | 
     if not data:
         return None
     command = data[0]
-    answer = None
-    if channel == _SUPERVISOR_INFO and _FIRST_BIT <= command <= _ALL_BITS:
-        bits = firmware.info
-        answer = bytes([bits >> (command - _FIRST_BIT) & 1])
-        if command == _ALL_BITS:
-            answer = struct.pack("<H", bits)
+    answer: bytes | None = None
+    if channel == _SUPERVISOR_INFO and _FIRST_BIT <= command < _ALL_BITS:
+        answer = bytes([firmware.info >> (command - _FIRST_BIT) & 1])
+    elif channel == _SUPERVISOR_INFO and command == _ALL_BITS:
+        answer = struct.pack("<H", firmware.info)
     elif channel == _SUPERVISOR_COMMAND and _ARM <= command <= _EMERGENCY_WATCHDOG:
         answer = _command_supervisor(firmware, command, data[1:])
     else:
@@ -113,7 +109,7 @@ _CONTINUOUS_WAVE, _NOTIFY = 0, 3
 _PROTOCOL, _FIRMWARE, _DEVICE = 0, 1, 2
 
 #: The firmware is the release whose behaviour is imitated.
-_NAMES = {_FIRMWARE: "2026.08 virtual", _DEVICE: "Crazyflie 2.1"}
+_NAMES = {_FIRMWARE: b"2026.08 virtual", _DEVICE: b"Crazyflie 2.1"}
 
 
 def handle_platform(firmware: Firmware, channel: int, data: bytes) -> bytes | None:
@@ -122,8 +118,12 @@ def handle_platform(firmware: Firmware, channel: int, data: bytes) -> bytes | No
         return None
     command, rest = data[0], data[1:]
     answer = None
-    if channel == _VERSION:
-        answer = _version(firmware, command)
+    if channel == _VERSION and command == _PROTOCOL:
+        answer = struct.pack("<i", firmware.protocol)
+    elif channel == _VERSION and command in _NAMES:
+        answer = _NAMES[command]
+    elif channel == _VERSION:
+        firmware.warn("platform", f"PLATFORM: unknown version {command}")
     elif channel == _PLATFORM_COMMAND and command in (_ARM, _RECOVER):
         answer = _command_supervisor(firmware, command, rest)
     elif channel == _PLATFORM_COMMAND and command in (_CONTINUOUS_WAVE, _NOTIFY):
@@ -131,15 +131,6 @@ def handle_platform(firmware: Firmware, channel: int, data: bytes) -> bytes | No
     else:
         firmware.warn("platform", f"PLATFORM: unknown command {channel}/{command}")
     return None if answer is None else bytes([command]) + answer
-
-
-def _version(firmware, command):
-    if command == _PROTOCOL:
-        return struct.pack("<i", firmware.protocol)
-    if command in _NAMES:
-        return _NAMES[command].encode()[: MAX_DATA - 1]
-    firmware.warn("platform", f"PLATFORM: unknown version {command}")
-    return None
 
 
 _POSITION, GENERIC, _PACKED_POSITIONS = 0, 1, 2  #: Channels of localization.
@@ -153,55 +144,41 @@ _PACKED_POSE = struct.Struct("<B3hI")
 def handle_localization(firmware: Firmware, channel: int, data: bytes) -> bytes | None:
     """Process an external measurement; only the storing of lighthouse data is answered."""
     f = firmware
+    command = data[0] if channel == GENERIC and data else None
     if channel == _POSITION and len(data) == 12:
-        _take_position(f, struct.unpack("<fff", data))
+        _take(f, struct.unpack("<fff", data))
     elif channel == _PACKED_POSITIONS:
         for values in _own(_PACKED_POSITION, data, f.address):
-            _take_position(f, [part / 1000.0 for part in values])
-    elif channel == GENERIC and len(data) == 5 and data[0] == _STORE_LIGHTHOUSE:
+            _take(f, [part / 1000.0 for part in values])
+    elif command == _POSE and len(data) == 29:
+        values = struct.unpack("<7f", data[1:])
+        _take(f, values[:3], values[3:])
+    elif command == _PACKED_POSES:
+        for *position, word in _own(_PACKED_POSE, data[1:], f.address):
+            _take(f, [part / 1000.0 for part in position], decompress_quaternion(word))
+    elif command == _STOP_MESSAGE:
+        f.supervisor.stop()
+    elif command == _WATCHDOG_MESSAGE:
+        f.supervisor.feed_watchdog(f.time)
+    elif command == _STORE_LIGHTHOUSE and len(data) == 5:
         done = f.deck.memory.store(*struct.unpack_from("<HH", data, 1))
         return bytes([_STORE_LIGHTHOUSE, done])
-    elif channel == GENERIC and data:
-        _handle_generic_location(f, data[0], data[1:])
+    elif command is not None:
+        f.warn("location", f"LOC: ignoring a message {command}")
     else:
         f.warn("location", f"LOC: nothing done with {len(data)} bytes on channel {channel}")
     return None
 
 
-def _handle_generic_location(f, command, data):
-    if command == _POSE and len(data) == 28:
-        values = struct.unpack("<7f", data)
-        _take_pose(f, values[:3], values[3:])
-    elif command == _PACKED_POSES:
-        for *position, word in _own(_PACKED_POSE, data, f.address):
-            _take_pose(f, [part / 1000.0 for part in position], decompress_quaternion(word))
-    elif command == _STOP_MESSAGE:
-        f.supervisor.stop()
-    elif command == _WATCHDOG_MESSAGE:
-        f.supervisor.feed_watchdog(f.time)
-    else:
-        f.warn("location", f"LOC: ignoring a message {command}")
-
-
-def _take_position(f, position):
-    if all(map(math.isfinite, position)):
-        f.localization.take_position(f.time, position)
-    else:
-        _refuse(f)
-
-
-def _take_pose(f, position, quaternion):
-    norm = math.hypot(*quaternion)
+def _take(f, position, quaternion=None):
+    norm = 1.0 if quaternion is None else math.hypot(*quaternion)
     # Not a rotation, or not a number.
     if not (all(map(math.isfinite, position)) and 0.5 < norm < 2.0):
-        _refuse(f)
-        return
-    unit = tuple(part / norm for part in quaternion)
-    f.localization.take_pose(f.time, position, unit)
-
-
-def _refuse(f):
-    f.warn("location", "LOC: a measurement that is not a number, or not a rotation")
+        f.warn("location", "LOC: a measurement that is not a number, or not a rotation")
+    elif quaternion is None:
+        f.localization.take_position(f.time, position)
+    else:
+        f.localization.take_pose(f.time, position, tuple(part / norm for part in quaternion))
 
 
 def _own(form, data, address):

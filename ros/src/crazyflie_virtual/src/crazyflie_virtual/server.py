@@ -185,32 +185,17 @@ class Observation(NamedTuple):
 
     def encode(self) -> bytes:
         """Return the observation as a datagram."""
-        return _FORM.pack(
-            _MAGIC,
-            self.body_id,
-            self.name.encode()[:31],
-            self.time,
-            *self.position,
-            *self.velocity,
-            *self.quaternion,
-            *self.rates,
-        )
+        numbers = (*self.position, *self.velocity, *self.quaternion, *self.rates)
+        return _FORM.pack(_MAGIC, self.body_id, self.name.encode()[:31], self.time, *numbers)
 
     @classmethod
     def decode(cls, datagram: bytes) -> "Observation | None":
         """Return the observation in a datagram, or None."""
         if len(datagram) != _FORM.size or not datagram.startswith(_MAGIC):
             return None
-        _, body_id, name, time, *numbers = _FORM.unpack(datagram)
-        return cls(
-            body_id,
-            name.rstrip(b"\0").decode("utf-8", "replace"),
-            time,
-            tuple(numbers[0:3]),
-            tuple(numbers[3:6]),
-            tuple(numbers[6:10]),
-            tuple(numbers[10:13]),
-        )
+        _, body_id, encoded, time, *n = _FORM.unpack(datagram)
+        name = encoded.rstrip(b"\0").decode("utf-8", "replace")
+        return cls(body_id, name, time, tuple(n[:3]), tuple(n[3:6]), tuple(n[6:10]), tuple(n[10:]))
 
 
 _TICK = 0.005  #: Longest time between two steps of the vehicle when no packet comes (s).
@@ -283,12 +268,11 @@ class VehicleServer(Server):
             if self._client is not None:
                 self._down.push(now, (datagram, self._client))
         for datagram, sender in self._up.pop(now):
-            receiver: Address | None = sender
-            if is_broadcast(datagram):
-                # As on a radio, answers go to the client.
-                receiver = self._client
-            elif datagram[:1] != _NULL:
+            is_for_all = is_broadcast(datagram)
+            if not is_for_all and datagram[:1] != _NULL:
                 self._client = sender
+            # As on a radio, answers to a broadcast go to the client.
+            receiver = self._client if is_for_all else sender
             for answer in self.vehicle.receive(datagram):
                 if receiver is not None:
                     self._down.push(now, (answer, receiver))

@@ -24,6 +24,7 @@ CLOCK_FREQUENCY = 1_000_000_000  #: Ticks per second of the server's clock.
 _RIGID_BODY = 1
 _TRACKED = 1
 _NO_PARENT = -1
+_NO_MARKERS = struct.pack("<i", 0)
 _POINT_CLOUD_SOLVED, _UNLABELLED = 0x02, 0x10
 _MARKER_SIZE = 0.0095  #: Diameter of a marker, m.
 _HEADER = struct.Struct("<HH")
@@ -72,18 +73,11 @@ class Encoder:
         """Return the answer to `REQUEST_MODEL`: names and numbers of the bodies."""
         payload = struct.pack("<i", len(bodies))
         for body in bodies:
-            description = (
-                body.name.encode()
-                + b"\0"
-                + struct.pack("<ii3f", body.body_id, _NO_PARENT, 0.0, 0.0, 0.0)
-            )
+            description = body.name.encode() + b"\0"
+            description += struct.pack("<ii3f", body.body_id, _NO_PARENT, 0.0, 0.0, 0.0)
             if self._parts >= (3, 0):
-                # No markers.
-                description += struct.pack("<i", 0)
-            payload += struct.pack("<i", _RIGID_BODY)
-            if self._parts >= (4, 1):
-                payload += struct.pack("<i", len(description))
-            payload += description
+                description += _NO_MARKERS
+            payload += struct.pack("<i", _RIGID_BODY) + self._sized(description)
         return _message(MODEL, payload)
 
     def frame(
@@ -101,21 +95,16 @@ class Encoder:
         the server's clock. ``markers`` do not belong to a rigid body, m; Motive sends them twice:
         as other markers, and flagged as unlabelled among the labelled ones.
         """
-        rigid_bodies = b"".join(self._rigid_body(body) for body in bodies)
-        others = b"".join(struct.pack("<3f", *marker) for marker in markers)
-        flagged = b"".join(self._unlabelled(*each) for each in enumerate(markers, 1))
+        others = [struct.pack("<3f", *marker) for marker in markers]
+        flagged = [self._unlabelled(*each) for each in enumerate(markers, 1)]
         # Marker sets, other markers, rigid bodies, skeletons, assets from 4.1 on, labelled
         # markers, force plates, and devices from 2.11 on.
-        empty = (0, b"")
-        sections = [empty, (len(markers), others), (len(bodies), rigid_bodies), empty]
-        sections += [empty] * (self._parts >= (4, 1)) + [(len(markers), flagged), empty]
-        sections += [empty] * (self._parts >= (2, 11))
+        sections = [[], others, [self._rigid_body(body) for body in bodies], []]
+        sections += [[]] * (self._parts >= (4, 1)) + [flagged, []]
+        sections += [[]] * (self._parts >= (2, 11))
         payload = struct.pack("<i", number)
-        for count, content in sections:
-            payload += struct.pack("<i", count)
-            if self._parts >= (4, 1):
-                payload += struct.pack("<i", len(content))
-            payload += content
+        for items in sections:
+            payload += struct.pack("<i", len(items)) + self._sized(b"".join(items))
         payload += struct.pack("<IId", 0, 0, exposure)
         if self._parts >= (3, 0):
             stamps = (round(s * CLOCK_FREQUENCY) for s in (exposure, received, sent))
@@ -124,6 +113,10 @@ class Encoder:
             # Precision time stamp, in seconds and their fraction: zeros without PTP.
             payload += struct.pack("<II", 0, 0)
         return _message(FRAME, payload + struct.pack("<hI", 0, 0))
+
+    def _sized(self, content):
+        size = struct.pack("<i", len(content)) if self._parts >= (4, 1) else b""
+        return size + content
 
     def _unlabelled(self, number, position):
         flags = _POINT_CLOUD_SOLVED | _UNLABELLED
@@ -134,8 +127,7 @@ class Encoder:
     def _rigid_body(self, body):
         data = struct.pack("<i7f", body.body_id, *body.position, *body.quaternion)
         if self._parts < (3, 0):
-            # No markers.
-            data += struct.pack("<i", 0)
+            data += _NO_MARKERS
         return data + struct.pack("<fh", 0.0, _TRACKED if body.is_tracked else 0)
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from crazyflie_model.angles import (
     Quaternion,
     Triple,
+    product,
     quaternion_from_zyx,
     rotate,
     rotate_back,
@@ -20,7 +21,6 @@ from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.quadrotor import CRAZYFLIE, QuadrotorParameters
 from crazyflie_model.stabilized_quadrotor import STILL_AIR, Airframe
 from crazyflie_model.units import GRAVITY
-from crazyflie_virtual.quaternions import product
 from crazyflie_world.world import World
 
 _CAPACITY = 900.0  #: Charge of the stock battery, C: 250 mAh [Bitcraze, data sheet].

@@ -9,13 +9,12 @@ from collections.abc import Callable
 
 from typing_extensions import override
 
-from crazyflie_model.angles import Quaternion, Triple
+from crazyflie_model.angles import Quaternion, Triple, turned
 from crazyflie_simulator.vehicle import MotionCapture
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, TEXT, Integer, Number, Text
 from crazyflie_virtual import natnet
 from crazyflie_virtual.natnet import VERSIONS, Encoder, StreamedBody
-from crazyflie_virtual.quaternions import product
 from crazyflie_virtual.server import (
     Address,
     Observation,
@@ -205,8 +204,7 @@ def _extrapolate(observation, time):
     position = tuple(
         p + v * dt for p, v in zip(observation.position, observation.velocity, strict=True)
     )
-    half_angles = (0.5 * dt * rate for rate in observation.rates)
-    return position, product(observation.quaternion, (*half_angles, 1.0))
+    return position, turned(observation.quaternion, [dt * rate for rate in observation.rates])
 
 
 _CLIENT_LIMIT = 5.0  #: Age of a client's last message above which it receives no frames (s).

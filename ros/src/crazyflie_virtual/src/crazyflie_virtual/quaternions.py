@@ -1,27 +1,12 @@
-"""Quaternions (x, y, z, w): products, and in 32 bits as they are on the wire."""
+"""Quaternions (x, y, z, w) in 32 bits, as they are on the wire."""
 
 import math
 
-from crazyflie_model import angles
 from crazyflie_model.angles import Quaternion
 
 _BITS = 9
 _MASK = (1 << _BITS) - 1
 _ROOT_HALF = math.sqrt(0.5)
-
-
-def normalized(x: float, y: float, z: float, w: float) -> Quaternion:
-    """Return the unit quaternion in a direction."""
-    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
-    return x * scale, y * scale, z * scale, w * scale
-
-
-def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return the unit quaternion of a product: the rotation q, then p.
-
-    The rotation by twice (a, b, c), small, rad, is (a, b, c, 1).
-    """
-    return normalized(*angles.product(p, q))
 
 
 def compress_quaternion(quaternion: Quaternion) -> int:

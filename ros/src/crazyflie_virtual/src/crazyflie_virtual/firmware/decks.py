@@ -13,11 +13,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from crazyflie_model.angles import Quaternion, Triple, rotate
+from crazyflie_model.angles import Quaternion, Triple, product, rotate
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.memory import LighthouseMemory
-from crazyflie_virtual.quaternions import product
 from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO, VehicleSettings
 
 _POSITION_DEVIATION = 0.003  #: Deviation of the deck that knows the true pose (m).

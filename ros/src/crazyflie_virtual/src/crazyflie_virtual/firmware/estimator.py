@@ -19,11 +19,10 @@ step of the yaw is lost, and it overshoots.
 
 import math
 
-from crazyflie_model.angles import Quaternion, Triple, rotate, zyx_from_quaternion
+from crazyflie_model.angles import Quaternion, Triple, rotate, turned, zyx_from_quaternion
 from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.body import Sensors
 from crazyflie_virtual.firmware.states import Estimate
-from crazyflie_virtual.quaternions import normalized, product
 
 _ACCELERATION_NOISE = 3.7e-4  #: Process noise, m^2/s^3: 0.6 m/s^2, held for 1 ms each.
 _RATE_NOISE = 1e-5  #: Process noise, rad^2/s: 0.1 rad/s, held for 1 ms each.
@@ -80,9 +79,8 @@ class Estimator:
         mean = [sum(parts) / len(parts) for parts in zip(*self._samples, strict=True)]
         self._samples = []
         e = self._estimate
-        half = 0.5 * dt * math.pi / 180.0
-        x, y, z = (half * rate for rate in mean[:3])
-        e.qx, e.qy, e.qz, e.qw = product(e.quaternion, (x, y, z, 1.0))
+        rotation = [dt * math.radians(rate) for rate in mean[:3]]
+        e.qx, e.qy, e.qz, e.qw = turned(e.quaternion, rotation)
         e.ax, e.ay, up = rotate(e.quaternion, mean[3:])
         e.az = up - 1.0
         dvx, dvy, dvz = GRAVITY * dt * e.ax, GRAVITY * dt * e.ay, GRAVITY * dt * e.az
@@ -142,12 +140,9 @@ class Estimator:
         e = self._estimate
         if e.qx * x + e.qy * y + e.qz * z + e.qw * w < 0.0:
             x, y, z, w = -x, -y, -z, -w
-        e.qx, e.qy, e.qz, e.qw = normalized(
-            e.qx + gain * (x - e.qx),
-            e.qy + gain * (y - e.qy),
-            e.qz + gain * (z - e.qz),
-            e.qw + gain * (w - e.qw),
-        )
+        parts = [a + gain * (b - a) for a, b in zip(e.quaternion, (x, y, z, w), strict=True)]
+        norm = math.hypot(*parts)
+        e.qx, e.qy, e.qz, e.qw = (part / norm for part in parts)
         self._update_angles()
 
     def _update_angles(self):

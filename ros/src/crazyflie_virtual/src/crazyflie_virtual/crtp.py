@@ -129,6 +129,8 @@ class Console:
         self.write_line(text)
         return True
 
-    def pop(self) -> bytes | None:
-        """Return the data of the next packet, or None."""
-        return self._packets.popleft() if self._packets else None
+    def take(self) -> list[bytes]:
+        """Return the data of the packets that wait, and forget them."""
+        packets = list(self._packets)
+        self._packets.clear()
+        return packets

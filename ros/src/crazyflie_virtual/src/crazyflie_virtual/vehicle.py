@@ -79,15 +79,12 @@ class Board:
 
     def unsolicited(self) -> list[Packet]:
         """Return the packets that answer no request: log data and console."""
-        packets = self._log.collect()
         firmware = self.firmware
-        for angles in firmware.deck.take_angles():
-            packets.append(Packet(Port.LOCALIZATION, ports.GENERIC, angles))
-        while firmware.link_statistics.is_connected:
-            piece = firmware.console.pop()
-            if piece is None:
-                break
-            packets.append(Packet(Port.CONSOLE, 0, piece))
+        packets = self._log.collect()
+        angles = firmware.deck.take_angles()
+        packets += [Packet(Port.LOCALIZATION, ports.GENERIC, each) for each in angles]
+        if firmware.link_statistics.is_connected:
+            packets += [Packet(Port.CONSOLE, 0, piece) for piece in firmware.console.take()]
         firmware.link_statistics.count_sent(len(packets))
         return packets
 
@@ -95,8 +92,9 @@ class Board:
 #: Channel of the link port that the radio chip answers, also while the microcontroller is off.
 _RADIO_CHANNEL = 3
 
-_RADIO_COMMAND = 0xFE
-_ALL_OFF, _OFF, _ON, _RESET = 0x01, 0x02, 0x03, 0xF0
+#: Commands to the radio chip: all off, microcontroller off and on, and reset, which has a mode.
+_ALL_OFF, _OFF, _ON, _RESET = b"\xfe\x01", b"\xfe\x02", b"\xfe\x03", b"\xfe\xf0"
+_TO_FIRMWARE = _RESET + b"\x01"  #: There is no boot loader to reset to.
 
 _BATTERY_STEPS = 10
 
@@ -202,21 +200,13 @@ class VirtualVehicle:
         self._restart_time = self.time + _RESTART_TIME
 
     def _command_radio(self, data):
-        if data[:1] != bytes([_RADIO_COMMAND]) or len(data) < 2:
-            return
-        command = data[1]
-        if command == _ALL_OFF:
-            self._is_dead = True
-        if command in (_ALL_OFF, _OFF):
+        command = data[:2]
+        if command in (_ALL_OFF, _OFF, _RESET):
             self.board = None
             self._restart_time = math.inf
-        elif command == _ON and self.board is None:
+            self._is_dead = command == _ALL_OFF
+        if data.startswith(_TO_FIRMWARE) or (command == _ON and self.board is None):
             self._turn_on()
-        elif command == _RESET:
-            self.board = None
-            # To the firmware; there is no boot loader to reset to.
-            if data[2:3] == b"\x01":
-                self._turn_on()
 
     def _turn_on(self):
         self.physics.put_upright()

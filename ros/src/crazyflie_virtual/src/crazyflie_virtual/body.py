@@ -120,7 +120,8 @@ OFF = MotorCommands(0.0, 0.0, 0.0, 0.0)
 _OVERTURNING = 0.5  #: Cosine of the tilt on the ground beyond which a vehicle lies on its back.
 
 
-_HAND_SPEED, _HAND_TURN = 0.5, math.radians(45.0)  #: m/s, rad/s.
+#: Largest change in a step, of x, y, z and yaw: at 0.5 m/s and 45 degrees/s.
+_HAND_STEPS = (0.5 * STEP, 0.5 * STEP, 0.5 * STEP, math.radians(45.0) * STEP)
 
 
 class Hand:
@@ -136,29 +137,22 @@ class Hand:
     def carry(self, x: Vector[float]) -> Vector[float] | None:
         """Return the state of the vehicle after a step, 17 components; None if not held."""
         goal = [self.x, self.y, self.z, math.radians(self.yaw)]
-        if self._start is None:
-            if not any(goal):
-                return None
-            self._start = (x[0], x[1], x[2]), zyx_from_quaternion(x[6:10])[2]
-        elif not (any(goal) or any(self._offset)):
+        if not (any(goal) or any(self._offset)):
             self._start = None
             return None
-        rates = (_HAND_SPEED, _HAND_SPEED, _HAND_SPEED, _HAND_TURN)
-        before = self._offset
-        self._offset = [
-            o + min(max(g - o, -rate * STEP), rate * STEP)
-            for o, g, rate in zip(before, goal, rates, strict=True)
+        if self._start is None:
+            self._start = (x[0], x[1], x[2]), zyx_from_quaternion(x[6:10])[2]
+        steps = [
+            clip(g - o, -most, most)
+            for g, o, most in zip(goal, self._offset, _HAND_STEPS, strict=True)
         ]
+        self._offset = [o + step for o, step in zip(self._offset, steps, strict=True)]
         place, yaw = self._start
-        turn = (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0))
-        way = rotate(turn, self._offset[:3])
-        velocity = rotate(
-            turn, [(b - a) / STEP for a, b in zip(before[:3], self._offset[:3], strict=True)]
-        )
+        turn = quaternion_from_zyx(0.0, 0.0, yaw)
+        position = [a + b for a, b in zip(place, rotate(turn, self._offset[:3]), strict=True)]
+        *velocity, turning = (step / STEP for step in steps)
         attitude = quaternion_from_zyx(0.0, 0.0, yaw + self._offset[3])
-        turning = (self._offset[3] - before[3]) / STEP
-        position = [a + b for a, b in zip(place, way, strict=True)]
-        return [*position, *velocity, *attitude, 0.0, 0.0, turning, *x[13:17]]
+        return [*position, *rotate(turn, velocity), *attitude, 0.0, 0.0, turning, *x[13:17]]
 
 
 class _Lags:

@@ -92,27 +92,38 @@ class Stabilizer:
             self.command_roll = self.command_pitch = self.command_yaw = 0.0
         # The mixer's pitch is positive nose down.
         inputs = (self.thrust, self.command_roll, -self.command_pitch, self.command_yaw)
-        self.requested = MotorCommands(*mix(*inputs)) if self.thrust > 0.0 else OFF
-        override = self.override.commands()
-        if override is not None:
-            self.requested = override
+        mixed = MotorCommands(*mix(*inputs)) if self.thrust > 0.0 else OFF
+        self.requested = self.override.commands() or mixed
         idle = float(self.idle_thrust)
         self.commands = MotorCommands(*limit(self.requested, idle)) if may_run else OFF
         return self.commands
 
     def _run_pid(self, setpoint, estimate, sensors, with_position):
-        if setpoint.mode != self._mode:
-            self._mode = setpoint.mode
+        mode = setpoint.mode
+        if mode != self._mode:
+            self._mode = mode
             self._reset(estimate)
-        controls_position = self._mode[:3] != (DISABLED,) * 3
-        if with_position and controls_position:
+        if with_position and mode[:3] != (DISABLED,) * 3:
             self._automatic = self.position.update(setpoint, estimate)
         self._update_desired_yaw(setpoint, estimate)
-        self._update_desired_tilt(setpoint)
+        self.roll, self.pitch, self.thrust = self._automatic
+        if DISABLED in (mode.x, mode.y):
+            self.roll, self.pitch = setpoint.roll, setpoint.pitch
+        if mode.z == DISABLED:
+            self.thrust = setpoint.thrust
         if self.thrust <= 0.0:
             self._idle(estimate)
-        else:
-            self._control_attitude(setpoint, estimate, sensors)
+            return
+        rates = self.attitude.desired_rates(estimate, self.roll, self.pitch, self.yaw)
+        self.roll_rate, self.pitch_rate, self.yaw_rate = rates
+        if mode.roll == VELOCITY:
+            self.roll_rate = setpoint.roll_rate
+        if mode.pitch == VELOCITY:
+            self.pitch_rate = setpoint.pitch_rate
+        self.command_roll, self.command_pitch, self.command_yaw = self.attitude.outputs(
+            (self.roll_rate, self.pitch_rate, self.yaw_rate),
+            (sensors.gyro_x, -sensors.gyro_y, sensors.gyro_z),
+        )
 
     def _reset(self, estimate):
         self.attitude.reset()
@@ -132,25 +143,6 @@ class Stabilizer:
             self.yaw = wrap_degrees(setpoint.yaw)
         elif setpoint.mode.quaternion == ABSOLUTE:
             self.yaw = math.degrees(zyx_from_quaternion(setpoint.quaternion)[2])
-
-    def _update_desired_tilt(self, setpoint):
-        roll, pitch, thrust = self._automatic
-        self.thrust = setpoint.thrust if setpoint.mode.z == DISABLED else thrust
-        if DISABLED in (setpoint.mode.x, setpoint.mode.y):
-            roll, pitch = setpoint.roll, setpoint.pitch
-        self.roll, self.pitch = roll, pitch
-
-    def _control_attitude(self, setpoint, estimate, sensors):
-        rates = self.attitude.desired_rates(estimate, self.roll, self.pitch, self.yaw)
-        roll_rate, pitch_rate, yaw_rate = rates
-        if setpoint.mode.roll == VELOCITY:
-            roll_rate = setpoint.roll_rate
-        if setpoint.mode.pitch == VELOCITY:
-            pitch_rate = setpoint.pitch_rate
-        self.roll_rate, self.pitch_rate, self.yaw_rate = roll_rate, pitch_rate, yaw_rate
-        gyro = (sensors.gyro_x, -sensors.gyro_y, sensors.gyro_z)
-        outputs = self.attitude.outputs((roll_rate, pitch_rate, yaw_rate), gyro)
-        self.command_roll, self.command_pitch, self.command_yaw = outputs
 
     def _idle(self, estimate):
         # Without thrust the controllers are reset, and the desired heading is the vehicle's.

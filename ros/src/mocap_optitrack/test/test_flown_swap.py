@@ -14,8 +14,7 @@ from test_single_markers import VirtualCameras
 
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
-from mocap_optitrack.marker_tracker import MarkerTracker
-from mocap_optitrack.marker_vehicle import MarkerVehicle
+from mocap_optitrack.marker_tracker import MarkerTracker, MarkerVehicle
 
 DISTURBANCES = {"ghosts": 0.3, "occlusions": 0.2, "dropout": 0.02}
 GAP, STEP_ASIDE = 1.0, 0.4

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from swarm_scenes import RATE, Cameras, SwapFlight, fly
 
 from mocap_optitrack.marker_motion import MotionLimits
-from mocap_optitrack.marker_tracker import MarkerTracker
-from mocap_optitrack.marker_vehicle import MarkerVehicle
+from mocap_optitrack.marker_tracker import MarkerTracker, MarkerVehicle
 
 LEFT, RIGHT = (0.0, 0.5, 0.04), (0.0, -0.5, 0.04)
 

@@ -13,8 +13,7 @@ from crazyflie_virtual.natnet import Encoder
 from crazyflie_virtual.server import Observation
 from mocap_optitrack import natnet_messages
 from mocap_optitrack.frames import Frame
-from mocap_optitrack.marker_tracker import MarkerTracker
-from mocap_optitrack.marker_vehicle import MarkerVehicle
+from mocap_optitrack.marker_tracker import MarkerTracker, MarkerVehicle
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 STILL = (0.0, 0.0, 0.0)

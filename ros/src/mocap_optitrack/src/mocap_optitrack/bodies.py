@@ -22,7 +22,7 @@ from crazyflie_utils.parameters.types import (
 )
 from crazyflie_utils.text import shortened, shown
 from mocap_optitrack.marker_motion import MotionLimits
-from mocap_optitrack.marker_vehicle import SEPARATION, MarkerVehicle
+from mocap_optitrack.marker_tracker import SEPARATION, MarkerVehicle
 
 
 class Body(Parameters):

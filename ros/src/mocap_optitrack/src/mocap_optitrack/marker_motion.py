@@ -1,4 +1,4 @@
-"""The motion of a reflecting marker, its prediction, and its assignment to a point of a frame."""
+"""Reflecting markers: their motion, its prediction, and their assignment to points of a frame."""
 
 import math
 from collections.abc import Sequence
@@ -17,13 +17,20 @@ GATE = 4.0  #: Gate in standard deviations: for three normal variables, 1 in 100
 #: only in part have larger errors.
 _MEASUREMENT_VARIANCE = 0.002**2
 
-#: Cost in the units of `MarkerMotion.costs`:
+#: Cost in the units of `Marker.costs`:
 #: -2 log(0.1 * 0.1 / m^3 * (2 pi _MEASUREMENT_VARIANCE)^1.5), for a marker that is missing in one
 #: frame of ten, and one reflection in 10 m^3.
 UNSEEN_COST = 40.0
 
 _FIRST_SPEED_VARIANCE = 1.0  #: Variance of the velocity after the first measurement (m^2/s^2).
 _BOX_MARGIN = GATE * (2.0 * _MEASUREMENT_VARIANCE) ** 0.5  #: Noise of two measurements, m.
+
+#: Time (s) for which a resting marker stays in a region, and size of that (m).
+_REST_TIME, REST_RADIUS = 0.5, 0.02
+
+#: Number of frames in which a marker must be seen before it is assigned to a vehicle: reflections
+#: flash.
+_LEAST_SIGHTINGS = 3
 
 
 class MotionLimits(NamedTuple):
@@ -35,21 +42,34 @@ class MotionLimits(NamedTuple):
     max_acceleration: float = 8.0
 
 
-class MarkerMotion:
-    """Constant-velocity Kalman filter of a marker; its three axes have one covariance.
+class Marker:
+    """A marker that is followed from frame to frame.
 
-    The acceleration is constant from one measurement to the next, and independent of that before
+    Its position is a constant-velocity Kalman filter's, whose three axes have one covariance. The
+    acceleration is constant from one measurement to the next, and independent of that before
     (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001,
     section 6.3.2, discrete white noise acceleration). The first measurement was made at ``time``
     (s), of a ``position`` (3,) in m.
     """
 
     def __init__(self, time: float, position: Point, limits: MotionLimits):
-        self.time = time  #: Time of the last measurement (s).
-        self.measured = position  #: The last measurement, m.
+        #: first_seen, time: Times of the first and the last measurement (s).
+        self.first_seen = self.time = self._rests_since = time
+        self.measured = self._rest = position  #: The last measurement, m.
         self.position, self.velocity = position, np.zeros(3)  #: Estimates at that time, m and m/s.
         self.limits = limits  #: Limits, used from the next prediction on.
         self._covariance = (_MEASUREMENT_VARIANCE, 0.0, _FIRST_SPEED_VARIANCE)
+        self._sightings = 1
+
+    @property
+    def flashes(self) -> bool:
+        """Whether it has been seen in too few frames to belong to a vehicle."""
+        return self._sightings < _LEAST_SIGHTINGS
+
+    @property
+    def rests(self) -> bool:
+        """Whether it has been at one place for a while."""
+        return self.time - self._rests_since >= _REST_TIME
 
     def variance(self, time: float) -> float:
         """Return the variance of the next measurement along each axis, m^2."""
@@ -86,6 +106,9 @@ class MarkerMotion:
         self.velocity = self.velocity + gain_v * (measured - predicted)
         self._covariance = ((1.0 - gain_p) * p, (1.0 - gain_p) * m, v - gain_v * m)
         self.time, self.measured = time, measured
+        self._sightings += 1
+        if math.dist(measured, self._rest) > REST_RADIUS:
+            self._rest, self._rests_since = measured, time
 
     def _predicted(self, dt: float) -> tuple[float, float, float]:
         p, m, v = self._covariance
@@ -105,19 +128,19 @@ _IMPOSSIBLE = 1e6
 
 
 def assign(
-    motions: Sequence[MarkerMotion], time: float, points: Point
+    markers: Sequence[Marker], time: float, points: Point
 ) -> tuple[dict[int, int], set[int]]:
     """Return index of marker -> index of point, and the markers that may be another point, too.
 
-    The assignment is the most likely one: it has the least sum of `MarkerMotion.costs`, and of
+    The assignment is the most likely one: it has the least sum of `Marker.costs`, and of
     `UNSEEN_COST` for each marker that is not seen. A pair is ambiguous when the marker has another
     point within its gate, or the point another marker, and the best assignment without the pair
     costs little more. ``time`` is the frame's, s; ``points`` are of shape (n, 3), m.
     """
-    m, n = len(motions), len(points)
+    m, n = len(markers), len(points)
     costs = np.full((m, n + m), _IMPOSSIBLE)
-    for row, motion in enumerate(motions):
-        costs[row, :n] = np.minimum(motion.costs(time, points), _IMPOSSIBLE)
+    for row, marker in enumerate(markers):
+        costs[row, :n] = np.minimum(marker.costs(time, points), _IMPOSSIBLE)
         costs[row, n + row] = UNSEEN_COST
     rows, columns = linear_sum_assignment(costs)
     best = costs[rows, columns].sum()

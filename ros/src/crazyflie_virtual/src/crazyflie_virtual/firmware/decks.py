@@ -13,7 +13,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from crazyflie_model.angles import Quaternion, Triple, product, rotate
+from crazyflie_model.angles import Quaternion, Triple, product, quaternion_from_zyx, rotate
+from crazyflie_model.elementwise import clip
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.memory import LighthouseMemory
@@ -82,11 +83,11 @@ def _frame(station: int, page: bytes) -> tuple[Quaternion, Triple] | None:
     rotation = np.reshape(values[3:12], (3, 3)) @ np.reshape(true[3:12], (3, 3)).T
     if not values[-1] or abs(np.linalg.det(rotation) - 1.0) > 0.01:
         return None
-    # It takes as long to import as all the rest.
-    from scipy.spatial.transform import Rotation
-
     x, y, z = map(float, np.array(values[:3]) - rotation @ true[:3])
-    return tuple(Rotation.from_matrix(rotation).as_quat().tolist()), (x, y, z)
+    roll = math.atan2(rotation[2, 1], rotation[2, 2])
+    yaw = math.atan2(rotation[1, 0], rotation[0, 0])
+    pitch = math.asin(clip(float(-rotation[2, 0]), -1.0, 1.0))
+    return quaternion_from_zyx(roll, pitch, yaw), (x, y, z)
 
 
 @dataclass(eq=False)
@@ -155,32 +156,31 @@ class PositioningDeck:
         kind = self.settings.positioning
         if kind == FLOW:
             self._measure_flow(dt)
-            return
-        if kind == LIGHTHOUSE:
-            self.received = self._stations & ~self.faults.occluded
-            self._angle_phase = (self._angle_phase + 1) % _ANGLE_PERIOD
-            if self.sends_angles and not self._angle_phase:
-                self._angles += map(self._measured_angles, _numbers(self.received))
-            self._measure_lighthouse(_numbers(self.active_stations))
-            return
-        deviation = _LOCO_DEVIATION if kind == LOCO else 0.0
-        self._correct(self._noisy(deviation), deviation or _POSITION_DEVIATION)
+        elif kind == LIGHTHOUSE:
+            self._measure_lighthouse()
+        else:
+            deviation = _LOCO_DEVIATION if kind == LOCO else 0.0
+            quaternion = self.physics.quaternion
+            self._correct(self._noisy(deviation), deviation or _POSITION_DEVIATION, quaternion)
 
-    def _measure_lighthouse(self, active):
+    def _measure_lighthouse(self):
+        self.received = self._stations & ~self.faults.occluded
+        self._angle_phase = (self._angle_phase + 1) % _ANGLE_PERIOD
+        if self.sends_angles and not self._angle_phase:
+            self._angles += map(self._measured_angles, _numbers(self.received))
+        active = _numbers(self.active_stations)
         if not active:
             return
         deviation = _LIGHTHOUSE_DEVIATIONS[len(active) - 1]
-        position, quaternion = self._noisy(deviation), self.physics.quaternion
-        if any(self.memory.page(i) != GEOMETRIES[i] for i in active):
-            # The estimate of a base station's place is wrong, and so is that of the vehicle.
-            frames = [frame for i in active if (frame := _frame(i, self.memory.page(i)))]
-            places = [
-                [a + b for a, b in zip(rotate(attitude, position), origin, strict=True)]
-                for attitude, origin in frames
-            ]
-            x, y, z = (sum(parts) / len(frames) for parts in zip(*places, strict=True))
-            position, quaternion = (x, y, z), product(frames[0][0], quaternion)
-        self._correct(position, deviation, quaternion)
+        position = self._noisy(deviation)
+        # Where the estimate of a base station's place is wrong, so is that of the vehicle.
+        frames = [frame for i in active if (frame := _frame(i, self.memory.page(i)))]
+        places = [
+            [a + b for a, b in zip(rotate(attitude, position), origin, strict=True)]
+            for attitude, origin in frames
+        ]
+        x, y, z = (sum(parts) / len(frames) for parts in zip(*places, strict=True))
+        self._correct((x, y, z), deviation, product(frames[0][0], self.physics.quaternion))
 
     def _measured_angles(self, station):
         # A packet with the horizontal and the vertical angle of each sensor (rad), those of the
@@ -196,11 +196,8 @@ class PositioningDeck:
         return struct.pack("<BBf3ef3e", _ANGLES, station, *fields)
 
     def _noisy(self, deviation: float) -> Triple:
-        x, y, z = self.physics.position
-        if not deviation:
-            return x, y, z
-        noise = self._random.gauss
-        return x + noise(0.0, deviation), y + noise(0.0, deviation), z + noise(0.0, deviation)
+        x, y, z = (part + self._random.gauss(0.0, deviation) for part in self.physics.position)
+        return x, y, z
 
     def _measure_flow(self, dt):
         e, (x, y, z) = self.estimator.estimate, self.physics.position
@@ -217,11 +214,12 @@ class PositioningDeck:
             self.unmeasured = 0.0
         else:
             self.unmeasured += _UNMEASURED * dt
-        self._correct((x + self._drift[0], y + self._drift[1], z), _POSITION_DEVIATION)
+        position = (x + self._drift[0], y + self._drift[1], z)
+        self._correct(position, _POSITION_DEVIATION, self.physics.quaternion)
 
-    def _correct(self, position: Triple, deviation: float, q: Quaternion | None = None) -> None:
+    def _correct(self, position: Triple, deviation: float, quaternion: Quaternion) -> None:
         self.estimator.correct_position(*position, deviation)
-        self.estimator.correct_attitude(*(q or self.physics.quaternion), _ATTITUDE_DEVIATION)
+        self.estimator.correct_attitude(*quaternion, _ATTITUDE_DEVIATION)
 
 
 def _numbers(mask):

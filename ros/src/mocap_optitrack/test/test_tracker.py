@@ -19,7 +19,7 @@ BODIES = RIGID_BODIES(
 
 def tracker(up_axis="z", stale_after=0.2, health=None):
     """Return a tracker of one body by its number and two by their names."""
-    return Tracker(BODIES, up_axis, stale_after, health or Health(BODIES, stale_after, 0.0))
+    return Tracker(BODIES, up_axis, health or Health(BODIES, stale_after, 0.0))
 
 
 def body(number=1, name=None, position=(1.0, 2.0, 3.0), quaternion=UPRIGHT, is_tracked=True):

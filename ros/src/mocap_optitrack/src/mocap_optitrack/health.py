@@ -46,7 +46,7 @@ class Health:
     ):
         self._rate_limits = rate_limits or (0.0, math.inf)
         self._bodies = {body.key: body for body in bodies}
-        self.stale_after = stale_after  #: Used from the next report on.
+        self.stale_after = stale_after  #: Largest age of a used frame, s.
         self._silence = "no frames"
         self._last: dict[str, float] = {}  # Time at which each body was tracked last, s.
         self._why: dict[str, str] = {}

@@ -40,29 +40,25 @@ _REPEAT = 5.0  #: Shortest period of the same warning (s).
 MAX_HEADING_AGE = 2.0
 
 
-class MocapNode(Node):
+class MocapNode(Node[MocapParameters]):
     """Publish the poses of a motion capture system's rigid bodies on topics and on tf."""
 
     needed_in_flight = True
     pose_type: type = PoseStamped  #: Message type of the topics with poses.
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(MocapParameters, self._reconfigure)
-        for name in self._parameters.unknown:
-            handle.warn(f"parameter {handle.name}/{name} is unknown and has no effect")
-
-    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
-        bodies, stale_after = parameters.bodies, parameters.stale_after
+        for name in parameters.unknown:
+            handle.warn(f"parameter {handle.name}/{name} is unknown and has no effect")
+        bodies, markers = parameters.bodies, parameters.markers
         self._server = ""
         self._stamp = genpy.Time()
-        self._health = Health(bodies, stale_after, handle.time(), parameters.rate_limits)
+        limits = (parameters.stale_after, handle.time(), parameters.rate_limits)
+        self._health = Health(bodies, *limits)
         self._tracker = Tracker(
-            bodies, parameters.up_axis, stale_after, self._health, parameters.hold_time, handle.warn
+            bodies, parameters.up_axis, self._health, parameters.hold_time, handle.warn
         )
-        markers = parameters.markers
         self._poses = _publishers(handle, bodies, "pose", self.pose_type)
         self._poses2d = _publishers(handle, bodies, "pose2d", Pose2D)
         self._positions = _publishers(handle, markers, "position", PointStamped)
@@ -92,9 +88,9 @@ class MocapNode(Node):
         if self._broadcast is None and body.child_frame_id:
             self._broadcast = self._handle.broadcast_transforms()
 
-    def _reconfigure(self, parameters):
+    @override
+    def _reconfigure(self, parameters: MocapParameters) -> None:
         self._health.stale_after = parameters.stale_after
-        self._tracker.stale_after = parameters.stale_after
 
     def make_receiver(self, handle: NodeHandle) -> Receiver:
         """Return the thread whose frames and events the executor passes to ``on_...``."""

@@ -33,7 +33,7 @@ class Tracker:
     """Finds the configured bodies in frames and drops what is invalid or stale.
 
     A frame is used once: one that is not newer than the last one is dropped. So is one that is
-    older than ``stale_after`` (s) on arrival, or from the future, or from another server's clock.
+    older than `Health.stale_after` on arrival, or from the future, or from another server's clock.
     Bodies of a frame that were not tracked, or whose pose is invalid, are dropped. ``up_axis`` is
     the stream's, see `frames.UP_AXES`; ``health`` counts events; ``hold_time`` (s) and ``log`` are
     those of a `MarkerTracker`.
@@ -43,7 +43,6 @@ class Tracker:
         self,
         bodies: Sequence[Body],
         up_axis: str,
-        stale_after: float,
         health: Health,
         hold_time: float = 0.5,
         log: Callable[[str], None] = lambda text: None,
@@ -57,7 +56,6 @@ class Tracker:
             if not isinstance(body, SingleMarker):
                 self.add(body)
         self._up_axis = up_axis
-        self.stale_after = stale_after  #: Used from the next frame on.
         self._health = health
         self._newest = self._arrival = -math.inf
         self.restart()
@@ -135,7 +133,7 @@ class Tracker:
             return FrameOrder.OLD, time
         if age < -_LEAD:
             return FrameOrder.FOREIGN, time
-        return FrameOrder.STALE if age > self.stale_after else FrameOrder.NEW, time
+        return FrameOrder.STALE if age > self._health.stale_after else FrameOrder.NEW, time
 
     def _configured(self, body):
         # In systems without numbers, a body may be named "1".

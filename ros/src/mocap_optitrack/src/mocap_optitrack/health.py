@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from mocap_optitrack.bodies import Body
@@ -45,11 +46,9 @@ class Health:
         rate_limits: tuple[float, float] | None = None,
     ):
         self._rate_limits = rate_limits or (0.0, math.inf)
-        self._bodies = {body.key: body for body in bodies}
+        self._bodies = {body.key: _BodyCount(body) for body in bodies}
         self.stale_after = stale_after  #: Largest age of a used frame, s.
         self._silence = "no frames"
-        self._last: dict[str, float] = {}  # Time at which each body was tracked last, s.
-        self._why: dict[str, str] = {}
         self._begin = now
         self.disconnected("not connected so far")
 
@@ -72,7 +71,7 @@ class Health:
 
     def add(self, body: Body) -> None:
         """Also report on a body."""
-        self._bodies[body.key] = body
+        self._bodies[body.key] = _BodyCount(body)
         self._others.pop((None, body.key), None)
 
     def count(self, order: FrameOrder) -> None:
@@ -91,11 +90,12 @@ class Health:
 
     def body(self, body: Body, now: float, is_tracked: bool, why: str = "") -> None:
         """Count a configured body in a good frame; ``why`` is the reason if it is not tracked."""
-        self._why[body.key] = why
-        self._frames[body.key] += 1
+        count = self._bodies[body.key]
+        count.why = why
+        count.frames += 1
         if is_tracked:
-            self._tracked[body.key] += 1
-            self._last[body.key] = now
+            count.tracked += 1
+            count.last = now
 
     def other(self, body: SeenBody) -> None:
         """Record a `SeenBody` in a good frame that is not configured."""
@@ -107,7 +107,7 @@ class Health:
 
         Counting starts again at ``now`` (s).
         """
-        bodies = [self._body_status(body, now) for body in self._bodies.values()]
+        bodies = [self._body_status(count, now) for count in self._bodies.values()]
         statuses = [self._stream_status(now), *bodies]
         self._begin = now
         self._clear_counts()
@@ -117,9 +117,8 @@ class Health:
         self._latencies: list[float] = []
         self._longest_gap = 0.0
         self._dropped: Counter[FrameOrder] = Counter()
-        # Of each body: frames that should have it, and those in which it was tracked.
-        self._frames: Counter[str] = Counter()
-        self._tracked: Counter[str] = Counter()
+        for count in self._bodies.values():
+            count.frames = count.tracked = 0
 
     def _stream_status(self, now):
         period = now - self._begin
@@ -168,31 +167,28 @@ class Health:
             f"{values['rate (Hz)']} frames per second, {values['latency, mean (ms)']} ms old"
         )
 
-    def _body_status(self, body, now):
-        frames, tracked = self._frames[body.key], self._tracked[body.key]
-        values = {"frames": str(frames), "tracked": str(tracked)}
-        if body.key in self._last:
-            values["last seen (s ago)"] = f"{now - self._last[body.key]:.2f}"
-        level, message = self._body_assessment(body.key, now)
-        return Status(body.component, level, message, values)
+    def _body_status(self, count, now):
+        values = {"frames": str(count.frames), "tracked": str(count.tracked)}
+        if math.isfinite(count.last):
+            values["last seen (s ago)"] = f"{now - count.last:.2f}"
+        level, message = self._body_assessment(count, now)
+        return Status(count.body.component, level, message, values)
 
-    def _body_assessment(self, key, now):
+    def _body_assessment(self, count, now):
         if self._last_frame is None or now - self._last_frame > self.stale_after:
             return ERROR, "no frames"
-        frames, tracked = self._frames[key], self._tracked[key]
-        last = self._last.get(key, -math.inf)
-        is_missing = now - last > self.stale_after
-        if is_missing and self._why.get(key):
-            return ERROR, self._why[key]
-        if last < self._stream_begin:
+        is_missing = now - count.last > self.stale_after
+        if is_missing and count.why:
+            return ERROR, count.why
+        if count.last < self._stream_begin:
             level = WARN if now - self._stream_begin < _GRACE else ERROR
-            if frames:
+            if count.frames:
                 return level, "in the stream, but not tracked so far"
             return level, f"not in the stream so far; {self._other_bodies()}"
         if is_missing:
-            return ERROR, f"not tracked for {now - last:.1f} s"
-        if tracked < frames:
-            return WARN, f"tracked in {tracked} of {frames} frames"
+            return ERROR, f"not tracked for {now - count.last:.1f} s"
+        if count.tracked < count.frames:
+            return WARN, f"tracked in {count.tracked} of {count.frames} frames"
         return OK, "tracked"
 
     def _other_bodies(self):
@@ -203,6 +199,16 @@ class Health:
             for number, name in self._others
         ]
         return "it shows others that are not configured: " + ", ".join(names)
+
+
+@dataclass
+class _BodyCount:
+    body: Body
+    #: Good frames since the last report, and those of them in which it was tracked.
+    frames: int = 0
+    tracked: int = 0
+    last: float = -math.inf  #: Time at which it was tracked last, s.
+    why: str = ""  #: Reason if it is not tracked.
 
 
 def _milliseconds(seconds):

@@ -16,7 +16,7 @@ from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TEXT, Integer, List
 from mocap_optitrack.bodies import RigidBody
 from mocap_optitrack.frames import Frame
 from mocap_optitrack.mocap_node import MocapNode, transform_of
-from mocap_optitrack.parameters import LibraryParameters, MocapParameters, NatNetParameters
+from mocap_optitrack.parameters import MocapParameters, NatNetParameters
 
 _VRPN_PORT = 3883
 _PORT = Integer(1, 65535)
@@ -42,11 +42,10 @@ class ClientNode(MocapNode):
         """Connect to a system when callbacks are registered."""
         self._known: dict[str, Mapping[str, Any] | None] = {}
         # mypy treats each default as a missing argument.
-        library = LibraryParameters(hostname=hostname)
         self._parameters = MocapParameters(  # type: ignore[call-arg]
             natnet=NatNetParameters(),  # type: ignore[call-arg]
             backend=backend,
-            library=library,
+            hostname=hostname,
         )
 
 

@@ -192,7 +192,7 @@ class MocapNode(Node[MocapParameters]):
     def _make_source(self, handle):
         parameters = self._parameters
         if parameters.backend != NATNET:
-            hostname = parameters.library.hostname
+            hostname = parameters.hostname
             assert hostname is not None, "MocapParameters.complaints sees to it"
             needs_points = bool(parameters.markers)
             return LibrarySource(parameters.backend, hostname, handle.time, needs_points)

@@ -98,17 +98,6 @@ class NatNetParameters(Parameters):
     )
 
 
-class LibraryParameters(Parameters):
-    """Connection to a server of another system, ``motioncapture_config``."""
-
-    hostname: str | None = parameter(
-        TEXT,
-        "the other systems, which require it: host name or address of the server; for VRPN also "
-        "with a port, `vicon:3884`",
-        None,
-    )
-
-
 class MocapParameters(Parameters):
     """Parameters of `MocapNode`."""
 
@@ -144,7 +133,13 @@ class MocapParameters(Parameters):
         None,
     )
     natnet: NatNetParameters = group(NatNetParameters, "optitrack_config")
-    library: LibraryParameters = group(LibraryParameters, "motioncapture_config")
+    hostname: str | None = parameter(
+        TEXT,
+        "the other systems, which require it: host name or address of the server; for VRPN also "
+        "with a port, `vicon:3884`",
+        None,
+        "motioncapture_config/hostname",
+    )
 
     @property
     def bodies(self) -> list[Body]:
@@ -173,7 +168,7 @@ class MocapParameters(Parameters):
         for key in dict.fromkeys(key for key in keys if keys.count(key) > 1):
             yield f"parameters rigid_bodies/{key} and single_markers/{key}; expected one of them"
         yield from shared_outputs(self.bodies)
-        if self.backend != NATNET and self.library.hostname is None:
+        if self.backend != NATNET and self.hostname is None:
             yield (
                 "parameter motioncapture_config/hostname is not set; expected the host name or "
                 f"address of the {self.backend} server"

@@ -11,12 +11,17 @@ from fake_fleet import STATE, FakeFleet
 from genpy.dynamic import generate_dynamic
 from geometry_msgs.msg import Point, PoseStamped, Vector3
 from rosgraph_msgs.msg import Log
-from std_msgs.msg import ColorRGBA, String
+from std_msgs.msg import ColorRGBA, Float32, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.snapshot import Fence
-from crazyflie_msgs.msg import ControlStamped, FlightStatus, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    ControlStamped,
+    FlightStatus,
+    PositionVelocityYawStateStamped,
+    VehicleStatus,
+)
 from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
 
 
@@ -357,3 +362,20 @@ def test_lists_of_markers_are_one_thing_each(fleet):
     ((lines, *_),) = listed(fleet, Marker.LINE_LIST, (*rows[::2], rows[0], bad, rows[0]))
     assert lines.rows == pytest.approx(np.array([[0.5, 0.0, 0.0], [1.0, -0.5, 1.0]]), abs=1e-6)
     assert listed(fleet, Marker.SPHERE_LIST, [bad]) == ()
+
+
+def test_a_voltage_that_was_known_stays_until_another_one_comes():
+    fleet = FakeFleet(1)
+    topics = {"/cf1/vehicle_status": VehicleStatus._type, "/cf1/battery": Float32._type}
+    fleet.graph = Graph({**fleet.graph.topics, **topics}, services=fleet.graph.services)
+    fleet.find()
+    shown = []
+    for topic, message in (
+        ("/cf1/battery", Float32(3.5)),
+        ("/cf1/vehicle_status", VehicleStatus(battery_voltage=4.0, link_quality=math.nan)),
+        ("/cf1/vehicle_status", VehicleStatus(battery_voltage=math.nan, link_quality=0.5)),
+    ):
+        fleet.process.publish(topic, message)
+        fleet.process.advance(0.05)
+        shown.append((fleet.vehicles["cf1"].battery, fleet.vehicles["cf1"].link_quality))
+    assert shown == [(3.5, None), (4.0, None), (4.0, 0.5)]

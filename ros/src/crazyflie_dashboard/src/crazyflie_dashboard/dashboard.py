@@ -107,8 +107,9 @@ class Dashboard:
         state = self._open.get(page)
         if state is None:
             return ()
-        plots = self._model.plots.get(state.vehicle or "")
-        return state.series() + (plots.series() if plots is not None else ())
+        model = self._model.models.get(state.vehicle or "")
+        plots = model and model.plots
+        return state.series() + (plots.series() if plots else ())
 
     def add_field(self, page: int, path: str) -> "Future[None]":
         """Plot a number of any topic, as in /topic/field/other[0], too."""

@@ -3,13 +3,13 @@
 Nothing is subscribed to, and the master is not asked, while no page is open.
 """
 
+import itertools
 import math
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import replace
-from functools import partial
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Log
@@ -21,7 +21,6 @@ from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.messages import Diagnostics, log_line
 from crazyflie_dashboard.page_state import IMAGES
-from crazyflie_dashboard.plots import VehiclePlots
 from crazyflie_dashboard.snapshot import (
     STALE_AGE,
     Frame,
@@ -75,7 +74,6 @@ class GraphModel:
         self.scene = Scene()  #: The newest one.
         self.graph = Graph()  #: The newest one.
         self.models: dict[str, VehicleModel] = {}  #: By name of the vehicle.
-        self.plots: dict[str, VehiclePlots] = {}  #: Plots of watched vehicles, by name.
         #: paths, sentences, missions, recording: Parts of the scene that are set from outside.
         self.paths: Mapping[str, tuple[Triple, ...]] = {}
         self.sentences: tuple[Sentence, ...] = ()
@@ -89,12 +87,11 @@ class GraphModel:
         self._diagnostics = Diagnostics(clock)
         self._surroundings = Surroundings(handle)
         self._log: deque[LogLine] = deque(maxlen=_MAX_LINES)
-        self._lines = 0
-        self._seen: dict[str, float] = {}
-        self._poll_at = 0.0
+        self._numbers = itertools.count(1)
+        self._watched: set[str] = set()
+        self._poll_at = 0.0  # Infinite while the master is asked.
         self._end_at = math.inf
         self._known_frames = 0
-        self._is_polling = False
         self._trouble = ""  #: Reason why there is no newer graph.
 
     def begin(self) -> None:
@@ -122,16 +119,11 @@ class GraphModel:
         if self._handle is not None:
             self._handle.close()
         self._handle = None
-        for known in (self.models, self.plots, self._seen):
-            known.clear()
-        self.scene, self.graph = Scene(), Graph()
+        self.models, self.scene, self.graph = {}, Scene(), Graph()
 
     def watch(self, names: set[str]) -> None:
         """Receive frequent messages for these vehicles only."""
-        for name in self.plots.keys() - names:
-            del self.plots[name]
-        for name in self.models.keys() & names - self.plots.keys():
-            self.plots[name] = VehiclePlots(self._clock)
+        self._watched = names
         self._receive()
 
     def fence(self, vehicle: FoundVehicle) -> Box | None:
@@ -143,15 +135,14 @@ class GraphModel:
         is_few = len(self.models) <= _FEW
         for name, model in self.models.items():
             model.frame = frame_of(model.vehicle, self.frames, len(self.models) == 1)
-            model.receive(name in self.plots, is_few, self.graph.topics)
+            model.receive(name in self._watched, is_few, self.graph.topics)
 
     def _on_timer(self):
         if self._clock() >= self._end_at:
             self._forget()
             return
-        if self._clock() >= self._poll_at and not self._is_polling:
-            self._is_polling = True
-            began = self._clock()
+        if (began := self._clock()) >= self._poll_at:
+            self._poll_at = math.inf
             self._workers.submit(self._master.graph).add_done_callback(
                 lambda done: self._parent.submit(self._on_graph, done, began)
             )
@@ -162,7 +153,6 @@ class GraphModel:
         self.scene = self._make_scene()
 
     def _on_graph(self, done: "Future[Graph]", began: float) -> None:
-        self._is_polling = False
         now = self._clock()
         self._poll_at = now + max(_POLL_PERIOD, (now - began) / _POLL_SHARE)
         if self._handle is None:
@@ -178,35 +168,32 @@ class GraphModel:
         self._surroundings.follow(self.graph)
 
     def _update_vehicles(self, found: list[FoundVehicle], now: float) -> None:
+        gone, models = dict(self.models), {}
         for vehicle in found:
-            name = vehicle.name
-            self._seen[name] = now
-            model = self.models.get(name)
-            if model is not None and model.vehicle.topics == vehicle.topics:
-                model.vehicle = vehicle
-                continue
-            if model is not None:
+            model = gone.pop(vehicle.name, None)
+            if model is None or model.vehicle.topics != vehicle.topics:
+                plots = None if model is None else model.plots
+                if model is not None:
+                    model.close()
+                model = VehicleModel(self._parent.child(), vehicle, self._clock, plots)
+            model.vehicle, model.seen = vehicle, now
+            model.kind = self._diagnostics.kind(vehicle)
+            models[vehicle.name] = model
+        for name, model in gone.items():
+            if now - model.seen > _FORGET_AFTER:
                 model.close()
-            take = partial(self._take_row, name)
-            self.models[name] = VehicleModel(self._parent.child(), vehicle, self._clock, take)
-        for name in [n for n in self.models if now - self._seen[n] > _FORGET_AFTER]:
-            self.models.pop(name).close()
-        self.models = {v.name: self.models[v.name] for v in found} | self.models
-        for model in self.models.values():
-            model.kind = self._diagnostics.kind(model.vehicle)
-        self.watch(set(self.plots))
-
-    def _take_row(self, name, role, row):
-        if name in self.plots:
-            self.plots[name].take(role, row)
+            else:
+                models[name] = model
+        # At once: the emergency of a page reads it in another thread.
+        self.models = models
+        self._receive()
 
     def _on_static(self, message):
         for transform in message.transforms:
             self.frames.read_static(StampedPose.of(transform))
 
     def _on_log(self, message):
-        self._lines += 1
-        self._log.append(log_line(self._lines, message))
+        self._log.append(log_line(next(self._numbers), message))
 
     def _make_scene(self) -> Scene:
         frames = self.frames
@@ -214,10 +201,9 @@ class GraphModel:
         roots = [frames.root(str(frame)) for frame in own or frames.poses]
         fixed = max(sorted(set(roots)), key=roots.count, default="world")
         snapshots = {name: self._snapshot(name, fixed) for name in self.models}
-        for name, plots in self.plots.items():
-            if name in snapshots:
-                has_state = "state" in self.models[name].vehicle.topics
-                plots.take_pose(snapshots[name], has_state)
+        for name, model in self.models.items():
+            if model.plots is not None:
+                model.plots.take_pose(snapshots[name], "state" in model.vehicle.topics)
         others = []
         for name in frames.poses.keys() - own:
             pose = frames.in_fixed(name, fixed)

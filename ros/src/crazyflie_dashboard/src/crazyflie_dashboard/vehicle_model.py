@@ -3,16 +3,15 @@
 import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 import roslib.message
-from std_msgs.msg import Float32
+from std_msgs.msg import String
 
 from crazyflie_dashboard.discovery import FoundVehicle
 from crazyflie_dashboard.frames import Frames
+from crazyflie_dashboard.plots import VehiclePlots
 from crazyflie_dashboard.snapshot import STALE_AGE, Kind, Reference, VehicleSnapshot
-from crazyflie_driver.msg import GenericLogData
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
 from crazyflie_reports.bag_topics import ROLES
@@ -24,12 +23,24 @@ _ROWS: dict[str, dict[str, Callable[[Any], Any]]] = defaultdict(dict)
 for _role in ROLES:
     _ROWS[_role.name].update(_role.rows)
 
-_SLOW = ("flight_status", "filter_status", "flight_state", "vehicle_status", "battery")
+#: Types of the driver's log topics -> function that returns their numbers.
+_LOGS: dict[str, Callable[[Any], Any]] = {
+    "crazyflie_driver/GenericLogData": lambda message: message.values,
+    "std_msgs/Float32": lambda message: (message.data,),
+}
+
+#: Roles that are always received, and what holds before their first message.
+_UNHEARD: dict[str, Any] = {
+    "flight_status": FlightStatus(),
+    "filter_status": FilterStatus(),
+    "vehicle_status": VehicleStatus(link_quality=math.nan),
+    "flight_state": String(),
+    "battery": (math.nan,),
+}
 
 _FILTER_WORDS = {
     FilterStatus.HOLDING: "held by the filter",
     FilterStatus.SINKING: "brought down by the filter",
-    FilterStatus.DOWN: "down, motors off",
     FilterStatus.EMERGENCY: "emergency, motors off",
 }
 _ON_GROUND = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
@@ -37,12 +48,7 @@ _ON_GROUND = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
 #: Time after which poses of a vehicle without a frame are taken from its topics, which costs more
 #: (s).
 _FRAME_TIMEOUT = 3.0
-
-#: Types of the driver's log topics, and their numbers.
-_LOGS: dict[str, tuple[Any, Callable[[Any], list[float]]]] = {
-    "crazyflie_driver/GenericLogData": (GenericLogData, lambda message: list(message.values)),
-    "std_msgs/Float32": (Float32, lambda message: [message.data]),
-}
+_NO_POSE = (None, (0.0, 0.0, 0.0, 1.0), None, None)
 
 _LOW_BATTERY = 3.2  #: Voltage that is low if no driver reports it; that of the fleet's warning (V).
 
@@ -57,8 +63,8 @@ class VehicleModel:
     vehicle : FoundVehicle
     time : callable
         The machine's time, s.
-    on_row : callable
-        ``on_row(role, row)`` is called with what comes on the topics of a watched vehicle.
+    plots : VehiclePlots, optional
+        What has been plotted of the vehicle until now.
     """
 
     def __init__(
@@ -66,26 +72,23 @@ class VehicleModel:
         handle: NodeHandle,
         vehicle: FoundVehicle,
         time: Callable[[], float],
-        on_row: Callable[[str, Any], None],
+        plots: VehiclePlots | None = None,
     ):
         self.vehicle = vehicle
         self.kind = Kind.REAL if vehicle.has_driver else Kind.SIMULATED
         #: Frame of /tf with its poses; without one they come from its own topics.
         self.frame: str | None = None
-        self._handle, self._time, self._on_row = handle, time, on_row
+        self.seen = time()  #: When its topics were last on the graph (s).
+        self.plots = plots  #: None while no page watches it.
+        self._handle, self._time = handle, time
         self._received: dict[str, NodeHandle] = {}
-        self._since = time()
-        self._rows: dict[str, Any] = {}
+        self._since = self._counted_since = time()
+        #: By role: the newest row, or message where a role has no rows, and its time (s).
+        self._newest = dict(_UNHEARD)
         self._arrivals: dict[str, float] = {}
         self._counts: Counter[str] = Counter()
         self._rates: dict[str, float] = {}
-        self._counted_since = time()
-        self._status = FlightStatus()
-        self._filter = FilterStatus()
-        self._driver: VehicleStatus | None = None
-        self._text = ""
-        self._battery: float | None = None
-        for role in _SLOW:
+        for role in _UNHEARD:
             self._subscribe(handle, role)
 
     def receive(self, is_watched: bool, is_one_of_few: bool, topics: Mapping[str, str]) -> None:
@@ -94,6 +97,7 @@ class VehicleModel:
         These are states and driver logs of a watched vehicle, and references and controls if
         vehicles are few. ``topics`` are all published topics -> type.
         """
+        self.plots = (self.plots or VehiclePlots(self._time)) if is_watched else None
         # Commands to a radio contain no more than the control does.
         control = "final_control" if "final_control" in self.vehicle.topics else "cmd_vel"
         wanted = {"reference", control} if is_watched or is_one_of_few else set()
@@ -103,7 +107,7 @@ class VehicleModel:
             wanted.add("pose" if "pose" in self.vehicle.topics else "state")
         for role in self._received.keys() - wanted:
             self._received.pop(role).close()
-            for known in (self._rows, self._arrivals, self._rates, self._counts):
+            for known in (self._newest, self._arrivals, self._rates, self._counts):
                 known.pop(role, None)
         for role in wanted - self._received.keys():
             handle = self._received[role] = self._handle.child()
@@ -121,13 +125,17 @@ class VehicleModel:
         """Return the present snapshot; poses are in the frame ``fixed``."""
         self._count_rates()
         position, rotation, velocity, age = self._pose(frames, fixed)
-        reference = self._rows.get("reference")
+        reference = self._newest.get("reference")
         control_at = self._arrivals.get("final_control", self._arrivals.get("cmd_vel"))
-        state, reason = self._words()
-        driver = self._driver
-        is_emergency = self._filter.state == FilterStatus.EMERGENCY or (
-            driver is not None and driver.is_emergency
-        )
+        flight, held, driver, text, (volts,) = (self._newest[role] for role in _UNHEARD)
+        state, reason = self._words(flight, held, driver, text.data)
+        is_flying = bool(driver.supervisor & VehicleStatus.FLYING)
+        if "flight_status" in self.vehicle.topics:
+            is_flying = flight.state not in _ON_GROUND
+        battery = _known(volts)
+        is_low = battery is not None and battery < _LOW_BATTERY
+        if driver.battery != VehicleStatus.BATTERY_UNKNOWN:
+            is_low = driver.battery >= VehicleStatus.BATTERY_LOW
         rates = dict(self._rates)
         if self.frame in frames.poses:
             rates["pose"] = frames.poses[self.frame].rate
@@ -144,12 +152,12 @@ class VehicleModel:
             control_age=None if control_at is None else self._time() - control_at,
             state=state,
             reason=reason,
-            takeoff_refusal=self._status.takeoff_refusal or self._filter.takeoff_refusal,
-            is_in_flight=self._is_in_flight(),
-            is_emergency=is_emergency,
-            battery=self._battery,
-            is_battery_low=self._is_battery_low(),
-            link_quality=None if driver is None else _known(driver.link_quality),
+            takeoff_refusal=flight.takeoff_refusal or held.takeoff_refusal,
+            is_in_flight=is_flying,
+            is_emergency=held.state == FilterStatus.EMERGENCY or driver.is_emergency,
+            battery=battery,
+            is_battery_low=is_low,
+            link_quality=_known(driver.link_quality),
             rates=rates,
             actions=frozenset(self.vehicle.services),
         )
@@ -158,34 +166,32 @@ class VehicleModel:
         if role not in self.vehicle.topics:
             return
         topic, kind = self.vehicle.topics[role]
-        message_type = roslib.message.get_message_class(kind)
-        if message_type is None:
-            return
-        take = getattr(self, f"_on_{role}", None)
-        if take is None:
-            convert = _ROWS[role][kind]
-
-            def take(message):
-                self._note(role, convert(message))
-
-        handle.subscribe(topic, message_type, take)
+        convert = _ROWS[role].get(kind, lambda message: message)
+        if message_type := roslib.message.get_message_class(kind):
+            handle.subscribe(topic, message_type, lambda m: self._note(role, convert(m)))
 
     def _subscribe_logs(self, handle, topics):
+        def subscribe(topic, kind, name):
+            message_type = roslib.message.get_message_class(kind)
+            handle.subscribe(topic, message_type, lambda m: self._plot(name, _LOGS[kind](m)))
+
         for topic, kind in topics.items():
             folder, _, name = topic.rpartition("/")
             if folder == self.vehicle.driver and kind in _LOGS and name != "battery":
-                message_type, values = _LOGS[kind]
-                take = partial(self._on_log, f"log {name}", values)
-                handle.subscribe(topic, message_type, take)
+                subscribe(topic, kind, f"log {name}")
 
-    def _on_log(self, name, values, message):
-        self._on_row(name, values(message))
-
-    def _note(self, role, row):
-        self._rows[role] = row
+    def _note(self, role, content):
+        self._newest[role] = content
+        # A voltage that was known stays until there is another one.
+        if role == "vehicle_status" and _known(content.battery_voltage) is not None:
+            self._newest["battery"] = (content.battery_voltage,)
         self._arrivals[role] = self._time()
         self._counts[role] += 1
-        self._on_row(role, row)
+        self._plot(role, content)
+
+    def _plot(self, role, row):
+        if self.plots is not None:
+            self.plots.take(role, row)
 
     def _count_rates(self):
         elapsed = self._time() - self._counted_since
@@ -194,63 +200,34 @@ class VehicleModel:
             self._counts = Counter(dict.fromkeys(self._counts, 0))
             self._counted_since += elapsed
 
-    def _on_flight_status(self, message):
-        self._status = message
-
-    def _on_filter_status(self, message):
-        self._filter = message
-
-    def _on_flight_state(self, message):
-        self._text = message.data
-
-    def _on_vehicle_status(self, message):
-        self._driver = message
-        self._battery = _known(message.battery_voltage) or self._battery
-
-    def _on_battery(self, message):
-        self._battery = _known(message.data)
-        self._note("battery", (message.data,))
-
     def _pose(self, frames, fixed):
+        """Return position, rotation, velocity and age, of the frame or of a topic."""
         if self.frame is not None:
             found = frames.in_fixed(self.frame, fixed)
             if found is None:
-                return None, (0.0, 0.0, 0.0, 1.0), None, None
+                return _NO_POSE
             return (*found, frames.poses[self.frame].velocity, frames.age(self.frame))
-        role = "pose" if self._rows.get("pose") else "state"
-        row = self._rows.get(role)
+        role = "pose" if self._newest.get("pose") else "state"
+        row = self._newest.get(role)
         if not row:
-            return None, (0.0, 0.0, 0.0, 1.0), None, None
+            return _NO_POSE
         attitude = row[3:6] if role == "pose" else (0.0, 0.0, row[6] if row[6] == row[6] else 0.0)
         velocity = row[3:6] if role == "state" else None
         age = self._time() - self._arrivals[role]
         return row[:3], quaternion_from_rpy(*attitude), velocity, age
 
-    def _is_in_flight(self):
-        if "flight_status" in self.vehicle.topics:
-            return self._status.state not in _ON_GROUND
-        return self._driver is not None and bool(self._driver.supervisor & VehicleStatus.FLYING)
-
-    def _words(self):
+    def _words(self, flight, held, driver, text):
         """Return the state of the flight and its reason."""
-        driver = self._driver
-        if self._filter.state in _FILTER_WORDS and self._filter.state != FilterStatus.DOWN:
-            return _FILTER_WORDS[self._filter.state], self._filter.reason
-        if self._status.state != FlightStatus.UNKNOWN:
-            words = WORDS[self._status.state]
-            reason = self._status.reason or self._filter.reason
+        if held.state in _FILTER_WORDS:
+            return _FILTER_WORDS[held.state], held.reason
+        if flight.state != FlightStatus.UNKNOWN:
             # In flight a takeoff is always refused.
-            if not reason and self._status.state == FlightStatus.ON_GROUND:
-                reason = self._status.takeoff_refusal
-            return words, reason
-        if driver is not None:
+            is_down = flight.state == FlightStatus.ON_GROUND
+            reason = flight.reason or held.reason or (flight.takeoff_refusal if is_down else "")
+            return WORDS[flight.state], reason
+        if "vehicle_status" in self._arrivals:
             return driver.text or "connected", driver.link_text
-        return self._text or "not known", ""
-
-    def _is_battery_low(self):
-        if self._driver is not None and self._driver.battery != VehicleStatus.BATTERY_UNKNOWN:
-            return self._driver.battery >= VehicleStatus.BATTERY_LOW
-        return self._battery is not None and self._battery < _LOW_BATTERY
+        return text or "not known", ""
 
 
 def _known(number: float) -> float | None:

@@ -3,10 +3,16 @@
 from urllib.parse import quote
 
 from nicegui import ui
+from nicegui.elements.mixins.value_element import ValueElement
 
-from crazyflie_dashboard.page.component import Camera
 from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.snapshot import Scene
+
+
+class Camera(ValueElement, component="camera.js"):  # type: ignore[call-arg]
+    """The picture at an address of this server, which the browser fetches; none at an empty one."""
+
+    VALUE_PROP = "address"
 
 
 class CamerasPanel:
@@ -16,7 +22,7 @@ class CamerasPanel:
         self._session = session
         self._topic = ui.select([], label="topic", on_change=self._watch, clearable=True)
         self._topic.props("dense outlined options-dense")
-        self._camera = Camera()
+        self._camera = Camera(value="")
         self._hint = ui.label().classes("hint")
 
     def refresh(self, scene: Scene) -> None:
@@ -29,7 +35,7 @@ class CamerasPanel:
         self._hint.text = (
             f"The picture cannot be shown: {image}" if isinstance(image, str) else hint
         )
-        self._camera.show(f"/camera?page={page}&topic={quote(topic)}" if topic and image else "")
+        self._camera.value = f"/camera?page={page}&topic={quote(topic)}" if topic and image else ""
 
     async def _watch(self) -> None:
         dashboard = self._session.dashboard

@@ -4,13 +4,23 @@ import re
 import time
 
 from nicegui import ui
+from nicegui.elements.mixins.value_element import ValueElement
 
-from crazyflie_dashboard.page.component import Lines
 from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.snapshot import LogLine, Scene
 
 LEVELS = ("debug", "info", "warn", "error", "fatal")
 MAX_LINES = 200  #: Lines of the log that are shown, the newest first.
+
+
+class Lines(ValueElement, component="lines.js"):  # type: ignore[call-arg]
+    """Lines: the value has key, style, source, text, and remedy of each."""
+
+    VALUE_PROP = "lines"
+
+    def __init__(self, nothing: str) -> None:
+        super().__init__(value=[])
+        self._props["nothing"] = nothing
 
 
 class MessagesPanel:
@@ -31,12 +41,10 @@ class MessagesPanel:
 
     def refresh(self, scene: Scene) -> None:
         """Show the newest messages."""
-        self._sentences.show(
-            [
-                [str(number), each.level, f"{each.level}  {each.source}", each.text, each.remedy]
-                for number, each in enumerate(scene.sentences)
-            ]
-        )
+        self._sentences.value = [
+            [str(number), each.level, f"{each.level}  {each.source}", each.text, each.remedy]
+            for number, each in enumerate(scene.sentences)
+        ]
         shown = LEVELS[LEVELS.index(self._level.value) :]
         part = (self._filter.value or "").lower()
         lines: dict[tuple[str, str, str], list[LogLine]] = {}
@@ -45,7 +53,7 @@ class MessagesPanel:
                 # Repeated messages differ only in their numbers.
                 same = re.sub(r"[0-9.]+", "#", line.text)
                 lines.setdefault((line.level, line.node, same), []).append(line)
-        self._log.show([_shown(each) for each in [*lines.values()][:MAX_LINES]])
+        self._log.value = [_shown(each) for each in [*lines.values()][:MAX_LINES]]
 
     async def _ask(self) -> None:
         self._examine.disable()

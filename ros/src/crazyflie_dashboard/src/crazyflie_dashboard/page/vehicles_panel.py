@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from nicegui import ui
+from nicegui.elements.mixins.value_element import ValueElement
 from nicegui.events import GenericEventArguments
 
 from crazyflie_dashboard.actions import HEIGHTS
-from crazyflie_dashboard.page.component import Cards
 from crazyflie_dashboard.page.scene_view import SceneView, condition
 from crazyflie_dashboard.page.session import CLICKED, Session
 from crazyflie_dashboard.snapshot import Action, Scene, VehicleSnapshot
@@ -24,6 +24,12 @@ RATES = {
 CHARGE_RANGE = 3.0, 4.2  #: Voltages of an empty and of a full battery (V).
 REACHED = 0.15  #: Distance from a goal at which it disappears (m).
 LOOKS = ("ground", "flight", "stale", "emergency")
+
+
+class Cards(ValueElement, component="cards.js"):  # type: ignore[call-arg]
+    """A card for each vehicle; the value is a list of what `card` returns."""
+
+    VALUE_PROP = "vehicles"
 
 
 class VehiclesPanel:
@@ -55,7 +61,7 @@ class VehiclesPanel:
             "keep their formation. Hold stops them where they are; a mission goes on with its next "
             "command."
         ).classes("hint")
-        self._cards = Cards()
+        self._cards = Cards(value=[])
         self._cards.on("choose", self._choose)
         self._cards.on("act", self._act)
         self._sent: tuple[float, ...] | None = None  # Goal of the last go-to command, m.
@@ -73,7 +79,7 @@ class VehiclesPanel:
         chosen = [scene.vehicles[name] for name in names if name in scene.vehicles]
         self._up.set_enabled(not chosen or any(Action.TAKEOFF in offered(v) for v in chosen))
         self._hide_goal_that_is_reached(chosen)
-        self._cards.show([card(each, each.name in names) for each in scene.vehicles.values()])
+        self._cards.value = [card(each, each.name in names) for each in scene.vehicles.values()]
 
     def _choose(self, event: GenericEventArguments) -> None:
         self._session.choose([event.args["name"]], event.args["add"])

@@ -60,17 +60,17 @@ def test_hover_error():
 
 
 def test_what_is_recorded_meanwhile_is_left_out(tmp_path, monkeypatch):
-    record, times = flight(), Series.times.fget
+    record, rows = flight(), Series.rows.fget
     record.reference.append(10.0, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     before = FlightReport.of(record, HOVER), len(record.tracking_errors()[0]), len(record.state)
 
     def growing(series):
-        """Return the times; another thread appends as soon as they are taken."""
-        taken = times(series)
+        """Return the rows; another thread appends as soon as they are taken."""
+        taken = rows(series)
         series.append(30.0, [0.0] * len(series.fields))
         return taken
 
-    monkeypatch.setattr(Series, "times", property(growing))
+    monkeypatch.setattr(Series, "rows", property(growing))
     report = FlightReport.of(record, HOVER)
     assert report.hover_error_max == before[0].hover_error_max
     assert report.touchdown_speed == before[0].touchdown_speed

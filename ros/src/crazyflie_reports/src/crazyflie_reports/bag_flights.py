@@ -317,7 +317,7 @@ def _series(rows, fields, first, last):
     # Positions or controls that are not finite, which every node also rejects.
     rows = rows[np.isfinite(rows[:, :4]).all(axis=1)]
     rows[np.isinf(rows)] = np.nan
-    return Series.of(fields, rows[:, 0], rows[:, 1:])
+    return Series.of(fields, rows)
 
 
 def between(rows: Rows, first: float, last: float) -> Rows:

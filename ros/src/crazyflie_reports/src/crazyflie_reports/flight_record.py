@@ -1,9 +1,10 @@
 """Recorded topics and events of a flight as arrays, figures of merit, and their limits."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,44 +40,36 @@ class Series:
 
     def __init__(self, fields: tuple[str, ...]):
         self.fields = fields
-        self._times: list[float] = []
-        self._rows: list[ArrayLike] = []
+        self._rows: Any = []
 
     @classmethod
-    def of(cls, fields: tuple[str, ...], times: ArrayLike, values: ArrayLike) -> "Series":
-        """Return a series of times (s), shape (n,), and rows, shape (n, len(fields))."""
+    def of(cls, fields: tuple[str, ...], rows: NDArray[np.float64]) -> "Series":
+        """Return a series of times (s) and rows, shape (n, 1 + len(fields))."""
         series = cls(fields)
-        series._times, series._rows = np.asarray(times), np.asarray(values)  # type: ignore[assignment]
+        series._rows = rows
         return series
 
-    def append(self, time: float, row: ArrayLike) -> None:
+    def append(self, time: float, row: Iterable[float]) -> None:
         """Add a row, shape (len(fields),), at ``time`` (s)."""
-        # Appended in this order, so that each time has its row.
-        self._rows.append(row)
-        self._times.append(time)
+        self._rows.append((time, *row))
 
     def __len__(self) -> int:
-        return len(self._times)
+        return len(self._rows)
+
+    @property
+    def rows(self) -> NDArray[np.float64]:
+        """Times (s) and rows until now, shape (n, 1 + len(fields))."""
+        return np.asarray(self._rows[:], dtype=float).reshape(-1, 1 + len(self.fields))
 
     @property
     def times(self) -> NDArray[np.float64]:
         """Times, s, shape (n,)."""
-        return np.asarray(self._times, dtype=float)
+        return self.rows[:, 0]
 
     @property
     def values(self) -> NDArray[np.float64]:
         """Rows, shape (n, len(fields)); more than `times` if some came since that was taken."""
-        return np.asarray(self._rows, dtype=float).reshape(-1, len(self.fields))
-
-    @property
-    def rows(self) -> NDArray[np.float64]:
-        """Times (s) and rows, shape (n, 1 + len(fields))."""
-        return np.column_stack(self.taken())
-
-    def taken(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return `times` and as many `values`, while another thread appends."""
-        times = self.times
-        return times, self.values[: len(times)]
+        return self.rows[:, 1:]
 
     def column(self, name: str) -> NDArray[np.float64]:
         """Return one column, shape (n,)."""
@@ -90,12 +83,12 @@ class Series:
     @property
     def last_time(self) -> float:
         """Time of the newest row, s."""
-        return self._times[-1]
+        return self._rows[-1][0]
 
     @property
     def last(self) -> NDArray[np.float64]:
         """The newest row."""
-        return np.asarray(self._rows[-1], dtype=float)
+        return np.asarray(self._rows[-1][1:], dtype=float)
 
 
 @dataclass
@@ -112,23 +105,17 @@ class FlightRecord:
     toggles: list[float] = field(default_factory=list)
     events: dict[str, float] = field(default_factory=dict)
 
-    def position_error(self, point: ArrayLike) -> NDArray[np.float64]:
-        """Return the distance of every recorded state from a point (m), shape (n,)."""
-        return np.linalg.norm(self.state.values[:, :3] - np.asarray(point), axis=1)
-
     def hover_interval(self, point: ArrayLike) -> tuple[float, float]:
         """Return begin and end of the time in which references led to a point (m), s.
 
         From the end of the takeoff until /land was called at the latest.
         """
         begin, end = self.events.get("flying", self.events["takeoff"]), self.events["land"]
-        times, references = self.reference.taken()
-        distances = np.linalg.norm(references[:, :3] - np.asarray(point), axis=1)
-        arrived = (times >= self.events["takeoff"]) & (distances < AT_POINT)
-        if arrived.any():
-            begin = max(begin, float(times[arrived][0]))
-            left = times[(times > begin) & (distances > AT_POINT)]
-            end = float(min([*left[:1], end]))
+        times, distances = _distances(self.reference, point)
+        arrived = times[(times >= self.events["takeoff"]) & (distances < AT_POINT)]
+        if len(arrived):
+            begin = max(begin, float(arrived[0]))
+            end = float(min([*times[(times > begin) & (distances > AT_POINT)][:1], end]))
         return begin, end
 
     def tracking_errors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -136,12 +123,10 @@ class FlightRecord:
 
         States before the first reference are not included.
         """
-        times, states = self.state.taken()
-        newest = np.searchsorted(self.reference.times, times, side="right") - 1
-        known = newest >= 0
-        references = self.reference.values[newest[known], :3]
-        states = states[known, :3]
-        return times[known], np.linalg.norm(states - references, axis=1)
+        states, references = self.state.rows, self.reference.rows
+        newest = np.searchsorted(references[:, 0], states[:, 0], side="right") - 1
+        states, references = states[newest >= 0], references[newest[newest >= 0]]
+        return states[:, 0], np.linalg.norm(states[:, 1:4] - references[:, 1:4], axis=1)
 
     def time_to_hover(self, point: ArrayLike, tolerance: float) -> float:
         """Return the time from the call of /takeoff until the vehicle stays at a point, s.
@@ -151,24 +136,21 @@ class FlightRecord:
         """
         times, errors = self._hover(point)
         outside = np.flatnonzero(errors > tolerance)
-        first = outside[-1] + 1 if outside.size else 0
-        if first >= times.size:
-            return float("nan")
-        return float(times[first] - self.events["takeoff"])
+        inside = times[outside[-1] + 1 :] if outside.size else times
+        return float(inside[0] - self.events["takeoff"]) if inside.size else float("nan")
 
     def overshoot(self, point: ArrayLike) -> float:
         """Return the overshoot above a hover point (m), at least 0."""
-        (times, states), height = self.state.taken(), np.asarray(point)[2]
-        until = states[times <= self.hover_interval(point)[1], self.state.fields.index("z")]
-        return max(0.0, float(until.max(initial=height)) - float(height))
+        height = float(np.asarray(point)[2])
+        states = self.state.between(-np.inf, self.hover_interval(point)[1])
+        return float(states[:, 2].max(initial=height)) - height
 
     def hover_error(self, point: ArrayLike, duration: float) -> tuple[float, float]:
         """Return mean and maximum distance (m) from a point in the last ``duration`` s of a hover.
 
         ValueError: no state was recorded in that time.
         """
-        times, errors = self._hover(point)
-        errors = errors[times >= self.hover_interval(point)[1] - duration]
+        _, errors = self._hover(point, duration)
         if not errors.size:
             raise ValueError("no state was recorded during the hover")
         return float(errors.mean()), float(errors.max())
@@ -179,32 +161,36 @@ class FlightRecord:
         The fastest of the last tenth of a second above `GROUND_TOLERANCE`; NaN when the vehicle did
         not come down, or no velocity is known there.
         """
-        times, states = self.state.taken()
-        heights = states[:, self.state.fields.index("z")]
+        rows = self.state.rows
+        times, heights, speeds = rows[:, 0], rows[:, 3], -rows[:, 6]
         descending = np.flatnonzero((times >= self.events["land"]) & (heights > GROUND_TOLERANCE))
         if not descending.size or descending[-1] == len(times) - 1:
             return float("nan")
         contact = times[descending[-1] + 1]
-        window = (times >= contact - 0.1) & (times <= contact)
-        speeds = -states[window, self.state.fields.index("z_dot")]
-        speeds = speeds[np.isfinite(speeds)]
+        speeds = speeds[(times >= contact - 0.1) & (times <= contact) & np.isfinite(speeds)]
         return float(max(0.0, speeds.max())) if speeds.size else float("nan")
 
     def save_csv(self, path: Path) -> None:
         """Write state and control, one row for every state, times from the call of /takeoff."""
-        control_times, controls = self.final_control.taken()
+        controls = self.final_control.rows
         with path.open("w", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(["time", *STATE_FIELDS, *CONTROL_FIELDS])
-            for time, state in zip(*self.state.taken(), strict=True):
-                index = int(np.searchsorted(control_times, time, side="right")) - 1
-                control = controls[index] if index >= 0 else [np.nan] * len(CONTROL_FIELDS)
+            for time, *state in self.state.rows:
+                before = controls[: np.searchsorted(controls[:, 0], time, side="right"), 1:]
+                control = before[-1] if len(before) else [np.nan] * len(CONTROL_FIELDS)
                 writer.writerow([f"{time - self.events['takeoff']:.3f}", *state, *control])
 
-    def _hover(self, point):
-        times, states = self.state.taken()
-        hover = (times >= self.events["takeoff"]) & (times <= self.hover_interval(point)[1])
-        return times[hover], np.linalg.norm(states[hover, :3] - np.asarray(point), axis=1)
+    def _hover(self, point, duration=np.inf):
+        """Return times and distances from the point, of the last ``duration`` s until its end."""
+        end, (times, errors) = self.hover_interval(point)[1], _distances(self.state, point)
+        hover = (times >= max(self.events["takeoff"], end - duration)) & (times <= end)
+        return times[hover], errors[hover]
+
+
+def _distances(series, point):
+    rows = series.rows
+    return rows[:, 0], np.linalg.norm(rows[:, 1:4] - np.asarray(point), axis=1)
 
 
 @dataclass(frozen=True)

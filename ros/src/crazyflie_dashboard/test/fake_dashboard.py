@@ -23,7 +23,6 @@ from crazyflie_dashboard.snapshot import (
     Frame,
     LogLine,
     Placed,
-    Reference,
     Scene,
     Sentence,
     VehicleSnapshot,
@@ -164,10 +163,7 @@ class FakeDashboard:
         x, y, _ = self._scene.vehicles[name].position
         if command.action is Action.TAKEOFF:
             there = (x, y, command.height)
-            reference = Reference(there, (0, 0, 0), 0.0)
-            self.change(
-                name, position=there, is_in_flight=True, state="hovering", reference=reference
-            )
+            self.change(name, position=there, is_in_flight=True, state="hovering", reference=there)
         elif command.action is Action.LAND:
             self.change(name, position=(x, y, 0.0), is_in_flight=False, state="on the ground")
         elif command.action is Action.GO_TO:

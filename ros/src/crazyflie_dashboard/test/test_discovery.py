@@ -26,9 +26,9 @@ def test_the_software_example_is_a_vehicle_without_a_namespace():
     (vehicle,) = vehicles(graph)
     assert vehicle.name == "/"
     assert vehicle.topics["state"] == ("/state", STATE)
-    assert vehicle.services[Action.TAKEOFF][0].kind is Empty
+    assert vehicle.services[Action.TAKEOFF].kind is Empty
     # A node for moves is started when one is asked for.
-    (go_to,) = vehicle.services[Action.GO_TO]
+    go_to = vehicle.services[Action.GO_TO]
     assert go_to.needs_commander
     assert go_to.name == "/high_level/go_to"
     assert Action.REBOOT not in vehicle.services
@@ -45,9 +45,9 @@ def test_a_fleet_is_in_natural_order_and_flown_by_its_high_level_services():
     )
     assert names(graph) == ["cf1", "cf9", "cf10"]
     found = vehicles(graph)[0].services
-    assert [each.name for each in found[Action.TAKEOFF]] == ["/cf1/high_level/takeoff"]
-    assert found[Action.TAKEOFF][0].kind is srv.Takeoff
-    assert found[Action.GO_TO][0].name == "/cf1/high_level/go_to"
+    assert found[Action.TAKEOFF].name == "/cf1/high_level/takeoff"
+    assert found[Action.TAKEOFF].kind is srv.Takeoff
+    assert found[Action.GO_TO].name == "/cf1/high_level/go_to"
 
 
 def test_a_driver_alone_is_a_vehicle():
@@ -60,8 +60,8 @@ def test_a_driver_alone_is_a_vehicle():
     )
     (vehicle,) = vehicles(graph)
     assert vehicle.has_driver
-    assert vehicle.services.keys() == {*Action} - {Action.RESET}
-    assert vehicle.services[Action.GO_TO][0].name == "/cf7/go_to"
+    assert vehicle.actions == {*Action} - {Action.RESET}
+    assert vehicle.services[Action.GO_TO].name == "/cf7/go_to"
 
 
 def test_in_the_hardware_example_the_driver_belongs_to_the_only_vehicle():
@@ -78,8 +78,7 @@ def test_in_the_hardware_example_the_driver_belongs_to_the_only_vehicle():
     assert (vehicle.name, vehicle.driver) == ("/", "/crazyflie")
     assert vehicle.topics["battery"][0] == "/crazyflie/battery"
     # Both stop the motors, whichever of them works.
-    stops = [each.name for each in vehicle.services[Action.EMERGENCY]]
-    assert stops == ["/emergency", "/crazyflie/emergency"]
+    assert vehicle.emergencies == ("/emergency", "/crazyflie/emergency")
 
 
 def test_objects_of_the_world_are_vehicles_only_where_nothing_else_is():

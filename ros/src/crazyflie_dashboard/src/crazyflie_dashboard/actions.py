@@ -12,12 +12,11 @@ import roslib.packages
 from geometry_msgs.msg import Point
 from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest
 
-from crazyflie_dashboard.answers import any_of, gathered
 from crazyflie_dashboard.discovery import FoundVehicle, Graph, Service
 from crazyflie_dashboard.graph_model import GraphModel
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.moves import Move, expect_apart, formation, in_frame
-from crazyflie_dashboard.page_data import MAX_COMMAND_AGE, Command, Outcomes
+from crazyflie_dashboard.page_data import MAX_COMMAND_AGE, Command, Outcomes, gathered
 from crazyflie_dashboard.snapshot import Action, Triple, VehicleSnapshot
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import BUFFER
@@ -58,6 +57,10 @@ class Target:
     vehicle: FoundVehicle
     now: VehicleSnapshot
     fence: Box | None = None  #: Its geofence, in the frame of its states.
+
+    def service(self, action: Action) -> Service | None:
+        """Return its service for an action."""
+        return self.vehicle.services.get(action)
 
 
 class Actions:
@@ -129,7 +132,7 @@ class Actions:
         own = [
             name
             for name, target in targets.items()
-            if any(nodes.get(s.name) == node for s in _services(target, Action.LAND))
+            if (service := target.service(Action.LAND)) and nodes.get(service.name) == node
         ]
         if len(own) < 2:
             return {}
@@ -137,8 +140,8 @@ class Actions:
         return dict.fromkeys(own, answer)
 
     def _command(self, command, target, name):
-        services = () if target is None else _services(target, command.action)
-        if not services:
+        service = target and target.service(command.action)
+        if service is None:
             raise RefusalError(_why_no_service(command.action, target))
         if command.action in _GROUND_ONLY and target.now.is_in_flight:
             raise RefusalError(
@@ -152,15 +155,13 @@ class Actions:
                 "where the geofence ends"
             )
         if command.action == Action.IDENTIFY:
-            yield from self._light(services[0].name.rpartition("/")[0], command)
+            yield from self._light(service.name.rpartition("/")[0], command)
             return
         self._moves.pop(name, None)
-        if command.action == Action.TAKEOFF and any(
-            each.needs_commander for each in _services(target, Action.GO_TO)
-        ):
+        go_to = target.service(Action.GO_TO)
+        if command.action == Action.TAKEOFF and go_to is not None and go_to.needs_commander:
             self._start_commander(target.vehicle)
-        calls = [self._call(command, s, _request(command, s, target)) for s in services]
-        yield any_of([*map(self._begin, calls)])
+        yield from self._call(command, service, _request(command, service, target))
 
     def _call(self, command: Command, service: Service, request: Any) -> Steps[None]:
         """Call a service unless the command becomes too old before the service is reached."""
@@ -214,10 +215,10 @@ class Actions:
         return outcomes
 
     def _why_it_stays(self, target):
-        services = () if target is None else _services(target, Action.GO_TO)
-        if not services:
+        service = target and target.service(Action.GO_TO)
+        if service is None:
             return _why_no_service(Action.GO_TO, target)
-        if services[0].needs_commander:
+        if service.needs_commander:
             self._start_commander(target.vehicle)
             return "it had no services for moves; they are being started, try again in a moment"
         if target.now.position is None or target.now.is_stale:
@@ -228,7 +229,7 @@ class Actions:
 
     def _prepared(self, command, chosen, targets, moving, fixed, now):
         """Return moves, and services with requests, of vehicles; waits for the master."""
-        services = {name: _services(target, Action.GO_TO)[0] for name, target in chosen.items()}
+        services = {name: target.service(Action.GO_TO) for name, target in chosen.items()}
         graph, frames = self._model.graph, self._model.frames
         spaces = {name: _namespace(service, graph) for name, service in services.items()}
         wanted = {name: f"{each.vehicle.namespace}/{BUFFER}" for name, each in targets.items()}
@@ -274,7 +275,7 @@ class Actions:
         """Hold vehicles where they are."""
         for target in targets:
             self._moves.pop(target.vehicle.name, None)
-            (service,) = _services(target, Action.GO_TO)
+            service = target.service(Action.GO_TO)
             self._handle.call_service(service.name, srv.GoTo, _hold_request(), _TIMEOUT)
 
     def _start_commander(self, vehicle):
@@ -321,10 +322,6 @@ def _check(command: Command) -> None:
         )
     if command.goal[2] < 0.0:
         raise RefusalError(f"go to: z is {command.goal[2]:g} m; expected 0 or more")
-
-
-def _services(target: Target, action: Action) -> tuple[Service, ...]:
-    return target.vehicle.services.get(action, ())
 
 
 def _why_no_service(action: Action, target: Target | None) -> str:

@@ -9,7 +9,6 @@ from typing import Any
 
 from crazyflie_dashboard import missions
 from crazyflie_dashboard.actions import Actions, expect_fresh
-from crazyflie_dashboard.answers import listed, summary, words
 from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.graph_model import GraphModel
@@ -22,11 +21,14 @@ from crazyflie_dashboard.page_data import (
     Outcomes,
     ParameterInfo,
     Series,
+    listed,
+    summary,
+    words,
 )
 from crazyflie_dashboard.page_state import PageState
 from crazyflie_dashboard.parameters import LiveParameters
 from crazyflie_dashboard.recording import Recording
-from crazyflie_dashboard.snapshot import Action, Scene
+from crazyflie_dashboard.snapshot import Scene
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.steps import follow
@@ -120,7 +122,10 @@ class Dashboard:
         self._submit(lambda: self._page(page).remove_field(path))
 
     def command(self, page: int, command: Command) -> "Future[Outcomes]":
-        """Carry out a command of the page that has control; return an outcome for each vehicle."""
+        """Carry out a command of the page that has control; return an outcome for each vehicle.
+
+        An emergency is none: it has a way of its own, `emergency`.
+        """
         return self._control(page, command.words, self._actions.carry_out, command)
 
     def emergency(self, vehicles: tuple[str, ...] | None, age: float) -> "Future[Outcomes]":
@@ -131,11 +136,11 @@ class Dashboard:
         """
         if vehicles is None:
             return self._lane.stop(None, age)
-        services = []
+        services: list[str] = []
         for name in vehicles:
             model = self._model.models.get(name)
-            found = () if model is None else model.vehicle.services.get(Action.EMERGENCY, ())
-            services += [each.name for each in found] or [f"/{name}/emergency".replace("///", "/")]
+            found = () if model is None else model.vehicle.emergencies
+            services += found or [f"/{name}/emergency".replace("///", "/")]
         return self._lane.stop(services, age)
 
     def parameter_owners(self) -> tuple[str, ...]:

@@ -2,8 +2,9 @@
 
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from std_srvs.srv import Empty, SetBool
@@ -56,14 +57,19 @@ class FoundVehicle:
     namespace: str  #: Absolute, without a slash at its end: "" or /cf1.
     driver: str = ""  #: Namespace of its driver, which differs in the hardware example.
     topics: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: Role -> topic and type.
-    #: `Action` -> services, all of which are called for it.
-    services: Mapping[Action, tuple[Service, ...]] = field(default_factory=dict)
+    services: Mapping[Action, Service] = field(default_factory=dict)
+    emergencies: tuple[str, ...] = ()  #: Services that stop its motors, all of which are called.
     has_driver: bool = False  #: Whether a driver connects it.
 
     @property
     def name(self) -> str:
         """Without a slash in front; "/" without a namespace."""
         return self.namespace.strip("/") or "/"
+
+    @cached_property
+    def actions(self) -> frozenset[Action]:
+        """Commands that it accepts."""
+        return frozenset({*self.services, *([Action.EMERGENCY] if self.emergencies else [])})
 
     @property
     def commander(self) -> str:
@@ -118,21 +124,21 @@ def _by_namespace(topics: Mapping[str, str]) -> dict[str, dict[str, tuple[str, s
 
 def _vehicle(top, driver, topics, services, has_driver):
     merged = {**topics.get(driver, {}), **topics.get(top, {})}
-    found: dict[Action, tuple[Service, ...]] = {}
-    for action, candidates in _candidates(top, driver, services):
-        there = tuple(each for each in candidates if each.name in services)
-        if there and action not in found:
-            found[action] = there
+    found: dict[Action, Service] = {}
+    for action, service in _candidates(top, driver, services):
+        if service.name in services:
+            found.setdefault(action, service)
     if Action.GO_TO not in found and {f"{top}/takeoff", f"{top}/land"} <= services.keys():
-        go_to = Service(f"{top}/high_level/go_to", srv.GoTo, needs_commander=True)
-        found[Action.GO_TO] = (go_to,)
-    return FoundVehicle(top, driver, merged, found, has_driver)
+        found[Action.GO_TO] = Service(f"{top}/high_level/go_to", srv.GoTo, needs_commander=True)
+    stops = dict.fromkeys((f"{top}/emergency", f"{driver}/emergency"))
+    emergencies = tuple(name for name in stops if name in services)
+    return FoundVehicle(top, driver, merged, found, emergencies, has_driver)
 
 
 def _candidates(
     top: str, driver: str, services: Mapping[str, str]
-) -> Iterator[tuple[Action, Iterable[Service]]]:
-    """Yield groups of services that carry out an action, the best first; all of one are called."""
+) -> Iterator[tuple[Action, Service]]:
+    """Yield services that carry out an action, the best first."""
     commander = f"{top}/high_level"
     flights: list[tuple[str, Any, Any]] = [(commander, srv.Takeoff, srv.Land)]
     node = services.get(f"{driver}/upload_trajectory")
@@ -142,15 +148,13 @@ def _candidates(
     if not is_flown_by_driver or driver != top:
         flights.append((top, Empty, Empty))
     for place, takeoff, land in flights:
-        yield Action.TAKEOFF, [Service(f"{place}/takeoff", takeoff)]
-        yield Action.LAND, [Service(f"{place}/land", land)]
-        for action in (Action.GO_TO, Action.HOLD):
-            yield action, [Service(f"{place}/go_to", srv.GoTo)]
-    stops = dict.fromkeys((f"{top}/emergency", f"{driver}/emergency"))
-    yield Action.EMERGENCY, [Service(name, Empty) for name in stops]
-    yield Action.RESET, [Service(f"{top}/emergency_reset", Empty)]
-    yield Action.REBOOT, [Service(f"{driver}/reboot", Empty)]
-    yield Action.RECOVER, [Service(f"{driver}/recover", Empty)]
-    yield Action.IDENTIFY, [Service(f"{driver}/update_params", srv.UpdateParams)]
-    yield Action.ARM, [Service(f"{driver}/arm", SetBool)]
-    yield Action.DISARM, [Service(f"{driver}/arm", SetBool)]
+        yield Action.TAKEOFF, Service(f"{place}/takeoff", takeoff)
+        yield Action.LAND, Service(f"{place}/land", land)
+        yield Action.GO_TO, Service(f"{place}/go_to", srv.GoTo)
+        yield Action.HOLD, Service(f"{place}/go_to", srv.GoTo)
+    yield Action.RESET, Service(f"{top}/emergency_reset", Empty)
+    yield Action.REBOOT, Service(f"{driver}/reboot", Empty)
+    yield Action.RECOVER, Service(f"{driver}/recover", Empty)
+    yield Action.IDENTIFY, Service(f"{driver}/update_params", srv.UpdateParams)
+    yield Action.ARM, Service(f"{driver}/arm", SetBool)
+    yield Action.DISARM, Service(f"{driver}/arm", SetBool)

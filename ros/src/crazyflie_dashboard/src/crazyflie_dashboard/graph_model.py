@@ -15,11 +15,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Log
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_dashboard.answers import listed
 from crazyflie_dashboard.discovery import FoundVehicle, Graph, vehicles
 from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.messages import Diagnostics, log_line
+from crazyflie_dashboard.page_data import listed
 from crazyflie_dashboard.page_state import IMAGES
 from crazyflie_dashboard.snapshot import (
     STALE_AGE,

@@ -1,10 +1,15 @@
-"""Requests of pages and their answers, as plain data."""
+"""Requests of pages and their answers, as plain data and in words."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
+from typing import Any
 
 from crazyflie_dashboard.snapshot import Action, Triple
+from crazyflie_utils.refusal import by_reason
+from crazyflie_utils.steps import Steps
 
+_MAX_NAMES = 8  #: Largest number of vehicle names in one text.
 #: Largest age of a command (s): an older one was delayed in a browser or a network, and is not
 #: carried out.
 MAX_COMMAND_AGE = 1.0
@@ -81,3 +86,29 @@ class Series:
     unit: str
     times: tuple[float, ...]
     values: tuple[float, ...]
+
+
+def words(error: BaseException) -> str:
+    """Return the text of an answer; `NodeHandle.call_service` has removed rospy's words."""
+    return str(error) or repr(error)
+
+
+def gathered(answers: "Mapping[str, Future[Any]]") -> Steps[Outcomes]:
+    """Return the outcomes of all vehicles, when the last one has answered."""
+    texts = dict.fromkeys(answers, "")
+    for name, answer in answers.items():
+        try:
+            yield answer
+        except Exception as error:
+            texts[name] = words(error)
+    return texts
+
+
+def summary(outcomes: Outcomes) -> list[str]:
+    """Return the refusals, each text once with its vehicles."""
+    return by_reason({name: text for name, text in outcomes.items() if text}, listed)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a text; for many vehicles only their number."""
+    return ", ".join(names) if len(names) <= _MAX_NAMES else f"{len(names)} vehicles"

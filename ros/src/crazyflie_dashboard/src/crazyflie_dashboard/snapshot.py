@@ -43,15 +43,6 @@ class Action(Enum):
 
 
 @dataclass(frozen=True)
-class Reference:
-    """Desired state of a vehicle: position (m), velocity (m/s), yaw (rad; NaN if unknown)."""
-
-    position: Triple
-    velocity: Triple
-    yaw: float
-
-
-@dataclass(frozen=True)
 class VehicleSnapshot:
     """A vehicle."""
 
@@ -66,7 +57,7 @@ class VehicleSnapshot:
     #: Whether the pose is older than `STALE_AGE`, or missing. Known for all vehicles if there are
     #: few, otherwise for watched ones.
     is_stale: bool = True
-    reference: Reference | None = None
+    reference: Triple | None = None  #: Desired position (m).
     control_age: float | None = None  #: s; as references.
     #: state, reason: State of the flight in words, and its reason; "" for an ordinary one.
     state: str = "not known"

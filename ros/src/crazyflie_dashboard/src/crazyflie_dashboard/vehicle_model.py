@@ -11,7 +11,7 @@ from std_msgs.msg import String
 from crazyflie_dashboard.discovery import FoundVehicle
 from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.plots import VehiclePlots
-from crazyflie_dashboard.snapshot import STALE_AGE, Kind, Reference, VehicleSnapshot
+from crazyflie_dashboard.snapshot import STALE_AGE, Kind, VehicleSnapshot
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
 from crazyflie_reports.bag_topics import ROLES
@@ -148,7 +148,7 @@ class VehicleModel:
             velocity=velocity,
             pose_age=age,
             is_stale=age is None or age > STALE_AGE,
-            reference=reference and Reference(reference[:3], reference[3:6], reference[6]),
+            reference=reference and reference[:3],
             control_age=None if control_at is None else self._time() - control_at,
             state=state,
             reason=reason,
@@ -159,7 +159,7 @@ class VehicleModel:
             is_battery_low=is_low,
             link_quality=_known(driver.link_quality),
             rates=rates,
-            actions=frozenset(self.vehicle.services),
+            actions=self.vehicle.actions,
         )
 
     def _subscribe(self, handle, role):

@@ -62,7 +62,6 @@ class ParameterRow:
 
     def __init__(self, session: Session, parameter: ParameterInfo):
         self._session, self._parameter = session, parameter
-        self._is_showing = False
         row = ui.element("div").classes("parameter")
         row.props["data-name"] = parameter.name
         with row:
@@ -87,7 +86,7 @@ class ParameterRow:
 
     async def _set(self) -> None:
         text = _text(self._field.value)
-        if self._is_showing or text == _text(self._parameter.value):
+        if text == _text(self._parameter.value):
             return
         future = self._session.dashboard.set_parameter(self._session.page, self._parameter, text)
         try:
@@ -96,10 +95,8 @@ class ParameterRow:
             self._tell(str(error), "bad")
             return
         self._tell(f"is {_text(self._parameter.value)} now", "good")
-        self._is_showing = True
         is_text = self._parameter.kind != "bool" and not self._parameter.choices
         self._field.set_value(_text(self._parameter.value) if is_text else self._parameter.value)
-        self._is_showing = False
 
     def _tell(self, text: str, look: str) -> None:
         self._answer.text = text

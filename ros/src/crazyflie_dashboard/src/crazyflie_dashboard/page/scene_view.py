@@ -141,9 +141,8 @@ def vehicle_rows(scene: Scene, chosen: set[str]) -> list[list[Any]]:
         pose = _pose(vehicle.position, vehicle.rotation)
         age = f"{vehicle.pose_age:.0f} s old" if vehicle.is_stale and vehicle.pose_age else ""
         remark = "emergency" if vehicle.is_emergency else age or ("held" if vehicle.is_held else "")
-        reference = vehicle.reference.position if vehicle.reference else ()
-        row = [*pose, condition(vehicle), name in chosen, remark, *_rounded(reference)]
-        rows.append(row)
+        reference = _rounded(vehicle.reference or ())
+        rows.append([*pose, condition(vehicle), name in chosen, remark, *reference])
     return rows
 
 

@@ -7,9 +7,8 @@ from typing import Any, TypeVar
 
 from nicegui import Client, ui
 
-from crazyflie_dashboard.answers import summary
 from crazyflie_dashboard.dashboard import Dashboard
-from crazyflie_dashboard.page_data import Command
+from crazyflie_dashboard.page_data import Command, summary
 from crazyflie_dashboard.snapshot import Action, VehicleSnapshot
 from crazyflie_utils.refusal import RefusalError
 

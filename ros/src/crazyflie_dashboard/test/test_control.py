@@ -44,7 +44,7 @@ def test_control_is_taken_once(told):
 def test_both_are_told_of_a_takeover(told):
     one, two, three = told.open(), told.open(), told.open()
     told.control.take(one)
-    told.control.take_over(two)
+    told.control.take(two, is_confirmed=True)
     with pytest.raises(RefusalError, match="take it first"):
         told.control.expect_control(one)
     assert told.texts[one] == [f"page {two} has taken over control: this page can only watch now"]

@@ -43,34 +43,28 @@ class PageControl:
                 return
         self.on_change()
 
-    def take(self, page: int) -> None:
-        """Give a page control if no other has it.
+    def take(self, page: int, is_confirmed: bool = False) -> None:
+        """Give a page control; all pages are notified.
 
         Raises
         ------
         RefusalError
-            Another page has control: the operator must confirm `take_over`.
+            Another page has control, and the operator has not confirmed that it is taken over.
         """
         with self._lock:
             self._expect_open(page)
-            if self._controller not in (None, page):
+            before = self._controller
+            if before not in (None, page) and not is_confirmed:
                 raise RefusalError(
-                    f"page {self._controller} has control; you can take it over, and both pages "
-                    "will say so"
+                    f"page {before} has control; you can take it over, and both pages will say so"
                 )
-            self.take_over(page)
-
-    def take_over(self, page: int) -> None:
-        """Give a page control, even if another one has it; all pages are notified."""
-        with self._lock:
-            self._expect_open(page)
-            before, self._controller = self._controller, page
+            self._controller = page
         if before == page:
             return
         if before is not None:
             self._say(before, f"page {page} has taken over control: this page can only watch now")
             self._say(page, f"this page has taken over control from page {before}")
-        self._tell_others(page, f"page {page} has control", excluding=before)
+        self._announce(f"page {page} has control", {page, before})
 
     def release(self, page: int) -> None:
         """Give up control, if the page has it."""
@@ -78,7 +72,7 @@ class PageControl:
             if self._controller != page:
                 return
             self._controller = None
-        self._tell_others(page, f"page {page} has given up control: no page has it")
+        self._announce(f"page {page} has given up control: no page has it", {page})
 
     def expect_control(self, page: int) -> None:
         """Raise `RefusalError` unless a page has control."""
@@ -103,14 +97,13 @@ class PageControl:
         if page not in self._tell:
             raise RefusalError(f"page {page} is closed; load it again")
 
-    def _tell_others(self, page, text, excluding=None):
+    def _announce(self, text, excluding):
         self.log(text)
-        for other in self.pages:
-            if other not in (page, excluding):
-                self._say(other, text)
+        for page in self.pages:
+            if page not in excluding:
+                self._say(page, text)
 
     def _say(self, page, text):
         # The page may have closed meanwhile.
-        tell = self._tell.get(page)
-        if tell is not None:
+        if (tell := self._tell.get(page)) is not None:
             tell(text)

@@ -122,5 +122,5 @@ class Session:
                     ui.button("Take over", color="warning", on_click=lambda: dialog.submit(True))
                     ui.button("Only look", on_click=lambda: dialog.submit(False)).props("flat")
             if await dialog and self.page:
-                pages.take_over(self.page)
+                pages.take(self.page, is_confirmed=True)
             dialog.delete()

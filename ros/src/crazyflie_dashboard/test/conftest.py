@@ -27,9 +27,11 @@ def browser(server, driver):
     from pages import Browser
 
     server.dashboard.reset()
+    server.errors.clear()
     browser = Browser(driver, server.url)
     browser.open()
     yield browser
     # Only files of the page itself are loaded, and nothing fails.
     errors = [each["message"] for each in driver.get_log("browser") if each["level"] == "SEVERE"]
     assert errors == []
+    assert server.errors == []

@@ -8,6 +8,7 @@ import sys
 import time
 
 from fake_dashboard import FakeDashboard
+from nicegui import app
 from selenium import webdriver
 from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.chrome.service import Service
@@ -190,6 +191,8 @@ class Server:
         self.dashboard = dashboard or FakeDashboard()
         access = Access(host, self.port, token)
         self.url = access.url
+        self.errors = []  # What handlers and timers of the page have raised.
+        app.on_exception(self.errors.append)
         self.page = Page(self.dashboard, access)
 
     def actions(self):

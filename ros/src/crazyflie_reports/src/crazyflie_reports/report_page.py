@@ -137,12 +137,17 @@ def _curve(name, times, values, start, points):
     times, values = times[known], values[known]
     # A reference is valid until the next one.
     if not name.endswith("reference"):
-        ends = np.flatnonzero(gaps(times)) + 1
-        times = np.insert(times, ends, (times[ends - 1] + times[ends]) / 2.0)
-        values = np.insert(values, ends, math.nan)
+        times, values = _broken(times, values)
     times, values = decimated(times, values, points)
     numbers = [None if math.isnan(v) else v for v in np.round(values, 4).tolist()]
     return {"name": name, "t": _rounded(times, start), "v": numbers}
+
+
+def _broken(times, values):
+    """Return times and values with a NaN in each gap, where nothing is known."""
+    ends = np.flatnonzero(gaps(times)) + 1
+    between = (times[ends - 1] + times[ends]) / 2.0
+    return np.insert(times, ends, between), np.insert(values, ends, math.nan, axis=0)
 
 
 def _path(flight, points):
@@ -150,43 +155,29 @@ def _path(flight, points):
 
     A pose in a gap is None.
     """
-    state, reference = flight.record.state, flight.record.reference
+    state, reference = flight.record.state, flight.record.reference.rows
     if not len(state):
         return None
-    times = state.times
+    times, values = _broken(state.times, state.values)
     period = max(FRAME_PERIOD, (times[-1] - times[0]) / points)
     moments = times[0] + period * np.arange((times[-1] - times[0]) // period + 1)
-    columns = [np.interp(moments, times, state.values[:, k]) for k in range(3)]
     attitude = flight.during(flight.vehicle.attitude, MARGIN)
-    if len(attitude):
-        angles = np.unwrap(attitude[:, 4:7], axis=0)
-        columns += [np.interp(moments, attitude[:, 0], angles[:, k]) for k in range(3)]
-    else:
-        yaw = np.unwrap(np.nan_to_num(state.column("yaw")))
-        flat = np.zeros_like(moments)
-        columns += [flat, flat, np.interp(moments, times, yaw)]
+    if not len(attitude):
+        attitude = np.zeros((len(state), 7))
+        attitude[:, [0, 6]] = np.column_stack([state.times, state.column("yaw")])
+    turns = _broken(attitude[:, 0], np.unwrap(np.nan_to_num(attitude[:, 4:7]), axis=0))
+    columns = [np.interp(moments, times, values[:, k]) for k in range(3)]
+    columns += [np.interp(moments, turns[0], turns[1][:, k]) for k in range(3)]
+    poses = np.round(np.column_stack(columns), 3)
     if len(reference):
-        newest = np.searchsorted(reference.times, moments, side="right") - 1
-        columns += list(reference.values[np.maximum(newest, 0), :3].T)
-    rows = np.nan_to_num(np.round(np.array(columns).T, 3), posinf=0.0, neginf=0.0)
-    unknown = _in_gaps(moments, times) | _in_gaps(moments, attitude[:, 0])
+        newest = np.searchsorted(reference[:, 0], moments, side="right") - 1
+        places = np.nan_to_num(reference[np.maximum(newest, 0), 1:4], posinf=0.0, neginf=0.0)
+        poses = np.hstack([poses, np.round(places, 3)])
     return {
         "start": round(float(times[0] - flight.start), 3),
         "period": period,
-        "rows": [
-            None if is_unknown else row
-            for row, is_unknown in zip(rows.tolist(), unknown, strict=True)
-        ],
+        "rows": [None if math.isnan(sum(row)) else row for row in poses.tolist()],
     }
-
-
-def _in_gaps(moments, times):
-    """Return which moments are in gaps of times, s."""
-    step = np.searchsorted(times, moments, side="right") - 1
-    inside = (step >= 0) & (step < len(times) - 1)
-    found = np.zeros(len(moments), dtype=bool)
-    found[inside] = gaps(times)[step[inside]] & (moments[inside] > times[step[inside]])
-    return found
 
 
 def _rounded(times, start):

@@ -143,6 +143,12 @@ def test_it_counts_for_five_seconds(bench):
     assert bench.calls == ["/cf1/emergency"]
 
 
+def test_a_service_that_is_named_twice_is_called_once(bench):
+    bench.wait()
+    assert bench.stop(["/cf1/emergency", "/cf1/emergency"]) == {"/cf1/emergency": ""}
+    assert bench.calls == ["/cf1/emergency"]
+
+
 def test_without_a_service_it_says_why():
     bench = Bench()
     bench.is_master_there = False

@@ -89,7 +89,8 @@ class EmergencyLane:
             An outcome for each service, after 5 s at the latest; its text is "" if it has answered.
         """
         result: Future[Outcomes] = Future()
-        what = "all vehicles" if services is None else ", ".join(services := tuple(services))
+        services = None if services is None else list(dict.fromkeys(services))
+        what = "all vehicles" if services is None else ", ".join(services)
         if not age <= MAX_EMERGENCY_AGE:
             text = f"the click is {age:.1f} s old; expected at most {MAX_EMERGENCY_AGE:g} s"
             self._end(what, result, {"emergency": f"{text}; nothing was done"})

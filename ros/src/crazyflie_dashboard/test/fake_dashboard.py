@@ -19,8 +19,6 @@ from crazyflie_dashboard.page_data import (
 )
 from crazyflie_dashboard.snapshot import (
     Action,
-    Fence,
-    Frame,
     LogLine,
     Placed,
     Scene,
@@ -28,6 +26,7 @@ from crazyflie_dashboard.snapshot import (
     VehicleSnapshot,
 )
 from crazyflie_dashboard.surroundings import grouped
+from crazyflie_takeoff.limits import Box
 from crazyflie_utils.refusal import RefusalError
 
 ACTIONS = frozenset(
@@ -93,10 +92,10 @@ class FakeDashboard:
         pole = Marker(type=Marker.CYLINDER, scale=Vector3(0.2, 0.2, 1.5))
         pole.color, pole.pose.position = ColorRGBA(0.6, 0.7, 0.8, 1.0), Point(1.2, 1.2, 0.75)
         known = {
-            "fences": (Fence((-2.5, -2.5, 0.0), (2.5, 2.5, 2.2)),),
+            "fences": (Placed(Box((-2.5, -2.5, 0.0), (2.5, 2.5, 2.2))),),
             "solids": (Placed(grouped([pole])[0][0][1]),),
             "images": ("/cf1/image_raw",),
-            "frames": (Frame("wand", (-1.5, 1.2, 0.3), (0, 0, 0, 1)),),
+            "frames": (Placed("wand", (-1.5, 1.2, 0.3), (0, 0, 0, 1)),),
             "sentences": (Sentence("warn", "doctor", "cf2 has a weak link", "move the antenna"),),
             "log": (
                 LogLine(1, 12.0, "info", "/cf1/takeoff_server", "ready"),

@@ -15,13 +15,14 @@ from std_msgs.msg import ColorRGBA, Float32, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard.discovery import Graph
-from crazyflie_dashboard.snapshot import Fence
+from crazyflie_dashboard.snapshot import Placed
 from crazyflie_msgs.msg import (
     ControlStamped,
     FlightStatus,
     PositionVelocityYawStateStamped,
     VehicleStatus,
 )
+from crazyflie_takeoff.limits import Box
 from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
 
 
@@ -172,15 +173,15 @@ def test_geofences_are_drawn_as_long_as_they_are_there(fleet):
         add_topic(fleet, topic, Config._type)
         fleet.process.publish(topic, encode_config({**BOX, "margin": 0.5}))
     fleet.process.advance(0.05)
-    assert fleet.dashboard.scene().fences == (Fence((-1.0,) * 3, (2.0,) * 3),)
+    assert fleet.dashboard.scene().fences == (Placed(Box((-1.0,) * 3, (2.0,) * 3)),)
     assert len(fleet.process.transport.subscribers[topic]) == 1
     fleet.process.publish(topic, encode_config({"box/max/x": 3.0}))
     fleet.process.advance(0.05)
-    assert fleet.dashboard.scene().fences[1] == Fence((-14.0,) * 3, (3.0, 14.0, 14.0))
+    assert fleet.dashboard.scene().fences[1] == Placed(Box((-14.0,) * 3, (3.0, 14.0, 14.0)))
     topics = {k: v for k, v in fleet.graph.topics.items() if k != topic}
     fleet.graph = Graph(topics, services=fleet.graph.services)
     fleet.process.advance(2.1)
-    assert fleet.dashboard.scene().fences == (Fence((-1.0,) * 3, (2.0,) * 3),)
+    assert fleet.dashboard.scene().fences == (Placed(Box((-1.0,) * 3, (2.0,) * 3)),)
 
 
 def test_geofences_are_drawn_where_the_frame_of_their_vehicles_is():
@@ -200,7 +201,7 @@ def test_geofences_are_drawn_where_the_frame_of_their_vehicles_is():
     assert scene.fixed_frame == "map"
     assert scene.vehicles["cf1"].position == pytest.approx((5.0, 0.5, 0.98))
     (fence,) = scene.fences
-    assert fence[:3] == ((-1.0,) * 3, (2.0,) * 3, pytest.approx((5.0, 0.0, 0.0)))
+    assert fence[:2] == (Box((-1.0,) * 3, (2.0,) * 3), pytest.approx((5.0, 0.0, 0.0)))
     assert fence.rotation == pytest.approx((0.0, 0.0, half, half))
 
 

@@ -19,8 +19,9 @@ from selenium.webdriver.common.keys import Keys
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
-from crazyflie_dashboard.snapshot import Action, Fence, LogLine, Placed, Sentence
+from crazyflie_dashboard.snapshot import Action, LogLine, Placed, Sentence
 from crazyflie_dashboard.surroundings import grouped
+from crazyflie_takeoff.limits import Box
 
 
 def test_vehicles_take_off_go_where_the_floor_is_clicked_and_land(browser, server):
@@ -389,7 +390,7 @@ def test_a_hundred_thousand_points_are_one_thing_in_the_scene(browser, server):
     cubes.points = 1000 * [Point(0.5, 0.0, 0.0)]
     turned = (1.0, 0.0, 0.0), (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
     solids = tuple(Placed(grouped([each])[0][0][1], *turned) for each in (cloud, cubes))
-    fence = Fence((-1.0, -1.0, 0.0), (2.0, 1.0, 1.0), *turned)
+    fence = Placed(Box((-1.0, -1.0, 0.0), (2.0, 1.0, 1.0)), *turned)
     server.dashboard.set_vehicles(vehicle("cf1", 0.0), solids=solids, fences=(fence,))
     parts = "surroundings.solids.children"
     wait_for(lambda: browser.in_scene(f"{parts}.length") == 2, "two objects")

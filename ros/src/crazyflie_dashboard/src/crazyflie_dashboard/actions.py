@@ -279,7 +279,7 @@ class Actions:
             self._handle.call_service(service.name, srv.GoTo, _hold_request(), _TIMEOUT)
 
     def _start_commander(self, vehicle):
-        name = vehicle.commander
+        name = f"{vehicle.namespace}/high_level"
         running = self._commanders.get(name)
         if running is not None and running.poll() is None:
             return

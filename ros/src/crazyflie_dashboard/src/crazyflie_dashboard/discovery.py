@@ -71,11 +71,6 @@ class FoundVehicle:
         """Commands that it accepts."""
         return frozenset({*self.services, *([Action.EMERGENCY] if self.emergencies else [])})
 
-    @property
-    def commander(self) -> str:
-        """Name of its `HighLevelNode`, if it has one."""
-        return f"{self.namespace}/high_level"
-
 
 def vehicles(graph: Graph) -> list[FoundVehicle]:
     """Return the vehicles of a graph, cf10 after cf9.

@@ -23,8 +23,8 @@ from crazyflie_dashboard.page_data import listed
 from crazyflie_dashboard.page_state import IMAGES
 from crazyflie_dashboard.snapshot import (
     STALE_AGE,
-    Frame,
     LogLine,
+    Placed,
     Scene,
     Sentence,
     Triple,
@@ -208,7 +208,7 @@ class GraphModel:
         for name in frames.poses.keys() - own:
             pose = frames.in_fixed(name, fixed)
             if pose is not None and frames.parent(name) not in own:
-                others.append(Frame(name, *pose))
+                others.append(Placed(name, *pose))
         return Scene(
             made=self._clock(),
             fixed_frame=fixed,

@@ -7,13 +7,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from crazyflie_takeoff.limits import Box
+
 Triple = tuple[float, float, float]
 Rotation = tuple[float, float, float, float]
+T = TypeVar("T")
 
 STALE_AGE = 0.5  #: A vehicle whose pose is older, s, is stale.
 
@@ -91,30 +94,12 @@ class Solids:
     width: float = 0.0
 
 
-class Placed(NamedTuple):
-    """Solids of a frame, with the frame's position (m) and quaternion (x, y, z, w)."""
+class Placed(NamedTuple, Generic[T]):
+    """Something in a frame, with the frame's position (m) and quaternion (x, y, z, w)."""
 
-    what: Solids
+    what: T
     position: Triple = (0.0, 0.0, 0.0)
     rotation: Rotation = (0.0, 0.0, 0.0, 1.0)
-
-
-class Fence(NamedTuple):
-    """A geofence: lower and upper corner (m) in a frame, and where that frame is."""
-
-    lower: Triple
-    upper: Triple
-    position: Triple = (0.0, 0.0, 0.0)
-    rotation: Rotation = (0.0, 0.0, 0.0, 1.0)
-
-
-@dataclass(frozen=True)
-class Frame:
-    """A frame of /tf that is not a vehicle, such as a rigid body of motion capture."""
-
-    name: str
-    position: Triple
-    rotation: Rotation
 
 
 @dataclass(frozen=True)
@@ -154,9 +139,10 @@ class Scene:
     fixed_frame: str = "world"
     #: By name, in the order in which they are shown.
     vehicles: Mapping[str, VehicleSnapshot] = field(default_factory=dict)
-    solids: tuple[Placed, ...] = ()
-    fences: tuple[Fence, ...] = ()
-    frames: tuple[Frame, ...] = ()
+    solids: tuple[Placed[Solids], ...] = ()
+    fences: tuple[Placed[Box], ...] = ()  #: Geofences.
+    #: Names of frames of /tf that are no vehicles, such as rigid bodies of motion capture.
+    frames: tuple[Placed[str], ...] = ()
     #: Planned trajectories, by the vehicle's name or by topic. Changes rarely.
     paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)
     sentences: tuple[Sentence, ...] = ()  #: Of the doctor and of /diagnostics, errors first.

@@ -12,7 +12,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.frames import Frames
-from crazyflie_dashboard.snapshot import Fence, Placed, Solids, Triple
+from crazyflie_dashboard.snapshot import Placed, Solids, Triple
 from crazyflie_model.angles import rotate
 from crazyflie_takeoff.flight_topics import follow_box
 from crazyflie_takeoff.limits import Box
@@ -66,7 +66,7 @@ class Surroundings:
             if topic not in self._topics:
                 self._subscribe(topic, kind)
 
-    def solids(self, frames: Frames, fixed: str) -> tuple[Placed, ...]:
+    def solids(self, frames: Frames, fixed: str) -> tuple[Placed[Solids], ...]:
         """Return the solids of markers, in the frame ``fixed``."""
         return tuple(
             Placed(solids, *place)
@@ -101,7 +101,7 @@ class Surroundings:
 
     def fences(
         self, frames: Frames, fixed: str, vehicles: Mapping[str, str | None]
-    ) -> tuple[Fence, ...]:
+    ) -> tuple[Placed[Box], ...]:
         """Return the geofences in the frame ``fixed``, each once.
 
         ``vehicles`` has the frame of each vehicle by its namespace: the box of its fence is in the
@@ -112,7 +112,7 @@ class Surroundings:
             own = (frame for name, frame in vehicles.items() if topic.startswith(f"{name}/"))
             home = frames.home(next(own, None)) or fixed
             if (place := frames.in_fixed(home, fixed)) is not None:
-                found.append(Fence(*_drawn(box), *place))
+                found.append(Placed(_drawn(box), *place))
         return tuple(dict.fromkeys(found))
 
     def box(self, namespace: str) -> Box | None:
@@ -149,12 +149,9 @@ class Surroundings:
         self._paths[topic] = message.header.frame_id.strip("/"), _path(points)
 
 
-def _drawn(box: Box) -> tuple[Triple, Triple]:
-    def near(corner):
-        x, y, z = (min(max(each, -_FAR), _FAR) for each in corner)
-        return x, y, z
-
-    return near(box.lower), near(box.upper)
+def _drawn(box):
+    corners = (tuple(min(max(x, -_FAR), _FAR) for x in each) for each in (box.lower, box.upper))
+    return Box(*corners)
 
 
 def _path(points: list[Point]) -> tuple[Triple, ...]:

@@ -98,10 +98,11 @@ class SceneView(
             self._solids_at = time.monotonic() + PART_TIME * count
             self.run_method("setSolids", [_packed(each) for each in solids])
         if solids == self._solids:
-            self._send("placeSolids", [[[e.position, e.rotation] for e in scene.solids]])
-        self._send("setFences", [[list(each) for each in scene.fences]])
+            self._send("placeSolids", [[place for _, *place in scene.solids]])
+        fences = [[box.lower, box.upper, *place] for box, *place in scene.fences]
+        self._send("setFences", [fences])
         self._send("setPaths", [[*scene.paths.values()]])
-        frames = [[each.name, *_pose(each.position, each.rotation)] for each in scene.frames]
+        frames = [[name, *_pose(place, turn)] for name, place, turn in scene.frames]
         self._send("setFrames", [frames])
         rows = vehicle_rows(scene, chosen)
         if self._shown.get("update") != rows and self._may_send():

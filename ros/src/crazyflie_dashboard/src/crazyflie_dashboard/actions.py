@@ -2,9 +2,6 @@
 
 import math
 import subprocess
-from collections.abc import Callable
-from concurrent.futures import Executor
-from dataclasses import dataclass
 from typing import Any
 
 import genpy
@@ -12,17 +9,16 @@ import roslib.packages
 from geometry_msgs.msg import Point
 from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest
 
-from crazyflie_dashboard.discovery import FoundVehicle, Graph, Service
+from crazyflie_dashboard.discovery import Graph, Service
 from crazyflie_dashboard.graph_model import GraphModel
-from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.moves import Move, expect_apart, formation, in_frame
 from crazyflie_dashboard.page_data import MAX_COMMAND_AGE, Command, Outcomes, gathered
-from crazyflie_dashboard.snapshot import Action, Triple, VehicleSnapshot
+from crazyflie_dashboard.snapshot import Action, Triple
+from crazyflie_dashboard.vehicle_model import VehicleModel
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import BUFFER
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_takeoff.limits import Box
-from crazyflie_utils import NodeHandle
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.steps import Steps, follow
 
@@ -50,44 +46,18 @@ _YAW, _FIXED = "reference/yaw", "frames/fixed"
 _YAW_REFERENCE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 
 
-@dataclass(frozen=True)
-class Target:
-    """A vehicle that is commanded, and its latest snapshot."""
-
-    vehicle: FoundVehicle
-    now: VehicleSnapshot
-    fence: Box | None = None  #: Its geofence, in the frame of its states.
-
-    def service(self, action: Action) -> Service | None:
-        """Return its service for an action."""
-        return self.vehicle.services.get(action)
-
-
 class Actions:
     """Calls services for commands.
 
     Parameters
     ----------
-    handle : NodeHandle
-    workers : concurrent.futures.Executor
-        Its threads may wait for the master.
-    master : Master
     model : GraphModel
-        The vehicles that are commanded.
-    time : callable
-        time.monotonic.
+        The vehicles that are commanded; the handle, and who may wait for the master.
     """
 
-    def __init__(
-        self,
-        handle: NodeHandle,
-        workers: Executor,
-        master: Master,
-        model: GraphModel,
-        time: Callable[[], float],
-    ):
-        self._handle, self._workers, self._time = handle, workers, time
-        self._master, self._model = master, model
+    def __init__(self, model: GraphModel):
+        self._model = model
+        self._handle, self._time = model.handle, model.clock
         self._moves: dict[str, Move] = {}
         self._commanders: dict[str, subprocess.Popen[bytes]] = {}
 
@@ -101,14 +71,9 @@ class Actions:
         """
         expect_fresh(command.action.value, self._time() - command.clicked)
         _check(command)
-        scene = self._model.scene
-        targets = {
-            name: Target(model.vehicle, scene.vehicles[name], self._model.fence(model.vehicle))
-            for name, model in self._model.models.items()
-            if name in scene.vehicles
-        }
+        targets = self._model.models
         if command.action == Action.GO_TO:
-            return (yield from self._go_to(command, targets, scene.fixed_frame))
+            return (yield from self._go_to(command, targets))
         answers = self._land_all(command, targets)
         for name in command.vehicles:
             if name not in answers:
@@ -132,7 +97,7 @@ class Actions:
         own = [
             name
             for name, target in targets.items()
-            if (service := target.service(Action.LAND)) and nodes.get(service.name) == node
+            if (service := _service(target, Action.LAND)) and nodes.get(service.name) == node
         ]
         if len(own) < 2:
             return {}
@@ -140,7 +105,7 @@ class Actions:
         return dict.fromkeys(own, answer)
 
     def _command(self, command, target, name):
-        service = target and target.service(command.action)
+        service = _service(target, command.action)
         if service is None:
             raise RefusalError(_why_no_service(command.action, target))
         if command.action in _GROUND_ONLY and target.now.is_in_flight:
@@ -148,7 +113,8 @@ class Actions:
                 f"{command.action.value}: the vehicle is {target.now.state}; expected it to be on "
                 "the ground"
             )
-        top = math.inf if target.fence is None else target.fence.upper[2]
+        fence = self._model.fence(target.vehicle)
+        top = math.inf if fence is None else fence.upper[2]
         if command.action == Action.TAKEOFF and command.height > top:
             raise RefusalError(
                 f"take off: the height is {command.height:g} m; expected at most {top:g} m, "
@@ -158,7 +124,7 @@ class Actions:
             yield from self._light(service.name.rpartition("/")[0], command)
             return
         self._moves.pop(name, None)
-        go_to = target.service(Action.GO_TO)
+        go_to = _service(target, Action.GO_TO)
         if command.action == Action.TAKEOFF and go_to is not None and go_to.needs_commander:
             self._start_commander(target.vehicle)
         yield from self._call(command, service, _request(command, service, target))
@@ -192,15 +158,15 @@ class Actions:
 
     # Go-to commands for several vehicles.
 
-    def _go_to(self, command, targets, fixed):
+    def _go_to(self, command, targets):
         """Send vehicles so that their centre comes to the goal: all of them, or none."""
         reasons = {n: self._why_it_stays(targets.get(n)) for n in command.vehicles}
         if any(reasons.values()):
             return {name: text or _STAYS for name, text in reasons.items()}
-        chosen = {name: targets[name] for name in command.vehicles}
+        fences = {name: self._model.fence(targets[name].vehicle) for name in command.vehicles}
         moving = {name: move for name, move in self._moves.items() if name in targets}
-        moves, requests = yield self._workers.submit(
-            self._prepared, command, chosen, targets, moving, fixed, self._time()
+        moves, requests = yield self._model.workers.submit(
+            self._prepared, command, targets, fences, moving, self._time()
         )
         calls = {name: self._call(command, *each) for name, each in requests.items()}
         answers = {name: self._begin(call) for name, call in calls.items()}
@@ -215,7 +181,7 @@ class Actions:
         return outcomes
 
     def _why_it_stays(self, target):
-        service = target and target.service(Action.GO_TO)
+        service = _service(target, Action.GO_TO)
         if service is None:
             return _why_no_service(Action.GO_TO, target)
         if service.needs_commander:
@@ -227,32 +193,32 @@ class Actions:
             return f"the vehicle is {target.now.state}; expected it to fly"
         return ""
 
-    def _prepared(self, command, chosen, targets, moving, fixed, now):
-        """Return moves, and services with requests, of vehicles; waits for the master."""
-        services = {name: target.service(Action.GO_TO) for name, target in chosen.items()}
-        graph, frames = self._model.graph, self._model.frames
+    def _prepared(self, command, targets, fences, moving, now):
+        """Return moves, and services with requests, of the vehicles; waits for the master."""
+        services = {n: targets[n].vehicle.services[Action.GO_TO] for n in command.vehicles}
+        graph, frames, fixed = self._model.graph, self._model.frames, self._model.scene.fixed_frame
         spaces = {name: _namespace(service, graph) for name, service in services.items()}
         wanted = {name: f"{each.vehicle.namespace}/{BUFFER}" for name, each in targets.items()}
-        known = self._master.parameters(
+        known = self._model.master.parameters(
             [
                 *wanted.values(),
                 *(f"{space}/{key}" for space in spaces.values() for key in (_YAW, _FIXED)),
             ]
         )
         places = {n: t.now.position for n, t in targets.items() if t.now.position is not None}
-        goals = formation({name: places[name] for name in chosen}, command.goal)
+        goals = formation({name: places[name] for name in services}, command.goal)
         distance = max(math.dist(places[name], goal) for name, goal in goals.items())
         duration = max(_MIN_DURATION, distance / command.speed)
         moves = {n: Move(places[n], goal, now, duration) for n, goal in goals.items()}
         requests = {}
-        for name, target in chosen.items():
-            space = spaces[name]
+        for name, space in spaces.items():
+            target = targets[name]
             has_yaw = known.get(f"{space}/{_YAW}", target.vehicle.has_driver)
             own = known.get(f"{space}/{_FIXED}") or frames.parent(target.now.frame) or fixed
             yaw = rpy_from_quaternion(*target.now.rotation)[2]
             yaw = yaw if command.yaw is None else command.yaw
             goal, yaw = self._in_own_frame(name, goals[name], yaw, own.strip("/"), fixed)
-            _expect_inside(name, goal, target.fence)
+            _expect_inside(name, goal, fences[name])
             request = srv.GoToRequest(goal=Point(*goal), yaw=yaw if has_yaw else 0.0)
             request.duration = genpy.Duration.from_sec(duration)
             requests[name] = services[name], request
@@ -275,7 +241,7 @@ class Actions:
         """Hold vehicles where they are."""
         for target in targets:
             self._moves.pop(target.vehicle.name, None)
-            service = target.service(Action.GO_TO)
+            service = target.vehicle.services[Action.GO_TO]
             self._handle.call_service(service.name, srv.GoTo, _hold_request(), _TIMEOUT)
 
     def _start_commander(self, vehicle):
@@ -324,7 +290,11 @@ def _check(command: Command) -> None:
         raise RefusalError(f"go to: z is {command.goal[2]:g} m; expected 0 or more")
 
 
-def _why_no_service(action: Action, target: Target | None) -> str:
+def _service(target: VehicleModel | None, action: Action) -> Service | None:
+    return None if target is None else target.vehicle.services.get(action)
+
+
+def _why_no_service(action: Action, target: VehicleModel | None) -> str:
     known = "there is no such vehicle" if target is None else "it has no service for it"
     return f"{action.value}: {known}"
 
@@ -348,7 +318,7 @@ def _expect_inside(name: str, goal: Triple, fence: Box | None) -> None:
             )
 
 
-def _request(command: Command, service: Service, target: Target | None) -> Any:
+def _request(command: Command, service: Service, target: VehicleModel) -> Any:
     if service.kind is Empty:
         return EmptyRequest()
     if service.kind is SetBool:
@@ -358,7 +328,6 @@ def _request(command: Command, service: Service, target: Target | None) -> Any:
         return srv.TakeoffRequest(0, command.height, genpy.Duration.from_sec(duration))
     if service.kind is srv.GoTo:
         return _hold_request()
-    assert target is not None
     position = target.now.position
     height = _UNKNOWN_HEIGHT if position is None else position[2]
     duration = max(_MIN_DURATION, height / _CLIMB_SPEED)

@@ -72,9 +72,9 @@ class Dashboard:
         # so, not the one that serves all pages.
         self._turns = workers or ThreadPoolExecutor(1, "dashboard_turns")
         self._model = GraphModel(handle, self._workers, master, clock)
-        self._actions = Actions(handle, self._workers, master, self._model, clock)
+        self._actions = Actions(self._model)
         self._lane = lane
-        self._parameters = LiveParameters(handle, self._workers, master, self._model)
+        self._parameters = LiveParameters(self._model)
         self._missions = missions.Missions()
         self._model.missions = lambda: self._missions.running
         self._recording = Recording()

@@ -54,7 +54,7 @@ _REMEDIES = {"is stamped in the future": f"{_OLDER}; {_CLOCKS}"}
 
 
 class GraphModel:
-    """The running graph. Not thread-safe, except ``scene`` and ``graph``.
+    """The running graph. Not thread-safe, except ``scene``, ``graph`` and ``models``.
 
     Parameters
     ----------
@@ -79,9 +79,9 @@ class GraphModel:
         self.sentences: tuple[Sentence, ...] = ()
         self.missions: Callable[[], tuple[str, ...]] = tuple
         self.recording: Callable[[], str] = str
-        self._parent, self._workers, self._master = handle, workers, master
-        self._clock = clock
-        self._handle: NodeHandle | None = None
+        #: handle, workers, master, clock: Also of those that command what is here.
+        self.handle, self.workers, self.master, self.clock = handle, workers, master, clock
+        self._subscriptions: NodeHandle | None = None
         ahead = MAX_FUTURE_STAMP_SIMULATED if handle.uses_sim_time else MAX_FUTURE_STAMP
         self.frames = Frames(clock, handle.nanoseconds, ahead)
         self._diagnostics = Diagnostics(clock)
@@ -97,9 +97,9 @@ class GraphModel:
     def begin(self) -> None:
         """Start to observe the graph: a page is open."""
         self._end_at = math.inf
-        if self._handle is not None:
+        if self._subscriptions is not None:
             return
-        handle = self._handle = self._parent.child()
+        handle = self._subscriptions = self.handle.child()
         self.frames.clear()
         self._surroundings = Surroundings(handle)
         self._poll_at = 0.0
@@ -111,14 +111,14 @@ class GraphModel:
 
     def end(self) -> None:
         """Observe the graph for a little longer: no page is open, or one is being reloaded."""
-        self._end_at = self._clock() + _LINGER_TIME
+        self._end_at = self.clock() + _LINGER_TIME
 
     def _forget(self):
         for model in self.models.values():
             model.close()
-        if self._handle is not None:
-            self._handle.close()
-        self._handle = None
+        if self._subscriptions is not None:
+            self._subscriptions.close()
+        self._subscriptions = None
         self.models, self.scene, self.graph = {}, Scene(), Graph()
 
     def watch(self, names: set[str]) -> None:
@@ -138,13 +138,13 @@ class GraphModel:
             model.receive(name in self._watched, is_few, self.graph.topics)
 
     def _on_timer(self):
-        if self._clock() >= self._end_at:
+        if self.clock() >= self._end_at:
             self._forget()
             return
-        if (began := self._clock()) >= self._poll_at:
+        if (began := self.clock()) >= self._poll_at:
             self._poll_at = math.inf
-            self._workers.submit(self._master.graph).add_done_callback(
-                lambda done: self._parent.submit(self._on_graph, done, began)
+            self.workers.submit(self.master.graph).add_done_callback(
+                lambda done: self.handle.submit(self._on_graph, done, began)
             )
         self.frames.update()
         if len(self.frames.poses) != self._known_frames:
@@ -153,14 +153,14 @@ class GraphModel:
         self.scene = self._make_scene()
 
     def _on_graph(self, done: "Future[Graph]", began: float) -> None:
-        now = self._clock()
+        now = self.clock()
         self._poll_at = now + max(_POLL_PERIOD, (now - began) / _POLL_SHARE)
-        if self._handle is None:
+        if self._subscriptions is None:
             return
         # Without a master, the last known data are shown, with their growing age.
         if done.exception() is not None:
             self._trouble = f"no graph: {done.exception()}"
-            self._parent.warn(self._trouble, throttle=60.0)
+            self.handle.warn(self._trouble, throttle=60.0)
             return
         self._trouble = ""
         self.graph = done.result()
@@ -175,7 +175,7 @@ class GraphModel:
                 plots = None if model is None else model.plots
                 if model is not None:
                     model.close()
-                model = VehicleModel(self._parent.child(), vehicle, self._clock, plots)
+                model = VehicleModel(self.handle.child(), vehicle, self.clock, plots)
             model.vehicle, model.seen = vehicle, now
             model.kind = self._diagnostics.kind(vehicle)
             models[vehicle.name] = model
@@ -200,19 +200,19 @@ class GraphModel:
         own = {model.frame for model in self.models.values()} - {None}
         roots = [frames.root(str(frame)) for frame in own or frames.poses]
         fixed = max(sorted(set(roots)), key=roots.count, default="world")
-        snapshots = {name: self._snapshot(name, fixed) for name in self.models}
         for name, model in self.models.items():
+            model.now = self._snapshot(name, fixed)
             if model.plots is not None:
-                model.plots.take_pose(snapshots[name], "state" in model.vehicle.topics)
+                model.plots.take_pose(model.now, "state" in model.vehicle.topics)
         others = []
         for name in frames.poses.keys() - own:
             pose = frames.in_fixed(name, fixed)
             if pose is not None and frames.parent(name) not in own:
                 others.append(Placed(name, *pose))
         return Scene(
-            made=self._clock(),
+            made=self.clock(),
             fixed_frame=fixed,
-            vehicles=snapshots,
+            vehicles={name: model.now for name, model in self.models.items()},
             solids=self._surroundings.solids(frames, fixed),
             fences=self._surroundings.fences(
                 frames, fixed, {m.vehicle.namespace: m.frame for m in self.models.values()}
@@ -232,7 +232,7 @@ class GraphModel:
             now = self.models[name].snapshot(self.frames, fixed)
             return replace(now, is_held=True) if name in self._surroundings.held else now
         except Exception as error:
-            self._parent.warn(f"{name} cannot be shown: {error}", throttle=10.0, key=name)
+            self.handle.warn(f"{name} cannot be shown: {error}", throttle=10.0, key=name)
             return VehicleSnapshot(name, state="cannot be shown", reason=str(error))
 
     def _own_sentences(self):

@@ -3,7 +3,7 @@
 import ast
 import math
 from collections.abc import Iterator, Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,10 +12,9 @@ from dynamic_reconfigure.msg import Config, ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
 
 from crazyflie_dashboard.graph_model import GraphModel
-from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.page_data import ParameterInfo
 from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
-from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils import ServiceError
 from crazyflie_utils.parameters.server import config_message
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.steps import Steps
@@ -133,8 +132,8 @@ def _choices(text):
 class LiveParameters:
     """Reads and sets parameters; see `Dashboard.parameters`."""
 
-    def __init__(self, handle: NodeHandle, workers: Executor, master: Master, model: GraphModel):
-        self._handle, self._workers, self._master, self._model = handle, workers, master, model
+    def __init__(self, model: GraphModel):
+        self._model, self._handle = model, model.handle
 
     def owners(self) -> tuple[str, ...]:
         """Return nodes with live parameters, and vehicles with firmware."""
@@ -152,7 +151,7 @@ class LiveParameters:
         if owner not in self._firmware():
             return (yield from self._of_node(owner))
         top = self._firmware()[owner] or "/"
-        known = yield self._workers.submit(self._master.parameters, [top])
+        known = yield self._model.workers.submit(self._model.master.parameters, [top])
         tree = known.get(top)
         return tuple(of_firmware(owner, tree if isinstance(tree, dict) else {}))
 
@@ -187,7 +186,7 @@ class LiveParameters:
             # The firmware's value, which may differ from the typed one.
             yield self._handle.set_param_later(full_name, parameter.value)
             raise
-        known = yield self._workers.submit(self._master.parameters, [full_name])
+        known = yield self._model.workers.submit(self._model.master.parameters, [full_name])
         return replace(parameter, value=known.get(full_name, value))
 
     def _of_node(self, node):

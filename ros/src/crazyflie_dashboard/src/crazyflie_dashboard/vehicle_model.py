@@ -75,6 +75,7 @@ class VehicleModel:
         plots: VehiclePlots | None = None,
     ):
         self.vehicle = vehicle
+        self.now = VehicleSnapshot(vehicle.name)  #: The one in the newest scene.
         self.kind = Kind.REAL if vehicle.has_driver else Kind.SIMULATED
         #: Frame of /tf with its poses; without one they come from its own topics.
         self.frame: str | None = None

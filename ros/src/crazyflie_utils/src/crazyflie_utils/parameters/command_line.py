@@ -4,7 +4,7 @@ import argparse
 from typing import TypeVar
 
 from crazyflie_utils.parameters.declaration import REQUIRED, ParameterError, Parameters
-from crazyflie_utils.parameters.types import Boolean, Integer, Number
+from crazyflie_utils.parameters.types import BOOLEAN, Integer, Number
 from crazyflie_utils.text import number_from_text
 
 P = TypeVar("P", bound=Parameters)
@@ -50,7 +50,7 @@ def _raw(parameter_type, text):
     # Only Python allows underscores in numbers.
     if isinstance(parameter_type, Integer) and "_" not in text:
         return int(text, 0)
-    if isinstance(parameter_type, Boolean):
+    if parameter_type is BOOLEAN:
         return {"true": True, "false": False}.get(text.lower(), text)
     return text
 

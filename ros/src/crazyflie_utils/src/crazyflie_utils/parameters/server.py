@@ -25,7 +25,7 @@ from dynamic_reconfigure.msg import (
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 from crazyflie_utils.parameters.declaration import REQUIRED, ParameterError, Parameters
-from crazyflie_utils.parameters.types import Boolean, Integer, Number, ParameterType, Text
+from crazyflie_utils.parameters.types import BOOLEAN, Integer, Number, Text
 from crazyflie_utils.refusal import ServiceError
 
 
@@ -119,9 +119,13 @@ class Reconfiguration:
         self._handle = handle
         self._type = type(parameters)
         self._on_change = on_change
+        declarations = [*self._type.declarations()]
         # All are read now: at a change, in flight, no callback may wait for the master.
-        self._values = _read(self._type.declarations(), get)
-        self._live = {d.name: d for d in self._type.declarations() if d.live}
+        self._values: dict[str, Any] = {}
+        for declaration in declarations:
+            with contextlib.suppress(KeyError):
+                self._values[declaration.name] = get(declaration.name)
+        self._live = {d.name: d for d in declarations if d.live}
         descriptions = handle.publisher("~parameter_descriptions", ConfigDescription, latch=True)
         self._updates = handle.publisher("~parameter_updates", Config, latch=True)
         descriptions.publish(_description(self._live.values(), self._config()))
@@ -137,56 +141,35 @@ class Reconfiguration:
         try:
             self._apply(wanted)
         except ParameterError as error:
-            self._updates.publish(config_message(self._config()))
             raise ServiceError(str(error)) from None
+        finally:
+            # Also after a refusal: programs that show the configuration get what holds.
+            self._updates.publish(config_message(self._config()))
         for name, value in wanted.items():
             self._handle.set_param_later(f"~{name}", value)
-        self._updates.publish(config_message(self._config()))
         return ReconfigureResponse(config_message(self._config()))
 
     def _apply(self, wanted):
-        unknown = wanted.keys() - self._live.keys()
-        if unknown:
+        if unknown := wanted.keys() - self._live.keys():
             raise ParameterError(
                 f"{', '.join(sorted(unknown))} cannot be changed while {self._handle.name} runs; "
                 f"expected names among {', '.join(self._live)}"
             )
-        before = self._values
-        self._values = {**before, **wanted}
-        try:
-            full_name = self._handle.resolve
-            self._on_change(
-                self._type.read(self._values.__getitem__, lambda name: full_name(f"~{name}"))
-            )
-        except Exception:
-            self._values = before
-            raise
+        values = {**self._values, **wanted}
+        full_name = self._handle.resolve
+        self._on_change(self._type.read(values.__getitem__, lambda name: full_name(f"~{name}")))
+        self._values = values
 
     def _config(self):
-        return {name: self._value(declaration) for name, declaration in self._live.items()}
-
-    def _value(self, declaration):
-        _, python_type, _, _ = _wire_format(declaration.type)
-        return python_type(self._values.get(declaration.name, declaration.default))
-
-
-def _read(declarations, get):
-    values = {}
-    for declaration in declarations:
-        with contextlib.suppress(KeyError):
-            values[declaration.name] = get(declaration.name)
-    return values
+        return {
+            name: _python_type(each)(self._values.get(name, each.default))
+            for name, each in self._live.items()
+        }
 
 
-def _wire_format(kind: ParameterType) -> tuple[str, type, Any, Any]:
-    """Return how a parameter is sent: its type's name there and in Python, and its limits."""
-    if isinstance(kind, Number):
-        return "double", float, max(kind.minimum, kind.above), kind.maximum
-    if isinstance(kind, Integer):
-        return "int", int, kind.minimum, kind.maximum
-    if isinstance(kind, Boolean):
-        return "bool", bool, False, True
-    return "str", str, "", ""
+def _python_type(declaration):
+    # What is neither a number nor a bool is sent as text, such as the path of a file.
+    return {"float": float, "int": int, "bool": bool}.get(declaration.type.label, str)
 
 
 def config_message(values: Mapping[str, bool | int | float | str]) -> Config:
@@ -209,18 +192,24 @@ def _description(live, config):
     low, high, defaults = {}, {}, {}
     group = Group(name="Default")
     for declaration in live:
-        name = declaration.name
-        wire_type, python_type, low[name], high[name] = _wire_format(declaration.type)
+        name, kind, python_type = declaration.name, declaration.type, _python_type(declaration)
+        low[name], high[name] = _limits(kind)
         has_default = declaration.default is not REQUIRED
         defaults[name] = python_type(declaration.default) if has_default else config[name]
-        unit = f", {declaration.type.unit}" if declaration.type.unit else ""
-        edit_method = _choices(declaration.type)
-        group.parameters.append(
-            ParamDescription(name, wire_type, 0, declaration.help + unit, edit_method)
-        )
+        wire_type = "double" if python_type is float else python_type.__name__
+        text = f"{declaration.help}{f', {kind.unit}' if kind.unit else ''}"
+        group.parameters.append(ParamDescription(name, wire_type, 0, text, _choices(kind)))
     return ConfigDescription(
         [group], config_message(high), config_message(low), config_message(defaults)
     )
+
+
+def _limits(kind):
+    if isinstance(kind, Number):
+        return max(kind.minimum, kind.above), kind.maximum
+    if isinstance(kind, Integer):
+        return kind.minimum, kind.maximum
+    return (False, True) if kind is BOOLEAN else ("", "")
 
 
 def _choices(parameter_type):

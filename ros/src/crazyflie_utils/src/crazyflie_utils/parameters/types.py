@@ -2,6 +2,7 @@
 
 import math
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -59,16 +60,12 @@ class Number(ParameterType):
 
     @override
     def __call__(self, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not (is_number and abs(value) <= sys.float_info.max):
             raise ValueError
-        try:
-            number = float(value)
-        except OverflowError as error:
-            raise ValueError(error) from None
-        is_in_range = self.minimum <= number <= self.maximum and number > self.above
-        if not math.isfinite(number) or not is_in_range:
+        if not self.minimum <= value <= self.maximum or value <= self.above:
             raise ValueError
-        return number
+        return float(value)
 
     def __str__(self) -> str:
         unit = f"({self.unit})" if self.unit else ""
@@ -87,9 +84,8 @@ class Integer(ParameterType):
     @property
     def range(self) -> str:  # type: ignore[override]
         """The limits, such as "0 to 255"."""
-        if self.minimum == self.maximum:
-            return f"{self.minimum}"
-        return f"{self.minimum} to {self.maximum}"
+        low, high = self.minimum, self.maximum
+        return f"{low}" if low == high else f"{low} to {high}"
 
     @override
     def __call__(self, value: Any) -> int:
@@ -99,25 +95,8 @@ class Integer(ParameterType):
         return int(number)
 
     def __str__(self) -> str:
-        if self.minimum == self.maximum:
-            return f"the integer {self.minimum}"
-        return f"an integer from {self.minimum} to {self.maximum}"
-
-
-@dataclass(frozen=True)
-class Boolean(ParameterType):
-    """true or false."""
-
-    label = "bool"
-
-    @override
-    def __call__(self, value: Any) -> bool:
-        if not isinstance(value, bool):
-            raise ValueError
-        return value
-
-    def __str__(self) -> str:
-        return "true or false"
+        one = self.minimum == self.maximum
+        return f"{'the integer' if one else 'an integer from'} {self.range}"
 
 
 @dataclass(frozen=True)
@@ -135,9 +114,8 @@ class Text(ParameterType):
 
     @override
     def __call__(self, value: Any) -> str:
-        if not isinstance(value, str) or not (value.strip() or self.may_be_empty):
-            raise ValueError
-        if value not in (self.choices or (value,)):
+        is_text = isinstance(value, str) and (value.strip() or self.may_be_empty)
+        if not is_text or value not in (self.choices or (value,)):
             raise ValueError
         return value
 
@@ -163,6 +141,20 @@ class Converted(ParameterType):
 
     def __str__(self) -> str:
         return self.expected
+
+
+class ListOf(Converted):
+    """A list with entries of one type; its value is a tuple. ``length`` None: any length."""
+
+    def __init__(self, entry: ParameterType, length: int | None = None):
+        def convert(value: Any) -> tuple[Any, ...]:
+            if not isinstance(value, (list, tuple)) or length not in (None, len(value)):
+                raise ValueError
+            return tuple(map(entry, value))
+
+        expected = f"a list{'' if length is None else f' of {length}'}, each entry {entry}"
+        label = f"list of {entry.label}"
+        super().__init__(convert, expected, label, entry.unit, entry.range)
 
 
 def matching(pattern: str, expected: str) -> Converted:
@@ -200,37 +192,10 @@ def _frame_name(value):
     return value.lstrip("/")
 
 
-@dataclass(frozen=True)
-class ListOf(ParameterType):
-    """A list with entries of one type; its value is a tuple. ``length`` None: any length."""
-
-    entry: ParameterType
-    length: int | None = None
-
-    @property
-    def label(self) -> str:  # type: ignore[override]
-        """The same property of the entries."""
-        return f"list of {self.entry.label}"
-
-    @property
-    def unit(self) -> str:  # type: ignore[override]
-        """The same property of the entries."""
-        return self.entry.unit
-
-    @property
-    def range(self) -> str:  # type: ignore[override]
-        """The same property of the entries."""
-        return self.entry.range
-
-    @override
-    def __call__(self, value: Any) -> tuple[Any, ...]:
-        if not isinstance(value, (list, tuple)) or self.length not in (None, len(value)):
-            raise ValueError
-        return tuple(map(self.entry, value))
-
-    def __str__(self) -> str:
-        count = "a list" if self.length is None else f"a list of {self.length}"
-        return f"{count}, each entry {self.entry}"
+def _boolean(value):
+    if not isinstance(value, bool):
+        raise ValueError
+    return value
 
 
 FINITE = Number()
@@ -239,7 +204,7 @@ DURATION = Number(unit="s", minimum=0.0)
 #: Shortest period of a node, which could not keep up with a shorter one.
 TIME_STEP = Number(unit="s", minimum=1e-4)
 METRES = Number(unit="m")
-BOOLEAN = Boolean()
+BOOLEAN = Converted(_boolean, "true or false", "bool")
 TEXT = Text()
 TOPIC = SERVICE = Converted(_graph_name, "the name of a topic or service, such as /state")
 FRAME = Converted(_frame_name, "the name of a tf frame, such as world")

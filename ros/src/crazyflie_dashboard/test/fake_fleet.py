@@ -10,7 +10,7 @@ from crazyflie_driver import srv
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.fake_process import FakeProcess
-from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
+from crazyflie_utils.tf.frame_tree import StampedPose, encode_poses
 
 STATE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 STATUS = "in_flight_flight_status"
@@ -133,7 +133,7 @@ class FakeFleet:
             StampedPose("world", name, self.stamp, place, (0.0, 0.0, 0.0, 1.0))
             for name, place in places.items()
         ]
-        self.process.publish("/tf", PoseCodec().encode(poses))
+        self.process.publish("/tf", encode_poses(poses))
         self.process.advance(0.05)
 
     def find(self):

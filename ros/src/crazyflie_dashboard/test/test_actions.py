@@ -17,7 +17,7 @@ from crazyflie_dashboard.snapshot import Action
 from crazyflie_driver import srv
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
+from crazyflie_utils.tf.frame_tree import StampedPose, encode_poses
 
 LIMIT = 10.0  # s.
 
@@ -166,7 +166,7 @@ def test_a_goal_is_given_to_a_vehicle_in_its_own_frame(fleet):
     for _ in range(2):
         stamp = fleet.process.clock.nanoseconds()
         above = StampedPose("map", "world", stamp, (5.0, 0.0, 0.0), (0.0, 0.0, half, half))
-        fleet.process.publish("/tf_static", PoseCodec().encode([above]))
+        fleet.process.publish("/tf_static", encode_poses([above]))
         fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 0.0, 1.0))
     assert fleet.dashboard.scene().fixed_frame == "map"
     assert fleet.vehicles["cf2"].position == pytest.approx((5.0, 1.0, 1.0))

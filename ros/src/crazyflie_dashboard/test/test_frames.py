@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crazyflie_dashboard.frames import Frames
-from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
+from crazyflie_utils.tf.frame_tree import StampedPose, encode_poses
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 QUARTER = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
@@ -33,7 +33,7 @@ def frames(clock):
 
 
 def send(frames, *poses):
-    frames.read(PoseCodec().encode(poses).raw)
+    frames.read(encode_poses(poses).raw)
     frames.update()
 
 
@@ -80,10 +80,9 @@ def test_what_is_no_message_is_passed_over(frames):
 
 
 def test_rates_are_those_of_messages(frames, clock):
-    codec = PoseCodec()
     for k in range(50):
         pose = StampedPose("world", "cf1", k + 1, (0.0, 0.0, 0.0), LEVEL)
-        frames.read(codec.encode([pose]).raw)
+        frames.read(encode_poses([pose]).raw)
     clock.now += 2.0
     frames.update()
     assert frames.poses["cf1"].rate == pytest.approx(25.0)

@@ -23,7 +23,7 @@ from crazyflie_msgs.msg import (
     VehicleStatus,
 )
 from crazyflie_takeoff.limits import Box
-from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
+from crazyflie_utils.tf.frame_tree import StampedPose, encode_poses
 
 
 @pytest.fixture
@@ -191,7 +191,7 @@ def test_geofences_are_drawn_where_the_frame_of_their_vehicles_is():
     above = StampedPose("map", "world", stamp, (5.0, 0.0, 0.0), (0.0, 0.0, half, half))
     # The body of motion capture moves, and the vehicle's own frame is fixed to it.
     own = StampedPose("body", "cf1", stamp, (0.0, 0.0, -0.02), (0.0, 0.0, 0.0, 1.0))
-    fleet.process.publish("/tf_static", PoseCodec().encode([above, own]))
+    fleet.process.publish("/tf_static", encode_poses([above, own]))
     places = {"body": (0.5, 0.0, 1.0), "cf2": (1.0, 0.0, 1.0)}
     fleet.send_poses(places=places)
     add_topic(fleet, topic, Config._type)
@@ -253,7 +253,7 @@ def test_an_invalid_pose_makes_only_its_own_vehicle_old(rotation):
     for _ in range(12):
         fleet.stamp = fleet.process.clock.nanoseconds()
         bad = StampedPose("world", "cf1", fleet.stamp, (0.0, 0.0, 1.0), rotation)
-        fleet.process.publish("/tf", PoseCodec().encode([bad]))
+        fleet.process.publish("/tf", encode_poses([bad]))
         fleet.send_poses(["cf2", "cf3"], z=2.0)
     assert [each.is_stale for each in fleet.vehicles.values()] == [True, False, False]
     assert fleet.vehicles["cf3"].position[2] == 2.0
@@ -268,7 +268,7 @@ def test_clocks_that_are_not_set_alike_are_reported(fleet, offset, text):
     for _ in range(5):
         stamp = fleet.process.clock.nanoseconds() + round(offset * 1e9)
         pose = StampedPose("world", "cf2", stamp, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))
-        fleet.process.publish("/tf", PoseCodec().encode([pose]))
+        fleet.process.publish("/tf", encode_poses([pose]))
         fleet.process.advance(0.05)
     (sentence,) = [each for each in fleet.dashboard.scene().sentences if text in each.text]
     assert "cf2" in sentence.text

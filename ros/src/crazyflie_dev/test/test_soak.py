@@ -14,7 +14,7 @@ from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus, PositionVelocityStateStamped
 from crazyflie_utils.testing import FakeGraph
-from crazyflie_utils.tf.frame_tree import PoseCodec, StampedPose
+from crazyflie_utils.tf.frame_tree import StampedPose, encode_poses
 
 POSE_PERIOD = 0.01
 """Of the simulator, s; a soak from the command line has twice as many poses."""
@@ -64,7 +64,7 @@ def test_faults_of_poses_arrive():
         "stamps are 8 s ahead",
     }
     pose = StampedPose("world", "crazyflie", 100_000_000_000, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))
-    message = PoseCodec().encode([pose])
+    message = encode_poses([pose])
     for fault in FAULTS:
         if fault.name in names:
             names.remove(fault.name)

@@ -13,7 +13,8 @@ from transform_helpers import hear, transform, x_of
 
 from crazyflie_utils import TransformError
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_utils.tf.frame_tree import PoseCodec, RawTransforms
+from crazyflie_utils.tf import frame_tree
+from crazyflie_utils.tf.frame_tree import RawTransforms
 
 
 def raw(*transforms):
@@ -30,14 +31,14 @@ def hear_raw(process, *transforms):
 def decoded(monkeypatch):
     """Return the child frames that are decoded, in order."""
     frames = []
-    decode = PoseCodec.decode
+    decode = frame_tree.decode_pose
 
-    def note(self, *arguments):
-        pose = decode(self, *arguments)
+    def note(*arguments):
+        pose = decode(*arguments)
         frames.append(pose.child)
         return pose
 
-    monkeypatch.setattr(PoseCodec, "decode", note)
+    monkeypatch.setattr(frame_tree, "decode_pose", note)
     return frames
 
 
@@ -136,9 +137,9 @@ def test_frames_without_end_are_not_kept(process, lookup):
         hear_raw(process, transform(f"junk{count}", "crazyflie", 100.0 + 1e-4 * count))
         hear(process, transform("world", f"static{count}", 0.0), topic="/tf_static")
     hear_raw(process, transform("world", "n" * 10_000, 100.0))
-    codec = kept._codec
-    for memory in (kept._unread, kept._names, kept.followed, kept._frames, codec._read):
+    for memory in (kept._unread, kept._names, kept.followed, kept._frames):
         assert len(memory) <= 1001
+    assert frame_tree._names.cache_info().currsize <= 1000
     assert max(map(len, kept._unread.values())) < 1024
     assert kept._tf2._buffer.all_frames_as_yaml().count("parent:") <= 1000
     hear_raw(process, transform("world", "crazyflie", 100.4, x=2.0))

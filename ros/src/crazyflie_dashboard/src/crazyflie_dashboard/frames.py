@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from crazyflie_dashboard.snapshot import Rotation, Triple
 from crazyflie_utils import TransformError
-from crazyflie_utils.tf.frame_tree import FrameTree, PoseCodec, StampedPose, entries
+from crazyflie_utils.tf.frame_tree import FrameTree, StampedPose, decode_pose, entries
 
 _MAX_FRAMES = 1000
 _FORGET_AFTER = 30.0  #: Time without a pose after which a moving frame is not shown (s).
@@ -47,7 +47,6 @@ class Frames:
         #: Frame whose newest pose was rejected -> reason.
         self.rejected: dict[str, str] = {}
         self._time, self._nanoseconds, self._ahead = time, nanoseconds, ahead
-        self._codec = PoseCodec()
         self._latest: dict[bytes, tuple[bytes, int, int]] = {}
         self._counts: Counter[bytes] = Counter()
         self._counted_since = time()
@@ -57,7 +56,7 @@ class Frames:
         """Forget all frames."""
         for known in (self.poses, self.rejected, self._latest, self._counts):
             known.clear()
-        self._tree = FrameTree(self._codec, self._on_rejected, self._ahead, self._on_new)
+        self._tree = FrameTree(self._on_rejected, self._ahead, self._on_new)
 
     def read(self, raw: bytes) -> None:
         """Store a serialized tf2_msgs/TFMessage."""
@@ -81,7 +80,7 @@ class Frames:
         elapsed = now - self._counted_since
         for child, (raw, start, end) in self._latest.items():
             try:
-                pose = self._codec.decode(raw, start, end)
+                pose = decode_pose(raw, start, end)
             except (UnicodeDecodeError, struct.error):
                 continue
             self._tree.take(pose, self._nanoseconds())

@@ -10,6 +10,7 @@ Nearly every lookup is of the latest pose of a frame in its parent, which is ans
 others go to tf2, whose buffer is filled with the latest poses at the first of them.
 """
 
+import functools
 import math
 import struct
 from collections import Counter, OrderedDict, deque
@@ -25,9 +26,8 @@ from tf2_msgs.msg import TFMessage
 from crazyflie_utils.timers import ros_time
 
 _LENGTH = struct.Struct("<I")
-_HEADER = struct.Struct("<4I")  # Sequence number, s, ns, length of the parent's name.
 _POSE = struct.Struct("<7d")
-_STAMP = struct.Struct("<3I")
+_STAMP = struct.Struct("<3I")  # Sequence number, s, ns.
 
 #: Largest number of frame pairs whose serialized and decoded names are stored.
 _MAX_NAMES = 1000
@@ -95,74 +95,62 @@ class RawTransforms(TFMessage):
         return TFMessage().deserialize(self.raw).transforms
 
 
-class PoseCodec:
-    """Serializes and deserializes poses; stores names of frames, which repeat."""
+def decode_pose(raw: bytes, start: int, end: int) -> StampedPose:
+    """Return the pose between two offsets of a serialized message, see `entries`.
 
-    def __init__(self) -> None:
-        self._read: dict[bytes, tuple[str, str]] = {}
-        self._written: dict[tuple[str, str], tuple[bytes, bytes]] = {}
+    UnicodeDecodeError: a name is not valid text.
+    """
+    _, seconds, nanoseconds = _STAMP.unpack_from(raw, start)
+    parent, child = _names(raw[start + _STAMP.size : end - _POSE.size])
+    numbers = _POSE.unpack_from(raw, end - _POSE.size)
+    moment = seconds * 1_000_000_000 + nanoseconds
+    return StampedPose(parent, child, moment, numbers[:3], numbers[3:])
 
-    def decode(self, raw: bytes, start: int, end: int) -> StampedPose:
-        """Return the pose between two offsets of a serialized message, see `entries`.
 
-        UnicodeDecodeError: a name is not valid text.
-        """
-        _, seconds, nanoseconds, length = _HEADER.unpack_from(raw, start)
-        names = raw[start + _HEADER.size - _LENGTH.size : end - _POSE.size]
-        known = self._read.get(names)
-        if known is None:
-            known = (
-                names[_LENGTH.size : _LENGTH.size + length].decode().removeprefix("/"),
-                names[2 * _LENGTH.size + length :].decode().removeprefix("/"),
-            )
-            _remember(self._read, names, known)
-        numbers = _POSE.unpack_from(raw, end - _POSE.size)
-        stamp = seconds * 1_000_000_000 + nanoseconds
-        return StampedPose(*known, stamp, numbers[:3], numbers[3:])
+def encode_poses(poses: Iterable[StampedPose]) -> RawTransforms:
+    """Return a message with poses."""
+    parts: list[bytes] = []
+    for parent, child, stamp, position, rotation in poses:
+        parts += (
+            _STAMP.pack(0, *divmod(stamp, 1_000_000_000)),
+            _serialized_names(parent, child),
+            _POSE.pack(*position, *rotation),
+        )
+    # A pose has three parts.
+    return RawTransforms().deserialize(_LENGTH.pack(len(parts) // 3) + b"".join(parts))
 
-    def encode(self, poses: Iterable[StampedPose]) -> RawTransforms:
-        """Return a message with poses."""
-        parts: list[bytes] = []
-        for parent, child, stamp, position, rotation in poses:
-            known = self._written.get((parent, child))
-            if known is None:
-                known = (_text(parent), _text(child))
-                _remember(self._written, (parent, child), known)
-            parts += (
-                _STAMP.pack(0, *divmod(stamp, 1_000_000_000)),
-                *known,
-                _POSE.pack(*position, *rotation),
-            )
-        # A pose has four parts.
-        return RawTransforms().deserialize(_LENGTH.pack(len(parts) // 4) + b"".join(parts))
+
+@functools.lru_cache(_MAX_NAMES)
+def _names(raw):
+    """Return the names of parent and child."""
+    child = _LENGTH.size + _LENGTH.unpack_from(raw)[0]
+    names = raw[_LENGTH.size : child], raw[child + _LENGTH.size :]
+    return tuple(name.decode().removeprefix("/") for name in names)
+
+
+@functools.lru_cache(_MAX_NAMES)
+def _serialized_names(*names):
+    texts = [name.encode() for name in names]
+    return b"".join(_LENGTH.pack(len(text)) + text for text in texts)
 
 
 def entries(raw: bytes) -> Iterator[tuple[bytes, int, int]]:
     """Yield child frame, start and end of every transform of a serialized TFMessage.
 
-    struct.error or ValueError: it is shorter than its own length fields.
+    A slash before the name of a frame is dropped. struct.error or ValueError: the message is
+    shorter than its own length fields.
     """
     (count,) = _LENGTH.unpack_from(raw)
     start = _LENGTH.size
     for _ in range(count):
-        parent = start + _HEADER.size + _LENGTH.unpack_from(raw, start + 12)[0]
+        parent = start + _STAMP.size
         child = parent + _LENGTH.size + _LENGTH.unpack_from(raw, parent)[0]
-        end = child + _POSE.size
+        pose = child + _LENGTH.size + _LENGTH.unpack_from(raw, child)[0]
+        end = pose + _POSE.size
         if end > len(raw):
             raise ValueError
-        yield raw[parent + _LENGTH.size : child], start, end
+        yield raw[child + _LENGTH.size : pose].removeprefix(b"/"), start, end
         start = end
-
-
-def _text(name):
-    data = name.encode()
-    return _LENGTH.pack(len(data)) + data
-
-
-def _remember(memory, key, value):
-    if len(memory) >= _MAX_NAMES:
-        memory.clear()
-    memory[key] = value
 
 
 TransformError = tf2_py.TransformException
@@ -171,8 +159,6 @@ TransformError = tf2_py.TransformException
 It is one of tf2's: LookupException (a frame is unknown), ConnectivityException (frames are not
 connected), ExtrapolationException (not at that time).
 """
-
-_LATEST = genpy.Time()
 
 _CACHE = genpy.Duration(10.0)  #: Length of tf2's buffer: tf2's default.
 #: Number of stamps stored for tf2: ten seconds of a vehicle at 1 kHz.
@@ -202,8 +188,7 @@ class Buffer:
 
     def lookup(self, target: str, source: str, stamp: int = 0) -> StampedPose:
         """Return the pose of frame ``source`` in ``target`` at a ROS time (ns); 0: the latest."""
-        moment = ros_time(stamp) if stamp else _LATEST
-        found = self._buffer.lookup_transform_core(target, source, moment)
+        found = self._buffer.lookup_transform_core(target, source, ros_time(stamp))
         pose = StampedPose.of(found)
         known = self._stamps.get(found.header.stamp.to_sec(), pose.stamp)
         return pose._replace(stamp=stamp or known)
@@ -243,22 +228,20 @@ class FrameTree:
 
     def __init__(
         self,
-        codec: PoseCodec,
         warn: Callable[[str, Hashable], None],
         ahead: float,
         on_new: Callable[[StampedPose], None],
     ):
         self.rejected: Counter[str] = Counter()  #: Number of dropped transforms by reason.
         self.followed: set[str] = set()  #: Frames that are decoded.
-        self._codec = codec
         self._warn = warn
         self._ahead = round(ahead * 1e9)
         self._on_new = on_new
         self._frames: dict[str, _Frame] = {}
         self._static: dict[str, StampedPose] = {}
         self._names: set[str] = set()
-        # Serialized names of the frames that are followed; and names that are not allowed.
-        self._wanted = {b"", b"/"}
+        # Serialized names of the frames that are followed; and the one that is not allowed.
+        self._wanted = {b""}
         self._unread: dict[bytes, bytes] = {}
         self._tf2: Buffer | None = None
 
@@ -300,7 +283,7 @@ class FrameTree:
         try:
             for child, start, end in entries(raw):
                 if child in self._wanted:
-                    self.take(self._codec.decode(raw, start, end), now)
+                    self.take(decode_pose(raw, start, end), now)
                 elif end - start <= _MAX_BYTES:
                     self._unread[child] = raw[start:end]
                     if len(self._unread) > _MAX_FRAMES:
@@ -311,15 +294,8 @@ class FrameTree:
 
     def take(self, pose: StampedPose, now: int) -> None:
         """Process a pose at the ROS time ``now`` (ns); reject an invalid one."""
-        frame = self._frames.get(pose.child)
-        reason = _why_invalid(pose) or self._why_too_many(pose)
-        if reason is None:
-            reason = self._why_untimely(frame, pose.stamp, now)
-        if reason:
-            self._reject(pose, reason)
-        if reason is not None:
+        if not self._is_valid(pose) or not self._is_timely(pose, now):
             return
-        # The frames may have been deleted meanwhile.
         frame = self._frames.get(pose.child)
         if frame is None:
             frame = self._frames[pose.child] = _Frame(pose)
@@ -337,9 +313,7 @@ class FrameTree:
 
     def take_static(self, pose: StampedPose, now: int) -> None:
         """Process a static pose; reject an invalid one."""
-        reason = _why_invalid(pose) or self._why_too_many(pose)
-        if reason is not None:
-            self._reject(pose, reason)
+        if not self._is_valid(pose):
             return
         self._static[pose.child] = pose
         if self._tf2 is not None:
@@ -351,11 +325,10 @@ class FrameTree:
         while frame is not None and frame not in self.followed:
             if len(self.followed) >= _MAX_FRAMES:
                 return
-            for name in (frame.encode(), b"/" + frame.encode()):
-                self._wanted.add(name)
-                kept = self._unread.pop(name, None)
-                if kept is not None:
-                    self.read(_ONE + kept, now)
+            name = frame.encode()
+            self._wanted.add(name)
+            if kept := self._unread.pop(name, None):
+                self.read(_ONE + kept, now)
             # Called afterwards, to avoid a recursion over a long chain.
             self.followed.add(frame)
             frame = self._parent(frame)
@@ -409,45 +382,39 @@ class FrameTree:
         if pose.child in self.followed:
             self.follow(pose.parent, now)
 
+    def _is_valid(self, pose):
+        # tf2 refuses all but the last of these, too, but logs each one; it never deletes a name.
+        (a, b, c), (x, y, z, w) = pose.position, pose.rotation
+        if not pose.child.strip("/") or not pose.parent.strip("/"):
+            return self._reject(pose, "does not name its frames")
+        if not math.isfinite(a + b + c + x + y + z + w):
+            return self._reject(pose, "is not finite")
+        if abs(x * x + y * y + z * z + w * w - 1.0) > _NORM_TOLERANCE:
+            return self._reject(pose, "has no unit quaternion")
+        names = self._names
+        if len(names) >= _MAX_FRAMES and not (pose.parent in names and pose.child in names):
+            return self._reject(pose, "is one frame too many")
+        return True
+
+    def _is_timely(self, pose, now):
+        """Return whether a pose is new; delete the moving frames if its source's clock was set."""
+        if pose.stamp > now + self._ahead:
+            # Before the first /clock of a running simulation, now is 0.
+            return self._reject(pose, "is stamped in the future") if now else False
+        frame = self._frames.get(pose.child)
+        if frame is None:
+            return True
+        if pose.stamp < frame.latest.stamp - _STEP_BACK:
+            frame.steps_back += 1
+            if frame.steps_back < _STEPS_BACK:
+                return self._reject(pose, "is stamped in the past")
+            # The last pose before the clock was set back would stay the latest until the stamps
+            # have caught up.
+            self.clear()
+        return pose.stamp != frame.latest.stamp
+
     def _reject(self, pose, reason):
         self.rejected[reason] += 1
         text = f"ignoring a transform {pose.parent[:50]} -> {pose.child[:50]} that {reason}"
         self._warn(text, (pose.parent, pose.child, reason))
-
-    def _why_untimely(self, frame, stamp, now):
-        """Return why a pose is rejected; "" if that needs no warning; None if it is accepted."""
-        if stamp > now + self._ahead:
-            # Before the first /clock of a running simulation, now is 0.
-            return "is stamped in the future" if now else ""
-        if frame is None:
-            return None
-        latest = frame.latest.stamp
-        if stamp == latest:
-            return ""
-        if stamp < latest - _STEP_BACK:
-            frame.steps_back += 1
-            if frame.steps_back < _STEPS_BACK:
-                return "is stamped in the past"
-            # The clock of the source was set back, and the last pose before that would
-            # stay the latest until the stamps have caught up.
-            self.clear()
-        return None
-
-    def _why_too_many(self, pose):
-        # tf2 never deletes a name.
-        names = self._names
-        if (pose.parent in names and pose.child in names) or len(names) < _MAX_FRAMES:
-            return None
-        return "is one frame too many"
-
-
-def _why_invalid(pose):
-    # tf2 refuses all of them, too, but logs each one.
-    if not pose.child.strip("/") or not pose.parent.strip("/"):
-        return "does not name its frames"
-    (a, b, c), (x, y, z, w) = pose.position, pose.rotation
-    if not math.isfinite(a + b + c + x + y + z + w):
-        return "is not finite"
-    if abs(x * x + y * y + z * z + w * w - 1.0) > _NORM_TOLERANCE:
-        return "has no unit quaternion"
-    return None
+        return False

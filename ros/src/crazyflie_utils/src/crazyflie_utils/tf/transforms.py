@@ -8,7 +8,7 @@ import genpy
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_utils.tf.frame_tree import FrameTree, PoseCodec, RawTransforms, StampedPose
+from crazyflie_utils.tf.frame_tree import FrameTree, RawTransforms, StampedPose, encode_poses
 from crazyflie_utils.topics import Subscriber, Topics
 
 #: Largest time of a stamp ahead of now (s). tf's static_transform_publisher stamps 0.1 s ahead.
@@ -51,8 +51,7 @@ class Transforms:
         self._topics = topics
         self._static: dict[str, TransformStamped] = {}
         self._now = now
-        self._codec = PoseCodec()
-        self._tree = FrameTree(self._codec, warn, ahead, self._note_arrival)
+        self._tree = FrameTree(warn, ahead, self._note_arrival)
         self._publisher: Any = None
         self._own: TFMessage | None = None
         self._broadcasters = 0
@@ -132,7 +131,7 @@ class Transforms:
             self._send(poses)
 
     def _send(self, poses):
-        self._own = self._codec.encode(poses)
+        self._own = encode_poses(poses)
         self._publisher.publish(self._own)
 
     def listener(self) -> Callable[..., TransformStamped]:

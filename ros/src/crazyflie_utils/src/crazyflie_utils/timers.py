@@ -147,8 +147,7 @@ class Executor:
     def start(self) -> None:
         """Begin to run work, in the order of submission."""
         self._started = True
-        if not self.is_running_here:
-            self._drain()
+        self._drain()
 
     @property
     def is_running_here(self) -> bool:
@@ -212,13 +211,12 @@ _SLOT = 0.01
 class Timer:
     """A callback that is due every ``period`` seconds; ends with `stop`."""
 
-    def __init__(self, period: float, work: Callable[[], None], now: float):
-        self.deadline = math.nan
-        self.number = 0
-        self.stopped = False
+    def __init__(self, period: float, work: Callable[[], None], number: int, begin: float):
         self.period = period
+        self.number = number
+        self.stopped = False
         self._work = work
-        self.restart(now)
+        self.restart(begin)
 
     def stop(self) -> None:
         """Stop the timer, even if it is due already."""
@@ -236,14 +234,12 @@ class Timer:
             self.deadline = now
             return
         # Multiples of the period do not add up rounding errors as sums do.
-        deadline = self._start + (self._count + 1) * self.period
-        if now + _TOLERANCE < deadline:
-            self._count += 1
-            self.deadline = deadline
-            return
-        passed = math.floor((now - self._start + _TOLERANCE) / self.period)
-        self._count = max(self._count, passed) + 1
+        self._count += 1
         self.deadline = self._start + self._count * self.period
+        if self.deadline <= now + _TOLERANCE:
+            passed = math.floor((now - self._start + _TOLERANCE) / self.period)
+            self._count = max(self._count, passed + 1)
+            self.deadline = self._start + self._count * self.period
 
     def fire(self) -> None:
         """Call the callback, unless the timer was stopped."""
@@ -296,32 +292,26 @@ class TimerQueue:
         if not 0.0 <= period < math.inf:
             raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
         with self._lock:
-            if align_phase and period > 0.0:
-                begin = self._next_moment(period, now, stagger) - period
-            else:
-                begin = self._begin(period, now, stagger)
-            timer = Timer(period, work, begin)
-            timer.number = next(self._order)
+            begin = self._begin(period, now, stagger, align_phase)
+            timer = Timer(period, work, next(self._order), begin)
             timer.stopped = self._is_stopped
             self._push(timer)
         return timer
 
-    def _begin(self, period, now, stagger):
-        if self._is_running or period == 0.0:
+    def _begin(self, period, now, stagger, align_phase):
+        """Return the moment one period before the first deadline."""
+        if period == 0.0 or (self._is_running and not align_phase):
             return now
+        if not stagger and not align_phase:
+            return self._next_multiple(period, now) if period <= _TOGETHER else now
+        begin = self._next_multiple(_SLOT, now)
         if stagger:
-            return self._next_multiple(_SLOT, now) + self._next_slot(period)
-        return self._next_multiple(period, now) if period <= _TOGETHER else now
-
-    def _next_moment(self, period, now, stagger):
-        first = self._next_multiple(_SLOT, now) + (self._next_slot(period) if stagger else 0.0)
-        # The first moment of its phase after now.
-        return first - math.floor((first - now - _TOLERANCE) / period) * period
-
-    def _next_slot(self, period):
-        slot = self._spread[period] % max(round(period / _SLOT), 1)
-        self._spread[period] += 1
-        return slot * _SLOT
+            begin += self._spread[period] % max(round(period / _SLOT), 1) * _SLOT
+            self._spread[period] += 1
+        if align_phase:
+            # The first deadline is the first moment of its phase after now.
+            begin -= (math.floor((begin - now - _TOLERANCE) / period) + 1) * period
+        return begin
 
     def _next_multiple(self, period, now):
         if self._origin is None or now < self._origin:
@@ -365,7 +355,7 @@ class TimerQueue:
                 timer.stop()
 
     def _push(self, timer):
-        heapq.heappush(self._heap, (timer.deadline, next(self._order), timer))
+        heapq.heappush(self._heap, (timer.deadline, timer.number, timer))
 
     def _take_due(self, now):
         due: list[Timer] = []
@@ -391,23 +381,19 @@ class VaryingTimer:
     def __init__(self, add_timer: Callable[..., Timer], work: Callable[[], None], period: float):
         self._add_timer = add_timer
         self._work = work
-        self._period = period
         self._timer = add_timer(period, work)
-        self._is_stopped = False
 
     def set_period(self, period: float) -> None:
         """Change the period, s; the next deadline is at most one period from now.
 
         Then many timers with the same period are due at different moments.
         """
-        if period != self._period and not self._is_stopped:
-            self._period = period
+        if period != self._timer.period and not self._timer.stopped:
             self._timer.stop()
             self._timer = self._add_timer(period, self._work, stagger=True, align_phase=True)
 
     def stop(self) -> None:
         """Stop the timer."""
-        self._is_stopped = True
         self._timer.stop()
 
 

@@ -5,7 +5,7 @@ import math
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
-from functools import partial
+from functools import partial, wraps
 from typing import Any, TypeVar
 
 import genpy
@@ -137,27 +137,9 @@ class NodeHandle:
         ``latest_only`` only the latest message is delivered, before the node's next timer or
         service call.
         """
-        name = self.resolve(topic)
-        numbers = number_getter(message_type, finite) if finite else None
-
-        def work(message):
-            if self.is_closed:
-                return
-            try:
-                # If the sum is finite, so are the numbers; if it is not, it may have overflowed.
-                if (
-                    not finite
-                    or (numbers and math.isfinite(sum(numbers(message))))
-                    or is_finite(getattr(message, finite))
-                ):
-                    callback(message)
-                    return
-                self.warn(f"ignoring a message on {name}: its {finite} is not finite", throttle=1.0)
-                if on_invalid is not None:
-                    on_invalid()
-            except Exception as error:
-                self.report_fault(callback, error)
-
+        name, work = self.resolve(topic), self.guard(callback)
+        if finite:
+            work = self._if_finite(name, message_type, finite, callback, on_invalid)
         topics = self._process.topics
         if latest_only:
             latest = LatestMessage(work)
@@ -167,6 +149,23 @@ class NodeHandle:
             subscriber = topics.subscribe(name, message_type, partial(self._submit, work))
         self._undo.append(subscriber.close)
         return subscriber
+
+    def _if_finite(self, topic, message_type, field, callback, on_invalid):
+        numbers = number_getter(message_type, field)
+
+        @wraps(callback)
+        def checked(message):
+            # If the sum is finite, so are the numbers; if it is not, it may have overflowed.
+            if (numbers and math.isfinite(sum(numbers(message)))) or is_finite(
+                getattr(message, field)
+            ):
+                callback(message)
+                return
+            self.warn(f"ignoring a message on {topic}: its {field} is not finite", throttle=1.0)
+            if on_invalid is not None:
+                on_invalid()
+
+        return self.guard(checked)
 
     def advertise_service(
         self, name: str, service_type: type, callback: Callable[[Any], Any]
@@ -179,58 +178,48 @@ class NodeHandle:
         """
         full_name = self.resolve(name)
 
+        def serve(request, is_withdrawn, answer):
+            for latest in self._latest:
+                latest.deliver()
+            if self.is_closed:
+                return self._refuse(answer, ServiceError(f"{self.name} has ended this service"))
+            if is_withdrawn():
+                self.warn(f"{full_name}: the caller has cancelled this call; it is not carried out")
+                return self._refuse(answer, ServiceError(f"{full_name}: the call was withdrawn"))
+            try:
+                response = callback(request)
+            except Exception as error:
+                if not isinstance(error, (ServiceError, RefusalError)):
+                    self.report_fault(callback, error)
+                return self._refuse(answer, error)
+            if isinstance(response, Future):
+                return response.add_done_callback(lambda done: self._forward(done, answer))
+            return answer.set_result(response)
+
         def begin(request, is_withdrawn):
             answer: Future[Any] = Future()
-
-            def work():
-                if is_withdrawn():
-                    self.warn(
-                        f"{full_name}: the caller has cancelled this call; it is not carried out"
-                    )
-                    answer.set_exception(ServiceError(f"{full_name}: the call was withdrawn"))
-                else:
-                    self._serve(callback, request, answer)
-
-            for latest in self._latest:
-                self._submit(latest.deliver)
-            self._submit(work)
+            self._submit(serve, request, is_withdrawn, answer)
             return answer
 
         advertise = self._process.transport.advertise_service
         self._undo.append(advertise(full_name, service_type, begin, self.time))
 
-    def _serve(self, callback, request, answer):
-        if self.is_closed:
-            answer.set_exception(ServiceError(f"{self.name} has ended this service"))
-            return
-        try:
-            response = callback(request)
-        except (ServiceError, RefusalError) as reason:
-            answer.set_exception(ServiceError(str(reason)))
-        except Exception as error:
-            self.report_fault(callback, error)
-            answer.set_exception(ServiceError(f"{self.name}: {error!r}"))
-        else:
-            if isinstance(response, Future):
-                response.add_done_callback(lambda done: self._forward(done, answer))
-            else:
-                answer.set_result(response)
+    def _refuse(self, answer, error):
+        is_refusal = isinstance(error, (ServiceError, RefusalError))
+        answer.set_exception(ServiceError(str(error) if is_refusal else f"{self.name}: {error!r}"))
 
     def _forward(self, done, to):
         """Complete a future with the outcome of another, any error as a `ServiceError`."""
         if not to.set_running_or_notify_cancel():
             return
         if done.cancelled():
-            to.set_exception(ServiceError(f"{self.name}: cancelled"))
-            return
-        error = done.exception()
-        if error is None:
+            self._refuse(to, ServiceError(f"{self.name}: cancelled"))
+        elif (error := done.exception()) is None:
             to.set_result(done.result())
-        elif isinstance(error, (ServiceError, RefusalError)):
-            to.set_exception(ServiceError(str(error)))
         else:
-            self.error(f"a service failed\n{''.join(traceback.format_exception(error))}")
-            to.set_exception(ServiceError(f"{self.name}: {error!r}"))
+            if not isinstance(error, (ServiceError, RefusalError)):
+                self.error(f"a service failed\n{''.join(traceback.format_exception(error))}")
+            self._refuse(to, error)
 
     def claim_controls(self, topic: str, kind: str) -> None:
         """Claim a topic's controls for this node's vehicle, which is "simulated" or "real".
@@ -310,15 +299,12 @@ class NodeHandle:
         return timer
 
     def _tick(self, callback):
+        guarded = self.guard(callback)
+
         def tick():
             for latest in self._latest:
                 latest.deliver()
-            if self.is_closed:
-                return
-            try:
-                callback()
-            except Exception as error:
-                self.report_fault(callback, error)
+            guarded()
 
         return tick
 

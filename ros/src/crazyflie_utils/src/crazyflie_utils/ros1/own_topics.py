@@ -14,6 +14,7 @@ import struct
 import threading
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import genpy
@@ -22,7 +23,7 @@ from rospy.exceptions import TransportTerminated
 from typing_extensions import override
 
 from crazyflie_utils.ros1 import master_watch
-from crazyflie_utils.ros1.receiving import Report, harden
+from crazyflie_utils.ros1.receiving import Reception, Report, validate_header
 
 _LENGTH = struct.Struct("<I")
 
@@ -142,7 +143,7 @@ class OwnCallback:
 class OwnSubscription(rospy.topics._SubscriberImpl):
     """rospy's side of a topic, by remapped name, that handles subscribe to, with these patches.
 
-    See `OwnCallback` and `receiving.harden`.
+    See `OwnCallback` and `receiving.Reception`.
     """
 
     def __init__(
@@ -204,9 +205,11 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
             ):
                 return False
             if "harden_subscribers" in self._patches and self._is_own():
-                c.reception = harden(
+                c.reception = Reception(
                     c, self._report, self._limits_rate, self._may_wait, self.receive_callback
                 )
+                c.receive_once = c.reception.receive_once
+                c._validate_header = partial(validate_header, c, c._validate_header, self._report)
             return super().add_connection(c)
 
 

@@ -13,7 +13,6 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Hashable
-from functools import partial
 from typing import Any
 
 import genpy
@@ -80,39 +79,37 @@ class Inbox:
         """
         frames = self._take()
         if limits_rate and frames and self._limiter.is_flooded(len(frames)):
-            frames = self._drop_flood(frames)
+            time.sleep(_FLOOD_PERIOD)
+            self._take_all(frames)
+            if not getattr(self._protocol.recv_data_class, "lossless", False):
+                topic = self._protocol.resolved_name
+                self._report(
+                    f"more than {MAX_RATE:g} messages a second on {topic}", ("flood", topic)
+                )
+                frames = frames[-1:]
         return self._decode(frames)
 
     def collect(self) -> tuple[list[genpy.Message], bool]:
         """Return the messages that are complete, without waiting, and whether more have come."""
         frames: list[bytes] = []
-        has_more = True
+        has_more = False
         try:
-            for _ in range(_MAX_READS):
-                read_before = self._connection.stat_bytes
-                frames += self._take(socket.MSG_DONTWAIT)
-                has_more = self._connection.stat_bytes - read_before == self._protocol.buff_size
-                if not has_more:
-                    break
-        except BlockingIOError:
-            has_more = False
+            has_more = self._take_all(frames)
         except TransportTerminated as end:
             self.end = end
         return self._decode(frames), has_more
 
-    def _drop_flood(self, frames):
-        """Return the messages of one period to decode: the last one, or all of a lossless type."""
-        time.sleep(_FLOOD_PERIOD)
+    def _take_all(self, frames):
+        """Append the messages that have come, without waiting; return whether there are more."""
         for _ in range(_MAX_READS):
+            read_before = self._connection.stat_bytes
             try:
                 frames += self._take(socket.MSG_DONTWAIT)
             except BlockingIOError:
-                break
-        if getattr(self._protocol.recv_data_class, "lossless", False):
-            return frames
-        topic = self._protocol.resolved_name
-        self._report(f"more than {MAX_RATE:g} messages a second on {topic}", ("flood", topic))
-        return frames[-1:]
+                return False
+            if self._connection.stat_bytes - read_before < self._protocol.buff_size:
+                return False
+        return True
 
     def _decode(self, frames):
         messages = []
@@ -133,15 +130,12 @@ class Inbox:
         data, self._read = self._read or self._receive(flags), b""
         if self._part:
             self._part += data
-            if len(self._part) < self._needed(self._part):
+            if len(self._part) < self._needed(self._part, 0):
                 return []
             data = bytes(self._part)
             self._part.clear()
-        frames, start, filled = [], 0, len(data)
-        while filled - start >= _LENGTH.size:
-            end = start + self._needed(data, start)
-            if end > filled:
-                break
+        frames, start = [], 0
+        while (end := start + self._needed(data, start)) <= len(data):
             frames.append(data[start + _LENGTH.size : end])
             start = end
         self._part += data[start:]
@@ -159,8 +153,8 @@ class Inbox:
         self._connection.stat_bytes += len(data)
         return data
 
-    def _needed(self, data, start=0):
-        """Return the length of a message, with its prefix, bytes."""
+    def _needed(self, data, start):
+        """Return the length of the message that begins at ``start``, with its prefix, bytes."""
         if len(data) - start < _LENGTH.size:
             return _LENGTH.size
         (size,) = _LENGTH.unpack_from(data, start)
@@ -174,6 +168,9 @@ class Inbox:
 
 class Reception:
     """Receives from a connection, a TCPROSTransport of rospy, in the place of its own method.
+
+    With ``limits_rate`` only the last message of every 5 ms is decoded in a flood of more than
+    `MAX_RATE`; all of them, every 5 ms, of a message type with the attribute ``lossless``.
 
     While ``may_wait()``, messages wait until `collect` is called or `PATIENCE` is over, unless they
     come as a flood: a thread that wakes up for each of them takes as long as what it does.
@@ -257,29 +254,17 @@ class Reception:
         return messages
 
 
-def harden(
+def validate_header(
     connection: Any,
+    validate: Callable[[dict[str, str]], None],
     report: Report,
-    limits_rate: bool,
-    may_wait: Callable[[], bool],
-    deliver: Callable[[list[genpy.Message], Any], None],
-) -> Reception:
-    """Make a connection to a publisher, which is not connected yet, receive by a `Reception`.
+    header: dict[str, str],
+) -> None:
+    """Check the header of a publisher, in the place of ``validate``, the connection's own method.
 
-    With ``limits_rate`` only the last message of every 5 ms is decoded in a flood of more than
-    `MAX_RATE`; all of them, every 5 ms, of a message type with the attribute ``lossless``.
+    TransportInitError for a publisher of another type, which is disconnected for good.
     """
-    reception = Reception(connection, report, limits_rate, may_wait, deliver)
-    connection.receive_once = reception.receive_once
-    connection._validate_header = partial(
-        _validate_header, connection, connection._validate_header, report
-    )
-    return reception
-
-
-def _validate_header(connection, validate, report, header):
-    mismatch = _type_mismatch(connection.protocol, header)
-    if mismatch:
+    if mismatch := _type_mismatch(connection.protocol, header):
         # Closed, so that rospy does not retry for ever.
         topic, peer = connection.protocol.resolved_name, header.get("callerid", "a publisher")
         connection.close()

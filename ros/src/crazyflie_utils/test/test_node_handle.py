@@ -96,7 +96,7 @@ def test_periods_that_never_end_are_refused(handle, period):
 
 def test_a_timer_whose_period_varies(process, handle):
     moments = []
-    timer = handle.varying_timer(0.5, lambda: moments.append(handle.time()))
+    timer = handle.timer(0.5, lambda: moments.append(handle.time()))
     process.advance(1.0)
     timer.set_period(0.5)
     process.advance(0.25)

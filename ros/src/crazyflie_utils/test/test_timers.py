@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_utils.testing.programs import wait_until
-from crazyflie_utils.timers import Executor, SteadyClock, SteadyTimers, TimerQueue
+from crazyflie_utils.timers import Executor, SimulatedClock, SteadyClock, SteadyTimers, TimerQueue
 
 LIMIT = 60.0
 
@@ -20,9 +20,22 @@ def started():
     return executor
 
 
+class Queue(TimerQueue):
+    """A queue with a clock that is set when a timer is added."""
+
+    def __init__(self, executor):
+        self.clock = SimulatedClock()
+        super().__init__(executor, self.clock)
+
+    def add_at(self, period, work, now, stagger=False):
+        """Add a timer at a moment."""
+        self.clock.set(now)
+        return self.add(period, work, stagger)
+
+
 @pytest.fixture
 def queue():
-    return TimerQueue(started())
+    return Queue(started())
 
 
 def run(queue, *moments):
@@ -32,7 +45,7 @@ def run(queue, *moments):
 
 def test_first_tick_is_one_period_after_the_beginning(queue):
     ticks = []
-    queue.add(0.5, lambda: ticks.append(1), now=10.0)
+    queue.add_at(0.5, lambda: ticks.append(1), now=10.0)
     assert queue.next_deadline() == 10.5
     run(queue, 10.0, 10.4)
     assert ticks == []
@@ -48,9 +61,9 @@ def test_without_timers_nothing_is_due(queue):
 
 def test_ticks_run_in_the_order_of_their_deadlines(queue):
     order = []
-    queue.add(0.3, lambda: order.append("slow"), now=0.0)
-    queue.add(0.2, lambda: order.append("fast"), now=0.0)
-    queue.add(0.3, lambda: order.append("slow too"), now=0.0)
+    queue.add_at(0.3, lambda: order.append("slow"), now=0.0)
+    queue.add_at(0.2, lambda: order.append("fast"), now=0.0)
+    queue.add_at(0.3, lambda: order.append("slow too"), now=0.0)
     run(queue, 0.3)
     assert order == ["fast", "slow", "slow too"]
 
@@ -58,7 +71,7 @@ def test_ticks_run_in_the_order_of_their_deadlines(queue):
 def test_what_is_due_at_one_moment_runs_in_the_order_in_which_it_was_added(queue):
     order = []
     for name, period, now in (("first", 0.01, 0.07), ("second", 0.01, 0.0), ("third", 0.1, 0.0)):
-        queue.add(period, lambda name=name: order.append(name), now=now)
+        queue.add_at(period, lambda name=name: order.append(name), now=now)
     for step in range(1, 101):
         order.clear()
         queue.run_due(step * 0.01)
@@ -68,8 +81,8 @@ def test_what_is_due_at_one_moment_runs_in_the_order_in_which_it_was_added(queue
 def test_short_periods_that_a_process_begins_with_are_due_together(queue):
     ticks = []
     for name, period, now in (("a", 0.01, 1.0), ("b", 0.01, 1.0037), ("c", 0.02, 1.005)):
-        queue.add(period, lambda name=name: ticks.append(name), now=now)
-    queue.add(0.3, lambda: ticks.append("long"), now=1.005)
+        queue.add_at(period, lambda name=name: ticks.append(name), now=now)
+    queue.add_at(0.3, lambda: ticks.append("long"), now=1.005)
     for moment, due in ((1.01, "a"), (1.02, "ab"), (1.03, "ab"), (1.04, "abc"), (1.05, "ab")):
         ticks.clear()
         queue.run_due(moment)
@@ -78,7 +91,7 @@ def test_short_periods_that_a_process_begins_with_are_due_together(queue):
     queue.run_due(1.305)
     assert "long" in ticks
     # A caller may wait for work that is added later.
-    queue.add(0.01, lambda: ticks.append("soon"), now=1.3337)
+    queue.add_at(0.01, lambda: ticks.append("soon"), now=1.3337)
     queue.run_due(1.3436)
     assert "soon" not in ticks
     queue.run_due(1.3437)
@@ -88,7 +101,7 @@ def test_short_periods_that_a_process_begins_with_are_due_together(queue):
 def test_those_that_are_spread_are_due_one_after_the_other(queue):
     ticks = []
     for number in range(7):
-        queue.add(0.05, lambda number=number: ticks.append(number), now=1.0, stagger=True)
+        queue.add_at(0.05, lambda number=number: ticks.append(number), now=1.0, stagger=True)
     for moment, due in ((1.05, [0, 5]), (1.06, [1, 6]), (1.07, [2]), (1.08, [3]), (1.09, [4])):
         ticks.clear()
         queue.run_due(moment)
@@ -100,11 +113,11 @@ def test_those_that_are_spread_are_due_one_after_the_other(queue):
 
 def test_those_that_may_be_early_are_due_at_the_same_moments(queue):
     due = []
-    queue.add(0.01, lambda: None, now=0.003)
+    queue.add_at(0.01, lambda: None, now=0.003)
     run(queue, 0.013)
     for name in "abcde":
-        queue.add(0.04, lambda name=name: due.append(name), 0.017, True, align_phase=True)
-    queue.add(0.01, lambda: due.append("quick"), 0.0185, align_phase=True)
+        queue.add_at(9.0, lambda name=name: due.append(name), 0.017).set_period(0.04)
+    queue.add_at(9.0, lambda: due.append("quick"), 0.0185).set_period(0.01)
     moments = {}
     while queue.next_deadline() < 0.06:
         now = queue.next_deadline()
@@ -118,7 +131,7 @@ def test_rounding_makes_no_tick_late_or_double(queue):
     # As with /clock in steps of 1 ms, at the stamps that its messages can hold.
     ticks = []
     now = 0.0
-    queue.add(0.01, lambda: ticks.append(now), now=now)
+    queue.add_at(0.01, lambda: ticks.append(now), now=now)
     for step in range(1, 200_001):
         now = step * 1_000_000 * 1e-9
         queue.run_due(now)
@@ -128,7 +141,7 @@ def test_rounding_makes_no_tick_late_or_double(queue):
 def test_times_as_large_as_wall_time_are_met(queue):
     ticks = []
     start = 1_700_000_000
-    queue.add(0.01, lambda: ticks.append(1), now=float(start))
+    queue.add_at(0.01, lambda: ticks.append(1), now=float(start))
     for step in range(1, 1001):
         queue.run_due((start * 1000 + step * 10) * 1e-3)
     assert len(ticks) == 1000
@@ -140,10 +153,10 @@ def test_times_as_large_as_wall_time_are_met(queue):
     st.lists(st.floats(1e-4, 50.0), min_size=1, max_size=40),
 )
 def test_missed_ticks_are_skipped_and_the_phase_is_kept(period, start, steps):
-    queue = TimerQueue(started())
+    queue = Queue(started())
     ticks = []
     now = start
-    queue.add(period, lambda: ticks.append(now), now=start)
+    queue.add_at(period, lambda: ticks.append(now), now=start)
     expected = 0
     for step in steps:
         before = math.floor((now - start + 1e-6) / period)
@@ -162,29 +175,29 @@ def test_missed_ticks_are_skipped_and_the_phase_is_kept(period, start, steps):
 
 def test_period_of_zero_is_due_every_time(queue):
     ticks = []
-    queue.add(0.0, lambda: ticks.append(1), now=1.0)
+    queue.add_at(0.0, lambda: ticks.append(1), now=1.0)
     run(queue, 1.0, 1.0, 1.5)
     assert len(ticks) == 3
 
 
 def test_what_a_timer_submits_is_done_before_it_is_repeated():
     executor = started()
-    queue = TimerQueue(executor)
+    queue = Queue(executor)
     done = []
 
     def tick():
         done.append("tick")
         executor.submit(done.append, "submitted")
 
-    queue.add(0.0, tick, now=0.0)
-    queue.add(1.0, lambda: done.append("second"), now=0.0)
+    queue.add_at(0.0, tick, now=0.0)
+    queue.add_at(1.0, lambda: done.append("second"), now=0.0)
     queue.run_due(1.0, times=2)
     assert done == ["tick", "submitted", "tick", "submitted", "second"]
 
 
 def test_a_thread_does_not_wait_for_all_repetitions_of_a_timer():
     executor = started()
-    queue = TimerQueue(executor)
+    queue = Queue(executor)
     has_returned = threading.Event()
     ticks = []
 
@@ -198,7 +211,7 @@ def test_a_thread_does_not_wait_for_all_repetitions_of_a_timer():
             wait_until(lambda: executor._running._waiting, "the thread to wait")
         ticks.append(not ticks or has_returned.wait(LIMIT))
 
-    queue.add(0.0, tick, now=0.0)
+    queue.add_at(0.0, tick, now=0.0)
     queue.run_due(0.0, times=2)
     assert ticks == [True, True]
 
@@ -206,12 +219,12 @@ def test_a_thread_does_not_wait_for_all_repetitions_of_a_timer():
 @pytest.mark.parametrize("period", [-1.0, math.nan, math.inf])
 def test_other_periods_are_refused(queue, period):
     with pytest.raises(ValueError, match=f"period of a timer is {period}"):
-        queue.add(period, lambda: None, now=0.0)
+        queue.add_at(period, lambda: None, now=0.0)
 
 
 def test_stopped_timer_never_fires_again(queue):
     ticks = []
-    timer = queue.add(1.0, lambda: ticks.append(1), now=0.0)
+    timer = queue.add_at(1.0, lambda: ticks.append(1), now=0.0)
     run(queue, 1.0)
     timer.stop()
     run(queue, 2.0, 3.0)
@@ -221,17 +234,17 @@ def test_stopped_timer_never_fires_again(queue):
 
 def test_timer_stopped_by_an_earlier_tick_does_not_fire_in_the_same_moment(queue):
     ticks = []
-    queue.add(1.0, lambda: later.stop(), now=0.0)
-    later = queue.add(1.0, lambda: ticks.append(1), now=0.0)
+    queue.add_at(1.0, lambda: later.stop(), now=0.0)
+    later = queue.add_at(1.0, lambda: ticks.append(1), now=0.0)
     queue._executor.submit(lambda: queue.run_due(1.0))
     assert ticks == []
 
 
 def test_stopped_queue_never_fires_again():
     executor = Executor()
-    queue = TimerQueue(executor)
+    queue = Queue(executor)
     ticks = []
-    queue.add(1.0, lambda: ticks.append(1), now=0.0)
+    queue.add_at(1.0, lambda: ticks.append(1), now=0.0)
     queue.run_due(1.0)
     queue.stop()
     executor.start()
@@ -241,8 +254,8 @@ def test_stopped_queue_never_fires_again():
 
 def test_rebase_after_a_reset(queue):
     ticks = []
-    queue.add(0.5, lambda: ticks.append("a"), now=100.0)
-    queue.add(0.2, lambda: ticks.append("b"), now=100.0)
+    queue.add_at(0.5, lambda: ticks.append("a"), now=100.0)
+    queue.add_at(0.2, lambda: ticks.append("b"), now=100.0)
     run(queue, 100.2)
     queue.rebase(0.0)
     assert queue.next_deadline() == 0.2
@@ -252,8 +265,8 @@ def test_rebase_after_a_reset(queue):
 
 def test_reset_while_ticks_run_loses_no_timer(queue):
     ticks = []
-    queue.add(1.0, lambda: queue.rebase(0.0), now=50.0)
-    queue.add(1.0, lambda: ticks.append(1), now=50.0)
+    queue.add_at(1.0, lambda: queue.rebase(0.0), now=50.0)
+    queue.add_at(1.0, lambda: ticks.append(1), now=50.0)
     run(queue, 51.0)
     assert queue.next_deadline() == 1.0
     run(queue, 1.0)
@@ -265,9 +278,9 @@ def test_timers_may_be_added_and_stopped_by_ticks(queue):
 
     def tick():
         timer.stop()
-        queue.add(0.1, lambda: ticks.append(1), now=1.0)
+        queue.add_at(0.1, lambda: ticks.append(1), now=1.0)
 
-    timer = queue.add(1.0, tick, now=0.0)
+    timer = queue.add_at(1.0, tick, now=0.0)
     run(queue, 1.0, 1.1, 1.2)
     assert ticks == [1, 1]
 
@@ -275,7 +288,7 @@ def test_timers_may_be_added_and_stopped_by_ticks(queue):
 @pytest.fixture
 def steady():
     """Return timers by the machine's clock."""
-    steady = SteadyTimers(TimerQueue(started()), SteadyClock())
+    steady = SteadyTimers(started(), SteadyClock())
     yield steady
     steady.stop()
 
@@ -330,5 +343,5 @@ def test_no_steady_timer_fires_after_stop(steady):
     steady._thread.join(LIMIT)
     assert not steady._thread.is_alive()
     count = len(ticks)
-    steady._queue.run_due(1e12)
+    steady.run_due(1e12)
     assert len(ticks) == count

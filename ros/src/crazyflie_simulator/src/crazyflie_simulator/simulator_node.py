@@ -185,7 +185,7 @@ class SimulatorNode(Node[SimulatorParameters]):
             handle.timer(period, self._on_clock_timer, steady=True)
         else:
             self._watch = RealTimeWatch(handle)
-            self._timer = handle.varying_timer(parameters.time_step, self._on_timer)
+            self._timer = handle.timer(parameters.time_step, self._on_timer)
 
     def _on_control(self, message):
         # One reading of the clock: the process may be interrupted between two, and the vehicle

@@ -180,7 +180,7 @@ class TakeoffControlFilterNode(Node):
             self._on_commanded_control,
             finite="control",
         )
-        self._timer = handle.varying_timer(TIME_STEP, self._on_timer)
+        self._timer = handle.timer(TIME_STEP, self._on_timer)
         # Connections are made in real time, also where time is simulated.
         self._listening_timer = handle.timer(LISTENING_TIME, self._stop_listening, steady=True)
         self._server_timer = handle.timer(SERVER_LIMIT, self._stop_waiting, steady=True)

@@ -144,7 +144,7 @@ class TakeoffServerNode(Node):
                 latest_only=True,
             )
             handle.subscribe(f"{parameters.state_topic}_missing", String, self._on_missing_state)
-        self._timer = handle.varying_timer(TIME_STEP, self._on_timer)
+        self._timer = handle.timer(TIME_STEP, self._on_timer)
         # Connections are made in real time, also where time is simulated.
         self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover, steady=True)
         self._start_timer = handle.timer(START_LIMIT, self._end_start, steady=True)

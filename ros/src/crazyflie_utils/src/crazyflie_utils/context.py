@@ -189,8 +189,8 @@ class ProcessContext:
         self._tf_log = NodeLog(transport, "/tf")
         # The poses of all vehicles that are simulated in one tick form one message.
         tf = self.transforms.gather, self.transforms.send_gathered
-        self._steady = SteadyTimers(TimerQueue(self.executor, *tf), SteadyClock())
-        self._simulated = TimerQueue(self.executor, *tf)
+        self._steady = SteadyTimers(self.executor, SteadyClock(), *tf)
+        self._simulated = TimerQueue(self.executor, self.clock, *tf)
         self._clock_publisher: Publisher | None = None
         self._inhibitors: list[ShutdownInhibitor] = []
         #: Exit status with which the process is to end; None while it is not to end.
@@ -228,18 +228,17 @@ class ProcessContext:
         work: Callable[[], None],
         steady: bool = False,
         stagger: bool = False,
-        align_phase: bool = False,
     ) -> Timer:
         """Add a timer by the process's clock, or by the machine's if ``steady``.
 
         ValueError for a period that is negative or not finite; or zero by simulated time, where the
         moment would never end.
         """
-        if self.uses_sim_time and not steady:
-            if period == 0.0:
-                raise ValueError("a timer by simulated time needs a period > 0")
-            return self._simulated.add(period, work, self.clock.time(), stagger, align_phase)
-        return self._steady.add(period, work, stagger, align_phase)
+        if steady or not self.uses_sim_time:
+            return self._steady.add(period, work, stagger)
+        if period == 0.0:
+            raise ValueError("a timer by simulated time needs a period > 0")
+        return self._simulated.add(period, work, stagger)
 
     def next_simulated_deadline(self) -> float:
         """Return when the next timer by simulated time is due, s."""

@@ -25,7 +25,7 @@ from crazyflie_utils.parameters.server import PrivateParameters, Reconfiguration
 from crazyflie_utils.parameters.types import ParameterType
 from crazyflie_utils.refusal import RefusalError, ServiceError
 from crazyflie_utils.tf.frame_tree import StampedPose
-from crazyflie_utils.timers import Timer, VaryingTimer
+from crazyflie_utils.timers import Timer
 from crazyflie_utils.topics import LatestMessage, Publisher, Subscriber
 from crazyflie_utils.vectors import is_finite, number_getter
 
@@ -289,12 +289,6 @@ class NodeHandle:
         `TimerQueue.add`.
         """
         timer = self._process.add_timer(period, self._tick(callback), steady, stagger)
-        self._undo.append(timer.stop)
-        return timer
-
-    def varying_timer(self, period: float, callback: Callable[[], None]) -> VaryingTimer:
-        """As `timer`, with a method ``set_period(period)``."""
-        timer = VaryingTimer(self._process.add_timer, self._tick(callback), period)
         self._undo.append(timer.stop)
         return timer
 

@@ -20,6 +20,7 @@ from operator import attrgetter
 from typing import Any
 
 import genpy
+from typing_extensions import override
 
 CLOCK_STEP = 0.02  #: A larger change of wall clock minus monotonic clock is a step (s).
 _QUIET = 100_000  #: Longest time between two readings that were not interrupted (ns).
@@ -211,16 +212,26 @@ _SLOT = 0.01
 class Timer:
     """A callback that is due every ``period`` seconds; ends with `stop`."""
 
-    def __init__(self, period: float, work: Callable[[], None], number: int, begin: float):
+    def __init__(self, queue: "TimerQueue", period: float, work: Callable[[], None]):
         self.period = period
-        self.number = number
         self.stopped = False
+        self.number = 0  #: Position among timers that are due at once; that in the queue is valid.
+        self.deadline = math.inf
+        self._queue = queue
         self._work = work
-        self.restart(begin)
 
     def stop(self) -> None:
         """Stop the timer, even if it is due already."""
         self.stopped = True
+
+    def set_period(self, period: float) -> None:
+        """Change the period, s; the next deadline is at most one period from now.
+
+        Then many timers with the same period are due at different moments.
+        """
+        if period != self.period and not self.stopped:
+            self.period = period
+            self._queue.begin(self, stagger=True, align_phase=True)
 
     def restart(self, now: float) -> None:
         """Set the next deadline one period after ``now`` (s)."""
@@ -251,7 +262,7 @@ _number = attrgetter("number")
 
 
 class TimerQueue:
-    """Timers in the order of their deadlines.
+    """Timers by a clock, in the order of their deadlines.
 
     ``before()`` and ``after()`` are called before and after several timers that are due at once.
     """
@@ -259,10 +270,12 @@ class TimerQueue:
     def __init__(
         self,
         executor: Executor,
+        clock: SteadyClock | SimulatedClock,
         before: Callable[[], None] | None = None,
         after: Callable[[], None] | None = None,
     ):
         self._executor = executor
+        self._clock = clock
         self._before = before
         self._after = after
         self._lock = threading.Lock()
@@ -273,45 +286,45 @@ class TimerQueue:
         self._spread: Counter[float] = Counter()
         self._is_stopped = False
 
-    def add(
-        self,
-        period: float,
-        work: Callable[[], None],
-        now: float,
-        stagger: bool = False,
-        align_phase: bool = False,
-    ) -> Timer:
-        """Add a timer whose first deadline is one period from ``now`` (s), or a little later.
+    def add(self, period: float, work: Callable[[], None], stagger: bool = False) -> Timer:
+        """Add a timer whose first deadline is one period from now, or a little later.
 
         Before the first `run_due`, one of a period up to 0.1 s is due at multiples of it since the
         first timer began, so that many wake the process up together; those that ``stagger`` are due
-        10 ms apart, up to one period later. Timers that are added later are not delayed; but with
-        ``align_phase`` the first deadline may be early, at such a moment. ValueError for a period
-        that is negative or not finite.
+        10 ms apart, up to one period later. Timers that are added later are not delayed. ValueError
+        for a period that is negative or not finite.
         """
-        if not 0.0 <= period < math.inf:
-            raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
-        with self._lock:
-            begin = self._begin(period, now, stagger, align_phase)
-            timer = Timer(period, work, next(self._order), begin)
-            timer.stopped = self._is_stopped
-            self._push(timer)
+        timer = Timer(self, period, work)
+        timer.stopped = self._is_stopped
+        self.begin(timer, stagger)
         return timer
 
-    def _begin(self, period, now, stagger, align_phase):
+    def begin(self, timer: Timer, stagger: bool, align_phase: bool = False) -> None:
+        """Set the first deadline of a timer, see `add`; again after a change of its period.
+
+        With ``align_phase`` it may be early, at one of those moments.
+        """
+        if not 0.0 <= timer.period < math.inf:
+            raise ValueError(f"the period of a timer is {timer.period!r} s; expected a number >= 0")
+        with self._lock:
+            timer.number = next(self._order)
+            timer.restart(self._start(timer.period, stagger, align_phase))
+            self._push(timer)
+
+    def _start(self, period, stagger, align_phase):
         """Return the moment one period before the first deadline."""
+        now = self._clock.time()
         if period == 0.0 or (self._is_running and not align_phase):
             return now
-        if not stagger and not align_phase:
+        if not stagger:
             return self._next_multiple(period, now) if period <= _TOGETHER else now
-        begin = self._next_multiple(_SLOT, now)
-        if stagger:
-            begin += self._spread[period] % max(round(period / _SLOT), 1) * _SLOT
-            self._spread[period] += 1
+        start = self._next_multiple(_SLOT, now)
+        start += self._spread[period] % max(round(period / _SLOT), 1) * _SLOT
+        self._spread[period] += 1
         if align_phase:
             # The first deadline is the first moment of its phase after now.
-            begin -= (math.floor((begin - now - _TOLERANCE) / period) + 1) * period
-        return begin
+            start -= (math.floor((start - now - _TOLERANCE) / period) + 1) * period
+        return start
 
     def _next_multiple(self, period, now):
         if self._origin is None or now < self._origin:
@@ -341,7 +354,7 @@ class TimerQueue:
     def rebase(self, now: float) -> None:
         """Set every deadline one period after ``now`` (s): time has been reset."""
         with self._lock:
-            timers = [timer for _, _, timer in sorted(self._heap)]
+            timers = [timer for _, number, timer in sorted(self._heap) if number == timer.number]
             self._heap.clear()
             for timer in timers:
                 timer.restart(now)
@@ -362,8 +375,9 @@ class TimerQueue:
         with self._lock:
             heap, limit = self._heap, now + _TOLERANCE
             while heap and heap[0][0] <= limit:
-                timer = heapq.heappop(heap)[2]
-                if not timer.stopped:
+                _, number, timer = heapq.heappop(heap)
+                # Of a timer whose period has changed, the earlier deadline is still there.
+                if number == timer.number and not timer.stopped:
                     due.append(timer)
             # Deadlines of one moment differ by rounding only, which varies. The order is that of
             # registration, so that periods are even.
@@ -375,61 +389,35 @@ class TimerQueue:
         return due
 
 
-class VaryingTimer:
-    """A timer whose period (s) can change; for ``add_timer`` see `ProcessContext`."""
+class SteadyTimers(TimerQueue):
+    """Timers by a steady clock, which a thread runs."""
 
-    def __init__(self, add_timer: Callable[..., Timer], work: Callable[[], None], period: float):
-        self._add_timer = add_timer
-        self._work = work
-        self._timer = add_timer(period, work)
-
-    def set_period(self, period: float) -> None:
-        """Change the period, s; the next deadline is at most one period from now.
-
-        Then many timers with the same period are due at different moments.
-        """
-        if period != self._timer.period and not self._timer.stopped:
-            self._timer.stop()
-            self._timer = self._add_timer(period, self._work, stagger=True, align_phase=True)
-
-    def stop(self) -> None:
-        """Stop the timer."""
-        self._timer.stop()
-
-
-class SteadyTimers:
-    """A thread that runs a queue of timers by a steady clock."""
-
-    def __init__(self, queue: TimerQueue, clock: SteadyClock | SimulatedClock):
-        self._queue = queue
-        self._clock = clock
+    def __init__(
+        self,
+        executor: Executor,
+        clock: SteadyClock | SimulatedClock,
+        before: Callable[[], None] | None = None,
+        after: Callable[[], None] | None = None,
+    ):
+        super().__init__(executor, clock, before, after)
         # Released when there is anything new. Waiting for a bare lock takes half the time of
         # waiting for a condition.
         self._news = threading.Lock()
         self._news.acquire()
-        self._stopped = False
         self._thread = threading.Thread(target=self._run, name="timers", daemon=True)
 
     def start(self) -> None:
         """Start the timers."""
         self._thread.start()
 
-    def add(
-        self,
-        period: float,
-        work: Callable[[], None],
-        stagger: bool = False,
-        align_phase: bool = False,
-    ) -> Timer:
-        """Add a timer; its first deadline is one period from now, or see `TimerQueue.add`."""
-        timer = self._queue.add(period, work, self._clock.time(), stagger, align_phase)
+    @override
+    def begin(self, timer: Timer, stagger: bool, align_phase: bool = False) -> None:
+        super().begin(timer, stagger, align_phase)
         self._wake_up()
-        return timer
 
+    @override
     def stop(self) -> None:
-        """Stop all timers, and end the thread."""
-        self._queue.stop()
-        self._stopped = True
+        super().stop()
         self._wake_up()
 
     def _wake_up(self):
@@ -437,10 +425,10 @@ class SteadyTimers:
         with contextlib.suppress(RuntimeError):
             self._news.release()
 
-    def _run(self) -> None:
-        while not self._stopped:
-            wait = self._queue.next_deadline() - self._clock.time()
+    def _run(self):
+        while not self._is_stopped:
+            wait = self.next_deadline() - self._clock.time()
             if wait > 0.0:
                 self._news.acquire(timeout=min(wait, 1.0))
             # To find a timer that is due takes as long as a short callback.
-            self._queue.run_due(self._clock.time(), times=10)
+            self.run_due(self._clock.time(), times=10)

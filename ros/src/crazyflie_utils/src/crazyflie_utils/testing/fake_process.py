@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from crazyflie_utils.node import Node, Process
 from crazyflie_utils.testing.fake_transport import FakeTransport
-from crazyflie_utils.timers import SimulatedClock, SteadyTimers, TimerQueue
+from crazyflie_utils.timers import SimulatedClock, SteadyTimers
 
 #: Period at which a timer of period 0 fires here (s); on a real machine it fires as often as
 #: possible.
@@ -54,9 +54,8 @@ class FakeProcess(Process):
         self.machine_clock = SimulatedClock()
         self.machine_clock.set(start)
         tf = self.transforms.gather, self.transforms.send_gathered
-        self._machine_queue = TimerQueue(self.executor, *tf)
-        self.machine_clock.on_change(lambda now, _: self._machine_queue.run_due(now))
-        self._steady = SteadyTimers(self._machine_queue, self.machine_clock)
+        self._steady = SteadyTimers(self.executor, self.machine_clock, *tf)
+        self.machine_clock.on_change(lambda now, _: self._steady.run_due(now))
         self.transport.machine_timers = self._steady
         self.executor.start()
 
@@ -101,12 +100,12 @@ class FakeProcess(Process):
     def advance_machine(self, duration: float) -> None:
         """Advance the machine's clock (s), while simulated time is not published."""
         machine = self.machine_clock
-        pass_time(duration, machine.time, self._machine_queue.next_deadline, machine.set)
+        pass_time(duration, machine.time, self._steady.next_deadline, machine.set)
 
     def next_deadline(self) -> float:
         """Return the time at which the next timer of either clock is due, in simulated time (s)."""
         ahead = self.machine_clock.time() - self.clock.time()
-        return min(self.next_simulated_deadline(), self._machine_queue.next_deadline() - ahead)
+        return min(self.next_simulated_deadline(), self._steady.next_deadline() - ahead)
 
     def move_to(self, moment: float) -> None:
         """Move both clocks, at once, until simulated time is ``moment`` (s)."""

@@ -180,13 +180,13 @@ class ProcessContext:
         self.clock: SimulatedClock | SteadyClock = clock or (
             SimulatedClock() if use_sim_time else SteadyClock()
         )
+        tf_log = NodeLog(transport, "/tf")
         self.transforms = Transforms(
             self.topics,
-            self._warn_about_transform,
+            lambda text, key: tf_log.warn(text, throttle=1.0, key=key),
             self.clock.nanoseconds,
             MAX_FUTURE_STAMP_SIMULATED if use_sim_time else MAX_FUTURE_STAMP,
         )
-        self._tf_log = NodeLog(transport, "/tf")
         # The poses of all vehicles that are simulated in one tick form one message.
         tf = self.transforms.gather, self.transforms.send_gathered
         self._steady = SteadyTimers(self.executor, SteadyClock(), *tf)
@@ -240,10 +240,6 @@ class ProcessContext:
             raise ValueError("a timer by simulated time needs a period > 0")
         return self._simulated.add(period, work, stagger)
 
-    def next_simulated_deadline(self) -> float:
-        """Return when the next timer by simulated time is due, s."""
-        return self._simulated.next_deadline()
-
     def clock_publisher(self) -> Callable[..., None]:
         """Return ``set_clock(moment, passed=())``, which moves simulated time to a moment (s).
 
@@ -269,7 +265,7 @@ class ProcessContext:
         publisher = self._clock_publisher
         if publisher is None or publisher.is_read_here(excluding=1):
             return -math.inf
-        return self.next_simulated_deadline()
+        return self._simulated.next_deadline()
 
     def _on_clock(self, clock, message):
         # Queued with all other work: time does not move within a callback, and a reset does not
@@ -281,9 +277,6 @@ class ProcessContext:
             self.transforms.clear()
             self._simulated.rebase(now)
         self._simulated.run_due(now)
-
-    def _warn_about_transform(self, text, key):
-        self._tf_log.warn(text, throttle=1.0, key=key)
 
 
 def _clock(stamp):

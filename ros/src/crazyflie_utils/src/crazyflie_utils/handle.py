@@ -142,8 +142,8 @@ class NodeHandle:
             work = self._if_finite(name, message_type, finite, callback, on_invalid)
         topics = self._process.topics
         if latest_only:
-            latest = LatestMessage(work)
-            subscriber = latest.subscribe(topics, name, message_type)
+            latest = LatestMessage(topics, name, message_type, work)
+            subscriber = latest.subscriber
             self._latest.append(latest)
         else:
             subscriber = topics.subscribe(name, message_type, partial(self._submit, work))

@@ -3,6 +3,7 @@
 import gc
 import io
 import logging
+import math
 import os
 import signal
 import sys
@@ -178,18 +179,18 @@ def ros_process() -> Process:
 
 
 def _wait_for_master(signals=None):
-    pause = threading.Event()
-    waited = 0.0
+    uri, end = rosgraph.get_master_uri(), time.monotonic() + _MASTER_LIMIT
+    is_told = False
     while not rosgraph.is_master_online():
-        if waited == 0.0:
-            print(f"waiting for a ROS master at {rosgraph.get_master_uri()}", file=sys.stderr)
-        if waited >= _MASTER_LIMIT:
+        if not is_told:
+            print(f"waiting for a ROS master at {uri}", file=sys.stderr)
+        is_told = True
+        if time.monotonic() > end:
             sys.exit(
-                f"no ROS master at {rosgraph.get_master_uri()} after {_MASTER_LIMIT:g} s; "
+                f"no ROS master at {uri} after {_MASTER_LIMIT:g} s; "
                 "start one with roscore or roslaunch"
             )
-        pause.wait(0.5)
-        waited += 0.5
+        time.sleep(0.5)
         if signals:
             sys.exit(f"signal {signals[0]}: ended before a ROS master was found")
 
@@ -210,9 +211,6 @@ def _run(process, make_nodes, signals):
                         _pause_refused(signals)
                     fail()
             shutdown = Shutdown(process, nodes, signals)
-    except ParameterError as error:
-        handle.error(str(error))
-        fail()
     except Exception as error:
         handle.error(initialization_failure(error))
         fail()
@@ -321,27 +319,22 @@ class Shutdown:
         # Reset before the log says that another signal ends the wait: one may come at once.
         begin, signals = time.monotonic(), len(self._signals)
         own = self._process.own_flights
-        if own:
-            self._log_waiting(own)
+        notice_at = begin if own else begin + _NOTICE_DELAY
         # In another thread: a callback may never return.
         prepare = self._process.prepare_shutdown
         threading.Thread(target=prepare, args=(self._nodes,), name="end", daemon=True).start()
-        is_logged = bool(own)
         while flights.in_flight and time.monotonic() < begin + _FLIGHT_LIMIT:
+            if time.monotonic() >= notice_at:
+                notice_at = math.inf
+                if names := own or flights.unattended(2.0 * _NOTICE_DELAY):
+                    self._process.transport.log(
+                        "warn",
+                        f"{', '.join(names)}: in flight; ends after the landing, or in "
+                        f"{_FLIGHT_LIMIT:g} s; another signal ends at once",
+                    )
             if len(self._signals) > signals:
                 return
             time.sleep(0.05)
-            if not is_logged and time.monotonic() > begin + _NOTICE_DELAY:
-                is_logged = True
-                if names := flights.unattended(2.0 * _NOTICE_DELAY):
-                    self._log_waiting(names)
-
-    def _log_waiting(self, names):
-        self._process.transport.log(
-            "warn",
-            f"{', '.join(names)}: in flight; ends after the landing, or in {_FLIGHT_LIMIT:g} s; "
-            "another signal ends at once",
-        )
 
 
 def fail() -> NoReturn:

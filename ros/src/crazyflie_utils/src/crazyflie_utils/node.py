@@ -14,7 +14,9 @@ P = TypeVar("P", bound=Parameters, default=Any)
 
 
 def initialization_failure(error: Exception) -> str:
-    """Return why a node cannot be initialized: a package to install, or the traceback."""
+    """Return why a node cannot be initialized: parameters, a package to install, or a traceback."""
+    if isinstance(error, ParameterError):
+        return str(error)
     trace = "".join(traceback.format_exception(error))
     return missing_module(error) or f"failed to initialize\n{trace}"
 
@@ -51,9 +53,6 @@ class Node(Generic[P]):
         try:
             self.load_parameters(handle)
             self.register_callbacks(handle)
-        except ParameterError as error:
-            handle.error(str(error))
-            return False
         except Exception as error:
             handle.error(initialization_failure(error))
             return False

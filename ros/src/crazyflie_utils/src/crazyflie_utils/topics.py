@@ -231,30 +231,6 @@ class Subscriber:
         self._external.close()
 
 
-class LatestMessage:
-    """The latest message of a topic, until ``callback(message)`` is called with it."""
-
-    def __init__(self, callback: Callable[[Any], None]):
-        self._callback = callback
-        self._waiting: deque[Any] = deque(maxlen=1)
-        self._collect: Callable[[], None] | None = None
-
-    def subscribe(self, topics: "Topics", name: str, message_type: type) -> Subscriber:
-        """Subscribe to a topic, whose messages may wait until the next `deliver`."""
-        subscriber = topics.subscribe(
-            name, message_type, self._waiting.append, may_wait=lambda: True
-        )
-        self._collect = subscriber.collect
-        return subscriber
-
-    def deliver(self) -> None:
-        """Call the callback with the latest message, if it is new."""
-        if self._collect is not None:
-            self._collect()
-        if self._waiting:
-            self._callback(self._waiting.pop())
-
-
 class Topics:
     """All topics of a process; TypeError for a topic that already has another type."""
 
@@ -297,3 +273,23 @@ class Topics:
                 f"topic {name} carries {topic.message_type._type}, not {message_type._type}"
             )
         return topic
+
+
+class LatestMessage:
+    """The latest message of a topic, which waits until ``callback(message)`` is called with it."""
+
+    def __init__(
+        self, topics: Topics, name: str, message_type: type, callback: Callable[[Any], None]
+    ):
+        self._callback = callback
+        self._waiting: deque[Any] = deque(maxlen=1)
+        #: The subscription, whose messages may wait until the next `deliver`.
+        self.subscriber = topics.subscribe(
+            name, message_type, self._waiting.append, may_wait=lambda: True
+        )
+
+    def deliver(self) -> None:
+        """Call the callback with the latest message, if it is new."""
+        self.subscriber.collect()
+        if self._waiting:
+            self._callback(self._waiting.pop())

@@ -105,7 +105,7 @@ class FakeProcess(Process):
     def next_deadline(self) -> float:
         """Return the time at which the next timer of either clock is due, in simulated time (s)."""
         ahead = self.machine_clock.time() - self.clock.time()
-        return min(self.next_simulated_deadline(), self._steady.next_deadline() - ahead)
+        return min(self._simulated.next_deadline(), self._steady.next_deadline() - ahead)
 
     def move_to(self, moment: float) -> None:
         """Move both clocks, at once, until simulated time is ``moment`` (s)."""

@@ -180,6 +180,7 @@ class ProcessContext:
         self.clock: SimulatedClock | SteadyClock = clock or (
             SimulatedClock() if use_sim_time else SteadyClock()
         )
+        transport.time = self.clock.time
         tf_log = NodeLog(transport, "/tf")
         self.transforms = Transforms(
             self.topics,

@@ -202,7 +202,7 @@ class NodeHandle:
             return answer
 
         advertise = self._process.transport.advertise_service
-        self._undo.append(advertise(full_name, service_type, begin, self.time))
+        self._undo.append(advertise(full_name, service_type, begin))
 
     def _refuse(self, answer, error):
         is_refusal = isinstance(error, (ServiceError, RefusalError))

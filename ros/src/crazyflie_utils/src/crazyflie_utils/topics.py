@@ -16,6 +16,15 @@ from typing import Any
 import genpy
 
 Receiver = Callable[[Any], None]
+Condition = Callable[[], bool]
+#: ``serve(request, is_withdrawn)`` returns the future response of a service; ``is_withdrawn()``
+#: returns whether the caller has given up the call.
+Serve = Callable[[Any, Condition], Future[Any]]
+
+
+def never() -> bool:
+    """Return False."""
+    return False
 
 
 class ExternalPublisher(ABC):
@@ -53,7 +62,8 @@ class Transport(ABC):
     """Parameters, topics, services, logging and life time, by absolute names."""
 
     #: Whether this thread runs callbacks, which must not wait for the master.
-    is_in_callback: Callable[[], bool] = staticmethod(lambda: False)
+    is_in_callback: Condition = staticmethod(never)
+    time: Callable[[], float]  #: The clock of the process, s.
 
     def starting(self) -> AbstractContextManager[None]:
         """Return a with block that initializes nodes; other processes see them at its end."""
@@ -87,11 +97,7 @@ class Transport(ABC):
 
     @abstractmethod
     def subscribe(
-        self,
-        topic: str,
-        message_type: type,
-        deliver: Callable[[Any], None],
-        may_wait: Callable[[], bool] = lambda: False,
+        self, topic: str, message_type: type, deliver: Receiver, may_wait: Condition = never
     ) -> ExternalSubscriber:
         """Call ``deliver(message)`` with the messages of other processes.
 
@@ -100,18 +106,11 @@ class Transport(ABC):
         """
 
     @abstractmethod
-    def advertise_service(
-        self,
-        name: str,
-        service_type: type,
-        serve: Callable[[Any, Callable[[], bool]], Future[Any]],
-        time: Callable[[], float],
-    ) -> Callable[[], None]:
-        """Answer calls of a service with the outcome of ``serve(request, is_withdrawn)``, a future.
+    def advertise_service(self, name: str, service_type: type, serve: Serve) -> Callable[[], None]:
+        """Answer calls of a service with the outcome of a future; see `Serve`.
 
-        ``is_withdrawn()`` returns whether the caller has given up the call. The caller gets a
-        `ServiceError`, also if the process ends, or if ``time()``, the service's clock, stands
-        still. Returns a function that ends the service.
+        The caller gets a `ServiceError`, also if the process ends, or if `time` stands still.
+        Returns a function that ends the service.
         """
 
     @abstractmethod
@@ -249,7 +248,7 @@ class Topics:
         message_type: type[genpy.Message],
         receiver: Receiver,
         outside_type: type[genpy.Message] | None = None,
-        may_wait: Callable[[], bool] = lambda: False,
+        may_wait: Condition = never,
     ) -> Subscriber:
         """Call ``receiver(message)`` for every message on a topic.
 

@@ -24,6 +24,7 @@ from typing_extensions import override
 
 from crazyflie_utils.ros1 import master_watch
 from crazyflie_utils.ros1.receiving import Reception, Report, validate_header
+from crazyflie_utils.topics import Condition, Receiver
 
 _LENGTH = struct.Struct("<I")
 
@@ -123,12 +124,7 @@ class OwnCallback:
     is that of `Transport.subscribe`.
     """
 
-    def __init__(
-        self,
-        deliver: Callable[[Any], None],
-        is_handed_over: Callable[[], bool],
-        may_wait: Callable[[], bool],
-    ):
+    def __init__(self, deliver: Receiver, is_handed_over: Condition, may_wait: Condition):
         self.may_wait = may_wait
         self._deliver = deliver
         self._is_handed_over = is_handed_over
@@ -150,7 +146,7 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
         self,
         name: str,
         message_type: type,
-        is_handed_over: Callable[[], bool],
+        is_handed_over: Condition,
         report: Report,
         limits_rate: bool,
         patches: frozenset[str],

@@ -15,7 +15,7 @@ import functools
 import importlib
 import logging
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import genpy
@@ -26,6 +26,7 @@ from rospy.impl import paramserver, registration, simtime, tcpros_base
 from crazyflie_utils.ros1 import master_watch
 from crazyflie_utils.ros1.own_topics import OwnPublication, OwnSubscription
 from crazyflie_utils.ros1.receiving import MAX_PENDING, Acceptor, Report
+from crazyflie_utils.topics import Condition
 
 _NO_TOPICS = "/rosout_disable_topics_generation"
 
@@ -211,7 +212,7 @@ def active() -> frozenset[str]:
 def own_subscription(
     name: str,
     message_type: type,
-    is_handed_over: Callable[[], bool],
+    is_handed_over: Condition,
     report: Report,
     limits_rate: bool,
 ) -> None:

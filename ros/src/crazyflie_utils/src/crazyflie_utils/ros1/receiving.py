@@ -24,6 +24,8 @@ from rosgraph.network import (
 )
 from rospy.exceptions import TransportException, TransportInitError, TransportTerminated
 
+from crazyflie_utils.topics import Condition
+
 #: ``report(text, key)`` reports an error of a peer; ``key`` identifies its kind.
 Report = Callable[[str, Hashable], None]
 
@@ -181,7 +183,7 @@ class Reception:
         connection: Any,
         report: Report,
         limits_rate: bool,
-        may_wait: Callable[[], bool],
+        may_wait: Condition,
         deliver: Callable[[list[genpy.Message], Any], None],
     ):
         self._connection = connection

@@ -29,7 +29,15 @@ from crazyflie_utils.ros1.calls import (
 from crazyflie_utils.ros1.master_watch import living_node
 from crazyflie_utils.ros1.own_topics import OwnCallback, OwnSubscription, publish
 from crazyflie_utils.ros1.patches import log_without_master, shield_screen_log
-from crazyflie_utils.topics import ExternalPublisher, ExternalSubscriber, Transport
+from crazyflie_utils.topics import (
+    Condition,
+    ExternalPublisher,
+    ExternalSubscriber,
+    Receiver,
+    Serve,
+    Transport,
+    never,
+)
 
 #: Number of messages kept for a subscriber that does not keep up: a simulation that runs as fast as
 #: possible fills a short queue before the subscriber runs.
@@ -167,11 +175,7 @@ class RosTransport(Transport):
         return _RosPublisher(publisher, lambda: self._published.subtract([topic]))
 
     def subscribe(
-        self,
-        topic: str,
-        message_type: type,
-        deliver: Callable[[Any], None],
-        may_wait: Callable[[], bool] = lambda: False,
+        self, topic: str, message_type: type, deliver: Receiver, may_wait: Condition = never
     ) -> ExternalSubscriber:
         """Register a subscriber with the master, from a callback without waiting for it."""
 
@@ -208,18 +212,12 @@ class RosTransport(Transport):
             except Exception as error:
                 self.log("error", f"a subscription has failed: {error!r}")
 
-    def advertise_service(
-        self,
-        name: str,
-        service_type: type,
-        serve: Callable[[Any, Callable[[], bool]], Future[Any]],
-        time: Callable[[], float],
-    ) -> Callable[[], None]:
+    def advertise_service(self, name: str, service_type: type, serve: Serve) -> Callable[[], None]:
         """Register a service; `ServiceError` if this process offers one of that name already."""
 
         def answer(request):
             try:
-                return wait_for_answer(serve(request, withdrawn()), name, time)
+                return wait_for_answer(serve(request, withdrawn()), name, self.time)
             except ServiceError as error:
                 raise rospy.ServiceException(str(error)) from None
 

@@ -13,9 +13,7 @@ import genpy
 from crazyflie_utils.node import Node
 from crazyflie_utils.testing.fake_process import FakeProcess, pass_time
 from crazyflie_utils.testing.fake_transport import FakeTransport, copy_outcome, refuse
-from crazyflie_utils.topics import ExternalPublisher, ExternalSubscriber
-
-Deliver = Callable[[Any], None]
+from crazyflie_utils.topics import Condition, ExternalPublisher, ExternalSubscriber, Receiver, never
 
 #: Largest number of messages that wait for a frozen process on one connection; of later ones only
 #: the last is kept.
@@ -41,7 +39,7 @@ class FakeGraph:
         self._headers: dict[tuple[str, str], dict[str, str]] = {}
         self._parameters = parameters
         self._processes: dict[str, _GraphProcess] = {}
-        self._listeners: dict[str, list[Deliver]] = {}
+        self._listeners: dict[str, list[Receiver]] = {}
 
     # The processes.
 
@@ -110,7 +108,7 @@ class FakeGraph:
                     for deliver in tuple(process.transport.subscribers.get(topic, ())):
                         process.receive(deliver, arriving)
 
-    def listen(self, topic: str, callback: Deliver) -> None:
+    def listen(self, topic: str, callback: Receiver) -> None:
         """Call ``callback(message)`` with each message published on a topic, without its faults."""
         self._listeners.setdefault(topic, []).append(callback)
 
@@ -178,7 +176,7 @@ class _GraphProcess(FakeProcess):
         self.name = name
         self.node = node
         self.is_frozen = False
-        self.waiting: list[tuple[Deliver, Any]] = []
+        self.waiting: list[tuple[Receiver, Any]] = []
 
     def keep_call(self, serve: Callable[[Any], Future[Any]], request: Any) -> Future[Any]:
         """Serve a call once the process continues, unless its future is cancelled before."""
@@ -191,8 +189,8 @@ class _GraphProcess(FakeProcess):
         self.waiting.append((begin, request))
         return answer
 
-    def receive(self, deliver: Deliver, message: Any) -> None:
-        """Deliver a message, or keep it until the process continues."""
+    def receive(self, deliver: Receiver, message: Any) -> None:
+        """Receiver a message, or keep it until the process continues."""
         if self.is_frozen:
             same = [k for k, (other, _) in enumerate(self.waiting) if other is deliver]
             if len(same) == _MAX_WAITING:
@@ -241,11 +239,7 @@ class _GraphTransport(FakeTransport):
         return _Publication(self, topic, latch)
 
     def subscribe(
-        self,
-        topic: str,
-        message_type: type,
-        deliver: Deliver,
-        may_wait: Callable[[], bool] = lambda: False,
+        self, topic: str, message_type: type, deliver: Receiver, may_wait: Condition = never
     ) -> ExternalSubscriber:
         subscription = super().subscribe(topic, message_type, deliver)
         for message in self.graph.latched(topic, self.name):

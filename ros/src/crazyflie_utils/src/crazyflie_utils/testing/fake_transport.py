@@ -11,7 +11,15 @@ from rosmaster.paramserver import ParamDictionary
 
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.timers import SteadyTimers
-from crazyflie_utils.topics import ExternalPublisher, ExternalSubscriber, Transport
+from crazyflie_utils.topics import (
+    Condition,
+    ExternalPublisher,
+    ExternalSubscriber,
+    Receiver,
+    Serve,
+    Transport,
+    never,
+)
 
 
 class _Record(ExternalPublisher):
@@ -32,7 +40,7 @@ class _Record(ExternalPublisher):
 
 
 class _Subscription(ExternalSubscriber):
-    def __init__(self, transport: "FakeTransport", topic: str, deliver: Callable[[Any], None]):
+    def __init__(self, transport: "FakeTransport", topic: str, deliver: Receiver):
         self._transport = transport
         self._topic = topic
         self._deliver = deliver
@@ -57,7 +65,7 @@ class FakeTransport(Transport):
     def __init__(self, parameters: dict[str, object]):
         self.parameters = dict(parameters)
         self.publishers: dict[str, _Record] = {}
-        self.subscribers: dict[str, list[Callable[[Any], None]]] = {}
+        self.subscribers: dict[str, list[Receiver]] = {}
         self.unpublished: set[str] = set()
         self.services: dict[str, Callable[[Any], Future[Any]]] = {}
         self.service_types: dict[str, type] = {}
@@ -92,11 +100,7 @@ class FakeTransport(Transport):
         return self.publishers.setdefault(topic, _Record())
 
     def subscribe(
-        self,
-        topic: str,
-        message_type: type,
-        deliver: Callable[[Any], None],
-        may_wait: Callable[[], bool] = lambda: False,
+        self, topic: str, message_type: type, deliver: Receiver, may_wait: Condition = never
     ) -> ExternalSubscriber:
         """Keep ``deliver`` for `FakeProcess.publish`."""
         self.subscribers.setdefault(topic, []).append(deliver)
@@ -106,15 +110,9 @@ class FakeTransport(Transport):
         """Return whether another process publishes a topic."""
         return topic not in self.unpublished
 
-    def advertise_service(
-        self,
-        name: str,
-        service_type: type,
-        serve: Callable[[Any, Callable[[], bool]], Future[Any]],
-        time: Callable[[], float],
-    ) -> Callable[[], None]:
+    def advertise_service(self, name: str, service_type: type, serve: Serve) -> Callable[[], None]:
         """Keep ``serve`` for `FakeProcess.call`."""
-        self.services[name] = lambda request: serve(request, lambda: False)
+        self.services[name] = lambda request: serve(request, never)
         self.service_types[name] = service_type
 
         def withdraw() -> None:

@@ -47,11 +47,11 @@ _QUEUE_SIZE = 100
 class _RosPublisher(ExternalPublisher):
     def __init__(self, publisher: rospy.Publisher, on_close: Callable[[], None]):
         self._publisher = publisher
-        self._implementation = publisher.impl
         self._on_close = on_close
 
     def has_subscribers(self) -> bool:
-        return self._implementation is not None and bool(self._implementation.connections)
+        implementation = self._publisher.impl
+        return implementation is not None and bool(implementation.connections)
 
     def publish(self, *messages: genpy.Message) -> None:
         publish(self._publisher, messages)
@@ -59,7 +59,6 @@ class _RosPublisher(ExternalPublisher):
     def close(self) -> None:
         self._on_close()
         self._publisher.unregister()
-        self._implementation = None
 
 
 class _RosSubscriber(ExternalSubscriber):
@@ -70,29 +69,22 @@ class _RosSubscriber(ExternalSubscriber):
     ):
         self._register, self._run = register, run
         self._subscriber: rospy.Subscriber | None = None
-        self._own: OwnSubscription | None = None
         run(self._begin)
 
     def _begin(self):
         self._subscriber = self._register()
-        own = self._subscriber.impl
-        self._own = own if isinstance(own, OwnSubscription) else None
 
     def has_publishers(self) -> bool:
         return self._subscriber is not None and self._subscriber.get_num_connections() > 0
 
     def collect(self) -> None:
+        own = self._subscriber and self._subscriber.impl
         # Most topics have no publisher in another process.
-        if self._own is not None and self._own.connections:
-            self._own.collect()
+        if own and own.connections and isinstance(own, OwnSubscription):
+            own.collect()
 
     def close(self) -> None:
-        self._run(self._end)
-
-    def _end(self):
-        self._own = None
-        if self._subscriber is not None:
-            self._subscriber.unregister()
+        self._run(lambda: self._subscriber and self._subscriber.unregister())
 
 
 class RosTransport(Transport):
@@ -118,7 +110,7 @@ class RosTransport(Transport):
         self._caller = ServiceCaller()
         self._parameter_writer = ParameterWriter(_write_param, partial(self.log, "warn"))
         self._for_master: SimpleQueue[Callable[[], None]] | None = None
-        self._services_at_start: dict[str, str] | None = None
+        self._services_at_start: dict[str, str] = {}
         self._is_starting = False
 
     def follow_clock(self) -> None:
@@ -130,12 +122,12 @@ class RosTransport(Transport):
     @contextlib.contextmanager
     def starting(self) -> Iterator[None]:
         """Register with the master in one request, and ask it for others' services once."""
-        self._is_starting = True
+        self._is_starting, self._services_at_start = True, {}
         try:
             with patches.registering_together():
                 yield
         finally:
-            self._is_starting, self._services_at_start = False, None
+            self._is_starting = False
 
     def _refuse(self, text, key):
         # Reported once, since a faulty peer stays faulty; and for the first 64 peers only.
@@ -243,10 +235,9 @@ class RosTransport(Transport):
 
     def service_nodes(self) -> dict[str, str]:
         """Ask the master."""
-        if self._is_starting and self._services_at_start is not None:
-            return self._services_at_start
-        _, _, services = rosgraph.Master(rospy.get_name()).getSystemState()
-        self._services_at_start = {name: nodes[0] for name, nodes in services}
+        if not (self._is_starting and self._services_at_start):
+            _, _, services = rosgraph.Master(rospy.get_name()).getSystemState()
+            self._services_at_start = {name: nodes[0] for name, nodes in services}
         return self._services_at_start
 
     def living_node(self, name: str) -> str | None:
@@ -255,9 +246,7 @@ class RosTransport(Transport):
 
     def log(self, level: str, text: str) -> None:
         """Log to the screen, the node's log file and /rosout."""
-        # The screen may have been closed; rospy's handler does not catch the error.
-        with contextlib.suppress(OSError):
-            _LOGGERS[level](text)
+        _LOGGERS[level](text)
 
     def clock_was_set(self, stamp: genpy.Time) -> None:
         """Set rospy's own clock, which stamps the log."""

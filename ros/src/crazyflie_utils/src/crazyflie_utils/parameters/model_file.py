@@ -16,10 +16,9 @@ from crazyflie_utils.parameters.types import ListOf, Number, Text
 #: Key of a model file below which `identify` stores the origin of its figures.
 RESULT = "identified"
 
-_INERTIA = Number("kg m^2", minimum=1e-7, maximum=0.1)
-_DRAG = Number("kg", minimum=0.0, maximum=1e-3)
-_LAG = Number("s", minimum=0.001, maximum=1.0)
-_TRIM = Number("rad", minimum=-0.2, maximum=0.2)
+
+def _figure(unit: str, minimum: float, maximum: float, help: str, name: str = "") -> Any:  # noqa: A002
+    return parameter(Number(unit, minimum=minimum, maximum=maximum), help, None, name)
 
 
 class ModelParameters(Parameters):
@@ -28,61 +27,46 @@ class ModelParameters(Parameters):
     type: str = parameter(
         Text(tuple(TYPES)), "type of vehicle that supplies the missing figures", "cf21"
     )
-    mass: float | None = parameter(
-        Number("kg", minimum=0.005, maximum=2.0),
-        "mass with battery and decks; 33 g are 0.033",
-        None,
-    )
-    arm: float | None = parameter(
-        Number("m", minimum=0.01, maximum=1.0), "distance from the centre to a rotor's axis", None
-    )
+    mass: float | None = _figure("kg", 0.005, 2.0, "mass with battery and decks; 33 g are 0.033")
+    arm: float | None = _figure("m", 0.01, 1.0, "distance from the centre to a rotor's axis")
     thrust_curve: tuple[float, float] | None = parameter(
         ListOf(Number("N", minimum=-100.0, maximum=100.0), 2),
         "`[a, b]`: the thrust of a rotor is a f + b f^2 at a command f from 0 to 1",
         None,
     )
-    motor_time_constant: float | None = parameter(
-        Number("s", minimum=0.001, maximum=0.5), "first-order lag of the rotors' speed", None
+    motor_time_constant: float | None = _figure(
+        "s", 0.001, 0.5, "first-order lag of the rotors' speed"
     )
-    drag_horizontal: float | None = parameter(
-        _DRAG, "drag over airspeed over the sum of the rotor speeds, across their axes", None
+    drag_horizontal: float | None = _figure(
+        "kg", 0.0, 1e-3, "drag over airspeed over the sum of the rotor speeds, across their axes"
     )
-    drag_vertical: float | None = parameter(_DRAG, "the same ratio along the rotors' axes", None)
-    inertia_x: float | None = parameter(_INERTIA, "moment of inertia about forward", None)
-    inertia_y: float | None = parameter(_INERTIA, "moment of inertia about left", None)
-    inertia_z: float | None = parameter(_INERTIA, "moment of inertia about up", None)
-    torque_per_thrust: float | None = parameter(
-        Number("m", minimum=1e-4, maximum=1.0), "torque of a rotor over its thrust", None
+    drag_vertical: float | None = _figure("kg", 0.0, 1e-3, "the same ratio along the rotors' axes")
+    inertia_x: float | None = _figure("kg m^2", 1e-7, 0.1, "moment of inertia about forward")
+    inertia_y: float | None = _figure("kg m^2", 1e-7, 0.1, "moment of inertia about left")
+    inertia_z: float | None = _figure("kg m^2", 1e-7, 0.1, "moment of inertia about up")
+    torque_per_thrust: float | None = _figure("m", 1e-4, 1.0, "torque of a rotor over its thrust")
+    delay: float | None = _figure("s", 0.0, 0.3, "delay from a command to the motion")
+    roll_lag: float | None = _figure(
+        "s", 0.001, 1.0, "first-order lag of roll behind its command", "lag/roll"
     )
-    delay: float | None = parameter(
-        Number("s", minimum=0.0, maximum=0.3), "delay from a command to the motion", None
+    pitch_lag: float | None = _figure("s", 0.001, 1.0, "the same of pitch", "lag/pitch")
+    yaw_lag: float | None = _figure("s", 0.001, 1.0, "the same of the yaw rate", "lag/yaw")
+    roll_trim: float | None = _figure(
+        "rad", -0.2, 0.2, "added to a command, so that the vehicle does not drift", "trim/roll"
     )
-    roll_lag: float | None = parameter(
-        _LAG, "first-order lag of roll behind its command", None, "lag/roll"
-    )
-    pitch_lag: float | None = parameter(_LAG, "the same of pitch", None, "lag/pitch")
-    yaw_lag: float | None = parameter(_LAG, "the same of the yaw rate", None, "lag/yaw")
-    roll_trim: float | None = parameter(
-        _TRIM, "added to a command, so that the vehicle does not drift", None, "trim/roll"
-    )
-    pitch_trim: float | None = parameter(_TRIM, "the same of pitch", None, "trim/pitch")
-    tilt_limit: float | None = parameter(
-        Number("rad", minimum=0.15, maximum=MAX_TILT),
+    pitch_trim: float | None = _figure("rad", -0.2, 0.2, "the same of pitch", "trim/pitch")
+    tilt_limit: float | None = _figure(
+        "rad",
+        0.15,
+        MAX_TILT,
         "largest roll and pitch that the takeoff filter passes on",
-        None,
         "limits/tilt",
     )
-    yaw_rate_limit: float | None = parameter(
-        Number("rad/s", minimum=0.1, maximum=MAX_YAW_RATE),
-        "the same of the yaw rate",
-        None,
-        "limits/yaw_rate",
+    yaw_rate_limit: float | None = _figure(
+        "rad/s", 0.1, MAX_YAW_RATE, "the same of the yaw rate", "limits/yaw_rate"
     )
-    thrust_limit: float | None = parameter(
-        Number("m/s^2", minimum=12.5, maximum=MAX_THRUST),
-        "the same of the thrust over the mass",
-        None,
-        "limits/thrust",
+    thrust_limit: float | None = _figure(
+        "m/s^2", 12.5, MAX_THRUST, "the same of the thrust over the mass", "limits/thrust"
     )
 
     @override

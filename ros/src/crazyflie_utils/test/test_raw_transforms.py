@@ -141,7 +141,7 @@ def test_frames_without_end_are_not_kept(process, lookup):
         assert len(memory) <= 1001
     assert frame_tree._names.cache_info().currsize <= 1000
     assert max(map(len, kept._unread.values())) < 1024
-    assert kept._tf2._buffer.all_frames_as_yaml().count("parent:") <= 1000
+    assert kept._tf2.all_frames_as_yaml().count("parent:") <= 1000
     hear_raw(process, transform("world", "crazyflie", 100.4, x=2.0))
     assert x_of(lookup) == 2.0
 

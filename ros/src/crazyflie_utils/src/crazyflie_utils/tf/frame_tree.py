@@ -163,37 +163,6 @@ connected), ExtrapolationException (not at that time).
 _CACHE = genpy.Duration(10.0)  #: Length of tf2's buffer: tf2's default.
 #: Number of stamps stored for tf2: ten seconds of a vehicle at 1 kHz.
 _MAX_STAMPS = 10_000
-
-
-class Buffer:
-    """Transforms in tf2, with exact stamps: tf2 in Python has floats, which resolve 0.1 us."""
-
-    def __init__(self) -> None:
-        self._buffer = tf2_py.BufferCore(_CACHE)
-        self._stamps: OrderedDict[float, int] = OrderedDict()
-
-    def add(self, pose: StampedPose, is_static: bool = False) -> None:
-        """Add a pose."""
-        message = pose.message()
-        buffer = self._buffer
-        (buffer.set_transform_static if is_static else buffer.set_transform)(message, "tf")
-        self._stamps[message.header.stamp.to_sec()] = pose.stamp
-        if len(self._stamps) > _MAX_STAMPS:
-            self._stamps.popitem(last=False)
-
-    def clear(self) -> None:
-        """Delete all moving frames."""
-        self._stamps.clear()
-        self._buffer.clear()
-
-    def lookup(self, target: str, source: str, stamp: int = 0) -> StampedPose:
-        """Return the pose of frame ``source`` in ``target`` at a ROS time (ns); 0: the latest."""
-        found = self._buffer.lookup_transform_core(target, source, ros_time(stamp))
-        pose = StampedPose.of(found)
-        known = self._stamps.get(found.header.stamp.to_sec(), pose.stamp)
-        return pose._replace(stamp=stamp or known)
-
-
 _HISTORY = 100  #: Number of poses of a frame that are kept until tf2 is used.
 _NORM_TOLERANCE = 0.01  #: tf2's tolerance of the squared norm of a quaternion.
 
@@ -243,12 +212,15 @@ class FrameTree:
         # Serialized names of the frames that are followed; and the one that is not allowed.
         self._wanted = {b""}
         self._unread: dict[bytes, bytes] = {}
-        self._tf2: Buffer | None = None
+        self._tf2: tf2_py.BufferCore | None = None
+        # tf2 in Python has floats, which resolve 0.1 us: the stamps by these floats.
+        self._stamps: OrderedDict[float, int] = OrderedDict()
 
     def clear(self) -> None:
         """Delete all moving frames: time has been reset."""
         self._frames.clear()
         self._unread.clear()
+        self._stamps.clear()
         if self._tf2 is not None:
             self._tf2.clear()
 
@@ -266,8 +238,8 @@ class FrameTree:
         """
         for name in (target, source):
             self._check_parents(name)
-        # tf2 is not needed as long as a frame is unknown.
         for name in (target, source):
+            # tf2 is not needed as long as a frame is unknown.
             if name not in self._names and target != source:
                 text = f"frame {name} is not known; looked up {target} -> {source}"
                 raise tf2_py.LookupException(text)
@@ -275,8 +247,17 @@ class FrameTree:
             text = f"frames {target} and {source} are not connected"
             raise tf2_py.ConnectivityException(text)
         if self._tf2 is None:
-            self._tf2 = self._begin_tf2()
-        return self._tf2.lookup(target, source, stamp)
+            self._tf2 = tf2_py.BufferCore(_CACHE)
+            for pose in self._static.values():
+                self._add_to_tf2(pose, is_static=True)
+            for frame in self._frames.values():
+                for pose in frame.recent:
+                    self._add_to_tf2(pose)
+                frame.recent.clear()
+        found = self._tf2.lookup_transform_core(target, source, ros_time(stamp))
+        pose = StampedPose.of(found)
+        known = self._stamps.get(found.header.stamp.to_sec(), pose.stamp)
+        return pose._replace(stamp=stamp or known)
 
     def read(self, raw: bytes, now: int) -> None:
         """Process a serialized message at the ROS time ``now`` (ns)."""
@@ -309,15 +290,14 @@ class FrameTree:
         if self._tf2 is None:
             frame.recent.append(pose)
         else:
-            self._tf2.add(pose)
+            self._add_to_tf2(pose)
 
     def take_static(self, pose: StampedPose, now: int) -> None:
         """Process a static pose; reject an invalid one."""
         if not self._is_valid(pose):
             return
         self._static[pose.child] = pose
-        if self._tf2 is not None:
-            self._tf2.add(pose, is_static=True)
+        self._add_to_tf2(pose, is_static=True)
         self._notice(pose, now)
 
     def follow(self, frame: str | None, now: int) -> None:
@@ -366,15 +346,15 @@ class FrameTree:
             return self._frames[name].latest.parent
         return self._static[name].parent if name in self._static else None
 
-    def _begin_tf2(self):
-        tf2 = Buffer()
-        for pose in self._static.values():
-            tf2.add(pose, is_static=True)
-        for frame in self._frames.values():
-            for pose in frame.recent:
-                tf2.add(pose)
-            frame.recent.clear()
-        return tf2
+    def _add_to_tf2(self, pose, is_static=False):
+        tf2 = self._tf2
+        if tf2 is None:
+            return
+        message = pose.message()
+        (tf2.set_transform_static if is_static else tf2.set_transform)(message, "tf")
+        self._stamps[message.header.stamp.to_sec()] = pose.stamp
+        if len(self._stamps) > _MAX_STAMPS:
+            self._stamps.popitem(last=False)
 
     def _notice(self, pose, now):
         """Store names that are new."""

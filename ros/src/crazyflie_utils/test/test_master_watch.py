@@ -1,5 +1,6 @@
 """Reaction of a process to a ROS master that has ended, restarted, or does not know it."""
 
+import http.client
 from types import SimpleNamespace
 
 import pytest
@@ -17,6 +18,7 @@ class Master:
         self.pid = 1000
         self.known = True
         self.is_there = True
+        self.absence = ConnectionRefusedError()
         self.on_look = lambda: None
 
     def lookupNode(self, name):  # noqa: N802
@@ -34,7 +36,7 @@ class Master:
 
     def _answer(self):
         if not self.is_there:
-            raise ConnectionRefusedError
+            raise self.absence
 
 
 class World:
@@ -110,6 +112,12 @@ def test_the_same_master_that_is_back_is_no_news(world):
     world.watch.look()
     assert len(world.said) == 1
     assert world.registered == 0
+
+
+def test_a_program_that_has_the_port_of_the_master_meanwhile_does_not_end_the_watch(world):
+    world.master.is_there, world.master.absence = False, http.client.BadStatusLine("hello")
+    world.watch.look()
+    assert world.said == ["the ROS master does not answer; existing connections continue"]
 
 
 @pytest.fixture

@@ -15,6 +15,9 @@ import rospy
 from rospy.impl import registration
 from typing_extensions import override
 
+#: What a request raises if its receiver is not there, or does not understand it.
+_NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
+
 _METHODS = {
     registration.Registration.PUB: "registerPublisher",
     registration.Registration.SUB: "registerSubscriber",
@@ -40,7 +43,7 @@ def register() -> None:
     try:
         outcome: Any = request()
         answers = [outcome[k] for k in range(len(registered))]
-    except (OSError, http.client.HTTPException, xmlrpc.client.Error):
+    except _NO_ANSWER:
         # One by one, each repeated until the master answers.
         for kind, name, type_or_uri in registered:
             listeners.notify_added(name, type_or_uri, kind)
@@ -97,11 +100,11 @@ def living_node(name: str) -> str | None:
         uri = rosgraph.Master(caller).lookupNode(name)
         node = bounded_proxy(uri, _ANSWER_LIMIT)
         _, _, pid = node.getPid(caller)
-    except (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException):
+    except _NO_ANSWER:
         return None
     try:
         _, _, answers_as = node.getName(caller)
-    except (OSError, http.client.HTTPException, xmlrpc.client.Error, ValueError):
+    except (*_NO_ANSWER, ValueError):
         # Only nodes in Python can say their names.
         answers_as = name
     # The port of a node that has died may be that of another one by now.
@@ -112,7 +115,7 @@ def namesake(names: set[str]) -> str | None:
     """Return which node of these names is running, with the remedy; None without any."""
     try:
         registrations = rosgraph.Master(rospy.get_name()).getSystemState()
-    except (OSError, rosgraph.MasterException):
+    except _NO_ANSWER:
         # The master has just ended; the registration waits for a new one.
         return None
     registered = {node for kind in registrations for _, nodes in kind for node in nodes}
@@ -149,9 +152,13 @@ class MasterWatch:
     def look(self) -> None:
         """Ask the master once, and register with it if it does not know this process."""
         try:
-            is_known = self._knows_this_process()
+            is_known = True
+            try:
+                self._master.lookupNode(rospy.get_name())
+            except rosgraph.MasterError:
+                is_known = False
             pid = self._pid if is_known and self._pid is not None else self._master.getPid()
-        except (OSError, xmlrpc.client.Error, rosgraph.MasterException):
+        except _NO_ANSWER:
             if self._was_there:
                 rospy.logwarn("the ROS master does not answer; existing connections continue")
             self._was_there = False
@@ -169,10 +176,3 @@ class MasterWatch:
     def _run(self):
         while not self._end.wait(_PERIOD):
             self.look()
-
-    def _knows_this_process(self):
-        try:
-            self._master.lookupNode(rospy.get_name())
-        except rosgraph.MasterError:
-            return False
-        return True

@@ -201,7 +201,10 @@ class ProcessContext:
         self.is_refused = False  #: Whether another process flies the vehicle of this one's nodes.
         if isinstance(self.clock, SimulatedClock):
             self.clock.on_change(self._run_simulated)
-            self.topics.subscribe("/clock", Clock, partial(self._on_clock, self.clock))
+            # Queued with all other work: time does not move within a callback, and a reset does not
+            # overtake earlier messages of the simulation.
+            move = partial(self.executor.submit, self.clock.set)
+            self.topics.subscribe("/clock", Clock, lambda message: move(message.clock.to_sec()))
 
     def end(self, status: int) -> None:
         """Shut the process down; it exits with ``status``."""
@@ -267,11 +270,6 @@ class ProcessContext:
         if publisher is None or publisher.is_read_here(excluding=1):
             return -math.inf
         return self._simulated.next_deadline()
-
-    def _on_clock(self, clock, message):
-        # Queued with all other work: time does not move within a callback, and a reset does not
-        # overtake earlier messages of the simulation.
-        self.executor.submit(clock.set, message.clock.to_sec())
 
     def _run_simulated(self, now, is_reset):
         if is_reset:

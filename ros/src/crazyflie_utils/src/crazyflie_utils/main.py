@@ -29,7 +29,7 @@ _END_LIMIT = 5.0  #: Longest time that the shutdown waits for nodes without a fl
 #: take the processor from the nodes that fly.
 _REFUSED_TIME = 5.0
 _MASTER_LIMIT = 10.0  #: Longest time that a node waits for a ROS master (s).
-#: Time after which a computing thread yields to a waiting one (s).
+#: Time after which a computing thread yields to a waiting one (s): 5 ms by default.
 _SWITCH_INTERVAL = 0.0005
 
 
@@ -73,7 +73,7 @@ def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, No
 def _node_classes(value):
     if not isinstance(value, dict) or not value:
         raise ValueError
-    return {TOPIC(name): _node_class(path) for name, path in _flatten(value).items()}
+    return {TOPIC(name): _node_class(path) for name, path in _leaves(value)}
 
 
 #: The nodes of a process: a dictionary of name to class.
@@ -90,15 +90,13 @@ class ComposedParameters(Parameters):
     nodes: dict[str, type[Node]] = parameter(NODE_CLASSES, 'node name to "package.module:Class"')
 
 
-def _flatten(tree, prefix=""):
+def _leaves(tree, prefix=""):
     # For the parameter server, a name such as cf1/simulator is a tree.
-    leaves = {}
     for key, value in tree.items():
         if isinstance(value, dict):
-            leaves.update(_flatten(value, f"{prefix}{key}/"))
+            yield from _leaves(value, f"{prefix}{key}/")
         else:
-            leaves[prefix + key] = value
-    return leaves
+            yield prefix + key, value
 
 
 def _node_class(path):
@@ -217,7 +215,10 @@ def _run(process, make_nodes, signals):
     rospy.on_shutdown(shutdown.run)
     watch = MasterWatch()
     watch.start()
-    _avoid_pauses()
+    # A search for garbage among all imported objects takes 10 ms, and never finds any.
+    gc.collect()
+    gc.freeze()
+    sys.setswitchinterval(_SWITCH_INTERVAL)
     # Run in another thread: this one must be able to end the process if a callback does not return.
     threading.Thread(target=process.start, name="start", daemon=True).start()
     while not signals and process.exit_status is None and not rospy.is_shutdown():
@@ -231,15 +232,6 @@ def _run(process, make_nodes, signals):
     if shutdown.is_stuck:
         exit_at_once(1)
     sys.exit(process.exit_status or 0)
-
-
-def _avoid_pauses():
-    """Reduce pauses by Python's garbage collection and thread switching."""
-    # A search for garbage among all imported objects takes 10 ms, and never finds any.
-    gc.collect()
-    gc.freeze()
-    # By default other threads wait 5 ms for one that computes.
-    sys.setswitchinterval(_SWITCH_INTERVAL)
 
 
 _SHUTDOWN_LIMIT = 2.0  #: Longest time that shutdown waits for a callback (s).

@@ -320,7 +320,13 @@ class Acceptor:
             sock.settimeout(_HEADER_LIMIT)
             header = read_ros_handshake_header(sock, io.BytesIO(), 4096)
             sock.settimeout(None)
-            error = self._handle(sock, address, header)
+            error = "no topic or service name detected"
+            if rospy.core.is_shutdown_requested():
+                error = "node shutting down"
+            elif "topic" in header:
+                error = self._server.topic_connection_handler(sock, address, header)
+            elif "service" in header:
+                error = self._server.service_connection_handler(sock, address, header)
             if error:
                 write_ros_handshake_header(sock, {"error": error})
                 raise ROSHandshakeException(error)
@@ -331,13 +337,3 @@ class Acceptor:
                 self._report(text, ("connection", str(error)[:250]))
         finally:
             self._places.release()
-
-    def _handle(self, sock, address, header):
-        """Return why a connection is refused, or a false value if it is accepted."""
-        if rospy.core.is_shutdown_requested():
-            return "node shutting down"
-        if "topic" in header:
-            return self._server.topic_connection_handler(sock, address, header)
-        if "service" in header:
-            return self._server.service_connection_handler(sock, address, header)
-        return "no topic or service name detected"

@@ -134,11 +134,12 @@ class FakeGraph:
 
     def advance(self, duration: float) -> None:
         """Advance the time (s), with a stop at every timer's deadline."""
-        pass_time(duration, lambda: self.time, self._next_deadline, self._move_to)
 
-    def _next_deadline(self):
-        awake = [each for each in self._processes.values() if not each.is_frozen]
-        return min((each.next_deadline() for each in awake), default=math.inf)
+        def next_deadline() -> float:
+            awake = [each for each in self._processes.values() if not each.is_frozen]
+            return min((each.next_deadline() for each in awake), default=math.inf)
+
+        pass_time(duration, lambda: self.time, next_deadline, self._move_to)
 
     def _move_to(self, time):
         self.time = time

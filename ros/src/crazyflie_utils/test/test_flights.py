@@ -60,25 +60,37 @@ def test_what_was_said_long_ago_does_not_count(process, flights, monkeypatch):
 def test_a_process_that_is_to_leave_tells_of_its_flights(process):
     tell = process.handle(PILOT).inhibit_shutdown()
     other = process.handle("/other/pilot").inhibit_shutdown()
-    assert process.own_flights == []
+    assert process.flights.in_flight == []
     tell(True)
     other(False)
-    assert process.own_flights == [PILOT]
+    assert process.flights.in_flight == [PILOT]
     process.prepare_shutdown({})
     assert told(process) == [
         f"{PILOT} in flight",
-        "/other/pilot on ground",
-        f"{PILOT} in flight, to end",
+        f"{PILOT} in flight\n/other/pilot on ground",
+        f"{PILOT} in flight, to end\n/other/pilot on ground",
     ]
     tell(False)
-    assert process.own_flights == []
+    assert process.flights.in_flight == []
+
+
+def test_a_process_that_starts_later_knows_all_flights(process):
+    """It is sent the last message on the topic, of whichever node of the process."""
+    process.handle("/cf/other").inhibit_shutdown()(True)
+    process.handle("/cf2/pilot").inhibit_shutdown()(False)
+    later = FakeProcess()
+    known = Flights(later.topics, ["/cf/sensors/instrument"])
+    later.publish("/flights", process.published("/flights")[-1])
+    assert known.in_flight == ["/cf/other"]
 
 
 def test_a_handle_that_is_closed_has_no_flights(process):
     handle = process.handle(PILOT)
     handle.inhibit_shutdown()(True)
     handle.close()
-    assert process.own_flights == []
+    assert process.flights.in_flight == []
+    # Nobody waits for them any more.
+    assert told(process)[-1] == f"{PILOT} on ground"
 
 
 class Pilot(Node):

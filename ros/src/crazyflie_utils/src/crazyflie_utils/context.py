@@ -26,31 +26,37 @@ FLIGHTS_TOPIC = "/flights"  #: Topic of nodes that start and end flights, latche
 _IN_FLIGHT, _TO_END, _ON_GROUND = "in flight", "in flight, to end", "on ground"
 
 
-class ShutdownInhibitor:
-    """Publishes the flights that a node starts and ends, which inhibit the end of processes."""
+class OwnFlights:
+    """The flights that nodes of this process start and end, which inhibit the end of processes.
 
-    def __init__(self, topics: Topics, node: str):
-        self.node = node  #: Absolute name of the node.
-        self.in_flight = False  #: Last published value.
-        self._publisher = topics.publisher(FLIGHTS_TOPIC, String, latch=True)
+    All are in one message, a line each: a process that starts later is sent only the last message.
+    """
 
-    def publish(self, in_flight: bool) -> None:
-        """Publish whether there is a flight."""
-        self.in_flight = in_flight
-        self._send(_IN_FLIGHT if in_flight else _ON_GROUND)
+    def __init__(self, topics: Topics):
+        self._topics = topics
+        self._publisher: Publisher | None = None
+        self._states: dict[str, str] = {}
+
+    @property
+    def in_flight(self) -> list[str]:
+        """Names of the nodes of this process that are in flight."""
+        return [node for node, state in self._states.items() if state != _ON_GROUND]
+
+    def inhibit_shutdown(self, node: str) -> Callable[[bool], None]:
+        """Return ``publish(in_flight)`` for a node, named absolutely."""
+        if self._publisher is None:
+            self._publisher = self._topics.publisher(FLIGHTS_TOPIC, String, latch=True)
+        return lambda in_flight: self._publish({node: _IN_FLIGHT if in_flight else _ON_GROUND})
 
     def publish_ending(self) -> None:
-        """Publish that the flight, if any, is ending because its process is to end."""
-        if self.in_flight:
-            self._send(_TO_END)
+        """Publish that the flights, if any, are ending because their process is to end."""
+        self._publish(dict.fromkeys(self.in_flight, _TO_END))
 
-    def close(self) -> None:
-        """End the publication."""
-        self.in_flight = False
-        self._publisher.close()
-
-    def _send(self, state):
-        self._publisher.publish(String(f"{self.node} {state}"))
+    def _publish(self, states):
+        if self._publisher is not None and not states.items() <= self._states.items():
+            self._states |= states
+            lines = (f"{node} {state}" for node, state in self._states.items())
+            self._publisher.publish(String("\n".join(lines)))
 
 
 class Flights:
@@ -73,12 +79,13 @@ class Flights:
         return [name for name in self.in_flight if self._to_end_since.get(name, since) <= since]
 
     def _note(self, message: String) -> None:
-        name, _, state = message.data.partition(" ")
-        here = _namespace(name)
-        if any(here.startswith(each) or each.startswith(here) for each in self._namespaces):
-            self._in_flight[name] = state in (_IN_FLIGHT, _TO_END)
-            if state == _TO_END:
-                self._to_end_since[name] = time.monotonic()
+        for line in message.data.splitlines():
+            name, _, state = line.partition(" ")
+            here = _namespace(name)
+            if any(here.startswith(each) or each.startswith(here) for each in self._namespaces):
+                self._in_flight[name] = state in (_IN_FLIGHT, _TO_END)
+                if state == _TO_END:
+                    self._to_end_since[name] = time.monotonic()
 
 
 def _namespace(name):
@@ -193,7 +200,7 @@ class ProcessContext:
         self._steady = SteadyTimers(self.executor, SteadyClock(), *tf)
         self._simulated = TimerQueue(self.executor, self.clock, *tf)
         self._clock_publisher: Publisher | None = None
-        self._inhibitors: list[ShutdownInhibitor] = []
+        self.flights = OwnFlights(self.topics)
         #: Exit status with which the process is to end; None while it is not to end.
         self.exit_status: int | None = None
         #: Whether the process ends as soon as its flights have ended: none may begin.
@@ -214,17 +221,6 @@ class ProcessContext:
     def uses_sim_time(self) -> bool:
         """Whether the clock is simulated time (/use_sim_time)."""
         return isinstance(self.clock, SimulatedClock)
-
-    def inhibit_shutdown(self, node: str) -> ShutdownInhibitor:
-        """Return the publisher of the flights of a node, named absolutely."""
-        inhibitor = ShutdownInhibitor(self.topics, node)
-        self._inhibitors.append(inhibitor)
-        return inhibitor
-
-    @property
-    def own_flights(self) -> list[str]:
-        """Names of the nodes of this process that are in flight."""
-        return [each.node for each in self._inhibitors if each.in_flight]
 
     def add_timer(
         self,

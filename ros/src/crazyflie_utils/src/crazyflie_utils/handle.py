@@ -335,9 +335,9 @@ class NodeHandle:
 
         Processes with nodes that are needed in flight do not end at SIGINT before it has ended.
         """
-        inhibitor = self._process.inhibit_shutdown(self.name)
-        self._undo.append(inhibitor.close)
-        return inhibitor.publish
+        publish = self._process.flights.inhibit_shutdown(self.name)
+        self._undo.append(lambda: publish(False))
+        return publish
 
     def on_fault(self, enter_safe_state: Callable[[], None]) -> None:
         """Call ``enter_safe_state()`` after a callback of this node has raised."""

@@ -310,7 +310,7 @@ class Shutdown:
             return
         # Reset before the log says that another signal ends the wait: one may come at once.
         begin, signals = time.monotonic(), len(self._signals)
-        own = self._process.own_flights
+        own = self._process.flights.in_flight
         notice_at = begin if own else begin + _NOTICE_DELAY
         # In another thread: a callback may never return.
         prepare = self._process.prepare_shutdown

@@ -108,8 +108,7 @@ class Process(ProcessContext):
     def prepare_shutdown(self, nodes: dict[str, Node]) -> None:
         """Call `prepare_shutdown` of every node, and publish that flights are to end."""
         self.is_ending = True
-        for inhibitor in self._inhibitors:
-            self.executor.submit(inhibitor.publish_ending)
+        self.executor.submit(self.flights.publish_ending)
         for name, node in nodes.items():
             self.executor.submit(self.handle(name).guard(node.prepare_shutdown))
 

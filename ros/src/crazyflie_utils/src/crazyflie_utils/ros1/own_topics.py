@@ -249,13 +249,3 @@ class OwnPublication(rospy.topics._PublisherImpl):
                     connection.write_data(data)
                 except (OSError, rospy.exceptions.TransportTerminated):
                     connection.close()
-
-
-def publish(publisher: rospy.Publisher, messages: tuple[genpy.Message, ...]) -> None:
-    """Publish messages that are of the publisher's type."""
-    own = publisher.impl
-    if isinstance(own, OwnPublication) and not own.closed:
-        own.send(messages)
-        return
-    for message in messages:
-        publisher.publish(message)

@@ -27,7 +27,7 @@ from crazyflie_utils.ros1.calls import (
     withdrawn,
 )
 from crazyflie_utils.ros1.master_watch import living_node
-from crazyflie_utils.ros1.own_topics import OwnCallback, OwnSubscription, publish
+from crazyflie_utils.ros1.own_topics import OwnCallback, OwnPublication, OwnSubscription
 from crazyflie_utils.ros1.patches import log_without_master, shield_screen_log
 from crazyflie_utils.topics import (
     Condition,
@@ -54,7 +54,12 @@ class _RosPublisher(ExternalPublisher):
         return implementation is not None and bool(implementation.connections)
 
     def publish(self, *messages: genpy.Message) -> None:
-        publish(self._publisher, messages)
+        own = self._publisher.impl
+        if isinstance(own, OwnPublication) and not own.closed:
+            own.send(messages)
+            return
+        for message in messages:
+            self._publisher.publish(message)
 
     def close(self) -> None:
         self._on_close()
@@ -108,7 +113,11 @@ class RosTransport(Transport):
         self._published: Counter[str] = Counter()
         self._sets_clock = False
         self._caller = ServiceCaller()
-        self._parameter_writer = ParameterWriter(_write_param, partial(self.log, "warn"))
+        self._parameter_writer = ParameterWriter(
+            # A new connection: other threads use rospy's own connection to the master.
+            lambda name, value: rosgraph.Master(rospy.get_name()).setParam(name, value),
+            partial(self.log, "warn"),
+        )
         self._for_master: SimpleQueue[Callable[[], None]] | None = None
         self._services_at_start: dict[str, str] = {}
         self._is_starting = False
@@ -175,12 +184,9 @@ class RosTransport(Transport):
             return self._published[topic] > 0
 
         def register():
-            patches.own_subscription(
-                topic, message_type, is_handed_over, self._refuse, self._limits_rate
-            )
-            callback = OwnCallback(
-                deliver, is_handed_over, lambda: self._limits_rate and may_wait()
-            )
+            report, limits_rate = self._refuse, self._limits_rate
+            patches.own_subscription(topic, message_type, is_handed_over, report, limits_rate)
+            callback = OwnCallback(deliver, is_handed_over, lambda: limits_rate and may_wait())
             name = self._rospy_name(topic)
             return rospy.Subscriber(name, message_type, callback, tcp_nodelay=True)
 
@@ -264,11 +270,6 @@ def allow_many_topics() -> None:
     # If the system refuses, a process with few topics does not need it.
     with contextlib.suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-
-
-def _write_param(name, value):
-    # A new connection: other threads use rospy's own connection to the master.
-    rosgraph.Master(rospy.get_name()).setParam(name, value)
 
 
 _LOGGERS = {

@@ -1,6 +1,7 @@
 """Command lines of declared parameters."""
 
 import argparse
+import contextlib
 from typing import TypeVar
 
 from crazyflie_utils.parameters.declaration import REQUIRED, ParameterError, Parameters
@@ -17,50 +18,39 @@ def parse_arguments(parameters: type[P], arguments: list[str], program: str, des
     all errors.
     """
     parser = argparse.ArgumentParser(prog=program, description=description)
-    declarations = {_option(d.name): d for d in parameters.declarations()}
-    for option, declaration in declarations.items():
+    types = {}
+    for declaration in parameters.declarations():
+        types[declaration.name] = declaration.type
+        unit = f", {declaration.type.unit}" if declaration.type.unit else ""
+        default = "" if declaration.default is REQUIRED else f" (default: {declaration.default})"
         parser.add_argument(
-            option,
+            _option(declaration.name),
             dest=declaration.name,
             default=argparse.SUPPRESS,
             metavar=declaration.type.label.upper(),
-            help=_help(declaration),
+            # argparse formats the text with %.
+            help=f"{declaration.help}{unit}{default}".replace("%", "%%"),
         )
     given = vars(parser.parse_args(arguments))
-
-    def get(name):
-        text = given[name]
-        try:
-            return _raw(types[name], text)
-        except ValueError:
-            # The type refuses the text, too, and names the expected value.
-            return text
-
-    types = {declaration.name: declaration.type for declaration in declarations.values()}
     try:
-        return parameters.read(get, _option)
+        return parameters.read(lambda name: _raw(types[name], given[name]), _option)
     except ParameterError as error:
         parser.error(str(error))
 
 
 def _raw(parameter_type, text):
-    """Return the raw value of a word on a command line, or raise ValueError."""
-    if isinstance(parameter_type, Number):
-        return number_from_text(text)
-    # Only Python allows underscores in numbers.
-    if isinstance(parameter_type, Integer) and "_" not in text:
-        return int(text, 0)
+    """Return the raw value of a word on a command line."""
+    with contextlib.suppress(ValueError):
+        if isinstance(parameter_type, Number):
+            return number_from_text(text)
+        # Only Python allows underscores in numbers.
+        if isinstance(parameter_type, Integer) and "_" not in text:
+            return int(text, 0)
     if parameter_type is BOOLEAN:
         return {"true": True, "false": False}.get(text.lower(), text)
+    # The type refuses a text that is no number, too, and names the expected value.
     return text
 
 
 def _option(name):
     return "--" + name.replace("/", "-").replace("_", "-")
-
-
-def _help(declaration):
-    unit = f", {declaration.type.unit}" if declaration.type.unit else ""
-    default = "" if declaration.default is REQUIRED else f" (default: {declaration.default})"
-    # argparse formats the text with %.
-    return f"{declaration.help}{unit}{default}".replace("%", "%%")

@@ -128,8 +128,13 @@ class FakeTransport(Transport):
         if answer.done() or self.machine_timers is None:
             return answer
         reply: Future[Any] = Future()
-        text = f"{name} has not answered within {limit:g} s"
-        timer = self.machine_timers.add(limit, lambda: _give_up(answer, reply, text))
+
+        def give_up() -> None:
+            answer.cancel()
+            with suppress(InvalidStateError):
+                reply.set_exception(ServiceError(f"{name} has not answered within {limit:g} s"))
+
+        timer = self.machine_timers.add(limit, give_up)
         reply.add_done_callback(lambda _: timer.stop())
         answer.add_done_callback(lambda _: copy_outcome(answer, reply))
         return reply
@@ -162,12 +167,6 @@ def refuse(service: str) -> Callable[[Any], Future[Any]]:
     refusal: Future[Any] = Future()
     refusal.set_exception(ServiceError(f"there is no service {service}"))
     return lambda request: refusal
-
-
-def _give_up(answer, reply, text):
-    answer.cancel()
-    with suppress(InvalidStateError):
-        reply.set_exception(ServiceError(text))
 
 
 def copy_outcome(answer: Future[Any], reply: Future[Any]) -> None:

@@ -42,19 +42,14 @@ def running(*command: object, **options: Any) -> Iterator[subprocess.Popen[Any]]
     try:
         yield process
     finally:
-        _interrupt(process)
-
-
-def _interrupt(process):
-    if process.poll() is not None:
-        return
-    os.killpg(process.pid, signal.SIGINT)
-    try:
-        process.wait(_END_LIMIT)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        raise
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGINT)
+            try:
+                process.wait(_END_LIMIT)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+                raise
 
 
 def wait_until(

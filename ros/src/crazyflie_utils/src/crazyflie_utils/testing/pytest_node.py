@@ -22,12 +22,7 @@ def pytest_arguments(arguments: list[str]) -> list[str]:
 
     rostest names a file for the results, in the way of gtest; with ``rostest -t`` it names none.
     """
-    converted = []
-    for argument in arguments:
-        if argument.startswith(_OUTPUT):
-            converted.append("--junit-xml=" + argument.removeprefix(_OUTPUT))
-        elif argument != _TEXT:
-            converted.append(argument)
+    converted = [each.replace(_OUTPUT, "--junit-xml=") for each in arguments if each != _TEXT]
     # The plugin of anyio, which the dashboard brings, costs each test 0.1 s.
     converted += ["-p", "no:cacheprovider", "-p", "no:anyio", "-v"]
     # rospy calls notifyAll, which Python 3.10 has deprecated, with every /clock.

@@ -191,7 +191,7 @@ class _GraphProcess(FakeProcess):
         return answer
 
     def receive(self, deliver: Receiver, message: Any) -> None:
-        """Receiver a message, or keep it until the process continues."""
+        """Deliver a message, or keep it until the process continues."""
         if self.is_frozen:
             same = [k for k, (other, _) in enumerate(self.waiting) if other is deliver]
             if len(same) == _MAX_WAITING:

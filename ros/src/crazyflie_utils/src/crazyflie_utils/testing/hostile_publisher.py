@@ -18,6 +18,7 @@ import struct
 import sys
 import threading
 import time
+from types import SimpleNamespace
 from xmlrpc.server import SimpleXMLRPCServer
 
 import genpy
@@ -59,8 +60,13 @@ class HostilePublisher:
         self.refused = 0  #: Number of connections that came too early.
         self._server = socket.create_server((_ADDRESS, 0))
         self._slave = SimpleXMLRPCServer((_ADDRESS, 0), logRequests=False)
-        port = self._server.getsockname()[1]
-        self._slave.register_instance(_Slave(port, [[topic, message_type._type]]))
+        answers = {
+            "requestTopic": ["TCPROS", *self._server.getsockname()],
+            "getPublications": [[topic, message_type._type]],
+        }
+        self._slave.register_instance(
+            SimpleNamespace(_dispatch=lambda method, _: (1, "", answers.get(method, 0)))
+        )
         for work in (self._slave.serve_forever, self._accept):
             threading.Thread(target=work, daemon=True).start()
         self._master = rosgraph.Master(self._header["callerid"])
@@ -109,17 +115,6 @@ class HostilePublisher:
                         continue
                     write_ros_handshake_header(connection, self._header)
                     self._sockets.append(connection)
-
-
-class _Slave:
-    def __init__(self, port: int, publications: list[list[str]]):
-        self._answers = {
-            "requestTopic": ["TCPROS", _ADDRESS, port],
-            "getPublications": publications,
-        }
-
-    def _dispatch(self, method, _):
-        return 1, "", self._answers.get(method, 0)
 
 
 def frame(message: genpy.Message) -> bytes:

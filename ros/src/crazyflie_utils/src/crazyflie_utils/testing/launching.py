@@ -56,14 +56,10 @@ def _with_master(log, program, *arguments):
         log.open("w") as output,
         running(*command, stdout=output, stderr=subprocess.STDOUT) as process,
     ):
-        _wait_for_master(process, log)
+        deadline = time.monotonic() + _START_LIMIT
+        while not rosgraph.is_master_online():
+            if process.poll() is not None or time.monotonic() > deadline:
+                reasons = complaints(log) or log.read_text(errors="replace").splitlines()[-3:]
+                raise LaunchError("\n".join(["roslaunch has not started anything:", *reasons]))
+            time.sleep(0.02)
         yield process
-
-
-def _wait_for_master(process, log):
-    deadline = time.monotonic() + _START_LIMIT
-    while not rosgraph.is_master_online():
-        if process.poll() is not None or time.monotonic() > deadline:
-            reasons = complaints(log) or log.read_text(errors="replace").splitlines()[-3:]
-            raise LaunchError("\n".join(["roslaunch has not started anything:", *reasons]))
-        time.sleep(0.02)

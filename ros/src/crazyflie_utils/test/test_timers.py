@@ -222,6 +222,16 @@ def test_other_periods_are_refused(queue, period):
         queue.add_at(period, lambda: None, now=0.0)
 
 
+@pytest.mark.parametrize("period", [-1.0, math.nan, math.inf])
+def test_a_timer_keeps_its_period_when_another_is_refused(queue, period):
+    ticks = []
+    timer = queue.add_at(1.0, lambda: ticks.append(1), now=0.0)
+    with pytest.raises(ValueError, match=f"period of a timer is {period}"):
+        timer.set_period(period)
+    run(queue, 1.0, 2.0)
+    assert (timer.period, len(ticks)) == (1.0, 2)
+
+
 def test_stopped_timer_never_fires_again(queue):
     ticks = []
     timer = queue.add_at(1.0, lambda: ticks.append(1), now=0.0)

@@ -212,11 +212,10 @@ _SLOT = 0.01
 class Timer:
     """A callback that is due every ``period`` seconds; ends with `stop`."""
 
-    def __init__(self, queue: "TimerQueue", period: float, work: Callable[[], None]):
-        self.period = period
+    def __init__(self, queue: "TimerQueue", work: Callable[[], None]):
+        self.period = self.deadline = math.inf  #: Both in s; set by the queue, as is `number`.
+        self.number = 0  #: Position among timers that are due at once.
         self.stopped = False
-        self.number = 0  #: Position among timers that are due at once; that in the queue is valid.
-        self.deadline = math.inf
         self._queue = queue
         self._work = work
 
@@ -230,8 +229,7 @@ class Timer:
         Then many timers with the same period are due at different moments.
         """
         if period != self.period and not self.stopped:
-            self.period = period
-            self._queue.begin(self, stagger=True, align_phase=True)
+            self._queue.begin(self, period, stagger=True, align_phase=True)
 
     def restart(self, now: float) -> None:
         """Set the next deadline one period after ``now`` (s)."""
@@ -294,21 +292,21 @@ class TimerQueue:
         10 ms apart, up to one period later. Timers that are added later are not delayed. ValueError
         for a period that is negative or not finite.
         """
-        timer = Timer(self, period, work)
+        timer = Timer(self, work)
         timer.stopped = self._is_stopped
-        self.begin(timer, stagger)
+        self.begin(timer, period, stagger)
         return timer
 
-    def begin(self, timer: Timer, stagger: bool, align_phase: bool = False) -> None:
-        """Set the first deadline of a timer, see `add`; again after a change of its period.
+    def begin(self, timer: Timer, period: float, stagger: bool, align_phase: bool = False) -> None:
+        """Set the period of a timer, s, and its first deadline by it, see `add`.
 
-        With ``align_phase`` it may be early, at one of those moments.
+        With ``align_phase`` the deadline may be early, at one of those moments.
         """
-        if not 0.0 <= timer.period < math.inf:
-            raise ValueError(f"the period of a timer is {timer.period!r} s; expected a number >= 0")
+        if not 0.0 <= period < math.inf:
+            raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
         with self._lock:
-            timer.number = next(self._order)
-            timer.restart(self._start(timer.period, stagger, align_phase))
+            timer.period, timer.number = period, next(self._order)
+            timer.restart(self._start(period, stagger, align_phase))
             self._push(timer)
 
     def _start(self, period, stagger, align_phase):
@@ -411,8 +409,8 @@ class SteadyTimers(TimerQueue):
         self._thread.start()
 
     @override
-    def begin(self, timer: Timer, stagger: bool, align_phase: bool = False) -> None:
-        super().begin(timer, stagger, align_phase)
+    def begin(self, timer: Timer, period: float, stagger: bool, align_phase: bool = False) -> None:
+        super().begin(timer, period, stagger, align_phase)
         self._wake_up()
 
     @override

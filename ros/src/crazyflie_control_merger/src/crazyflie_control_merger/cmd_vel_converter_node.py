@@ -8,9 +8,8 @@ from typing_extensions import override
 from crazyflie_model.angles import Triple
 from crazyflie_model.quadrotor import CRAZYFLIE, QuadrotorParameters
 from crazyflie_msgs.msg import ControlStamped
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
 from crazyflie_utils.parameters import vehicle_model
-from crazyflie_utils.parameters.types import TOPIC
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 from crazyflie_utils.vectors import to_tuple
 
@@ -38,10 +37,8 @@ def cmd_vel_from_control(
 class CmdVelConverterParameters(Parameters):
     """Parameters of `CmdVelConverterNode`."""
 
-    control_topic: str = parameter(TOPIC, "where controls come from", name="topics/control")
-    cmd_vel_topic: str = parameter(
-        TOPIC, "where commands of the radio driver go", name="topics/cmd_vel"
-    )
+    control_topic: str = topic("control", "where controls come from")
+    cmd_vel_topic: str = topic("cmd_vel", "where commands of the radio driver go")
     model: str = parameter(
         VEHICLE_MODEL,
         "type of the vehicle, or model file: its thrust curve, mass and trims",

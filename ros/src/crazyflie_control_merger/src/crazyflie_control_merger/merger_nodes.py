@@ -13,19 +13,17 @@ from crazyflie_msgs.msg import (
     PrioritizedControl,
     PrioritizedControlStamped,
 )
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import TOPIC, Text
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
+from crazyflie_utils.parameters.types import Text
 from crazyflie_utils.vectors import from_vector, to_vector
 
 
 class MergerParameters(Parameters):
     """Parameters of both mergers."""
 
-    control_topic: str = parameter(TOPIC, "where regular controls come from", name="topics/control")
-    prioritized_topic: str = parameter(
-        TOPIC, "where prioritised controls come from", name="topics/prioritized_control"
-    )
-    merged_topic: str = parameter(TOPIC, "where merged controls go", name="topics/merged")
+    control_topic: str = topic("control", "where regular controls come from")
+    prioritized_topic: str = topic("prioritized_control", "where prioritised controls come from")
+    merged_topic: str = topic("merged", "where merged controls go")
     mode: str = parameter(
         Text(choices=MODES), "p is the priority that came with the control; 0; 1", live=True
     )

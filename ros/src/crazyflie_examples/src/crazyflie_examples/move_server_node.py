@@ -6,8 +6,8 @@ from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import METRES, SERVICE, TOPIC, Converted
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
+from crazyflie_utils.parameters.types import METRES, SERVICE, Converted
 from crazyflie_utils.text import shown
 from crazyflie_utils.vectors import stamped
 
@@ -49,7 +49,7 @@ POINTS = Converted(
 class MoveServerParameters(Parameters):
     """Parameters of `MoveServerNode`."""
 
-    reference_topic: str = parameter(TOPIC, "where references go", name="topics/ref")
+    reference_topic: str = topic("ref", "where references go")
     service: str = parameter(SERVICE, "moves the vehicle to the next point", "/move", "srv/move")
     points: tuple[Point, ...] = parameter(
         POINTS, "the route; after its last point it starts again", DEFAULT_POINTS

@@ -9,8 +9,8 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import TOPIC, Text
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
+from crazyflie_utils.parameters.types import Text
 
 #: Types to which a reference can be converted, by the value of the parameter ``state``.
 TYPES = {
@@ -22,8 +22,8 @@ TYPES = {
 class ReferenceConverterParameters(Parameters):
     """Parameters of `ReferenceConverterNode`."""
 
-    reference_topic: str = parameter(TOPIC, "where references come from", name="topics/reference")
-    converted_topic: str = parameter(TOPIC, "where converted ones go", name="topics/converted")
+    reference_topic: str = topic("reference", "where references come from")
+    converted_topic: str = topic("converted", "where converted ones go")
     state: str = parameter(
         Text(choices=tuple(TYPES)),
         "converted to PositionVelocityYawStateStamped or FullStateStamped",

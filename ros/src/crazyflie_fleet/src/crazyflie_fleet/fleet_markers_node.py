@@ -7,8 +7,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_fleet.fleet_config import DOWNWASH, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters
-from crazyflie_utils import Node, NodeHandle, parameter
-from crazyflie_utils.parameters.types import TOPIC
+from crazyflie_utils import Node, NodeHandle, topic
 
 BODY = ColorRGBA(0.15, 0.17, 0.20, 1.0)
 NAME = ColorRGBA(0.05, 0.25, 0.60, 1.0)
@@ -25,10 +24,8 @@ PERIOD = 1.0  #: Period of the messages (s): RViz drops a marker that comes befo
 class FleetMarkersParameters(FleetParameters):
     """Parameters of `FleetMarkersNode`."""
 
-    held_topic: str = parameter(
-        TOPIC, "names of the vehicles that are held", "/fleet/waiting", "topics/waiting"
-    )
-    markers_topic: str = parameter(TOPIC, "markers", "/fleet/markers", "topics/markers")
+    held_topic: str = topic("waiting", "names of the vehicles that are held", "/fleet/waiting")
+    markers_topic: str = topic("markers", "markers", "/fleet/markers")
 
 
 class FleetMarkersNode(Node):

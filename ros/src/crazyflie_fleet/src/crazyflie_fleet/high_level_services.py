@@ -18,10 +18,10 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils import NodeHandle, Parameters, parameter
+from crazyflie_utils import NodeHandle, Parameters, parameter, topic
 from crazyflie_utils.flight_status import FlightTopics
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import BOOLEAN, FRAME, SERVICE, TIME_STEP, TOPIC
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, SERVICE, TIME_STEP
 from crazyflie_utils.vectors import to_tuple
 
 
@@ -97,7 +97,7 @@ KEEP_HEADING = math.nan
 class HighLevelParameters(Parameters):
     """Parameters of `HighLevelNode`."""
 
-    reference_topic: str = parameter(TOPIC, "references of the controller", "ref", "topics/ref")
+    reference_topic: str = topic("ref", "references of the controller", "ref")
     has_yaw: bool = parameter(
         BOOLEAN,
         "the controller follows a heading; references are PositionVelocityYawStateStamped, and not "
@@ -105,17 +105,15 @@ class HighLevelParameters(Parameters):
         default=False,
         name="reference/yaw",
     )
-    state_topic: str = parameter(TOPIC, "states of the vehicle", "state", "topics/state")
+    state_topic: str = topic("state", "states of the vehicle", "state")
     flight: FlightTopics = group(FlightTopics, "topics")
     takeoff: str = parameter(SERVICE, "the takeoff server's", "takeoff", "srv/takeoff")
     land: str = parameter(SERVICE, "the takeoff server's", "land", "srv/land")
     emergency: str = parameter(SERVICE, "stops the motors", "emergency", "srv/emergency")
-    start_topic: str = parameter(
-        TOPIC, "names of the nodes that start trajectory 0 at once", START_TOPIC, "topics/start"
+    start_topic: str = topic(
+        "start", "names of the nodes that start trajectory 0 at once", START_TOPIC
     )
-    plan_topic: str = parameter(
-        TOPIC, "trajectory that is flown, until its end", "~plan/markers", "topics/plan"
-    )
+    plan_topic: str = topic("plan", "trajectory that is flown, until its end", "~plan/markers")
     fixed_frame: str = parameter(FRAME, "frame the references are in", "world", "frames/fixed")
     time_step: float = parameter(TIME_STEP, "period of the references", 0.02)
 

@@ -34,8 +34,8 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped as Reference
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
+from crazyflie_utils.parameters.types import TIME_STEP
 from crazyflie_utils.timers import Timer
 from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import is_finite, to_tuple
@@ -79,9 +79,9 @@ class VehicleStates:
             on_status = partial(self._on_flight_status, number)
             handle.subscribe(f"/{name}/{FLIGHT_STATUS}", FlightStatus, on_status)
         scalar = dict(self.numbers)
-        for topic, vehicles in self._vectorized.items():
+        for name, vehicles in self._vectorized.items():
             numbers = np.array([scalar.pop(vehicle.name) for vehicle in vehicles])
-            handle.subscribe(topic, Float64MultiArray, partial(self._on_states, numbers))
+            handle.subscribe(name, Float64MultiArray, partial(self._on_states, numbers))
         for name, number in scalar.items():
             on_state = partial(self._on_state, number)
             handle.subscribe(f"/{name}/{STATE}", PositionVelocityYawStateStamped, on_state)
@@ -142,9 +142,7 @@ class ReferencesParameters(Parameters):
     """Parameters of `ReferencesNode`."""
 
     watch_period: float = parameter(TIME_STEP, "from one check of the distances to the next", 0.05)
-    held_topic: str = parameter(
-        TOPIC, "names of the vehicles that are held", "/fleet/waiting", "topics/waiting"
-    )
+    held_topic: str = topic("waiting", "names of the vehicles that are held", "/fleet/waiting")
 
 
 class SharedTimers:

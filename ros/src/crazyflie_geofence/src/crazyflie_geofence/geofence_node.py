@@ -19,9 +19,9 @@ from crazyflie_msgs.msg import (
     PrioritizedControl,
     PrioritizedControlStamped,
 )
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import TOPIC, Number
+from crazyflie_utils.parameters.types import Number
 from crazyflie_utils.vectors import from_vector, to_vector
 
 # Without these bounds the fence's equations overflow or divide by nothing.
@@ -48,11 +48,9 @@ class CornerParameters(Parameters):
 class GeofenceParameters(Parameters):
     """Parameters of `GeofenceNode`."""
 
-    state_topic: str = parameter(TOPIC, "where states come from", name="topics/state")
-    control_topic: str = parameter(TOPIC, "where regular controls come from", name="topics/control")
-    prioritized_topic: str = parameter(
-        TOPIC, "where the fence's controls go", name="topics/prioritized_control"
-    )
+    state_topic: str = topic("state", "where states come from")
+    control_topic: str = topic("control", "where regular controls come from")
+    prioritized_topic: str = topic("prioritized_control", "where the fence's controls go")
     lower: CornerParameters = group(CornerParameters, "box/min")
     upper: CornerParameters = group(CornerParameters, "box/max")
     margin: float = parameter(

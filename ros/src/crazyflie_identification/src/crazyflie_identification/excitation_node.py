@@ -14,8 +14,8 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import TOPIC, Number
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
+from crazyflie_utils.parameters.types import Number
 from crazyflie_utils.vectors import stamped
 
 SETTLED = 3.0  #: Time in flight after which the excitation begins, s.
@@ -27,15 +27,13 @@ MAX_SPEED = 1.2  #: Speed at which the excitation is ended (m/s).
 class ExcitationParameters(Parameters):
     """Parameters of `ExcitationNode`."""
 
-    control_topic: str = parameter(TOPIC, "controls of the controller", name="topics/control")
-    excited_topic: str = parameter(
-        TOPIC, "where controls with the excitation go: to the takeoff filter", name="topics/excited"
+    control_topic: str = topic("control", "controls of the controller")
+    excited_topic: str = topic(
+        "excited", "where controls with the excitation go: to the takeoff filter"
     )
-    reference_topic: str = parameter(TOPIC, "where references go", name="topics/reference")
-    state_topic: str = parameter(TOPIC, "where states come from", name="topics/state")
-    flight_status_topic: str = parameter(
-        TOPIC, "flight status of the takeoff server", name="topics/flight_status"
-    )
+    reference_topic: str = topic("reference", "where references go")
+    state_topic: str = topic("state", "where states come from")
+    flight_status_topic: str = topic("flight_status", "flight status of the takeoff server")
     duration: float = parameter(
         Number("s", minimum=5.0, maximum=120.0), "length of the excitation", 45.0
     )

@@ -14,12 +14,12 @@ from crazyflie_lqr.linear_feedback import GroundGuess, LinearFeedback, at_rest
 from crazyflie_lqr.reference import GuardedReference, StateAge
 from crazyflie_model.limits import MAX_SPEED
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
-from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter, topic
 from crazyflie_utils.flight_status import FlightTopics
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import TEXT, TOPIC, Converted, Integer, Number
+from crazyflie_utils.parameters.types import TEXT, Converted, Integer, Number
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple, to_vector
 
 MAX_GAIN = 1e6  #: Largest entry of a gain file: larger ones give controls that are not finite.
@@ -61,15 +61,14 @@ class LinearFeedbackParameters(Parameters):
         name="u_ref_file",
         live=True,
     )
-    reference_topic: str = parameter(TOPIC, "where references come from", name="topics/reference")
-    state_topic: str = parameter(TOPIC, "where states come from", name="topics/state")
-    control_topic: str = parameter(TOPIC, "where controls go", name="topics/control")
-    own_descent_topic: str | None = parameter(
-        TOPIC,
+    reference_topic: str = topic("reference", "where references come from")
+    state_topic: str = topic("state", "where states come from")
+    control_topic: str = topic("control", "where controls go")
+    own_descent_topic: str | None = topic(
+        "descent_reference",
         "references of a descent, which override all others; by default the name of reference + "
         "`_descent`",
         None,
-        name="topics/descent_reference",
     )
     flight: FlightTopics = group(FlightTopics, "topics")
     max_jump: float = parameter(

@@ -10,26 +10,24 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_references.velocity_reference import LimitParameters, Velocity, VelocityReference
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
 from crazyflie_utils.flight_status import FlightTopics
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
+from crazyflie_utils.parameters.types import TIME_STEP
 from crazyflie_utils.vectors import is_finite, stamped
 
 
 class VelocityReferenceParameters(Parameters):
     """Parameters of `VelocityReferenceNode`."""
 
-    cmd_vel_topic: str = parameter(
-        TOPIC, "velocities in the heading frame, m/s and rad/s", "cmd_vel", "topics/cmd_vel"
+    cmd_vel_topic: str = topic(
+        "cmd_vel", "velocities in the heading frame, m/s and rad/s", "cmd_vel"
     )
-    reference_topic: str = parameter(
-        TOPIC,
-        "references of other nodes, such as the takeoff server's, which are passed on",
-        name="topics/reference",
+    reference_topic: str = topic(
+        "reference", "references of other nodes, such as the takeoff server's, which are passed on"
     )
-    controller_reference_topic: str = parameter(
-        TOPIC, "references for the controller go here", name="topics/controller_reference"
+    controller_reference_topic: str = topic(
+        "controller_reference", "references for the controller go here"
     )
     flight: FlightTopics = group(FlightTopics, "topics")
     time_step: float = parameter(TIME_STEP, "period of the references", 0.02)

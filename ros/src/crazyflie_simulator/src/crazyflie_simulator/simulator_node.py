@@ -11,14 +11,21 @@ from typing_extensions import override
 from crazyflie_model.dynamics import Coupled7D, Dynamics, NearHover
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_simulator.vehicle import MotionCapture, SimulatedVehicle
-from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, StampedPose, parameter
+from crazyflie_utils import (
+    Node,
+    NodeHandle,
+    ParameterError,
+    Parameters,
+    StampedPose,
+    parameter,
+    topic,
+)
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FRAME,
     METRES,
     TIME_STEP,
-    TOPIC,
     Integer,
     Number,
 )
@@ -110,7 +117,7 @@ class SimulatorParameters(Parameters):
     init_z: float = parameter(METRES, "initial position; the ground is z = 0", name="init/z")
     fixed_frame: str = parameter(FRAME, "tf frame of the world", name="frames/fixed")
     robot_frame: str = parameter(FRAME, "tf frame of the vehicle", name="frames/robot")
-    control_topic: str = parameter(TOPIC, "where controls come from", name="topics/control")
+    control_topic: str = topic("control", "where controls come from")
     clock: ClockParameters = group(ClockParameters, "clock")
     mocap: MotionCaptureParameters = group(MotionCaptureParameters, "mocap")
     seed: int = parameter(

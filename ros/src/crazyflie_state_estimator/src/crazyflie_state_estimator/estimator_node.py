@@ -26,9 +26,9 @@ from crazyflie_state_estimator.motion import (
     MotionEstimator,
 )
 from crazyflie_state_estimator.pose_gate import Classification, PoseGate, TiltMonitor
-from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter, topic
 from crazyflie_utils.last_valid import HOLD_LIMIT
-from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer, Number, Text
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, Integer, Number, Text
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple
 
 FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"
@@ -41,7 +41,7 @@ class StateEstimatorParameters(Parameters):
     time_step: float = parameter(TIME_STEP, "period at which tf is read")
     fixed_frame: str = parameter(FRAME, "frame the state is in", name="frames/fixed")
     robot_frame: str = parameter(FRAME, "frame of the vehicle", name="frames/robot")
-    state_topic: str = parameter(TOPIC, "where states go", name="topics/state")
+    state_topic: str = topic("state", "where states go")
     acts_on_arrival: bool = parameter(
         BOOLEAN,
         "answer a new pose at once, at most one every `time_step`, instead of at the next time "
@@ -52,12 +52,11 @@ class StateEstimatorParameters(Parameters):
     filter_type: str = parameter(
         Text((FINITE_DIFFERENCE, KALMAN)), "how rates are found", FINITE_DIFFERENCE, "filter/type"
     )
-    control_topic: str | None = parameter(
-        TOPIC,
+    control_topic: str | None = topic(
+        "control",
         "the vehicle's control, such as /control/final: poses must follow it, and the Kalman "
         "filter uses it",
         None,
-        "topics/control",
     )
     max_speed: float = parameter(
         Number("m/s", above=0.0),

@@ -5,8 +5,8 @@ from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 from typing_extensions import override
 
-from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
-from crazyflie_utils.parameters.types import SERVICE, TOPIC
+from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter, topic
+from crazyflie_utils.parameters.types import SERVICE
 
 REPETITIONS = 20  #: Number of messages for each call.
 PERIOD = 0.05  #: Period of the messages (s).
@@ -15,11 +15,8 @@ PERIOD = 0.05  #: Period of the messages (s).
 class AllEmergencyParameters(Parameters):
     """Parameters of `AllEmergencyNode`."""
 
-    topic: str = parameter(
-        TOPIC,
-        "topic that every takeoff control filter reads",
-        "/all/emergency",
-        "topics/all_emergency",
+    topic: str = topic(
+        "all_emergency", "topic that every takeoff control filter reads", "/all/emergency"
     )
     service: str = parameter(SERVICE, "stops all vehicles", "/all/emergency", "srv/all_emergency")
 

@@ -8,9 +8,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from dynamic_reconfigure.msg import Config
 
 from crazyflie_takeoff.limits import NO_BOX, Box
-from crazyflie_utils import NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.declaration import REQUIRED, group
-from crazyflie_utils.parameters.types import METRES, TOPIC
+from crazyflie_utils import NodeHandle, Parameters, parameter, topic
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import METRES
 
 DIAGNOSTICS_PERIOD = 1.0  #: Period of the diagnostics, as REP 107 recommends (s).
 
@@ -27,11 +27,6 @@ class CornerParameters(Parameters):
     def vector(self, missing: float) -> tuple[float, ...]:
         """Return x, y, z in m; ``missing`` for a coordinate without a wall."""
         return tuple(missing if value is None else value for value in (self.x, self.y, self.z))
-
-
-def topic(name: str, help: str, default: Any = REQUIRED) -> Any:  # noqa: A002
-    """Declare the parameter topics/NAME, a topic; see `parameter`."""
-    return parameter(TOPIC, help, default, f"topics/{name}")
 
 
 def named_after(base: str, suffix: str, name: str = "") -> Any:

@@ -8,11 +8,11 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic, named_after, topic
+from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic, named_after
 from crazyflie_takeoff.limits import Box
 from crazyflie_takeoff.motion import MeasuredPosition
 from crazyflie_takeoff.server_table import FilterReport, ServerEvent, TakeoffPlan
-from crazyflie_utils import parameter
+from crazyflie_utils import parameter, topic
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, Number
 
 SLOWEST_DESCENT = 0.05  #: A slower descent would hardly ever end (m/s).

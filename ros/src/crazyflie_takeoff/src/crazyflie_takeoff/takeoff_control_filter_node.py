@@ -17,12 +17,12 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_takeoff import flight_topics
 from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, LossTimeouts, Status
-from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic, named_after, topic
+from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic, named_after
 from crazyflie_takeoff.limits import Limits
 from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import SafeSetpoint
 from crazyflie_takeoff.transition_table import FlightState, flight_state
-from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
+from crazyflie_utils import Node, NodeHandle, ServiceError, parameter, topic
 from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, Number
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL

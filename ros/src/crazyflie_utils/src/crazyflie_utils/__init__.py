@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from crazyflie_utils.parameters.declaration import ParameterError as ParameterError
     from crazyflie_utils.parameters.declaration import Parameters as Parameters
     from crazyflie_utils.parameters.declaration import parameter as parameter
+    from crazyflie_utils.parameters.declaration import topic as topic
     from crazyflie_utils.program import run_program as run_program
     from crazyflie_utils.refusal import ServiceError as ServiceError
     from crazyflie_utils.tf.frame_tree import StampedPose as StampedPose
@@ -32,6 +33,7 @@ _HOME = {
     "run": "crazyflie_utils.main",
     "run_nodes": "crazyflie_utils.main",
     "run_program": "crazyflie_utils.program",
+    "topic": "crazyflie_utils.parameters.declaration",
 }
 
 

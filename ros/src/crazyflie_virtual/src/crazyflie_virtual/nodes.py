@@ -6,8 +6,7 @@ from typing import ClassVar, cast
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from typing_extensions import override
 
-from crazyflie_utils import Node, NodeHandle, ParameterError, TransformError, parameter
-from crazyflie_utils.parameters.types import TOPIC
+from crazyflie_utils import Node, NodeHandle, ParameterError, TransformError, topic
 from crazyflie_virtual.mocap import MocapServer, MocapSettings
 from crazyflie_virtual.server import Server, VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
@@ -68,8 +67,8 @@ _LOOK_PERIOD = 0.05  #: Period at which the moving objects of the vehicle's worl
 class VehicleParameters(VehicleSettings):
     """Parameters of `VirtualCrazyflieNode`."""
 
-    true_pose_topic: str = parameter(
-        TOPIC, "the true pose, for the drift in a report", "~true_pose", "topics/true_pose"
+    true_pose_topic: str = topic(
+        "true_pose", "the true pose, for the drift in a report", "~true_pose"
     )
 
 

@@ -7,7 +7,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import FlightStatus
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
 from crazyflie_utils.flight_status import FlightTopics
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
@@ -58,12 +58,8 @@ class WorldNodeParameters(Parameters):
     """Parameters of `WorldNode`."""
 
     world: World = parameter(WORLD_FILE, "the world, a YAML file")
-    markers_topic: str = parameter(
-        TOPIC, "markers for RViz, latched", "world/markers", name="topics/markers"
-    )
-    poses_topic: str = parameter(
-        TOPIC, "namespace of the moving objects' poses, NAME/pose", "world", name="topics/poses"
-    )
+    markers_topic: str = topic("markers", "markers for RViz, latched", "world/markers")
+    poses_topic: str = topic("poses", "namespace of the moving objects' poses, NAME/pose", "world")
     flight: _FlightTopics = group(_FlightTopics, "topics")
     time_step: float = parameter(TIME_STEP, "period of the poses", 0.02)
 

@@ -10,9 +10,9 @@ from typing_extensions import override
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
-from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter, topic
 from crazyflie_utils.last_valid import LastValid
-from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TOPIC
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME
 
 
 class FlownPath:
@@ -73,14 +73,14 @@ class VisualizerParameters(Parameters):
 
     fixed_frame: str = parameter(FRAME, "frame of the markers", name="frames/fixed")
     robot_frame: str = parameter(FRAME, "frame of the vehicle", name="frames/robot")
-    reference_topic: str = parameter(TOPIC, "where references come from", name="topics/reference")
+    reference_topic: str = topic("reference", "where references come from")
     has_yaw: bool = parameter(
         BOOLEAN,
         "references are PositionVelocityYawStateStamped instead of PositionVelocityStateStamped",
         False,
         "reference/yaw",
     )
-    markers_topic: str = parameter(TOPIC, "where markers go", name="topics/markers")
+    markers_topic: str = topic("markers", "where markers go")
 
 
 class VisualizerNode(Node[VisualizerParameters]):

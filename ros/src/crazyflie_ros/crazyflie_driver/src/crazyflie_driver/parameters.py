@@ -16,13 +16,12 @@ from crazyflie_link.limits import (
     REPEATS,
     SHORTEST_PERIOD_MS,
 )
-from crazyflie_utils import ParameterError, Parameters, ServiceError, parameter
+from crazyflie_utils import ParameterError, Parameters, ServiceError, parameter, topic
 from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, group, read_parameter
 from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FRAME,
     TEXT,
-    TOPIC,
     Converted,
     Integer,
     ListOf,
@@ -109,11 +108,8 @@ class CrazyflieServerParameters(Parameters):
         15.0,
         "connect/limit",
     )
-    emergency_topic: str = parameter(
-        TOPIC,
-        "std_msgs/Empty, stops the motors of all vehicles, for good",
-        "/all/emergency",
-        "topics/emergency",
+    emergency_topic: str = topic(
+        "emergency", "std_msgs/Empty, stops the motors of all vehicles, for good", "/all/emergency"
     )
     link: LinkLimits = group(LinkLimits, "link")
     broadcast: BroadcastParameters = group(BroadcastParameters, "broadcast")

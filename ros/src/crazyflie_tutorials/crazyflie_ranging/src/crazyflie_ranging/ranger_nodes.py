@@ -12,8 +12,8 @@ from typing_extensions import override
 
 from crazyflie_driver.msg import GenericLogData
 from crazyflie_ranging.range_sensors import SENSOR_FILE, ULTRASONIC, Ranger, RangeSensor
-from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TEXT, TIME_STEP, TOPIC, Integer, ListOf
+from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter, topic
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TEXT, TIME_STEP, Integer, ListOf
 from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 from crazyflie_utils.vectors import stamped
@@ -25,9 +25,7 @@ class RangerParameters(Parameters):
     """Parameters that both nodes have."""
 
     sensors: tuple[RangeSensor, ...] = parameter(SENSOR_FILE, "the sensors, a YAML file")
-    ranges_topic: str = parameter(
-        TOPIC, "namespace of the sensors' topics", "range", name="topics/ranges"
-    )
+    ranges_topic: str = topic("ranges", "namespace of the sensors' topics", "range")
     robot_frame: str = parameter(FRAME, "tf frame of the vehicle", "crazyflie", "frames/robot")
 
 
@@ -73,7 +71,7 @@ class DeckRangerParameters(RangerParameters):
         "variables of the log block in their order, as in the driver's parameter",
         name="genericLogTopic_ranges_Variables",
     )
-    log_topic: str = parameter(TOPIC, "rate of the log block", "crazyflie/ranges", "topics/log")
+    log_topic: str = topic("log", "rate of the log block", "crazyflie/ranges")
 
     @override
     def complaints(self) -> Iterator[str]:

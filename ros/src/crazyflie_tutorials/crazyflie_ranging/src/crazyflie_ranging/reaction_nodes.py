@@ -10,8 +10,8 @@ from typing_extensions import override
 
 from crazyflie_ranging.reactions import AXES, ObjectFollower, ObstacleStop
 from crazyflie_references.velocity_reference import Velocity
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, ListOf, Text
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
+from crazyflie_utils.parameters.types import TIME_STEP, ListOf, Text
 from crazyflie_utils.vectors import is_finite
 
 
@@ -22,8 +22,8 @@ class LatestRanges:
         self._handle = handle
         self._age = age
         self._readings = [(math.nan, -math.inf)] * len(topics)
-        for number, topic in enumerate(topics):
-            handle.subscribe(topic, Range, partial(self._take, number))
+        for number, name in enumerate(topics):
+            handle.subscribe(name, Range, partial(self._take, number))
 
     def _take(self, number, message):
         if not math.isnan(message.range):
@@ -58,10 +58,10 @@ class SilenceParameters(Parameters):
 class FollowObjectParameters(SilenceParameters, ObjectFollower):
     """Parameters of `FollowObjectNode`."""
 
-    front_topic: str = parameter(TOPIC, "the sensor in front", "range/front", "topics/front")
-    left_topic: str = parameter(TOPIC, "the sensor at the left", "range/left", "topics/left")
-    right_topic: str = parameter(TOPIC, "the sensor at the right", "range/right", "topics/right")
-    cmd_vel_topic: str = parameter(TOPIC, "where velocities go", "cmd_vel", "topics/cmd_vel")
+    front_topic: str = topic("front", "the sensor in front", "range/front")
+    left_topic: str = topic("left", "the sensor at the left", "range/left")
+    right_topic: str = topic("right", "the sensor at the right", "range/right")
+    cmd_vel_topic: str = topic("cmd_vel", "where velocities go", "cmd_vel")
 
 
 class FollowObjectNode(Node[FollowObjectParameters]):
@@ -94,18 +94,15 @@ class FollowObjectNode(Node[FollowObjectParameters]):
 class ObstacleStopParameters(SilenceParameters, ObstacleStop):
     """Parameters of `ObstacleStopNode`."""
 
-    in_topic: str = parameter(
-        TOPIC, "velocities in the heading frame, m/s and rad/s", "cmd_vel_in", "topics/cmd_vel_in"
+    in_topic: str = topic(
+        "cmd_vel_in", "velocities in the heading frame, m/s and rad/s", "cmd_vel_in"
     )
-    out_topic: str = parameter(
-        TOPIC,
+    out_topic: str = topic(
+        "cmd_vel_out",
         "the velocities, limited so that the vehicle stops before obstacles",
         "cmd_vel",
-        "topics/cmd_vel_out",
     )
-    ranges_topic: str = parameter(
-        TOPIC, "namespace of the sensors, one for each direction", "range", name="topics/ranges"
-    )
+    ranges_topic: str = topic("ranges", "namespace of the sensors, one for each direction", "range")
     directions: tuple[str, ...] = parameter(
         ListOf(Text(tuple(AXES))),
         "guarded directions; a silent sensor stops all motion in its direction",

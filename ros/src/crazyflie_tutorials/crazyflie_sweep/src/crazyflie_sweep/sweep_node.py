@@ -26,7 +26,7 @@ from crazyflie_tutorial_msgs.srv import (
     VelocityAtResponse,
     VelocityResponse,
 )
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
 from crazyflie_utils.flight_status import FlightTopics
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import (
@@ -34,7 +34,6 @@ from crazyflie_utils.parameters.types import (
     FRAME,
     SERVICE,
     TIME_STEP,
-    TOPIC,
     Integer,
     Number,
 )
@@ -117,14 +116,12 @@ class SweepParameters(SweepPlan):
     velocity_service: str = parameter(
         SERVICE, "service with the velocity for a position", "oscillator", "srv/velocity"
     )
-    state_topic: str = parameter(TOPIC, "states of the vehicle", name="topics/state")
-    reference_topic: str = parameter(TOPIC, "where references go", name="topics/reference")
+    state_topic: str = topic("state", "states of the vehicle")
+    reference_topic: str = topic("reference", "where references go")
     flight: FlightTopics = group(FlightTopics, "topics")
-    report_topic: str = parameter(TOPIC, "status of the sweep", "~report", "topics/report")
-    velocity_topic: str = parameter(
-        TOPIC, "speed of the reference, as `Vel` linear", "~velocity", "topics/velocity"
-    )
-    markers_topic: str = parameter(TOPIC, "for RViz", "~markers", "topics/markers")
+    report_topic: str = topic("report", "status of the sweep", "~report")
+    velocity_topic: str = topic("velocity", "speed of the reference, as `Vel` linear", "~velocity")
+    markers_topic: str = topic("markers", "for RViz", "~markers")
 
 
 class SweepNode(Node[SweepParameters]):

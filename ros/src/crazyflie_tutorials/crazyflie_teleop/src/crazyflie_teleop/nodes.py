@@ -11,9 +11,9 @@ from typing_extensions import override
 from crazyflie_lqr.lqr_nodes import PositionVelocityYawStateLiftLqrNode
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_references.velocity_reference import Velocity
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import BOOLEAN, SERVICE, TIME_STEP, TOPIC, Integer, Number
+from crazyflie_utils.parameters.types import BOOLEAN, SERVICE, TIME_STEP, Integer, Number
 
 
 def circle_velocity(radius: float, speed: float, clockwise: bool) -> Velocity:
@@ -29,7 +29,7 @@ def circle_velocity(radius: float, speed: float, clockwise: bool) -> Velocity:
 class CircleParameters(Parameters):
     """Parameters of `CircleNode`."""
 
-    cmd_vel_topic: str = parameter(TOPIC, "topic of the velocities", "cmd_vel", "topics/cmd_vel")
+    cmd_vel_topic: str = topic("cmd_vel", "topic of the velocities", "cmd_vel")
     time_step: float = parameter(TIME_STEP, "period of the velocities", 0.1)
     radius: float = parameter(Number("m", above=0.0), "radius of the circle", 0.5, live=True)
     speed: float = parameter(Number("m/s", above=0.0), "speed along the circle", 0.3, live=True)
@@ -90,8 +90,8 @@ class JoyVelocityParameters(Parameters):
     yaw_dot: float = parameter(
         Number("rad/s", above=0.0), "yaw rate at full deflection", 1.0, "speed/yaw_dot", live=True
     )
-    joy_topic: str = parameter(TOPIC, "a joystick, or a keyboard", "joy", "topics/joy")
-    cmd_vel_topic: str = parameter(TOPIC, "topic of the velocities", "cmd_vel", "topics/cmd_vel")
+    joy_topic: str = topic("joy", "a joystick, or a keyboard", "joy")
+    cmd_vel_topic: str = topic("cmd_vel", "topic of the velocities", "cmd_vel")
     takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
     land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
     emergency_service: str | None = parameter(

@@ -15,8 +15,9 @@ from crazyflie_utils import (
     Parameters,
     TransformError,
     parameter,
+    topic,
 )
-from crazyflie_utils.parameters.types import FRAME, TOPIC, path_of
+from crazyflie_utils.parameters.types import FRAME, path_of
 from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_vision.camera import CameraParameters, Pinhole, PixelNoise, Pose, load, optical_pose
 from crazyflie_vision.images import camera_info, to_message
@@ -41,9 +42,9 @@ class CameraNodeParameters(Parameters):
     camera_frame: str = parameter(
         FRAME, "the camera's optical frame", "crazyflie/camera", name="frames/camera"
     )
-    image_topic: str = parameter(TOPIC, "images", "camera/image_raw", name="topics/image")
-    info_topic: str = parameter(
-        TOPIC, "parameters of the camera, with each image", "camera/camera_info", name="topics/info"
+    image_topic: str = topic("image", "images", "camera/image_raw")
+    info_topic: str = topic(
+        "info", "parameters of the camera, with each image", "camera/camera_info"
     )
 
 

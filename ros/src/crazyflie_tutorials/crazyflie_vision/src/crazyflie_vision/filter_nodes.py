@@ -7,8 +7,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 from typing_extensions import TypeVar, override
 
-from crazyflie_utils import NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import TOPIC, Integer, Number
+from crazyflie_utils import NodeHandle, Parameters, parameter, topic
+from crazyflie_utils.parameters.types import Integer, Number
 from crazyflie_vision import filters
 from crazyflie_vision.images import ImageNode, to_message
 
@@ -16,8 +16,8 @@ from crazyflie_vision.images import ImageNode, to_message
 class FilterParameters(Parameters):
     """Parameters that all filters have."""
 
-    image_topic: str = parameter(TOPIC, "input images", "camera/image_raw", name="topics/image")
-    result_topic: str = parameter(TOPIC, "resulting images", "~image", name="topics/result")
+    image_topic: str = topic("image", "input images", "camera/image_raw")
+    result_topic: str = topic("result", "resulting images", "~image")
 
 
 F = TypeVar("F", bound=FilterParameters, default=FilterParameters)

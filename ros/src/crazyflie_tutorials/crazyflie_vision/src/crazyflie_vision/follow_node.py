@@ -7,8 +7,8 @@ from sensor_msgs.msg import CameraInfo
 from typing_extensions import override
 
 from crazyflie_references.velocity_reference import Velocity
-from crazyflie_utils import Node, NodeHandle, parameter
-from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
+from crazyflie_utils import Node, NodeHandle, parameter, topic
+from crazyflie_utils.parameters.types import TIME_STEP
 from crazyflie_vision.follow import TargetFollower
 from crazyflie_vision.trackers import Target
 
@@ -20,15 +20,9 @@ class FollowParameters(TargetFollower):
         TIME_STEP, "time without a target after which the vehicle stops", 0.12, live=True
     )
     time_step: float = parameter(TIME_STEP, "period of the velocities", 0.02)
-    target_topic: str = parameter(
-        TOPIC, "the target: x, y and, as z, radius in pixels", "target", name="topics/target"
-    )
-    info_topic: str = parameter(
-        TOPIC, "parameters of the camera", "camera/camera_info", name="topics/info"
-    )
-    cmd_vel_topic: str = parameter(
-        TOPIC, "velocities in the heading frame", "cmd_vel", name="topics/cmd_vel"
-    )
+    target_topic: str = topic("target", "the target: x, y and, as z, radius in pixels", "target")
+    info_topic: str = topic("info", "parameters of the camera", "camera/camera_info")
+    cmd_vel_topic: str = topic("cmd_vel", "velocities in the heading frame", "cmd_vel")
 
 
 class FollowNode(Node[FollowParameters]):

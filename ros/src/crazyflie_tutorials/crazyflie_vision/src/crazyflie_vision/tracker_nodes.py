@@ -8,8 +8,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 from typing_extensions import TypeVar, override
 
-from crazyflie_utils import NodeHandle, ParameterError, Parameters, parameter
-from crazyflie_utils.parameters.types import TEXT, TOPIC, Integer, Number
+from crazyflie_utils import NodeHandle, ParameterError, Parameters, parameter, topic
+from crazyflie_utils.parameters.types import TEXT, Integer, Number
 from crazyflie_vision.images import ImageNode, to_message
 from crazyflie_vision.trackers import CASCADE, ColourBounds, FaceDetector, Target, draw, find
 
@@ -17,13 +17,9 @@ from crazyflie_vision.trackers import CASCADE, ColourBounds, FaceDetector, Targe
 class TrackerParameters(Parameters):
     """Parameters that all trackers have."""
 
-    image_topic: str = parameter(TOPIC, "input images", "camera/image_raw", name="topics/image")
-    target_topic: str = parameter(
-        TOPIC, "the target: x, y and, as z, radius in pixels", "target", name="topics/target"
-    )
-    debug_topic: str = parameter(
-        TOPIC, "images with the target marked", "~image", name="topics/debug_image"
-    )
+    image_topic: str = topic("image", "input images", "camera/image_raw")
+    target_topic: str = topic("target", "the target: x, y and, as z, radius in pixels", "target")
+    debug_topic: str = topic("debug_image", "images with the target marked", "~image")
 
 
 T = TypeVar("T", bound=TrackerParameters, default=Any)

@@ -7,8 +7,8 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 from typing_extensions import override
 
-from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
-from crazyflie_utils.parameters.types import FRAME, TEXT, TOPIC, Integer, Number
+from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter, topic
+from crazyflie_utils.parameters.types import FRAME, TEXT, Integer, Number
 from crazyflie_vision.camera import Pinhole
 from crazyflie_vision.frame_source import FrameSource, open_source
 from crazyflie_vision.images import camera_info, to_message
@@ -31,9 +31,9 @@ class WebcamParameters(Parameters):
         60.0,
     )
     frame: str = parameter(FRAME, "the camera's optical frame", "camera", name="frames/camera")
-    image_topic: str = parameter(TOPIC, "images", "camera/image_raw", name="topics/image")
-    info_topic: str = parameter(
-        TOPIC, "parameters of the camera, with each image", "camera/camera_info", name="topics/info"
+    image_topic: str = topic("image", "images", "camera/image_raw")
+    info_topic: str = topic(
+        "info", "parameters of the camera, with each image", "camera/camera_info"
     )
 
 

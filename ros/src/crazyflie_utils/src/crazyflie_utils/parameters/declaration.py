@@ -12,7 +12,7 @@ import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Self, dataclass_transform
 
-from crazyflie_utils.parameters.types import ParameterType, checked
+from crazyflie_utils.parameters.types import TOPIC, ParameterType, checked
 
 REQUIRED = dataclasses.MISSING  #: Default of a parameter that must be set.
 
@@ -75,12 +75,19 @@ def parameter(
     return dataclasses.field(default=default, metadata={_KEY: declaration})
 
 
+def topic(name: str, help: str, default: Any = REQUIRED) -> Any:  # noqa: A002
+    """Declare the parameter topics/NAME, the name of a topic; see `parameter`."""
+    return parameter(TOPIC, help, default, f"topics/{name}")
+
+
 def group(type: "type[Parameters]", prefix: str) -> Any:  # noqa: A002
     """Declare a field that holds further parameters, whose names begin with ``prefix/``."""
     return dataclasses.field(metadata={_KEY: _Group(prefix, type)})
 
 
-@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(parameter, group))
+@dataclass_transform(
+    frozen_default=True, kw_only_default=True, field_specifiers=(parameter, topic, group)
+)
 class Parameters:
     """Base class of declarations; an object of a subclass has checked values.
 

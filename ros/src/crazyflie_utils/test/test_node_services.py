@@ -4,7 +4,16 @@ from concurrent.futures import Future
 
 import pytest
 from std_msgs.msg import String
-from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerResponse
+from std_srvs.srv import (
+    Empty,
+    EmptyRequest,
+    EmptyResponse,
+    SetBool,
+    SetBoolRequest,
+    SetBoolResponse,
+    Trigger,
+    TriggerResponse,
+)
 
 from crazyflie_utils.refusal import RefusalError, ServiceError
 
@@ -17,6 +26,19 @@ def test_service_answers(process, handle):
     )
     answer = process.call("/ns/node/switch", SetBoolRequest(True))
     assert (answer.success, answer.message) == (True, "done")
+
+
+def test_a_response_without_data_need_not_be_returned(process, handle):
+    late = Future()
+    handle.advertise_service("reset", Empty, lambda request: None)
+    handle.advertise_service("reset_later", Empty, lambda request: late)
+    assert process.call("/ns/reset", EmptyRequest()) == EmptyResponse()
+    answer = process.call("/ns/reset_later", EmptyRequest())
+    late.set_result(None)
+    assert answer.result(LIMIT) == EmptyResponse()
+    # One with data is never made up.
+    handle.advertise_service("go", Trigger, lambda request: None)
+    assert process.call("/ns/go", None) is None
 
 
 @pytest.mark.parametrize("error", [ServiceError, RefusalError])

@@ -1,12 +1,12 @@
 """ROS interface of the odometer."""
 
 from std_msgs.msg import Float64
-from std_srvs.srv import Empty, EmptyResponse
+from std_srvs.srv import Empty
 from typing_extensions import override
 
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Number
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
+from crazyflie_utils.parameters.types import TIME_STEP, Number
 from odometer.odometer import Odometer
 
 
@@ -14,8 +14,8 @@ class OdometerParameters(Parameters):
     """Parameters of `OdometerNode`."""
 
     time_step: float = parameter(TIME_STEP, "from one message to the next")
-    state_topic: str = parameter(TOPIC, "where states come from", name="topics/state")
-    distance_topic: str = parameter(TOPIC, "where distances go", name="topics/distance")
+    state_topic: str = topic("state", "where states come from")
+    distance_topic: str = topic("distance", "where distances go")
     max_step: float = parameter(
         Number("m", above=0.0),
         "two positions further apart are a jump, which is not counted",
@@ -47,7 +47,6 @@ class OdometerNode(Node):
 
     def _on_reset(self, _):
         self._odometer.reset()
-        return EmptyResponse()
 
     def _on_state(self, message):
         self._odometer.add((message.state.x, message.state.y, message.state.z))

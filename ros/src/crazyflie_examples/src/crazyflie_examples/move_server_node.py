@@ -2,7 +2,7 @@
 
 import itertools
 
-from std_srvs.srv import Empty, EmptyResponse
+from std_srvs.srv import Empty
 from typing_extensions import override
 
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
@@ -72,4 +72,3 @@ class MoveServerNode(Node[MoveServerParameters]):
         state, stamp = PositionVelocityState(x=x, y=y, z=z), self._handle.stamp()
         self._publisher.publish(stamped(PositionVelocityStateStamped, stamp, state=state))
         self._handle.info(f"on to ({x:g}, {y:g}, {z:g}) m")
-        return EmptyResponse()

@@ -2,7 +2,6 @@
 
 from concurrent.futures import Future
 from functools import partial
-from typing import Any
 
 from std_srvs.srv import Empty
 from typing_extensions import override
@@ -125,7 +124,7 @@ class FleetServicesNode(Node):
         refusals = yield self._call(names, service, service_type, request, is_takeoff=True)
         if idle := self._have_not_begun(refusals):
             yield from self._abort(refusals, [name for name in names if name not in idle])
-        return self._response(service_type, refusals)
+        self._raise(refusals)
 
     def _have_not_begun(self, names):
         return [name for name in names if self._states.flight_state(name) in _NOT_BEGUN]
@@ -153,9 +152,8 @@ class FleetServicesNode(Node):
         }
         raise ServiceError(text + (f"; MAY STILL FLY: {self._text(failures)}" if failures else ""))
 
-    def _land(self, _, service_type, __):
-        refusals = yield self._lander.land(self._fleet.names)
-        return self._response(service_type, refusals)
+    def _land(self, *_):
+        self._raise((yield self._lander.land(self._fleet.names)))
 
     def _go_to(self, service, service_type, request):
         if not request.relative and len(self._fleet.vehicles) > 1:
@@ -166,8 +164,7 @@ class FleetServicesNode(Node):
         return (yield from self._command(service, service_type, request))
 
     def _command(self, service, service_type, request):
-        refusals = yield self._call(self._fleet.names, service, service_type, request)
-        return self._response(service_type, refusals)
+        self._raise((yield self._call(self._fleet.names, service, service_type, request)))
 
     def _call(self, names, service, service_type, request, is_takeoff=False):
         """Call the services of vehicles; return the future of their refusals.
@@ -191,10 +188,9 @@ class FleetServicesNode(Node):
             call.add_done_callback(partial(on_answer, name))
         return outcome
 
-    def _response(self, service_type: Any, refusals: Refusals) -> Any:
+    def _raise(self, refusals: Refusals) -> None:
         if refusals:
             raise ServiceError(self._text(refusals))
-        return service_type._response_class()
 
     def _text(self, refusals: Refusals) -> str:
         return refusals_text(refusals, len(self._fleet.vehicles))

@@ -8,7 +8,7 @@ from typing import Any
 
 from std_msgs.msg import Empty as EmptyMessage
 from std_msgs.msg import String
-from std_srvs.srv import Empty, EmptyResponse
+from std_srvs.srv import Empty
 from typing_extensions import override
 
 from crazyflie_driver import srv
@@ -78,7 +78,7 @@ class HighLevelNode(Node[HighLevelParameters]):
             ("go_to", srv.GoTo, self._on_go_to),
             ("start_trajectory", srv.StartTrajectory, self._on_start),
         ):
-            call = partial(self._for_members, service_type, callback)
+            call = partial(self._for_members, callback)
             handle.advertise_service(f"~{name}", service_type, call)
         for name, service_type, callback in (
             ("emergency", Empty, self._on_emergency),
@@ -86,7 +86,7 @@ class HighLevelNode(Node[HighLevelParameters]):
             ("notify_setpoints_stop", srv.NotifySetpointsStop, self._on_setpoints_stop),
             ("set_group_mask", srv.SetGroupMask, self._on_set_group_mask),
             # Services that only the firmware could carry out.
-            ("update_params", srv.UpdateParams, lambda _: srv.UpdateParamsResponse()),
+            ("update_params", srv.UpdateParams, lambda _: None),
         ):
             handle.advertise_service(f"~{name}", service_type, callback)
         parameters.flight.subscribe(handle, self._on_flight_status)
@@ -133,7 +133,7 @@ class HighLevelNode(Node[HighLevelParameters]):
             landings, self._landings = self._landings, []
             for answer in landings:
                 if not answer.done():
-                    answer.set_result(srv.LandResponse())
+                    answer.set_result(None)
 
     def _on_reference(self):
         # When it sends the hover point, the server hands the vehicle over to the controller.
@@ -187,14 +187,13 @@ class HighLevelNode(Node[HighLevelParameters]):
 
     def _on_set_group_mask(self, request):
         self._groups = request.groupMask
-        return srv.SetGroupMaskResponse()
 
-    def _for_members(self, service_type, callback, request):
+    def _for_members(self, callback, request):
         """Call ``callback(request)``; ignore requests to other groups, as the firmware does."""
         # The mask of a command to all vehicles is 0.
         if request.groupMask == 0 or request.groupMask & self._groups:
             return callback(request)
-        return service_type._response_class()
+        return None
 
     def _on_takeoff(self, request):
         duration = request.duration.to_sec()
@@ -213,30 +212,30 @@ class HighLevelNode(Node[HighLevelParameters]):
         hover = at_rest((x, y, request.height), start.yaw)
         if self._is_followed() or self._takeoff is not None:
             self._execute(CommandFollower.go_to, hover.position, hover.yaw, duration)
-            return srv.TakeoffResponse()
+            return None
         takeoff = self._takeoff = _Takeoff(hover, self._handle.time() + duration)
 
         def forget_refused(call):
             if call.exception() is not None and self._takeoff is takeoff:
                 self._forget_takeoff()
 
-        call = relay(self._handle, self._parameters.takeoff, srv.TakeoffResponse)
+        call = relay(self._handle, self._parameters.takeoff)
         call.add_done_callback(self._handle.guard(forget_refused))
         return call
 
     def _on_land(self, _):
         if self._status.state == FlightStatus.ON_GROUND:
-            return srv.LandResponse()
-        answer = relay(self._handle, self._parameters.land, srv.LandResponse)
+            return None
+        answer = relay(self._handle, self._parameters.land)
         if self._status.state in (FlightStatus.DESCENDING, FlightStatus.LANDING):
-            return srv.LandResponse()
+            return None
         # The server answers after the landing, the driver when it begins.
         self._landings.append(answer)
         return answer
 
     def _on_emergency(self, _):
         self._references.forget()
-        return relay(self._handle, self._parameters.emergency, EmptyResponse)
+        return relay(self._handle, self._parameters.emergency)
 
     def _on_stop(self, _):
         if self._status.state in (FlightStatus.FLYING, FlightStatus.TAKING_OFF):
@@ -244,11 +243,9 @@ class HighLevelNode(Node[HighLevelParameters]):
                 f"the vehicle is {WORDS[self._status.state]}; expected it to have landed: stop "
                 "would let it fall; for that, call emergency"
             )
-        return srv.StopResponse()
 
     def _on_go_to(self, request):
         self._execute(CommandFollower.go_to, *self._move(request))
-        return srv.GoToResponse()
 
     def _on_limited_go_to(self, request):
         move = self._move(request)
@@ -256,7 +253,6 @@ class HighLevelNode(Node[HighLevelParameters]):
             self._go(CommandFollower.go_to, *move, True)
         except RefusalError as reason:
             raise RefusalError(f"{self._handle.resolve('go_to')} refused: {reason}") from None
-        return srv.GoToResponse()
 
     def _move(self, request):
         """Return the arguments of `CommandFollower.go_to`."""
@@ -276,12 +272,10 @@ class HighLevelNode(Node[HighLevelParameters]):
             )
         pieces = [from_message(piece) for piece in request.pieces]
         self._references.follower.upload(request.trajectoryId, pieces)
-        return srv.UploadTrajectoryResponse()
 
     def _on_start(self, request):
         flown = (request.trajectoryId, request.timescale, request.reversed, request.relative)
         self._execute(CommandFollower.start, *flown)
-        return srv.StartTrajectoryResponse()
 
     def _on_start_all(self, message):
         if self._handle.name not in message.data.split():
@@ -293,7 +287,6 @@ class HighLevelNode(Node[HighLevelParameters]):
 
     def _on_setpoints_stop(self, _):
         self._references.end_setpoints()
-        return srv.NotifySetpointsStopResponse()
 
     def _is_to_land(self):
         """Return whether only the fleet moves the vehicle."""

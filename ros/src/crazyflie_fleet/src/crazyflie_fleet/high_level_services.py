@@ -126,12 +126,12 @@ class HighLevelParameters(Parameters):
 _CALL_TIMEOUT = 58.0  #: Timeout of the server's takeoffs and landings (s of the machine's clock).
 
 
-def relay(handle: NodeHandle, service: str, response_type: type) -> "Future[Any]":
-    """Call a service of type Empty; return the future of a response of another type.
+def relay(handle: NodeHandle, service: str) -> "Future[None]":
+    """Call a service of type Empty; return a future that is done when it has answered.
 
     An error after the future was set otherwise is logged.
     """
-    answer: Future[Any] = Future()
+    answer: Future[None] = Future()
 
     def on_done(done):
         error = done.exception()
@@ -139,7 +139,7 @@ def relay(handle: NodeHandle, service: str, response_type: type) -> "Future[Any]
             if error is not None:
                 handle.error(str(error))
         elif error is None:
-            answer.set_result(response_type())
+            answer.set_result(None)
         else:
             answer.set_exception(error)
 

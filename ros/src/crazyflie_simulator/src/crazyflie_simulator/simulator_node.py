@@ -5,7 +5,7 @@ import zlib
 from collections import deque
 from typing import Any
 
-from std_srvs.srv import Empty, EmptyResponse
+from std_srvs.srv import Empty
 from typing_extensions import override
 
 from crazyflie_model.dynamics import Coupled7D, Dynamics, NearHover
@@ -207,7 +207,6 @@ class SimulatorNode(Node[SimulatorParameters]):
 
     def _on_reset(self, _):
         self._vehicle.recover()
-        return EmptyResponse()
 
     def _on_timer(self):
         if self._handle.uses_sim_time:

@@ -2,7 +2,6 @@
 
 from std_msgs.msg import Empty
 from std_srvs.srv import Empty as EmptyService
-from std_srvs.srv import EmptyResponse
 from typing_extensions import override
 
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter, topic
@@ -39,7 +38,6 @@ class AllEmergencyNode(Node[AllEmergencyParameters]):
         if not self._publisher.has_subscribers():
             name = self._handle.resolve(self._parameters.topic)
             raise ServiceError(f"no filter listens on {name}: no vehicle has been stopped")
-        return EmptyResponse()
 
     def _on_timer(self):
         if self._left > 0:

@@ -5,7 +5,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import Empty as EmptyService
-from std_srvs.srv import EmptyResponse
 from typing_extensions import override
 
 from crazyflie_msgs.msg import (
@@ -266,7 +265,6 @@ class TakeoffControlFilterNode(Node):
 
     def _on_emergency(self, _):
         self._stop(f"{self._handle.resolve(self._parameters.emergency_service)} was called")
-        return EmptyResponse()
 
     def _stop(self, reason):
         self._filter.stop(reason)
@@ -279,7 +277,6 @@ class TakeoffControlFilterNode(Node):
             name = self._handle.resolve(self._parameters.reset_service)
             raise ServiceError(f"{name} refused: {reason}") from None
         self._publish_state()
-        return EmptyResponse()
 
     # Timers.
 

@@ -5,7 +5,6 @@ from concurrent.futures import Future
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Bool, Empty, Float32, String
 from std_srvs.srv import Empty as EmptyService
-from std_srvs.srv import EmptyResponse
 from typing_extensions import override
 
 from crazyflie_model.supervisor import SupervisorState
@@ -82,8 +81,8 @@ class TakeoffServerNode(Node):
         self._is_starting = True
         # Service calls are answered at the end of a takeoff or a landing. At most one is under way;
         # of those that wait, in their order, it is not known yet whether they may begin.
-        self._under_way: Future[EmptyResponse] = Future()
-        self._waiting: list[tuple[ServerEvent, Future[EmptyResponse]]] = []
+        self._under_way: Future[None] = Future()
+        self._waiting: list[tuple[ServerEvent, Future[None]]] = []
         self._state: FlightState | None = None  # The last state that was published.
         self._reason = ""  # Why the last landing or abort began.
         self._published: tuple[object, ...] | None = None
@@ -178,7 +177,7 @@ class TakeoffServerNode(Node):
         return self._serve(ServerEvent.LAND)
 
     def _serve(self, event):
-        future: Future[EmptyResponse] = Future()
+        future: Future[None] = Future()
         self._waiting.append((event, future))
         self._serve_waiting()
         return future.result() if future.done() else future
@@ -222,7 +221,7 @@ class TakeoffServerNode(Node):
         if failure:
             self._under_way.set_exception(ServiceError(failure))
         else:
-            self._under_way.set_result(EmptyResponse())
+            self._under_way.set_result(None)
 
     def _end_start(self):
         self._start_timer.stop()

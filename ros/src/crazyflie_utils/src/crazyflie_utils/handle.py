@@ -172,11 +172,12 @@ class NodeHandle:
     ) -> None:
         """Answer calls of a service.
 
-        ``callback(request)`` returns the response; or, for work that takes time, a
-        `concurrent.futures.Future` of it; or raises `ServiceError` or `RefusalError`
+        ``callback(request)`` returns the response, or None for one without data; or, for work that
+        takes time, a `concurrent.futures.Future` of it; or raises `ServiceError` or `RefusalError`
         with a text for the caller.
         """
-        full_name = self.resolve(name)
+        full_name, response_type = self.resolve(name), service_type._response_class
+        empty = None if response_type.__slots__ else response_type()
 
         def serve(request, is_withdrawn, answer):
             for latest in self._latest:
@@ -193,8 +194,8 @@ class NodeHandle:
                     self.report_fault(callback, error)
                 return self._refuse(answer, error)
             if isinstance(response, Future):
-                return response.add_done_callback(lambda done: self._forward(done, answer))
-            return answer.set_result(response)
+                return response.add_done_callback(lambda done: self._forward(done, answer, empty))
+            return answer.set_result(empty if response is None else response)
 
         def begin(request, is_withdrawn):
             answer: Future[Any] = Future()
@@ -208,14 +209,14 @@ class NodeHandle:
         is_refusal = isinstance(error, (ServiceError, RefusalError))
         answer.set_exception(ServiceError(str(error) if is_refusal else f"{self.name}: {error!r}"))
 
-    def _forward(self, done, to):
+    def _forward(self, done, to, empty=None):
         """Complete a future with the outcome of another, any error as a `ServiceError`."""
         if not to.set_running_or_notify_cancel():
             return
         if done.cancelled():
             self._refuse(to, ServiceError(f"{self.name}: cancelled"))
         elif (error := done.exception()) is None:
-            to.set_result(done.result())
+            to.set_result(empty if done.result() is None else done.result())
         else:
             if not isinstance(error, (ServiceError, RefusalError)):
                 self.error(f"a service failed\n{''.join(traceback.format_exception(error))}")

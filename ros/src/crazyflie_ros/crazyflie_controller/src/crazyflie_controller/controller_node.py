@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Iterator
 
 from geometry_msgs.msg import PoseStamped, Twist, Vector3
-from std_srvs.srv import Empty, EmptyResponse
+from std_srvs.srv import Empty
 from typing_extensions import override
 
 from crazyflie_controller.flight import GoToFlight, State
@@ -97,7 +97,6 @@ class ControllerNode(Node):
             manoeuvre()
         except RefusalError as reason:
             raise ServiceError(f"{self._handle.resolve(service)} refused: {reason}") from None
-        return EmptyResponse()
 
     def _on_goal(self, message):
         world_frame = self._parameters.world_frame

@@ -111,21 +111,20 @@ class FlightCommands:
         if self._vehicle.server.emergency_watchdog:
             self._vehicle.handle.timer(_WATCHDOG_PERIOD, self._feed, steady=True)
 
-    def send(self, command: Command, response: Result) -> Future[Result]:
+    def send(self, command: Command) -> Future[None]:
         """Submit a command, which follows the notice that setpoints stop if they were streamed.
 
         Every cause of a refusal, and of no effect, is checked before a stream is ended. Landing and
         stopping supersede all commands and uploads before them. A landing of a vehicle that lands
-        already is a success. The result of the future is ``response``.
+        already is a success.
         """
 
-        def work(job: Job) -> Result:
+        def work(job: Job) -> None:
             need = self._check(command, job)
             if need is Need.NOT_ADDRESSED:
                 command.send(self._vehicle.crazyflie.high_level.guarded(job.may_send))
             elif need is not Need.ON_GROUND:
                 self._execute(command, job)
-            return response
 
         return self._vehicle.jobs.submit(
             command.name, work, is_flight=True, urgent=command.ends_flight
@@ -444,7 +443,7 @@ class FlightCommands:
     def _send_landing(self, command):
         self._begin = self._vehicle.handle.time()
         self._end = self._begin + command.duration + _MARGIN
-        return self.send(command, None)
+        return self.send(command)
 
     def _feed(self):
         # Also when the reply to the first command was lost.

@@ -23,9 +23,7 @@ from crazyflie_driver.parameters import (
 )
 from crazyflie_driver.srv import (
     AddCrazyflie,
-    AddCrazyflieResponse,
     RemoveCrazyflie,
-    RemoveCrazyflieResponse,
 )
 from crazyflie_driver.status import diagnostics
 from crazyflie_driver.vehicle import DriverVehicle
@@ -142,8 +140,7 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
         handle.advertise_service(ADD, AddCrazyflie, self._on_add)
         handle.advertise_service(REMOVE, RemoveCrazyflie, self._on_remove)
         for name, service_type in SERVICE_TYPES.items():
-            callback = partial(self._on_command, name, service_type._response_class())
-            handle.advertise_service(f"~all/{name}", service_type, callback)
+            handle.advertise_service(f"~all/{name}", service_type, partial(self._on_command, name))
         handle.advertise_service("~all/emergency", std_srvs.Empty, self._on_emergency)
         handle.subscribe(self._parameters.emergency_topic, Empty, self._on_emergency)
         self._inhibit_shutdown = handle.inhibit_shutdown()
@@ -204,7 +201,6 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
         if done.exception() is not None:
             self._forget(vehicle)
         done.result()
-        return AddCrazyflieResponse()
 
     def _on_remove(self, request):
         vehicle = None
@@ -223,9 +219,8 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
         if problem := done.result():
             raise ServiceError(f"{vehicle.parameters.uri} is removed, but {problem}")
         vehicle.info("removed")
-        return RemoveCrazyflieResponse()
 
-    def _on_command(self, name, response, request):
+    def _on_command(self, name, request):
         if name in _GO_TO and not request.relative:
             raise ServiceError(
                 f"{name} of all vehicles: relative is False, and they cannot go to one place; "
@@ -238,12 +233,7 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
             raise ServiceError(f"{name} of all vehicles: none is connected; expected one or more")
         # Started here, in the order of the calls.
         checks = {vehicle: vehicle.commands.check(command) for vehicle in ready}
-
-        def work(_: Job) -> Any:
-            self._send(command, channels, checks)
-            return response
-
-        return Job(work).start(f"all-{name}")
+        return Job(lambda _: self._send(command, channels, checks)).start(f"all-{name}")
 
     def _send(
         self,
@@ -262,7 +252,7 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
             for vehicle in channel.vehicles:
                 if vehicle in needs:
                     own = command.by(shared if needs[vehicle] is Need.COMMAND else None)
-                    sent[vehicle] = vehicle.commands.send(own, None)
+                    sent[vehicle] = vehicle.commands.send(own)
         refusals.update(_results(sent, not command.ends_flight)[1])
         if refusals:
             raise ServiceError(f"{command.name}: {refusals_text(refusals, len(checks))}")
@@ -278,7 +268,6 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
                 vehicle.error(f"emergency stop, sent when there is a link: {error}")
             else:
                 vehicle.error("emergency stop of all vehicles")
-        return std_srvs.EmptyResponse()
 
     def _forget(self, vehicle: DriverVehicle) -> None:
         address = vehicle.crazyflie.address

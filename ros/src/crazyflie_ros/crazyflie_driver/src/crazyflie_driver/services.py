@@ -213,11 +213,11 @@ class VehicleServices:
         if crazyflie.address.is_radio:
             services["reboot"] = Empty, self._reboot
         callbacks: dict[str, tuple[type, Callable[[Any], Any]]] = {
-            name: (kind, partial(self._on_call, name, kind, work))
+            name: (kind, partial(self._on_call, name, work))
             for name, (kind, work) in services.items()
         }
         for name, kind in SERVICE_TYPES.items():
-            callbacks[name] = kind, partial(self._on_command, name, kind)
+            callbacks[name] = kind, partial(self._on_command, name)
         handle, prefix = self._vehicle.handle, self._vehicle.parameters.prefix
         nodes = handle.service_nodes()
         for name, (kind, callback) in callbacks.items():
@@ -227,18 +227,15 @@ class VehicleServices:
                 handle.warn(f"{desired} is a service of {nodes[desired]}: the driver's is {free}")
             handle.advertise_service(free, kind, callback)
 
-    def _on_command(self, name, kind, request):
-        return self._commands.send(requested(name, request), kind._response_class())
+    def _on_command(self, name, request):
+        return self._commands.send(requested(name, request))
 
-    def _on_call(self, name, kind, work, request):
-        def answer(job):
-            response = work(job, request)
-            return kind._response_class() if response is None else response
-
+    def _on_call(self, name, work, request):
         if name not in _AT_ONCE:
-            return self._vehicle.jobs.submit(name, answer, is_flight=name in _UPLOADS)
+            is_flight = name in _UPLOADS
+            return self._vehicle.jobs.submit(name, lambda job: work(job, request), is_flight)
         try:
-            return answer(None)
+            return work(None, request)
         except CrazyflieError as error:
             raise ServiceError(str(error)) from None
 

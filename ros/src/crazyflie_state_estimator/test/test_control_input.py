@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from crazyflie_model.limits import HOLD_LIMIT
 from crazyflie_model.units import GRAVITY
 from crazyflie_state_estimator.control_response import ControlInput
-from crazyflie_utils.last_valid import HOLD_LIMIT
 
 HOVER = np.array([0.0, 0.0, 0.0, GRAVITY])
 

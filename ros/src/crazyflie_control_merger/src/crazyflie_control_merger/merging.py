@@ -6,7 +6,7 @@ Controls are u = (roll, pitch, yaw_dot, thrust) in rad, rad/s and m/s^2.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from crazyflie_utils.last_valid import HOLD_LIMIT
+from crazyflie_model.limits import HOLD_LIMIT
 
 MERGE = "MERGE"
 LQR = "LQR"
@@ -21,7 +21,7 @@ NO_YAW_ENTRIES = (0, 1, 3)  #: Entries of the control that the prioritised contr
 class Merger:
     """Mix the latest prioritised control into regular ones.
 
-    A prioritised control is valid for `crazyflie_utils.last_valid.HOLD_LIMIT`. Without one the
+    A prioritised control is valid for `crazyflie_model.limits.HOLD_LIMIT`. Without one the
     regular control is left as it is, in every mode.
 
     Parameters

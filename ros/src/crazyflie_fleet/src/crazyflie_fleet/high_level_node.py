@@ -22,11 +22,11 @@ from crazyflie_fleet.high_level_services import (
     setpoint_of,
 )
 from crazyflie_fleet.references_node import TrackedVehicle
+from crazyflie_model.limits import HOLD_LIMIT
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle
 from crazyflie_utils.flight_status import WORDS
-from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.timers import Timer
 from crazyflie_utils.vectors import to_tuple

@@ -12,11 +12,10 @@ from typing_extensions import override
 from crazyflie_lqr.gain_file import CONTROL_FILE, MatrixFile
 from crazyflie_lqr.linear_feedback import GroundGuess, LinearFeedback, at_rest
 from crazyflie_lqr.reference import GuardedReference, StateAge
-from crazyflie_model.limits import MAX_SPEED
+from crazyflie_model.limits import HOLD_LIMIT, MAX_SPEED
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter, topic
 from crazyflie_utils.flight_status import FlightTopics
-from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import TEXT, Converted, Integer, Number

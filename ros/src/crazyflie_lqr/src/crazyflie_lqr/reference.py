@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from crazyflie_lqr.linear_feedback import Components, at_rest
-from crazyflie_utils.last_valid import HOLD_LIMIT
+from crazyflie_model.limits import HOLD_LIMIT
 from crazyflie_utils.timers import CLOCK_STEP
 
 #: Age of the last reference up to which its velocity is used (s).
@@ -70,7 +70,7 @@ DESCENT_LIMIT = 0.3  #: Time for which a descent's reference overrides all other
 class GuardedReference:
     """The last valid reference; or, some time after invalid ones came, a hold point.
 
-    `crazyflie_utils.last_valid.HOLD_LIMIT` after the first invalid reference the vehicle stops
+    `crazyflie_model.limits.HOLD_LIMIT` after the first invalid reference the vehicle stops
     where it is, until a valid one comes. A reference that is older than the present one is ignored.
     One that is further from the vehicle than ``max_jump`` (m) is replaced by a position at rest at
     this distance in the same direction, which stays while references come from about the same

@@ -24,3 +24,7 @@ MAX_SPEED = 5.0  #: Largest plausible speed of a vehicle (m/s).
 #: Age of the last setpoint from which the firmware levels a flying vehicle out, and from which it
 #: stops its motors, s (COMMANDER_WDT_TIMEOUT_STABILIZE and _SHUTDOWN of commander.h).
 LEVEL_AGE, OFF_AGE = 0.5, 2.0
+
+#: Longest time for which a valid value replaces invalid ones (s): the firmware, too, gives up a
+#: setpoint then.
+HOLD_LIMIT = LEVEL_AGE

@@ -30,9 +30,8 @@ from operator import mul
 from typing import NamedTuple
 
 from crazyflie_model.dynamics import coupled_acceleration
-from crazyflie_model.limits import MAX_THRUST, MIN_THRUST
+from crazyflie_model.limits import HOLD_LIMIT, MAX_THRUST, MIN_THRUST
 from crazyflie_state_estimator.motion import ConstantAccelerationFilter
-from crazyflie_utils.last_valid import HOLD_LIMIT
 
 
 class ControlInput:

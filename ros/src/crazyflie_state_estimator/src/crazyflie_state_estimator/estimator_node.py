@@ -5,7 +5,7 @@ from std_msgs.msg import Bool, Header, String
 from typing_extensions import override
 
 from crazyflie_model.angles import rpy_from_quaternion
-from crazyflie_model.limits import CRASH_TILT, MAX_SPEED
+from crazyflie_model.limits import CRASH_TILT, HOLD_LIMIT, MAX_SPEED
 from crazyflie_msgs.msg import (
     ControlStamped,
     FullStateStamped,
@@ -27,7 +27,6 @@ from crazyflie_state_estimator.motion import (
 )
 from crazyflie_state_estimator.pose_gate import Classification, PoseGate, TiltMonitor
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter, topic
-from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, Integer, Number, Text
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple
 

@@ -7,9 +7,8 @@ import math
 from enum import Enum
 
 from crazyflie_controller.go_to import GoToController, GoToSetpoint, HeadingPose
-from crazyflie_model.limits import OFF_AGE
+from crazyflie_model.limits import HOLD_LIMIT, OFF_AGE
 from crazyflie_model.units import GRAVITY, HOVER_PWM
-from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.refusal import RefusalError
 
 TAKEOFF_RATE = 10000.0  #: Rate of the thrust in a takeoff, PWM/s.

@@ -9,9 +9,9 @@ from std_msgs.msg import ColorRGBA
 from typing_extensions import override
 from visualization_msgs.msg import Marker, MarkerArray
 
+from crazyflie_model.limits import HOLD_LIMIT
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter, topic
-from crazyflie_utils.last_valid import LastValid
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME
 
 
@@ -92,7 +92,8 @@ class VisualizerNode(Node[VisualizerParameters]):
 
     def __init__(self) -> None:
         self._path = FlownPath(SPACING, CAPACITY)
-        self._reference: LastValid[tuple[float, float, float]] = LastValid()
+        self._reference: tuple[float, float, float] | None = None
+        self._expiry = math.inf  # When invalid references end it (s).
         self._shown_reference: tuple[float, float, float] | None = None
 
     @override
@@ -110,14 +111,15 @@ class VisualizerNode(Node[VisualizerParameters]):
         handle.timer(PERIOD, self._on_timer)
 
     def _on_reference(self, message):
-        self._reference.update((message.state.x, message.state.y, message.state.z))
+        self._reference = (message.state.x, message.state.y, message.state.z)
+        self._expiry = math.inf
 
     def _on_invalid_reference(self):
-        self._reference.invalidate(self._handle.time())
+        self._expiry = min(self._expiry, self._handle.time() + HOLD_LIMIT)
 
     def _on_timer(self):
         path_changed = self._extend_path()
-        reference = self._reference.value(self._handle.time())
+        reference = self._reference if self._handle.time() < self._expiry else None
         if path_changed or reference != self._shown_reference:
             self._shown_reference = reference
             self._publisher.publish(self._markers())

@@ -5,7 +5,7 @@ import math
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
-from functools import partial, wraps
+from functools import partial
 from typing import Any, TypeVar
 
 import genpy
@@ -137,9 +137,28 @@ class NodeHandle:
         ``latest_only`` only the latest message is delivered, before the node's next timer or
         service call.
         """
-        name, work = self.resolve(topic), self.guard(callback)
-        if finite:
-            work = self._if_finite(name, message_type, finite, callback, on_invalid)
+        name = self.resolve(topic)
+        numbers = number_getter(message_type, finite) if finite else None
+
+        # One function, not one around another: it is called for each message.
+        def work(message):
+            if self.is_closed:
+                return
+            try:
+                # If the sum is finite, so are the numbers; if it is not, it may have overflowed.
+                if (
+                    not finite
+                    or (numbers and math.isfinite(sum(numbers(message))))
+                    or is_finite(getattr(message, finite))
+                ):
+                    callback(message)
+                    return
+                self.warn(f"ignoring a message on {name}: its {finite} is not finite", throttle=1.0)
+                if on_invalid is not None:
+                    on_invalid()
+            except Exception as error:
+                self.report_fault(callback, error)
+
         topics = self._process.topics
         if latest_only:
             latest = LatestMessage(topics, name, message_type, work)
@@ -150,25 +169,8 @@ class NodeHandle:
         self._undo.append(subscriber.close)
         return subscriber
 
-    def _if_finite(self, topic, message_type, field, callback, on_invalid):
-        numbers = number_getter(message_type, field)
-
-        @wraps(callback)
-        def checked(message):
-            # If the sum is finite, so are the numbers; if it is not, it may have overflowed.
-            if (numbers and math.isfinite(sum(numbers(message)))) or is_finite(
-                getattr(message, field)
-            ):
-                callback(message)
-                return
-            self.warn(f"ignoring a message on {topic}: its {field} is not finite", throttle=1.0)
-            if on_invalid is not None:
-                on_invalid()
-
-        return self.guard(checked)
-
     def advertise_service(
-        self, name: str, service_type: type, callback: Callable[[Any], Any]
+        self, name: str, service_type: Any, callback: Callable[[Any], Any]
     ) -> None:
         """Answer calls of a service.
 

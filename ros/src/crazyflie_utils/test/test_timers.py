@@ -232,6 +232,20 @@ def test_a_timer_keeps_its_period_when_another_is_refused(queue, period):
     assert (timer.period, len(ticks)) == (1.0, 2)
 
 
+def test_a_timer_that_is_added_while_all_are_stopped_does_not_fire(queue):
+    class Period(float):
+        """A period that is checked while another thread stops the queue."""
+
+        def __ge__(self, other):
+            queue.stop()
+            return super().__ge__(other)
+
+    ticks = []
+    queue.add(Period(1.0), lambda: ticks.append(1))
+    run(queue, 1.0, 2.0)
+    assert ticks == []
+
+
 def test_stopped_timer_never_fires_again(queue):
     ticks = []
     timer = queue.add_at(1.0, lambda: ticks.append(1), now=0.0)

@@ -293,7 +293,6 @@ class TimerQueue:
         for a period that is negative or not finite.
         """
         timer = Timer(self, work)
-        timer.stopped = self._is_stopped
         self.begin(timer, period, stagger)
         return timer
 
@@ -307,6 +306,7 @@ class TimerQueue:
         with self._lock:
             timer.period, timer.number = period, next(self._order)
             timer.restart(self._start(period, stagger, align_phase))
+            timer.stopped |= self._is_stopped
             self._push(timer)
 
     def _start(self, period, stagger, align_phase):

@@ -92,6 +92,9 @@ def test_timers_fire_by_simulated_time(process, handle):
 def test_periods_that_never_end_are_refused(handle, period):
     with pytest.raises(ValueError, match="timer"):
         handle.timer(period, lambda: None)
+    timer = handle.timer(1.0, lambda: None)
+    with pytest.raises(ValueError, match="timer"):
+        timer.set_period(period)
 
 
 def test_a_timer_whose_period_varies(process, handle):

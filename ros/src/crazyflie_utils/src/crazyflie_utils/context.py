@@ -14,10 +14,10 @@ from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIM
 from crazyflie_utils.timers import (
     Executor,
     SimulatedClock,
+    SimulatedTimers,
     SteadyClock,
     SteadyTimers,
     Timer,
-    TimerQueue,
 )
 from crazyflie_utils.topics import Publisher, Topics, Transport
 
@@ -198,7 +198,7 @@ class ProcessContext:
         # The poses of all vehicles that are simulated in one tick form one message.
         tf = self.transforms.gather, self.transforms.send_gathered
         self._steady = SteadyTimers(self.executor, SteadyClock(), *tf)
-        self._simulated = TimerQueue(self.executor, self.clock, *tf)
+        self._simulated = SimulatedTimers(self.executor, self.clock, *tf)
         self._clock_publisher: Publisher | None = None
         self.flights = OwnFlights(self.topics)
         #: Exit status with which the process is to end; None while it is not to end.
@@ -236,8 +236,6 @@ class ProcessContext:
         """
         if steady or not self.uses_sim_time:
             return self._steady.add(period, work, stagger)
-        if period == 0.0:
-            raise ValueError("a timer by simulated time needs a period > 0")
         return self._simulated.add(period, work, stagger)
 
     def clock_publisher(self) -> Callable[..., None]:

@@ -387,6 +387,16 @@ class TimerQueue:
         return due
 
 
+class SimulatedTimers(TimerQueue):
+    """Timers by simulated time; ValueError for a period of zero, whose moment would never end."""
+
+    @override
+    def begin(self, timer: Timer, period: float, stagger: bool, align_phase: bool = False) -> None:
+        if period == 0.0:
+            raise ValueError("a timer by simulated time needs a period > 0")
+        super().begin(timer, period, stagger, align_phase)
+
+
 class SteadyTimers(TimerQueue):
     """Timers by a steady clock, which a thread runs."""
 

@@ -38,6 +38,18 @@ def test_nothing_runs_before_start():
     assert done == [0, 1, 2, 3]
 
 
+def test_work_may_start_the_executor_again(executor):
+    done = []
+
+    def work():
+        executor.submit(lambda: done.append("later"))
+        executor.start()
+        done.append("work")
+
+    in_threads(lambda: executor.submit(work))
+    assert done == ["work", "later"]
+
+
 def test_submit_returns_when_the_work_is_done(executor):
     done = []
     executor.submit(lambda: done.append(1))

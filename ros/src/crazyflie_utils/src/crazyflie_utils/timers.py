@@ -148,7 +148,9 @@ class Executor:
     def start(self) -> None:
         """Begin to run work, in the order of submission."""
         self._started = True
-        self._drain()
+        # Running work would wait for its own end.
+        if not self.is_running_here:
+            self._drain()
 
     @property
     def is_running_here(self) -> bool:

@@ -134,6 +134,25 @@ def test_those_that_have_begun_are_held_when_one_refuses(fleet):
     assert (request.goal.x, request.goal.y, request.goal.z) == (0.0, 0.0, 0.0)
 
 
+def test_those_that_have_begun_are_held_when_services_disappear_meanwhile(fleet):
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 0.0, 1.0))
+    fleet.refusals["/cf3/high_level/go_to"] = "the vehicle is landing; expected it to fly"
+    advertised = fleet.process.transport.services
+
+    def refuse(request, answer=advertised["/cf3/high_level/go_to"]):
+        """Let the dashboard find that cf1 has no services any more, then answer."""
+        services = {k: v for k, v in fleet.graph.services.items() if not k.startswith("/cf1/")}
+        fleet.graph = Graph(fleet.graph.topics, fleet.graph.topics, services)
+        fleet.process.advance(2.1)
+        return answer(request)
+
+    advertised["/cf3/high_level/go_to"] = refuse
+    outcome = fleet.command(Action.GO_TO, goal=(0.5, 1.0, 1.0))
+    assert outcome["cf1"] == outcome["cf2"] == "is held: not all of them can go"
+    held = [service for service, request in fleet.calls if request.relative]
+    assert held == ["/cf1/high_level/go_to", "/cf2/high_level/go_to"]
+
+
 @pytest.mark.parametrize("x", [0.9, 4.0])
 def test_a_way_that_comes_too_near_to_another_vehicle_is_refused(fleet, x):
     fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 2.0, 1.0))

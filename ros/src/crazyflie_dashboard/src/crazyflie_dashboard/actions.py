@@ -2,19 +2,18 @@
 
 import math
 import subprocess
-from typing import Any
+from typing import Any, NamedTuple
 
 import genpy
 import roslib.packages
 from geometry_msgs.msg import Point
 from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest
 
-from crazyflie_dashboard.discovery import Graph, Service
+from crazyflie_dashboard.discovery import FoundVehicle, Graph, Service
 from crazyflie_dashboard.graph_model import GraphModel
 from crazyflie_dashboard.moves import Move, expect_apart, formation, in_frame
 from crazyflie_dashboard.page_data import MAX_COMMAND_AGE, Command, Outcomes, gathered
-from crazyflie_dashboard.snapshot import Action, Triple
-from crazyflie_dashboard.vehicle_model import VehicleModel
+from crazyflie_dashboard.snapshot import Action, Triple, VehicleSnapshot
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import BUFFER
 from crazyflie_model.angles import rpy_from_quaternion
@@ -46,6 +45,13 @@ _YAW, _FIXED = "reference/yaw", "frames/fixed"
 _YAW_REFERENCE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 
 
+class Target(NamedTuple):
+    """A vehicle and its newest snapshot when a command comes: its model changes meanwhile."""
+
+    vehicle: FoundVehicle
+    now: VehicleSnapshot
+
+
 class Actions:
     """Calls services for commands.
 
@@ -71,9 +77,14 @@ class Actions:
         """
         expect_fresh(command.action.value, self._time() - command.clicked)
         _check(command)
-        targets = self._model.models
+        scene = self._model.scene
+        targets = {
+            name: Target(model.vehicle, scene.vehicles[name])
+            for name, model in self._model.models.items()
+            if name in scene.vehicles
+        }
         if command.action == Action.GO_TO:
-            return (yield from self._go_to(command, targets))
+            return (yield from self._go_to(command, targets, scene.fixed_frame))
         answers = self._land_all(command, targets)
         for name in command.vehicles:
             if name not in answers:
@@ -158,7 +169,7 @@ class Actions:
 
     # Go-to commands for several vehicles.
 
-    def _go_to(self, command, targets):
+    def _go_to(self, command, targets, fixed):
         """Send vehicles so that their centre comes to the goal: all of them, or none."""
         reasons = {n: self._why_it_stays(targets.get(n)) for n in command.vehicles}
         if any(reasons.values()):
@@ -166,7 +177,7 @@ class Actions:
         fences = {name: self._model.fence(targets[name].vehicle) for name in command.vehicles}
         moving = {name: move for name, move in self._moves.items() if name in targets}
         moves, requests = yield self._model.workers.submit(
-            self._prepared, command, targets, fences, moving, self._time()
+            self._prepared, command, targets, fences, moving, fixed, self._time()
         )
         calls = {name: self._call(command, *each) for name, each in requests.items()}
         answers = {name: self._begin(call) for name, call in calls.items()}
@@ -193,10 +204,10 @@ class Actions:
             return f"the vehicle is {target.now.state}; expected it to fly"
         return ""
 
-    def _prepared(self, command, targets, fences, moving, now):
+    def _prepared(self, command, targets, fences, moving, fixed, now):
         """Return moves, and services with requests, of the vehicles; waits for the master."""
         services = {n: targets[n].vehicle.services[Action.GO_TO] for n in command.vehicles}
-        graph, frames, fixed = self._model.graph, self._model.frames, self._model.scene.fixed_frame
+        graph, frames = self._model.graph, self._model.frames
         spaces = {name: _namespace(service, graph) for name, service in services.items()}
         wanted = {name: f"{each.vehicle.namespace}/{BUFFER}" for name, each in targets.items()}
         known = self._model.master.parameters(
@@ -290,11 +301,11 @@ def _check(command: Command) -> None:
         raise RefusalError(f"go to: z is {command.goal[2]:g} m; expected 0 or more")
 
 
-def _service(target: VehicleModel | None, action: Action) -> Service | None:
+def _service(target: Target | None, action: Action) -> Service | None:
     return None if target is None else target.vehicle.services.get(action)
 
 
-def _why_no_service(action: Action, target: VehicleModel | None) -> str:
+def _why_no_service(action: Action, target: Target | None) -> str:
     known = "there is no such vehicle" if target is None else "it has no service for it"
     return f"{action.value}: {known}"
 
@@ -318,7 +329,7 @@ def _expect_inside(name: str, goal: Triple, fence: Box | None) -> None:
             )
 
 
-def _request(command: Command, service: Service, target: VehicleModel) -> Any:
+def _request(command: Command, service: Service, target: Target) -> Any:
     if service.kind is Empty:
         return EmptyRequest()
     if service.kind is SetBool:

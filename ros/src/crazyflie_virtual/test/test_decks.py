@@ -3,10 +3,13 @@
 import math
 import struct
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from virtual_bench import Bench
 
 from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.firmware.decks import GEOMETRIES
 
 
 def go(bench, x, y, duration=3.0):
@@ -72,6 +75,22 @@ def test_one_base_station_measures_less_precisely_and_without_geometry_none():
         return bench.firmware.estimator.variance_position
 
     assert variance() < variance(base_stations=1) < 1e-4 < variance(knows_stations=False)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 50.0])
+@pytest.mark.parametrize("pitch", [30.0, 90.0, -90.0])
+def test_the_estimate_is_in_the_frame_of_the_stored_geometry(pitch, yaw):
+    bench = Bench(positioning="lighthouse")
+    frame = Rotation.from_euler("ZY", [yaw, pitch], degrees=True)
+    form = struct.Struct("<12f?")
+    for station, geometry in enumerate(GEOMETRIES):
+        *values, valid = form.unpack(geometry)
+        rotation = frame.as_matrix() @ np.reshape(values[3:], (3, 3))
+        page = form.pack(*frame.apply(values[:3]), *rotation.flat, valid)
+        assert bench.firmware.deck.memory.write(station << 8, page)
+    bench.run(2.0)
+    found = Rotation.from_quat(bench.firmware.estimate.quaternion)
+    assert (frame.inv() * found).magnitude() < math.radians(1.0)
 
 
 def test_a_hand_carries_the_vehicle_and_lets_it_go():

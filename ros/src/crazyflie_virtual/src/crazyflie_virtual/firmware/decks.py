@@ -13,8 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from crazyflie_model.angles import Quaternion, Triple, product, quaternion_from_zyx, rotate
-from crazyflie_model.elementwise import clip
+from crazyflie_model.angles import Quaternion, Triple, product, rotate
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.memory import LighthouseMemory
@@ -84,10 +83,22 @@ def _frame(station: int, page: bytes) -> tuple[Quaternion, Triple] | None:
     if not values[-1] or abs(np.linalg.det(rotation) - 1.0) > 0.01:
         return None
     x, y, z = map(float, np.array(values[:3]) - rotation @ true[:3])
-    roll = math.atan2(rotation[2, 1], rotation[2, 2])
-    yaw = math.atan2(rotation[1, 0], rotation[0, 0])
-    pitch = math.asin(clip(float(-rotation[2, 0]), -1.0, 1.0))
-    return quaternion_from_zyx(roll, pitch, yaw), (x, y, z)
+    return _quaternion(rotation), (x, y, z)
+
+
+def _quaternion(rotation):
+    # Of a rotation matrix. Source: I. Y. Bar-Itzhack, New method for extracting the quaternion from
+    # a rotation matrix, Journal of Guidance, Control, and Dynamics 23 (2000).
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    matrix = [
+        [a - e - i, b + d, c + g, h - f],
+        [b + d, e - a - i, f + h, c - g],
+        [c + g, f + h, i - a - e, d - b],
+        [h - f, c - g, d - b, a + e + i],
+    ]
+    # The eigenvector of the largest eigenvalue.
+    x, y, z, w = map(float, np.linalg.eigh(matrix)[1][:, 3])
+    return x, y, z, w
 
 
 @dataclass(eq=False)

@@ -375,8 +375,9 @@ def test_a_voltage_that_was_known_stays_until_another_one_comes():
         ("/cf1/battery", Float32(3.5)),
         ("/cf1/vehicle_status", VehicleStatus(battery_voltage=4.0, link_quality=math.nan)),
         ("/cf1/vehicle_status", VehicleStatus(battery_voltage=math.nan, link_quality=0.5)),
+        ("/cf1/vehicle_status", VehicleStatus(battery_voltage=0.0, link_quality=0.5)),
     ):
         fleet.process.publish(topic, message)
         fleet.process.advance(0.05)
         shown.append((fleet.vehicles["cf1"].battery, fleet.vehicles["cf1"].link_quality))
-    assert shown == [(3.5, None), (4.0, None), (4.0, 0.5)]
+    assert shown == [(3.5, None), (4.0, None), (4.0, 0.5), (4.0, 0.5)]

@@ -183,8 +183,8 @@ class VehicleModel:
 
     def _note(self, role, content):
         self._newest[role] = content
-        # A voltage that was known stays until there is another one.
-        if role == "vehicle_status" and _known(content.battery_voltage) is not None:
+        # A voltage that was known stays until there is another one; 0 V is no measurement.
+        if role == "vehicle_status" and _known(content.battery_voltage):
             self._newest["battery"] = (content.battery_voltage,)
         self._arrivals[role] = self._time()
         self._counts[role] += 1

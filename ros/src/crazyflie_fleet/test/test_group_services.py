@@ -115,6 +115,17 @@ def status(process, name, refusal):
     process.publish(f"/{name}/in_flight_flight_status", message)
 
 
+def test_a_vehicle_that_is_landed_in_a_common_takeoff_does_not_land_the_others(swarm):
+    answer = swarm.process.call("/takeoff_all", EmptyRequest())
+    swarm.process.advance(0.5)
+    swarm.process.call("/cf1/land", EmptyRequest())
+    swarm.advance_until(answer.done, 20.0)
+    with pytest.raises(ServiceError, match="^1 of 3 vehicles: cf1: takeoff aborted: /cf1/land was"):
+        answer.result(0)
+    swarm.process.advance(3.0)
+    assert swarm.heights() == pytest.approx([0.0, 1.0, 1.0], abs=0.1)
+
+
 def test_a_group_takes_off_whatever_the_others_would_do(swarm):
     status(swarm.process, "cf2", "the battery has 3.0 V")
     swarm.call("/all/high_level/takeoff", srv.TakeoffRequest(ODD, 0.6, seconds(2.0)))

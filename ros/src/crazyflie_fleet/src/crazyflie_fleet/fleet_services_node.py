@@ -121,13 +121,10 @@ class FleetServicesNode(Node):
                 raise ServiceError("refused: all vehicles are flying already")
             rest = ", ".join(names)
             self._handle.info(f"flying already: {', '.join(flying)}; taking off: {rest}")
-        refusals = yield self._call(names, service, service_type, request, is_takeoff=True)
-        if idle := self._have_not_begun(refusals):
+        refusals, idle = yield self._call(names, service, service_type, request, is_takeoff=True)
+        if idle:
             yield from self._abort(refusals, [name for name in names if name not in idle])
         self._raise(refusals)
-
-    def _have_not_begun(self, names):
-        return [name for name in names if self._states.flight_state(name) in _NOT_BEGUN]
 
     def _takeoff_refusals(self):
         """Return why vehicles that do not fly yet refuse to take off: name to reason."""
@@ -164,24 +161,28 @@ class FleetServicesNode(Node):
         return (yield from self._command(service, service_type, request))
 
     def _command(self, service, service_type, request):
-        self._raise((yield self._call(self._fleet.names, service, service_type, request)))
+        refusals, _ = yield self._call(self._fleet.names, service, service_type, request)
+        self._raise(refusals)
 
     def _call(self, names, service, service_type, request, is_takeoff=False):
         """Call the services of vehicles; return the future of their refusals.
 
-        It does not wait for all answers if one on the ground refuses a takeoff.
+        With them come the names of those that were on the ground when they refused. A takeoff
+        does not wait for all answers after the first of these.
         """
-        outcome: Future[Refusals] = Future()
+        outcome: Future[tuple[Refusals, list[str]]] = Future()
         refusals: dict[str, str] = {}
+        idle: list[str] = []
         waiting = {*names}
 
         def on_answer(name, done):
             waiting.discard(name)
             if done.exception() is not None:
                 refusals[name] = str(done.exception())
-            is_enough = not waiting or (is_takeoff and self._have_not_begun(refusals))
-            if is_enough and not outcome.done():
-                outcome.set_result(refusals)
+                if self._states.flight_state(name) in _NOT_BEGUN:
+                    idle.append(name)
+            if (not waiting or (is_takeoff and idle)) and not outcome.done():
+                outcome.set_result((refusals, idle))
 
         for name in names:
             call = self._lander.call(name, service, service_type, request)

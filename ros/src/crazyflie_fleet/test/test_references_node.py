@@ -477,3 +477,13 @@ def test_both_services_fly_the_same_move():
         flown.append([to_tuple(each.state) for each in flight.followed("cf1")])
     assert flown[0] == flown[1]
     assert flown[0][-1] == pytest.approx((0.0, -0.5, 1.0, 0.0, 0.0, 0.0, -0.4))
+
+
+def test_a_move_by_which_the_fleet_lands_a_vehicle_follows_its_takeoff(flight):
+    flight.process.publish("/cf1/in_flight_flight_status", flight_status("TAKING_OFF"))
+    flight.process.publish("/fleet/landing", String("cf1"))
+    flight.go_to(goal=(0.0, 0.5, 1.0), seconds=3.0)
+    flight.process.publish("/cf1/in_flight_flight_status", flight_status("FLYING"))
+    flight.process.advance(3.5)
+    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.5)
+    assert flight.process.logged("error") == []

@@ -281,7 +281,7 @@ class HighLevelNode(Node[HighLevelParameters]):
         if self._handle.name not in message.data.split():
             return
         if self._status.state == FlightStatus.FLYING:
-            self._begin_or_log(CommandFollower.start, 0)
+            self._begin_or_log(False, CommandFollower.start, 0)
         else:
             self._handle.error(f"not started: the vehicle is {WORDS[self._status.state]}")
 
@@ -307,13 +307,14 @@ class HighLevelNode(Node[HighLevelParameters]):
             self._references.begin(command, *arguments)
         elif self._status.state == FlightStatus.TAKING_OFF:
             self._references.planned(command, *arguments)
-            self._next = (command, *arguments)
+            self._next = (self._is_to_land(), command, *arguments)
         else:
             raise RefusalError(f"the vehicle is {WORDS[self._status.state]}; expected it to fly")
 
-    def _begin_or_log(self, command, *arguments):
+    def _begin_or_log(self, is_of_landing, command, *arguments):
         try:
-            self._refuse_if_to_land()
+            if not is_of_landing:
+                self._refuse_if_to_land()
             self._references.begin(command, *arguments)
         except RefusalError as reason:
             self._handle.error(f"not done: {reason}")

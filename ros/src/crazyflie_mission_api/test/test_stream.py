@@ -125,6 +125,21 @@ def test_a_second_trajectory_is_not_ended_by_the_end_of_the_first(bench):
     assert first.pose.position.x == pytest.approx(0.0, abs=0.01)
 
 
+def test_the_next_trajectory_ends_the_fault_of_the_last_one(bench):
+    bench.answer("the vehicle has not replied")
+    assert bench.stream.fault
+    bench.stream.start(PIECES)
+    assert len(bench.setpoints(0.1)) > 0
+    assert bench.stream.fault == ""
+
+
+def test_the_end_of_a_trajectory_is_no_fault_of_the_next_one(bench):
+    bench.stream.start(PIECES)
+    bench.answer("the vehicle has not replied")
+    assert len(bench.setpoints(0.1)) > 0
+    assert bench.stream.fault == ""
+
+
 def test_a_command_that_fails_leaves_the_stream_alone():
     made = Bench()
     made.stream.start(PIECES)

@@ -117,6 +117,7 @@ class SetpointStream:
             turn.set_result(None)
 
     def _begin(self, pieces):
+        self.fault = ""
         self._trajectory = TimedTrajectory(pieces, self._handle.time())
         yield from ()
 
@@ -152,10 +153,11 @@ class SetpointStream:
         if now >= max(trajectory.end, self._next_hold) and self._last_turn.done():
             self._next_hold = now + RETRY_PERIOD
             held = self.hand_over(partial(self._hold, trajectory.destination))
-            held.add_done_callback(self._note_hold)
+            held.add_done_callback(partial(self._note_hold, trajectory))
 
-    def _note_hold(self, held):
-        if held.exception() is not None and self.is_active:
+    def _note_hold(self, trajectory, held):
+        # Another trajectory may have begun.
+        if held.exception() is not None and self._trajectory is trajectory:
             self.fault = (
                 f"the trajectory has ended, and go_to has failed: {held.exception()}; setpoints "
                 "go on at its end"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from crazyflie_model.angles import (
@@ -110,6 +111,12 @@ def test_wrapping_works_on_arrays():
 def test_rotation_by_yaw_is_scipys(x, y, yaw):
     expected = Rotation.from_euler("z", yaw).apply([x, y, 0.0])[:2]
     assert rotate_by_yaw(x, y, yaw) == pytest.approx(expected, abs=1e-6)
+
+
+@given(arrays(float, (3, 5), elements=st.floats(-3.0, 3.0)))
+def test_many_vectors_are_turned_as_each_by_itself(vectors):
+    each = [rotate_by_yaw(*vector) for vector in vectors.T.tolist()]
+    np.testing.assert_allclose(rotate_by_yaw(*vectors), np.transpose(each), atol=1e-12)
 
 
 @given(FINITE, FINITE, ANGLE)

@@ -72,9 +72,10 @@ def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> Triple:
     return math.atan2(-r12, r22), pitch, math.atan2(-r01, r00)
 
 
-def rotate_by_yaw(x: float, y: float, yaw: float) -> tuple[float, float]:
+def rotate_by_yaw(x: Number, y: Number, yaw: Number) -> tuple[Number, Number]:
     """Return the horizontal vector (x, y) turned counter-clockwise by ``yaw`` (rad)."""
-    c, s = math.cos(yaw), math.sin(yaw)
+    f = functions(yaw)
+    c, s = f.cos(yaw), f.sin(yaw)
     return c * x - s * y, s * x + c * y
 
 

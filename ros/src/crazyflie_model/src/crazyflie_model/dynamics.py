@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
+from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy, rotate_by_yaw
 from crazyflie_model.elementwise import Number, Vector, functions, join, nowhere, split, where
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 from crazyflie_model.units import GRAVITY
@@ -255,7 +255,7 @@ class Coupled7D(SevenDimensional):
             half_turn = duration / 2.0 * yaw_dot
             square = half_turn * half_turn
             mean = 1.0 - square / 6.0 * (1.0 - square / 20.0)
-            ax, ay = _turned(mean * forward, mean * left, x[6] + half_turn)
+            ax, ay = rotate_by_yaw(mean * forward, mean * left, x[6] + half_turn)
             end = _accelerate(duration, x, [ax, ay, az], 2.0 * half_turn)
             lag = duration * duration * half_turn / 6.0 * (1.0 + square / 15.0)
             end[0] = end[0] + lag * ay
@@ -273,7 +273,8 @@ def coupled_acceleration(u: Sequence[Number], yaw: Number) -> Vector[Number]:
     sin(yaw)), z_ddot = T cos(roll) cos(pitch) - g. The yaw rate has no effect.
     """
     acceleration: Vector[Number] = _heading_acceleration(u)
-    return _turned(acceleration[0], acceleration[1], yaw) + acceleration[2:]
+    x, y = rotate_by_yaw(acceleration[0], acceleration[1], yaw)
+    return [x, y, acceleration[2]]
 
 
 def _heading_acceleration(u: Sequence[Number]) -> Vector[Number]:
@@ -282,10 +283,3 @@ def _heading_acceleration(u: Sequence[Number]) -> Vector[Number]:
     f = functions(roll)
     lift = thrust * f.cos(roll) * f.cos(pitch)
     return [thrust * f.sin(pitch), -thrust * f.sin(roll), lift - GRAVITY]
-
-
-def _turned(forward: Number, left: Number, yaw: Number) -> Vector[Number]:
-    """Return a horizontal vector of the heading frame in the fixed frame."""
-    f = functions(yaw)
-    c, s = f.cos(yaw), f.sin(yaw)
-    return [forward * c - left * s, forward * s + left * c]

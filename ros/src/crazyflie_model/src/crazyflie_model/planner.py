@@ -1,5 +1,6 @@
 """Moves to a point: those of the firmware's high-level commander, and of a fleet's vehicles."""
 
+import cmath
 import math
 
 from crazyflie_model.angles import Triple
@@ -123,30 +124,24 @@ def spiral_piece(
     """
     sense = -1.0 if clockwise else 1.0
     rate = sense * angle / duration
-    # Vector from the axis to the vehicle.
+    # Direction from the axis to the vehicle. In the horizontal plane, (x, y) is x + iy.
     direction = start.yaw - sense * math.pi / 2.0 + (math.pi / 2.0 if sideways else 0.0)
     growth = (radii[1] - radii[0]) / duration
     x, y, z = start.position
-    center = (x - radii[0] * math.cos(direction), y - radii[0] * math.sin(direction))
+    center = complex(x, y) - cmath.rect(radii[0], direction)
 
     def end(time):
         # Value, velocity, acceleration and jerk of each axis.
-        radius, around = radii[0] + growth * time, direction + rate * time
-        c, s = math.cos(around), math.sin(around)
-        tangential, normal = 2.0 * growth * rate, radius * rate**2
+        radius, outward = radii[0] + growth * time, cmath.rect(1.0, direction + rate * time)
+        plane = (
+            center + radius * outward,
+            (growth + 1j * radius * rate) * outward,
+            (2j * growth * rate - radius * rate**2) * outward,
+            0j,
+        )
         return (
-            (
-                center[0] + radius * c,
-                growth * c - radius * rate * s,
-                -tangential * s - normal * c,
-                0.0,
-            ),
-            (
-                center[1] + radius * s,
-                growth * s + radius * rate * c,
-                tangential * c - normal * s,
-                0.0,
-            ),
+            [each.real for each in plane],
+            [each.imag for each in plane],
             (z + ascent * time / duration, ascent / duration, 0.0, 0.0),
             (start.yaw + rate * time, rate, 0.0, 0.0),
         )

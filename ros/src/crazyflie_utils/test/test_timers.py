@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_utils.testing.programs import wait_until
-from crazyflie_utils.timers import Executor, SimulatedClock, SteadyClock, SteadyTimers, TimerQueue
+from crazyflie_utils.timers import Executor, SimulatedClock, SteadyClock, TimerQueue
 
 LIMIT = 60.0
 
@@ -312,7 +312,7 @@ def test_timers_may_be_added_and_stopped_by_ticks(queue):
 @pytest.fixture
 def steady():
     """Return timers by the machine's clock."""
-    steady = SteadyTimers(started(), SteadyClock())
+    steady = TimerQueue(started(), SteadyClock())
     yield steady
     steady.stop()
 

@@ -16,8 +16,8 @@ from crazyflie_utils.timers import (
     SimulatedClock,
     SimulatedTimers,
     SteadyClock,
-    SteadyTimers,
     Timer,
+    TimerQueue,
 )
 from crazyflie_utils.topics import Publisher, Topics, Transport
 
@@ -197,7 +197,7 @@ class ProcessContext:
         )
         # The poses of all vehicles that are simulated in one tick form one message.
         tf = self.transforms.gather, self.transforms.send_gathered
-        self._steady = SteadyTimers(self.executor, SteadyClock(), *tf)
+        self._steady = TimerQueue(self.executor, SteadyClock(), *tf)
         self._simulated = SimulatedTimers(self.executor, self.clock, *tf)
         self._clock_publisher: Publisher | None = None
         self.flights = OwnFlights(self.topics)

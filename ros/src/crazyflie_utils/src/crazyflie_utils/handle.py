@@ -291,11 +291,6 @@ class NodeHandle:
         ``stagger`` the ticks differ from those of other timers, for reports of many nodes. See
         `TimerQueue.add`.
         """
-        timer = self._process.add_timer(period, self._tick(callback), steady, stagger)
-        self._undo.append(timer.stop)
-        return timer
-
-    def _tick(self, callback):
         guarded = self.guard(callback)
 
         def tick():
@@ -303,7 +298,9 @@ class NodeHandle:
                 latest.deliver()
             guarded()
 
-        return tick
+        timer = self._process.add_timer(period, tick, steady, stagger)
+        self._undo.append(timer.stop)
+        return timer
 
     def submit(self, callback: Callable[..., None], *arguments: Any) -> None:
         """Queue a call ``callback(*arguments)``; from any thread of the node."""

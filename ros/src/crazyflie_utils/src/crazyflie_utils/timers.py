@@ -262,7 +262,7 @@ _number = attrgetter("number")
 
 
 class TimerQueue:
-    """Timers by a clock, in the order of their deadlines.
+    """Timers by a clock, in the order of their deadlines; `run_due` runs them, or a thread.
 
     ``before()`` and ``after()`` are called before and after several timers that are due at once.
     """
@@ -285,6 +285,15 @@ class TimerQueue:
         self._is_running = False
         self._spread: Counter[float] = Counter()
         self._is_stopped = False
+        # Released when there is anything new. Waiting for a bare lock takes half the time of
+        # waiting for a condition.
+        self._news = threading.Lock()
+        self._news.acquire()
+        self._thread = threading.Thread(target=self._run, name="timers", daemon=True)
+
+    def start(self) -> None:
+        """Start a thread that runs the timers, by the machine's clock."""
+        self._thread.start()
 
     def add(self, period: float, work: Callable[[], None], stagger: bool = False) -> Timer:
         """Add a timer whose first deadline is one period from now, or a little later.
@@ -310,6 +319,7 @@ class TimerQueue:
             timer.restart(self._start(period, stagger, align_phase))
             timer.stopped |= self._is_stopped
             self._push(timer)
+        self._wake_up()
 
     def _start(self, period, stagger, align_phase):
         """Return the moment one period before the first deadline."""
@@ -366,6 +376,20 @@ class TimerQueue:
             self._is_stopped = True
             for _, _, timer in self._heap:
                 timer.stop()
+        self._wake_up()
+
+    def _wake_up(self):
+        # It may be released already.
+        with contextlib.suppress(RuntimeError):
+            self._news.release()
+
+    def _run(self):
+        while not self._is_stopped:
+            wait = self.next_deadline() - self._clock.time()
+            if wait > 0.0:
+                self._news.acquire(timeout=min(wait, 1.0))
+            # To find a timer that is due takes as long as a short callback.
+            self.run_due(self._clock.time(), times=10)
 
     def _push(self, timer):
         heapq.heappush(self._heap, (timer.deadline, timer.number, timer))
@@ -397,48 +421,3 @@ class SimulatedTimers(TimerQueue):
         if period == 0.0:
             raise ValueError("a timer by simulated time needs a period > 0")
         super().begin(timer, period, stagger, align_phase)
-
-
-class SteadyTimers(TimerQueue):
-    """Timers by a steady clock, which a thread runs."""
-
-    def __init__(
-        self,
-        executor: Executor,
-        clock: SteadyClock | SimulatedClock,
-        before: Callable[[], None] | None = None,
-        after: Callable[[], None] | None = None,
-    ):
-        super().__init__(executor, clock, before, after)
-        # Released when there is anything new. Waiting for a bare lock takes half the time of
-        # waiting for a condition.
-        self._news = threading.Lock()
-        self._news.acquire()
-        self._thread = threading.Thread(target=self._run, name="timers", daemon=True)
-
-    def start(self) -> None:
-        """Start the timers."""
-        self._thread.start()
-
-    @override
-    def begin(self, timer: Timer, period: float, stagger: bool, align_phase: bool = False) -> None:
-        super().begin(timer, period, stagger, align_phase)
-        self._wake_up()
-
-    @override
-    def stop(self) -> None:
-        super().stop()
-        self._wake_up()
-
-    def _wake_up(self):
-        # It may be released already.
-        with contextlib.suppress(RuntimeError):
-            self._news.release()
-
-    def _run(self):
-        while not self._is_stopped:
-            wait = self.next_deadline() - self._clock.time()
-            if wait > 0.0:
-                self._news.acquire(timeout=min(wait, 1.0))
-            # To find a timer that is due takes as long as a short callback.
-            self.run_due(self._clock.time(), times=10)

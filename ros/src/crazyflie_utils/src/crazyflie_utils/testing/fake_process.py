@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from crazyflie_utils.node import Node, Process
 from crazyflie_utils.testing.fake_transport import FakeTransport
-from crazyflie_utils.timers import SimulatedClock, SteadyTimers
+from crazyflie_utils.timers import SimulatedClock, TimerQueue
 
 #: Period at which a timer of period 0 fires here (s); on a real machine it fires as often as
 #: possible.
@@ -54,7 +54,7 @@ class FakeProcess(Process):
         self.machine_clock = SimulatedClock()
         self.machine_clock.set(start)
         tf = self.transforms.gather, self.transforms.send_gathered
-        self._steady = SteadyTimers(self.executor, self.machine_clock, *tf)
+        self._steady = TimerQueue(self.executor, self.machine_clock, *tf)
         self.machine_clock.on_change(lambda now, _: self._steady.run_due(now))
         self.transport.machine_timers = self._steady
         self.executor.start()

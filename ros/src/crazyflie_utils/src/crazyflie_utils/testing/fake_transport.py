@@ -10,7 +10,7 @@ import genpy
 from rosmaster.paramserver import ParamDictionary
 
 from crazyflie_utils.refusal import ServiceError
-from crazyflie_utils.timers import SteadyTimers
+from crazyflie_utils.timers import TimerQueue
 from crazyflie_utils.topics import (
     Condition,
     ExternalPublisher,
@@ -60,7 +60,7 @@ class FakeTransport(Transport):
     ``machine_timers`` limit the duration of service calls; without them, calls have no limit.
     """
 
-    machine_timers: SteadyTimers | None = None
+    machine_timers: TimerQueue | None = None
 
     def __init__(self, parameters: dict[str, object]):
         self.parameters = dict(parameters)

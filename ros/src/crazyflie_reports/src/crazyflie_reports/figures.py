@@ -106,7 +106,7 @@ def _hover(flight: Flight) -> Iterator[Figure]:
     tolerance = HARDWARE_TOLERANCE if flight.vehicle.is_driven else HOVER_TOLERANCE
     time = over = mean = largest = math.nan
     begin, end = record.hover_interval(point) if point is not None else (0.0, 0.0)
-    if point is not None and len(record.state) and end - begin >= SHORTEST_HOVER:
+    if point is not None and end - begin >= SHORTEST_HOVER:
         time = record.time_to_hover(point, tolerance)
         over = record.overshoot(point)
         try:

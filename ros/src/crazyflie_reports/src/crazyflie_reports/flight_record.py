@@ -140,15 +140,15 @@ class FlightRecord:
         return float(inside[0] - self.events["takeoff"]) if inside.size else float("nan")
 
     def overshoot(self, point: ArrayLike) -> float:
-        """Return the overshoot above a hover point (m), at least 0."""
-        height = float(np.asarray(point)[2])
-        states = self.state.between(-np.inf, self.hover_interval(point)[1])
-        return float(states[:, 2].max(initial=height)) - height
+        """Return the overshoot above a hover point (m), at least 0; NaN without a known height."""
+        height, states = float(np.asarray(point)[2]), self._states()
+        heights = states[states[:, 0] <= self.hover_interval(point)[1], 3]
+        return max(0.0, float(heights.max()) - height) if len(heights) else float("nan")
 
     def hover_error(self, point: ArrayLike, duration: float) -> tuple[float, float]:
         """Return mean and maximum distance (m) from a point in the last ``duration`` s of a hover.
 
-        ValueError: no state was recorded in that time.
+        ValueError: no state is known in that time.
         """
         _, errors = self._hover(point, duration)
         if not errors.size:
@@ -161,7 +161,7 @@ class FlightRecord:
         The fastest of the last tenth of a second above `GROUND_TOLERANCE`; NaN when the vehicle did
         not come down, or no velocity is known there.
         """
-        rows = self.state.rows
+        rows = self._states()
         times, heights, speeds = rows[:, 0], rows[:, 3], -rows[:, 6]
         descending = np.flatnonzero((times >= self.events["land"]) & (heights > GROUND_TOLERANCE))
         if not descending.size or descending[-1] == len(times) - 1:
@@ -181,6 +181,11 @@ class FlightRecord:
                 control = before[-1] if len(before) else [np.nan] * len(CONTROL_FIELDS)
                 writer.writerow([f"{time - self.events['takeoff']:.3f}", *state, *control])
 
+    def _states(self):
+        """Return times (s) and states of known height, shape (n, 1 + len(STATE_FIELDS))."""
+        rows = self.state.rows
+        return rows[~np.isnan(rows[:, 3])]
+
     def _hover(self, point, duration=np.inf):
         """Return times and distances from the point, of the last ``duration`` s until its end."""
         end, (times, errors) = self.hover_interval(point)[1], _distances(self.state, point)
@@ -189,8 +194,11 @@ class FlightRecord:
 
 
 def _distances(series, point):
+    """Return times and distances from a point, where they are known."""
     rows = series.rows
-    return rows[:, 0], np.linalg.norm(rows[:, 1:4] - np.asarray(point), axis=1)
+    distances = np.linalg.norm(rows[:, 1:4] - np.asarray(point), axis=1)
+    is_known = ~np.isnan(distances)
+    return rows[is_known, 0], distances[is_known]
 
 
 @dataclass(frozen=True)
@@ -221,7 +229,7 @@ class FlightReport:
             hover_error_mean=mean,
             hover_error_max=largest,
             touchdown_speed=record.touchdown_speed(),
-            final_height=float(record.state.last[2]),
+            final_height=float(record._states()[-1, 3]),
             final_thrust=float(record.final_control.last[3]),
         )
 
@@ -234,7 +242,7 @@ class FlightReport:
                 f"(limit {HOVER_TOLERANCE * 1000:.0f} mm)",
             ),
             (
-                self.overshoot <= OVERSHOOT_LIMIT,
+                not self.overshoot > OVERSHOOT_LIMIT,
                 f"it rose {self.overshoot * 1000:.0f} mm above the hover point "
                 f"(limit {OVERSHOOT_LIMIT * 1000:.0f} mm)",
             ),

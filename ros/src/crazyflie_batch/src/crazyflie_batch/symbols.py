@@ -15,6 +15,8 @@ import numpy as np
 from llvmlite import ir
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
+from crazyflie_model.elementwise import NUMPY_FUNCTIONS
+
 DOUBLE = ir.DoubleType()
 _INDEX = ir.IntType(32)  #: Type of a lane's number.
 
@@ -22,15 +24,8 @@ _INDEX = ir.IntType(32)  #: Type of a lane's number.
 #: function ABI), with AVX-512, AVX2 and SSE.
 _VECTOR_LETTERS = {8: "e", 4: "d", 2: "b"}
 
-#: Functions of the C library.
-_FUNCTIONS = {
-    np.sin: "sin",
-    np.cos: "cos",
-    np.tan: "tan",
-    np.arcsin: "asin",
-    np.arctan2: "atan2",
-    np.hypot: "hypot",
-}
+#: Functions of the C library, whose names are those of Python's math.
+_FUNCTIONS = {function: name for name, function in vars(NUMPY_FUNCTIONS).items()}
 
 #: Intrinsics of LLVM: one instruction on most processors.
 _INTRINSICS = {np.sqrt: "llvm.sqrt", np.floor: "llvm.floor", np.absolute: "llvm.fabs"}

@@ -37,7 +37,7 @@ def join(components: Sequence[Many]) -> NDArray[np.float64]:
 
 
 #: numpy's functions by math's names, which numpy itself has since version 2 only.
-_NUMPY_FUNCTIONS = SimpleNamespace(
+NUMPY_FUNCTIONS = SimpleNamespace(
     sin=np.sin,
     cos=np.cos,
     tan=np.tan,
@@ -50,7 +50,7 @@ _NUMPY_FUNCTIONS = SimpleNamespace(
 
 def functions(value: Many) -> ModuleType | SimpleNamespace:
     """Return math, or numpy under the same names, whose sin, cos, ... take ``value``."""
-    return math if isinstance(value, float) else _NUMPY_FUNCTIONS
+    return math if isinstance(value, float) else NUMPY_FUNCTIONS
 
 
 @overload

@@ -129,6 +129,21 @@ def test_no_velocity_is_known_of_a_pose_between_two_gaps(run):
     assert {value for value in x_dot["v"] if value is not None} == {0.0}
 
 
+@pytest.mark.filterwarnings("error")
+def test_an_infinite_pose_is_no_ground(run):
+    with bags.written(run.folder / "a.bag") as bag:
+        for number, time in bags.steps():
+            pose = bags.PoseStamped(header=bags.header(time, number))
+            pose.pose.position.z = float("-inf") if number == 30 else bags.height(time)[0]
+            pose.pose.orientation.w = 1.0
+            bag.write("/cf1/pose", pose, bags.stamp(time))
+    _, _, (flight,) = run(run.folder / "a.bag")
+    # In flight from 0.1 m on.
+    begin = bags.TAKEOFF + 0.1 / bags.SPEED
+    end = bags.LAND + (1.0 + bags.OFFSET - 0.1) / bags.SINK
+    assert values(flight)["duration"] == pytest.approx(end - begin, abs=0.03)
+
+
 def test_a_flight_with_one_state(run):
     with bags.written(run.folder / "a.bag") as bag:
         bags.write_flight(bag, gap=(-1.0, 99.0))

@@ -64,7 +64,7 @@ def test_states_of_unknown_position_are_left_out():
     for time in (10.5, 13.0, 17.0, 19.99, 22.0, 27.0):
         changed.state.append(time, [0.0, 0.0, math.nan, 0.0, 0.0, math.nan, 0.0])
     rows = changed.state.rows
-    changed.state = Series.of(changed.state.fields, rows[np.argsort(rows[:, 0], kind="stable")])
+    changed.state = Series(changed.state.fields, rows[np.argsort(rows[:, 0], kind="stable")])
     assert FlightReport.of(changed, HOVER) == FlightReport.of(record, HOVER)
     assert FlightReport.of(changed, HOVER).complaints() == []
     assert changed.time_to_hover(HOVER, 0.01) == record.time_to_hover(HOVER, 0.01)
@@ -74,7 +74,7 @@ def test_no_figure_is_known_without_a_known_position():
     record = flight()
     rows = record.state.rows
     rows[:, 3] = math.nan
-    record.state = Series.of(record.state.fields, rows)
+    record.state = Series(record.state.fields, rows)
     assert math.isnan(record.overshoot(HOVER))
     assert math.isnan(record.time_to_hover(HOVER, 0.01))
     assert math.isnan(record.touchdown_speed())

@@ -188,10 +188,22 @@ def test_what_is_no_log_is_named(tmp_path, data, text):
         UsdLogFile(path)
 
 
-def test_a_log_of_attitudes_alone_is_laid_over_too(run):
+def attitudes(path):
+    """Write a log that has attitudes only."""
     times = np.arange(0.0, 12.0, 0.01)
     events = [(1, t, (*np.degrees((tilt(t)[0], -tilt(t)[1])), 0.0)) for t in times]
-    log = written(run.folder / "log07", {(1, "a"): ANGLES}, events)
+    return written(path, {(1, "a"): ANGLES}, events)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_log_of_attitudes_alone_has_no_flight(run):
+    status, output, flown = run(attitudes(run.folder / "log07"))
+    assert (status, flown) == (0, [])
+    assert "It has no flight." in output
+
+
+def test_a_log_of_attitudes_alone_is_laid_over_too(run):
+    log = attitudes(run.folder / "log07")
     status, output, flown = run(bag(run.folder / "a.bag"), log)
     assert (status, [each["vehicle"] for each in flown]) == (0, ["cf1", "cf2", "cf1 log07"])
     assert "log07 is laid over cf1" in output

@@ -17,6 +17,16 @@ MAX_EVENTS = 20_000  #: Largest number of events of a bag; more are only counted
 
 _WARN, _ERROR = 4, 8  # Levels of rosgraph_msgs/Log.
 _ROS2_LEVELS = {30: _WARN, 40: _ERROR, 50: _ERROR}  # Levels of rcl_interfaces/Log.
+_FILTER_STATES = {
+    FilterStatus.HOLDING: "holding",
+    FilterStatus.SINKING: "sinking",
+    FilterStatus.DOWN: "down",
+    FilterStatus.EMERGENCY: "emergency",
+}
+_LOW_BATTERIES = {
+    VehicleStatus.BATTERY_LOW: "battery low",
+    VehicleStatus.BATTERY_CRITICAL: "battery critical",
+}
 
 
 class Kind(Enum):
@@ -95,11 +105,8 @@ class EventLog:
 
     def _filter_status(self, time, topic, namespace, message):
         if self._changes(topic, message.state) and message.state != FilterStatus.PASSING:
-            is_hold = message.state == FilterStatus.HOLDING
-            name = _constant(
-                FilterStatus, message.state, ("HOLDING", "SINKING", "DOWN", "EMERGENCY")
-            )
-            kind = Kind.HOLD if is_hold else Kind.EMERGENCY
+            kind = Kind.HOLD if message.state == FilterStatus.HOLDING else Kind.EMERGENCY
+            name = _FILTER_STATES.get(message.state, "?")
             yield namespace, kind, f"the filter is {name}: {message.reason}"
 
     def _vehicle_status(self, time, topic, namespace, message):
@@ -109,10 +116,9 @@ class EventLog:
             yield namespace, Kind.LINK, message.link_text
         if self._changes((topic, "emergency"), message.is_emergency) and message.is_emergency:
             yield namespace, Kind.EMERGENCY, message.text
-        is_low = message.battery in (VehicleStatus.BATTERY_LOW, VehicleStatus.BATTERY_CRITICAL)
-        if self._changes((topic, "battery"), message.battery) and is_low:
-            name = _constant(VehicleStatus, message.battery, ("BATTERY_LOW", "BATTERY_CRITICAL"))
-            yield namespace, Kind.BATTERY, f"{name}: {message.battery_voltage:.2f} V"
+        low = _LOW_BATTERIES.get(message.battery)
+        if self._changes((topic, "battery"), message.battery) and low:
+            yield namespace, Kind.BATTERY, f"{low}: {message.battery_voltage:.2f} V"
 
     def _parameters(self, time, topic, namespace, message):
         node = topic.rpartition("/")[0]
@@ -182,12 +188,6 @@ def _line_of_log(name, line, level):
     else:
         return
     yield _parent(node), kind, line if own_name else f"{node}: {line}"
-
-
-def _constant(message_type, value, names):
-    return next(
-        (n.lower().replace("_", " ") for n in names if getattr(message_type, n) == value), "?"
-    )
 
 
 def _parent(node):

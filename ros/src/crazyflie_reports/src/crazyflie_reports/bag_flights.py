@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_reports.bag_events import Event, concerning
 from crazyflie_reports.bag_log import BagLog, Spool
-from crazyflie_reports.bag_topics import POSE_FIELDS
+from crazyflie_reports.bag_topics import ROLES
 from crazyflie_reports.flight_record import (
     CONTROL_FIELDS,
     STATE_FIELDS,
@@ -22,6 +22,7 @@ from crazyflie_reports.flight_record import (
 Rows = NDArray[np.float64]
 
 _TIME, _STAMP, _NUMBER, _FIRST = 0, 1, 2, 3  # Columns of a spool.
+_WIDTHS = {role.name: _FIRST + len(role.fields) for role in ROLES}
 
 #: Difference of stamps from the time of recording above which they are of another clock (s).
 OTHER_CLOCK = 10.0
@@ -121,20 +122,20 @@ def _moves(spool: Spool) -> bool:
 
 
 def _vehicle(namespace, driver, sources, frame, log):
-    def rows(role, width):
+    def rows(role):
         of_role = [each for each in sources if each.role == role]
         # Among several topics, the one with the most messages.
         longest = max(of_role, key=lambda spool: spool.count, default=None)
-        return longest.rows() if longest else np.empty((0, _FIRST + width))
+        return longest.rows() if longest else np.empty((0, _WIDTHS[role]))
 
-    pose = rows("pose", len(POSE_FIELDS))
+    pose = rows("pose")
     if not len(pose) and frame is not None:
         pose = log.frames[frame].rows()
-    state = rows("state", len(STATE_FIELDS))
+    state = rows("state")
     lost = _lost(state)
     if not len(state):
         state = _states_of(pose)
-    control, cmd_vel = (rows(role, len(CONTROL_FIELDS)) for role in ("final_control", "cmd_vel"))
+    control, cmd_vel = rows("final_control"), rows("cmd_vel")
     is_driven = len(cmd_vel) > 0 or any(each.role == "battery" for each in sources)
     control = control if len(control) else cmd_vel
     return Vehicle(
@@ -143,16 +144,16 @@ def _vehicle(namespace, driver, sources, frame, log):
         is_driven=is_driven,
         state=_without_header(state),
         stamps=state[:, [_TIME, _STAMP]],
-        reference=_without_header(rows("reference", len(STATE_FIELDS))),
+        reference=_without_header(rows("reference")),
         control=_without_header(control),
         command=_without_header(cmd_vel),
         attitude=_without_header(pose),
         pose_stamps=pose[:, [_TIME, _STAMP]],
-        true_pose=_without_header(rows("true_pose", len(POSE_FIELDS))),
-        battery=_without_header(rows("battery", 1)),
+        true_pose=_without_header(rows("true_pose")),
+        battery=_without_header(rows("battery")),
         link=np.reshape(log.events.links.get(driver, ()), (-1, 3)),
         flight_states=log.events.flight_states.get(namespace, []),
-        toggles=_without_header(rows("toggle", 0)),
+        toggles=_without_header(rows("toggle")),
         delays=_delays(control, state),
         lost=lost,
     )
@@ -165,10 +166,11 @@ def _without_header(rows: Rows) -> Rows:
 def _states_of(poses: Rows) -> Rows:
     """Return rows of states from rows of poses, with velocities by central differences.
 
-    A velocity is NaN without a neighbouring pose, as between two gaps.
+    A velocity is NaN without a neighbouring pose, as between two gaps. What is infinite is NaN.
     """
     increasing = np.r_[True, np.diff(poses[:, _TIME]) > 1e-4][: len(poses)]
     poses = poses[increasing]
+    poses[np.isinf(poses)] = np.nan
     position, yaw = poses[:, _FIRST : _FIRST + 3], poses[:, -1:]
     velocity = np.full_like(position, np.nan)
     ends = np.flatnonzero(gaps(poses[:, _TIME])) + 1
@@ -274,23 +276,21 @@ def _phases(states, end):
 def _guessed(vehicle):
     toggles = vehicle.toggles[:, 0]
     for start, end in _airborne(vehicle):
-        moments = [start, *toggles[(toggles > start) & (toggles < end)], end]
-        names = ["taking off", "flying", "landing"] if len(moments) == 4 else ["flying"]
-        if len(names) == 1:
-            moments = [start, end]
-        yield [Phase(*each) for each in zip(names, moments, moments[1:], strict=False)]
+        within = toggles[(toggles > start) & (toggles < end)].tolist()
+        if len(within) != 2:
+            yield [Phase("flying", start, end)]
+            continue
+        on, off = within
+        yield [Phase("taking off", start, on), Phase("flying", on, off), Phase("landing", off, end)]
 
 
 def _airborne(vehicle):
     """Return begin and end of each time with thrust or, where no control is known, above ground."""
     if len(vehicle.control):
-        times, flies = vehicle.control[:, 0], vehicle.control[:, 4] > 0.0
-    elif len(vehicle.state):
-        height = vehicle.state[:, 3]
-        times, flies = vehicle.state[:, 0], height > np.nanmin(height) + LIFT
+        times = vehicle.control[vehicle.control[:, 4] > 0.0, 0]
     else:
-        return []
-    times = times[flies]
+        height = vehicle.state[:, 3]
+        times = vehicle.state[height > np.fmin.reduce(height, initial=np.inf) + LIFT, 0]
     if not len(times):
         return []
     pauses = np.flatnonzero(np.diff(times) > PAUSE)
@@ -317,7 +317,7 @@ def _series(rows, fields, first, last):
     # Positions or controls that are not finite, which every node also rejects.
     rows = rows[np.isfinite(rows[:, :4]).all(axis=1)]
     rows[np.isinf(rows)] = np.nan
-    return Series.of(fields, rows)
+    return Series(fields, rows)
 
 
 def between(rows: Rows, first: float, last: float) -> Rows:

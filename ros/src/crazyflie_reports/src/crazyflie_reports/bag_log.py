@@ -180,8 +180,8 @@ class _Reader:
         newest = self._newest.get(connection.topic, time)
         if time < newest - RESTART and newest < SIMULATED:
             self.logs.append(BagLog(self._name))
-            self._newest = {}
-        self._newest[connection.topic] = max(time, self._newest.get(connection.topic, time))
+            self._newest, newest = {}, time
+        self._newest[connection.topic] = max(time, newest)
         log = self.logs[-1]
         log.start, log.end = min(log.start, time), max(log.end, time)
         try:

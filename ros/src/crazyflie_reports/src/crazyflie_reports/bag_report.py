@@ -67,26 +67,21 @@ class Report:
         names = [[f.name, f.unit, f.needs, f.note] for _, row in self._flights[:1] for f in row]
         folder.mkdir(parents=True, exist_ok=True)
         (folder / PAGE).write_text(report_page.page(self.recordings, names))
-        keys = ("recording", "vehicle", "flight")
-        rows = [([entry[key] for key in keys], entry, found) for entry, found in self._flights]
-        _write_csv(
-            folder / FIGURES,
-            [*keys, "figure", "value", "unit", "normal", "is normal"],
-            [
-                [*key, f.name, _number(f.value), f.unit, f.normal, _is_normal(f)]
-                for key, _, found in rows
-                for f in found
-            ],
-        )
-        _write_csv(
-            folder / EVENTS,
-            [*keys, "time (s)", "kind", "text", "count"],
-            [[*key, *event] for key, entry, _ in rows for event in entry["events"]],
-        )
-        tables = [
-            {**entry, "figures": {f.name: _figure(f) for f in found}}
-            for entry, found in self._flights
-        ]
+        keys = ["recording", "vehicle", "flight"]
+        figure_rows: list[list[Any]] = [[*keys, "figure", "value", "unit", "normal", "is normal"]]
+        event_rows: list[list[Any]] = [[*keys, "time (s)", "kind", "text", "count"]]
+        tables = []
+        for entry, found in self._flights:
+            key, values = [entry[each] for each in keys], {}
+            for f in found:
+                number = f.value if math.isfinite(f.value) else None
+                is_normal = None if math.isnan(f.value) else f.is_normal
+                figure_rows.append([*key, f.name, number, f.unit, f.normal, is_normal])
+                values[f.name] = {"value": number, "unit": f.unit, "normal": f.normal}
+            event_rows += [[*key, *event] for event in entry["events"]]
+            tables.append({**entry, "figures": values})
+        _write_csv(folder / FIGURES, figure_rows)
+        _write_csv(folder / EVENTS, event_rows)
         (folder / DATA).write_text(json.dumps(tables, indent=1, allow_nan=False))
 
     def table(self) -> str:
@@ -204,21 +199,9 @@ def _why_there_is_no_flight(log):
         yield f"{event.time - log.start:.1f} s: {event.kind.value}: {event.text}"
 
 
-def _is_normal(figure):
-    return None if math.isnan(figure.value) else figure.is_normal
-
-
-def _figure(figure):
-    return {"value": _number(figure.value), "unit": figure.unit, "normal": figure.normal}
-
-
-def _number(value):
-    return value if math.isfinite(value) else None
-
-
-def _write_csv(path, header, rows):
+def _write_csv(path, rows):
     with path.open("w", newline="") as file:
-        csv.writer(file).writerows([header, *([_cell(each) for each in row] for row in rows)])
+        csv.writer(file).writerows([_cell(each) for each in row] for row in rows)
 
 
 def _cell(value):

@@ -35,19 +35,13 @@ def gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
 class Series:
     """Rows of numbers with the times they belong to, growing.
 
-    One thread may append while another reads. ``fields`` are the names of the columns.
+    One thread may append while another reads. ``fields`` are the names of the columns, ``rows``
+    times (s) and rows, shape (n, 1 + len(fields)), to which none is appended.
     """
 
-    def __init__(self, fields: tuple[str, ...]):
+    def __init__(self, fields: tuple[str, ...], rows: NDArray[np.float64] | None = None):
         self.fields = fields
-        self._rows: Any = []
-
-    @classmethod
-    def of(cls, fields: tuple[str, ...], rows: NDArray[np.float64]) -> "Series":
-        """Return a series of times (s) and rows, shape (n, 1 + len(fields))."""
-        series = cls(fields)
-        series._rows = rows
-        return series
+        self._rows: Any = [] if rows is None else rows
 
     def append(self, time: float, row: Iterable[float]) -> None:
         """Add a row, shape (len(fields),), at ``time`` (s)."""

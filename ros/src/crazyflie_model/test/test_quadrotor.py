@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from crazyflie_model.elementwise import join, split
+from crazyflie_model.limits import FULL_PWM
 from crazyflie_model.quadrotor import CRAZYFLIE
 from crazyflie_model.stabilized_quadrotor import Airframe
 from crazyflie_model.units import GRAVITY, HOVER_PWM
@@ -219,6 +220,18 @@ def test_motor_commands_are_thrust():
     assert CRAZYFLIE.rotor_speed(HOVER_PWM) == pytest.approx(CRAZYFLIE.hover_speed)
     speeds = CRAZYFLIE.rotor_speed(np.array([0.0, 0.25 * HOVER_PWM, HOVER_PWM]))
     np.testing.assert_allclose(speeds, CRAZYFLIE.hover_speed * np.array([0.0, 0.5, 1.0]))
+
+
+@pytest.mark.parametrize("curve", [(0.2, -0.09), (0.05, 0.1), (0.2, 0.0)])
+def test_a_thrust_that_no_command_makes_asks_for_more_than_a_full_one(curve):
+    model = dataclasses.replace(CRAZYFLIE, mass=0.033).with_thrust_curve(*curve)
+    full = model.thrust(FULL_PWM)
+    thrusts = [0.5 * full, full, full + 0.01, full + 5.0, 1e3]
+    commands = [model.pwm(thrust) for thrust in thrusts]
+    assert [model.thrust(command) for command in commands[:2]] == pytest.approx(thrusts[:2])
+    assert commands[1] == pytest.approx(FULL_PWM)
+    assert commands == sorted(commands)
+    assert model.pwm(np.array(thrusts)) == pytest.approx(commands)
 
 
 def test_a_vehicle_with_errors_hovers_with_other_thrust():

@@ -83,8 +83,10 @@ class QuadrotorParameters:
         Below 0 it is linear, and not limited.
         """
         a, b, force = self.thrust_linear, self.thrust_quadratic, thrust * (self.mass / 4.0)
-        # A form of the root of b f^2 + a f = force that is also valid for b = 0.
-        root = functions(force).sqrt(a * a + 4.0 * b * clip(force, 0.0, math.inf))
+        # A form of the root of b f^2 + a f = force that is also valid for b = 0. With b < 0 and a
+        # force that the curve does not reach, the command is beyond the curve's highest point.
+        square = a * a + 4.0 * b * clip(force, 0.0, math.inf)
+        root = functions(force).sqrt(clip(square, 0.0, math.inf))
         return 2.0 * force / (a + root) * FULL_PWM
 
     @property
@@ -113,15 +115,13 @@ class QuadrotorParameters:
             thrust_constant=self.thrust_constant * (1.0 + thrust_error),
         )
 
+    def with_thrust_curve(self, linear: float, quadratic: float) -> "QuadrotorParameters":
+        """Return a vehicle with a thrust curve, whose top speed is that of a full command."""
+        model = replace(self, thrust_linear=linear, thrust_quadratic=quadratic)
+        return replace(model, max_rotor_speed=model.rotor_speed(FULL_PWM))
+
 
 CRAZYFLIE = QuadrotorParameters()  #: The Crazyflie 2.1.
-
-
-def _with_top(curve: tuple[float, float], **figures: float) -> QuadrotorParameters:
-    """Return a type whose rotors reach the speed that a full command asks for."""
-    parameters = replace(CRAZYFLIE, thrust_linear=curve[0], thrust_quadratic=curve[1], **figures)
-    return replace(parameters, max_rotor_speed=parameters.rotor_speed(FULL_PWM))
-
 
 #: Types of vehicles by name. Where Bitcraze publishes no figure, it is that of `CRAZYFLIE`.
 #: Sources, of crazyflie-firmware (2025): [P] platform_defaults_cf2.h (of the 2.1+ propellers) and
@@ -130,9 +130,9 @@ def _with_top(curve: tuple[float, float], **figures: float) -> QuadrotorParamete
 TYPES = {
     "cf21": CRAZYFLIE,
     # With markers and battery 33 g, which the curve of [D] carries at `HOVER_PWM`.
-    "cf21_markers": _with_top((0.067673604, 0.091492681), mass=0.033),
-    "cf21plus": _with_top((0.1125, 0.0), mass=0.029),
-    "brushless": _with_top(
-        (0.2, 0.0), mass=0.0393, arm=0.050, torque_per_thrust=0.00569278844371417
-    ),
+    "cf21_markers": replace(CRAZYFLIE, mass=0.033).with_thrust_curve(0.067673604, 0.091492681),
+    "cf21plus": replace(CRAZYFLIE, mass=0.029).with_thrust_curve(0.1125, 0.0),
+    "brushless": replace(
+        CRAZYFLIE, mass=0.0393, arm=0.050, torque_per_thrust=0.00569278844371417
+    ).with_thrust_curve(0.2, 0.0),
 }

@@ -52,6 +52,11 @@ def test_the_published_curve_carries_33_g_at_the_links_hover():
             r"thrust_curve .*:2\) is \[0.1\]; expected a list of 2",
         ),
         ("thrust_curve: [0.2, -0.15]\n", "expected one that rises"),
+        # At full command its thrust is negative, so that no speed of the rotors makes it.
+        (
+            "thrust_curve: [0.2, -0.3]\n",
+            r"mine.yaml:1: .*is \[0.2, -0.3\]; expected one that rises",
+        ),
         ("mass: 0.06\n", "mass is 0.06 kg, and the rotors lift 0.64 times the weight"),
         ("masss: 0.03\n", "masss is not known; expected one of .*mass"),
         ("type: cf3\n", "type .* is 'cf3'; expected one of cf21,"),

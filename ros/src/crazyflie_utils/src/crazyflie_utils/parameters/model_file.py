@@ -9,6 +9,7 @@ from typing_extensions import override
 
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE
 from crazyflie_model.quadrotor import TYPES, QuadrotorParameters
+from crazyflie_model.units import GRAVITY
 from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import ListOf, Number, Text
@@ -71,18 +72,20 @@ class ModelParameters(Parameters):
 
     @override
     def complaints(self) -> list[str]:
-        curve, figures = self.thrust_curve, self.figures()
+        curve = self.thrust_curve
         # A curve that falls anywhere between zero and full command has no inverse.
         if curve is not None and (curve[0] <= 0.0 or curve[0] + 2.0 * curve[1] <= 0.0):
             return [
                 f"thrust_curve is {list(curve)}; expected one that rises from command 0 to 1: "
                 "a > 0 and a + 2 b > 0"
             ]
-        if figures.max_thrust < 1.05 * 9.81:
+        model = self.figures()
+        lifted = model.max_thrust / GRAVITY
+        if lifted < 1.05:
             return [
-                f"mass is {figures.mass:g} kg, and the rotors lift {figures.max_thrust / 9.81:.2f} "
-                "times the weight at the largest command; expected at least 1.05 times: a smaller "
-                "mass or a stronger thrust_curve"
+                f"mass is {model.mass:g} kg, and the rotors lift {lifted:.2f} times the weight at "
+                "the largest command; expected at least 1.05 times: a smaller mass or a stronger "
+                "thrust_curve"
             ]
         return []
 
@@ -90,13 +93,8 @@ class ModelParameters(Parameters):
         """Return the figures of the vehicle."""
         names = {each.name for each in fields(QuadrotorParameters)}
         given = {k: v for k, v in vars(self).items() if k in names and v is not None}
-        if self.thrust_curve is not None:
-            linear, quadratic = self.thrust_curve
-            given |= {"thrust_linear": linear, "thrust_quadratic": quadratic}
         model = replace(TYPES[self.type], **given)
-        if self.thrust_curve is not None:
-            model = replace(model, max_rotor_speed=model.rotor_speed(65535.0))
-        return model
+        return model if self.thrust_curve is None else model.with_thrust_curve(*self.thrust_curve)
 
 
 def load(path: str) -> QuadrotorParameters:

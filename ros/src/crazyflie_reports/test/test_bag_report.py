@@ -315,6 +315,27 @@ def test_recordings_side_by_side_of_which_one_is_bad(run):
     assert [name for name, _, _ in flights[0]["phases"]] == ["taking off", "flying", "landing"]
 
 
+def test_a_recording_in_the_present_folder_has_its_name(run, monkeypatch):
+    bags.flight_bag(run.folder / "a.bag")
+    (run.folder / "b").mkdir()
+    for here, given in ((run.folder, "."), (run.folder / "b", "..")):
+        monkeypatch.chdir(here)
+        status, output, flights = run(given, "--mcap")
+        assert (status, [each["recording"] for each in flights]) == (0, [run.folder.name])
+        assert f"mcap/{run.folder.name}/{run.folder.name}.mcap" in output
+
+
+@pytest.mark.parametrize("name", ["a.bag", "a.mcap", "a.db3"])
+def test_a_bag_that_cannot_be_opened_does_not_stop_the_others(run, name):
+    good = bags.flight_bag(run.folder / "good.bag")
+    (run.folder / "bad").mkdir()
+    (run.folder / "bad" / name).symlink_to("nowhere")
+    status, output, flights = run(run.folder / "bad", good)
+    assert (status, [each["recording"] for each in flights]) == (1, ["good.bag"])
+    assert f"bad/{name}: No such file or directory" in output
+    assert "written" not in output
+
+
 def test_no_flight(run):
     with bags.written(run.folder / "a.bag") as bag:
         for _, time in bags.steps():

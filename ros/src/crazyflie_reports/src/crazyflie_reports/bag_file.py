@@ -108,10 +108,7 @@ class Connection:
 
 
 class BagFile:
-    """A bag file that is read once, from its beginning.
-
-    `BagError`: the file does not exist, or is not a bag of format 2.0.
-    """
+    """A bag file that is read once, from its beginning; `BagError`: it has not the format 2.0."""
 
     def __init__(self, path: Path):
         self._path = path
@@ -119,12 +116,9 @@ class BagFile:
         self.interruption = ""  #: Reason why reading has ended early; empty if it has not.
         self.done = 0  #: Number of bytes that have been read.
         self._by_id: dict[bytes, Connection | None] = {}  # None: not wanted.
-        try:
-            with path.open("rb") as file:
-                start = file.read(len(MAGIC))
-            self.size = path.stat().st_size
-        except OSError as error:
-            raise BagError(f"{path}: {error.strerror}") from None
+        with path.open("rb") as file:
+            start = file.read(len(MAGIC))
+        self.size = path.stat().st_size
         self._expansion = Expansion(self.size)
         if not start:
             raise BagError(f"{path} is empty; expected a bag, as rosbag record writes")

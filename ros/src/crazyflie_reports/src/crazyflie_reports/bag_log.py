@@ -1,5 +1,6 @@
 """The messages of a recording, read once: numbers in files, events in memory."""
 
+import os
 from array import array
 from collections import Counter
 from collections.abc import Sequence
@@ -88,6 +89,11 @@ class BagLog:
     remarks: list[str] = field(default_factory=list)
 
 
+def name_of(path: Path) -> str:
+    """Return the name of a recording: that of its file or folder, also of "." and ".."."""
+    return os.path.basename(os.path.abspath(path))
+
+
 def _files_of(path: Path) -> list[Path]:
     """Return the files of a recording: those of a folder in their order, or the file itself.
 
@@ -118,10 +124,11 @@ def read(path: Path, folder: Path, names: dict[str, str] | None = None) -> list[
     expressions of topics in place of the documented ones. `BagError`: the recording cannot be read,
     or has none of the topics.
     """
-    reader = _Reader(path.name, folder, names or {})
+    name = name_of(path)
+    reader = _Reader(name, folder, names or {})
     files = [_opened(each, folder) for each in _files_of(path)]
     size = sum(file.size for file in files)
-    with tqdm(total=size, unit="B", unit_scale=True, desc=path.name, disable=None) as bar:
+    with tqdm(total=size, unit="B", unit_scale=True, desc=name, disable=None) as bar:
         for file in files:
             done = 0.0
             for connection, time, data in file.messages(reader.is_wanted):
@@ -142,14 +149,17 @@ def read(path: Path, folder: Path, names: dict[str, str] | None = None) -> list[
     logs[0].remarks += remarks
     for number, log in enumerate(logs, 1):
         if len(logs) > 1:
-            log.name = f"{path.name}, start {number} of {len(logs)}"
+            log.name = f"{name}, start {number} of {len(logs)}"
     return logs
 
 
 def _opened(path, folder):
-    if path.name.endswith(SUFFIXES):
-        return Ros2BagFile(path, folder)
-    return UsdLogFile(path) if is_usd_log(path) else BagFile(path)
+    try:
+        if path.name.endswith(SUFFIXES):
+            return Ros2BagFile(path, folder)
+        return UsdLogFile(path) if is_usd_log(path) else BagFile(path)
+    except OSError as error:
+        raise BagError(f"{path}: {error.strerror}") from None
 
 
 class _Reader:

@@ -110,24 +110,23 @@ def make(
     the folder cannot be written.
     """
     report, problems, written = Report(), [], []
+    own_names = [bag_log.name_of(each) for each in paths]
     logs: list[bag_log.BagLog] = []
     on_board: list[bag_log.BagLog] = []  # Logs of vehicles' micro SD cards.
     try:
         folder.mkdir(parents=True, exist_ok=True)
         # Next to the report, since /tmp may be in memory.
         with tempfile.TemporaryDirectory(dir=folder) as place:
-            for number, path in enumerate(paths):
-                series = Path(place, str(number))
-                series.mkdir()
+            for path, name in zip(paths, own_names, strict=True):
                 try:
-                    found = bag_log.read(path, series, names)
+                    found = bag_log.read(path, Path(tempfile.mkdtemp(dir=place)), names)
                 except BagError as error:
                     problems.append(str(error))
                     continue
                 for log in found:
                     # Bags in different folders may have the same name.
-                    if [each.name for each in paths].count(path.name) > 1:
-                        log.name = str(path) + log.name.removeprefix(path.name)
+                    if own_names.count(name) > 1:
+                        log.name = str(path) + log.name.removeprefix(name)
                 (on_board if path.is_file() and is_usd_log(path) else logs).extend(found)
             alone = [log for log in on_board if not lay_over(log, logs)]
             for log in [*logs, *alone]:

@@ -159,8 +159,8 @@ def _fields(definition):
 class Ros2BagFile:
     """A file of a ROS 2 bag, as `bag_file.BagFile` is one of ROS 1.
 
-    A file that is compressed as a whole is decompressed into ``folder``. `BagError`: the file does
-    not exist, or cannot be read.
+    A file that is compressed as a whole is decompressed into ``folder``. `BagError`: it cannot be
+    read.
     """
 
     def __init__(self, path: Path, folder: Path):

@@ -1,5 +1,6 @@
 """Log blocks that the vehicle refuses, at first or when it is connected again."""
 
+import errno
 import queue
 
 import pytest
@@ -9,6 +10,15 @@ from crazyflie_link.errors import RefusedError, ValueRangeError
 from crazyflie_link.log import LogBlock
 
 LIMIT = 60.0
+START, CREATE, APPEND = 3, 6, 7
+
+#: Ten variables with the 26 bytes of a packet: one packet creates the block with nine of them, a
+#: second one appends the last.
+TEN = {
+    **{f"ten.{name}": ("f", 1.5) for name in "abcde"},
+    **{f"ten.{name}": ("B", 7) for name in "fghi"},
+    "ten.j": ("h", -300),
+}
 
 
 def log_block(name, receive=lambda *_: None, variables=("pm.vbat",), period_ms=20):
@@ -58,3 +68,71 @@ def test_periods_between_the_steps_are_not_cut(link, period_ms):
         ValueRangeError, match=f"{period_ms} ms; expected 10 to 2540 ms, in steps of 10"
     ):
         link.add_log_block(log_block("odd", period_ms=period_ms))
+
+
+class Losses:
+    """A vehicle that loses the first packet with each of some commands, or its answer."""
+
+    def __init__(self, vehicle, requests, answers):
+        self._vehicle, self._requests, self._answers = vehicle, list(requests), list(answers)
+        self._handle, vehicle._reply = vehicle._reply, self._reply
+        vehicle.lose = lambda _: self._is_lost(self._answers, *vehicle.received[-1])
+
+    def _reply(self, *packet):
+        if not self._is_lost(self._requests, *packet):
+            self._handle(*packet)
+
+    def _is_lost(self, commands, port, channel, data):
+        is_lost = (port, channel) == (5, 1) and data[0] in commands
+        if is_lost:
+            commands.remove(data[0])
+        return is_lost
+
+
+@pytest.mark.parametrize(
+    ("requests", "answers"),
+    [
+        ([], []),
+        ([CREATE], []),
+        ([APPEND], []),
+        ([START], []),
+        ([], [CREATE]),
+        ([], [APPEND]),
+        ([], [START]),
+        ([], [APPEND, START]),
+        ([CREATE, APPEND], []),
+        ([], [CREATE, APPEND]),
+        ([CREATE, APPEND, START], [CREATE, APPEND, START]),
+    ],
+)
+def test_a_block_of_two_packets_is_complete_whatever_is_lost(
+    make_vehicle, make_link, requests, answers
+):
+    vehicle = make_vehicle(log=TEN)
+    link = make_link(vehicle.uri)
+    link.connect()
+    Losses(vehicle, requests, answers)
+    received = queue.Queue()
+    link.add_log_block(log_block("ten", lambda *data: received.put(data), tuple(TEN)))
+    assert received.get(timeout=LIMIT)[1] == tuple(value for _, value in TEN.values())
+
+
+@pytest.mark.parametrize(
+    ("command", "code", "text"),
+    [
+        (CREATE, errno.ENOMEM, "No more memory available"),
+        (CREATE, errno.E2BIG, "Block too large"),
+        (APPEND, errno.ENOMEM, "No more memory available"),
+        (APPEND, errno.EEXIST, "Block already exists"),
+        (START, errno.EEXIST, "Block already exists"),
+    ],
+)
+def test_a_block_of_which_a_part_is_refused_is_refused(
+    make_vehicle, make_link, command, code, text
+):
+    vehicle = make_vehicle(log=TEN)
+    link = make_link(vehicle.uri)
+    link.connect()
+    vehicle.answers[5, 1, command] = bytes([command, 1, code])
+    with pytest.raises(RefusedError, match=f"'ten': the vehicle answers: {text}"):
+        link.add_log_block(log_block("ten", variables=tuple(TEN)))

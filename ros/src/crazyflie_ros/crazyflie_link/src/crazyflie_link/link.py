@@ -350,19 +350,17 @@ class Link:
             )
         self.put(partial(self.cflib.send_packet, packet(port, channel, data)))
 
-    def request(
-        self, send: Send | bytes, request: Request, put: Callable[[Send], None] | None = None
-    ) -> bytes:
+    def request(self, send: Send | bytes, request: Request) -> bytes:
         """Send a request and return the data of its answer; see `Transmission.request`.
 
-        ``send`` is a call, or data for the port and channel of the answer. By default it is queued.
+        ``send`` is a call, or data for the port and channel of the answer.
         """
         transmit = (
             partial(self.cflib.send_packet, packet(request.port, request.channel, send))
             if isinstance(send, bytes)
             else send
         )
-        return self._transmission.request(transmit, request, put or self.put)
+        return self._transmission.request(transmit, request, self.put)
 
     def guarded(self, may_send: MaySend) -> Self:
         """Return the same open link, whose commands and requests go out only if ``may_send()``.

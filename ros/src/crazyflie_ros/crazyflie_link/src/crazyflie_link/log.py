@@ -5,9 +5,15 @@ import struct
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 from cflib.crazyflie import log as cflib_log
-from cflib.crazyflie.log import CHAN_SETTINGS, CMD_START_LOGGING, LogConfig
+from cflib.crazyflie.log import (
+    CHAN_SETTINGS,
+    CMD_APPEND_BLOCK_V2,
+    CMD_CREATE_BLOCK_V2,
+    LogConfig,
+)
 from cflib.crtp.crtpstack import CRTPPort
 from cflib.utils.encoding import decompress_quaternion
 
@@ -23,6 +29,9 @@ _TICKS = 1 << 24  #: The vehicle's time in ms has 24 bits.
 #: (ms): this machine may have been busy.
 _REORDERED_MS = 100
 _LATEST_FIRST_MS = 60_000.0
+
+#: Command -> error of a repetition whose first answer was lost: the block exists, or is full.
+_REPEATED = {CMD_CREATE_BLOCK_V2: errno.EEXIST, CMD_APPEND_BLOCK_V2: errno.E2BIG}
 
 
 def quaternion_from_compressed(number: int) -> tuple[float, ...]:
@@ -151,22 +160,37 @@ class Log(Subsystem):
                 tuple(values[variable] for variable in block.variables),
             )
 
-        def accepts(answer: bytes) -> bool:
-            # cflib has a block started once it is created, which it is after a repetition, too.
-            command, number, code = answer[:3] if len(answer) > 2 else (0, 0, 0)
-            is_end = command == CMD_START_LOGGING or code not in (0, errno.EEXIST)
-            return number == config.id and is_end
-
         config.data_received_cb.add_callback(deliver)
-        # cflib repeats what is lost.
-        request = Request(CRTPPort.LOGGING, CHAN_SETTINGS, b"", what, False, accepts=accepts)
         try:
-            link.cflib.log.add_config(config)
-            # Sent by this thread: cflib raises here if the block exceeds its limits.
-            _, _, code, *_ = link.request(config.start, request, put=lambda send: send())
+            packets = _packets(link.cflib.log, config)
         except (AttributeError, KeyError) as error:
             raise RefusedError(f"{what}: {error}") from None
-        if code:
-            reason = cflib_log.Log._err_codes.get(code, f"error {code}")
-            raise RefusedError(f"{what}: the vehicle answers: {reason}")
+        for data in packets:
+            request = Request(
+                CRTPPort.LOGGING, CHAN_SETTINGS, data[:2], what, accepts=lambda data: len(data) > 2
+            )
+            code = link.request(data, request)[2]
+            if code not in (0, _REPEATED.get(data[0])):
+                reason = cflib_log.Log._err_codes.get(code, f"error {code}")
+                raise RefusedError(f"{what}: the vehicle answers: {reason}")
         link.monitor.expect_log(block.period_ms / 1000.0, time.monotonic())
+
+
+def _packets(log: cflib_log.Log, config: LogConfig) -> list[bytes]:
+    """Add a block to those that cflib receives; return the packets that create and start it.
+
+    cflib would send them all at once: one that overtakes a lost one is refused, and cflib does not
+    notice that. Raises `AttributeError` or `KeyError` if the block exceeds cflib's limits.
+    """
+    packets: list[bytes] = []
+
+    def send_packet(sent, expected_reply):
+        packets.append(bytes(sent.data))
+
+    log.add_config(config)
+    config.cf = SimpleNamespace(log=log, link=True, send_packet=send_packet)
+    config.start()
+    # Otherwise cflib starts it as well.
+    config.added = True
+    config.start()
+    return packets

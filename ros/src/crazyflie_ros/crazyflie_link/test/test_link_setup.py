@@ -19,10 +19,11 @@ PACKETS = [
     ((2, 1, b"\x00\x01\x00\x07"), "parameter values, 1 of 5"),
     ((2, 1, b"\x00\x02\x00\x07"), "parameter values, 2 of 5"),
 ]
-#: Neither a value that has come already nor another packet is progress.
+#: None of these is progress; a value that has come already is none either.
 OTHERS = [
-    (2, 1, b"\x00\x02\x01\x00"),
+    (0, 0, b"text"),
     (13, 1, b"\x00"),
+    (15, 3, b""),
     (2, 0, b"\x02\x01"),
     (2, 0, b"\x07\x01\x00"),
 ]
@@ -44,8 +45,9 @@ def test_each_step_is_progress_and_is_named_where_it_ends(clock, count):
         setup.check(12)
     clock.now += 1.0
     for packet in OTHERS:
-        if count == len(PACKETS):
-            setup.receive(*packet)
+        setup.receive(*packet)
+    if count == len(PACKETS):
+        setup.receive(2, 1, b"\x00\x02\x01\x00")
     clock.now += 0.6
     with pytest.raises(SetupError) as caught:
         setup.check(12)

@@ -92,9 +92,9 @@ class LinkSetup:
     def receive(self, port: int, channel: int, data: bytes) -> None:
         """Follow the progress by a packet from the vehicle."""
         step = self._step_of(port, channel, data)
-        if step in _UNNUMBERED or step != self._step or not self._has_answered:
+        if step in _UNNUMBERED or step not in (None, self._step) or not self._has_answered:
             self._progress_time = time.monotonic()
-        self._step = step
+        self._step = step or self._step
         self._has_answered = True
 
     def check(self, protocol: int) -> None:
@@ -127,6 +127,7 @@ class LinkSetup:
             )
 
     def _step_of(self, port, channel, data):
+        # Returns None for a packet that belongs to no step.
         size = self._sizes.get(port, 0)
         if port == CRTPPort.MEM:
             return _MEMORIES
@@ -143,7 +144,7 @@ class LinkSetup:
                 return f"{_TABLES[port]} of {number} items"
             if data[0] == CMD_TOC_ITEM_V2:
                 return f"{_TABLES[port]}, item {number + 1} of {size}"
-        return self._step
+        return None
 
 
 class LinkHealth(enum.Enum):

@@ -66,6 +66,18 @@ def test_a_driver_that_gives_up_ends_the_attempt(mock, text, error):
     mock.cflib.disconnect.assert_called()
 
 
+def test_a_driver_that_gives_up_as_the_set_up_ends_ends_the_attempt(mock):
+    link = Link(Address.parse(URI))
+
+    def open_link(uri):
+        mock.fail("Too many packets lost")
+        link._on_complete(uri)
+
+    mock.cflib.open_link.side_effect = open_link
+    with pytest.raises(NoAnswerError):
+        link.open()
+
+
 def test_a_dongle_that_hangs_does_not_hang_us(mock):
     release = threading.Event()
     link = Link(Address.parse(URI), LinkTimeouts(first_answer=0.3))

@@ -294,7 +294,7 @@ class Link:
             # A dongle that hangs, or the lookup of a host's name, may block.
             threading.Thread(target=self._open_cflib, name="crazyflie-open", daemon=True).start()
             asked = time.monotonic()
-            while not self._complete.wait(_CHECK_PERIOD):
+            while not self._complete.wait(_CHECK_PERIOD) or self.error is not None:
                 if self.error is not None:
                     raise self.error
                 self._setup.check(self.protocol)

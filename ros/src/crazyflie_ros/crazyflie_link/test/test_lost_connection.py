@@ -12,7 +12,7 @@ from crazyflie_link.address import Address
 from crazyflie_link.cflib_internals import packet
 from crazyflie_link.crazyflie import LinkState
 from crazyflie_link.errors import LinkLostError, RefusedError
-from crazyflie_link.link import Link
+from crazyflie_link.link import Link, LinkTimeouts
 from crazyflie_link.log import LogBlock
 
 LIMIT = 60.0
@@ -38,6 +38,20 @@ def test_a_frozen_vehicle_is_lost_and_taken_up_again(vehicle, make_link, states)
     assert received.get(timeout=LIMIT)[1] == (1.5, -1)
     link.setpoints.stop()
     vehicle.wait_for_packets(7, 0)
+
+
+def test_without_a_link_the_reason_is_that_of_the_last_attempt(vehicle, make_link, states):
+    limits = LinkTimeouts(first_answer=0.2)
+    link = make_link(vehicle.uri, reconnect=True, on_state=states, limits=limits)
+    link.connect()
+    vehicle.is_frozen = True
+    while "no answer has come" not in states.wait_for(LinkState.LOST):
+        pass
+    with pytest.raises(LinkLostError, match="no link to the vehicle: .* no answer has come"):
+        link.setpoints.stop()
+    link.close()
+    with pytest.raises(LinkLostError, match="no link to the vehicle: the link was closed"):
+        link.setpoints.stop()
 
 
 def test_a_vehicle_that_is_heard_again_soon_needs_no_set_up(vehicle, make_link, states):

@@ -219,10 +219,13 @@ class Crazyflie:
 
     def link(self) -> Link:
         """Return the link on which the vehicle is heard; `LinkLostError` without a link."""
-        link = self._link
-        if link is not None and link.error is None and self._silent_since is None:
-            return link
-        reason = self._text if link is None else link.error or self._text
+        link, reason = self._link, self._text
+        if link is not None:
+            if link.error is None and self._silent_since is None:
+                return link
+            if self.state is LinkState.CONNECTED:
+                # The thread that checks the link has not noticed its end yet.
+                reason = str(link.error or reason)
         raise LinkLostError(f"no link to the vehicle: {reason}")
 
     def add_log_block(self, block: LogBlock) -> None:

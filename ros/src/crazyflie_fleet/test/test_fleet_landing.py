@@ -124,7 +124,7 @@ def test_references_of_others_do_not_disturb_a_landing():
         up.header.stamp = tower.process.clock.stamp()
         tower.process.publish("/cf3/ref", up)
 
-    timer = tower.process.add_timer(0.05, insist)
+    timer = tower.process.timers().add(0.05, insist)
     tower.advance_until(answer.done, 60.0)
     timer.stop()
     answer.result(0)

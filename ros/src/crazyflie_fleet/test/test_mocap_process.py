@@ -151,7 +151,7 @@ def test_why_there_is_no_pose_is_reported_by_takeoff(tmp_path, poses, reason):
         ]
         process.publish("/tf", TFMessage(transforms))
 
-    process.add_timer(0.01, broadcast)
+    process.timers().add(0.01, broadcast)
     process.advance(6.0)
     text = f"/takeoff refused: no state has come on /cf1/state for 0.5 s; {reason}"
     with pytest.raises(ServiceError, match=text):

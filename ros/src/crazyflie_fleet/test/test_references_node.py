@@ -48,7 +48,7 @@ class Flight:
             self.process.publish(f"/{name}/in_flight_flight_status", flight_status("FLYING"))
             if f"/{name}/state" in self.process.transport.subscribers:
                 self.see(name, y)
-        self.process.add_timer(0.05, self.repeat_states)
+        self.process.timers().add(0.05, self.repeat_states)
 
     def see(self, name, y, y_dot=0.0, yaw=0.0):
         self.states[name] = PositionVelocityYawState(y=y, z=1.0, y_dot=y_dot, yaw=yaw)

@@ -384,7 +384,7 @@ def test_a_mission_whose_vehicles_another_one_has_leaves_them(fleet, process, co
 def test_vehicles_of_other_missions_are_obstacles(fleet, process, controlled, driven):
     other = ControllerVehicle(process, "cf3", (-1.0, 0.0, 0.8))
     process.transport.parameters["/cf3/buffer"] = 0.3
-    process.add_timer(0.5, lambda: claim(process, "other", "cf3", "|", "cf3"))
+    process.timers().add(0.5, lambda: claim(process, "other", "cf3", "|", "cf3"))
     process.advance(0.5)
 
     def mission(group):

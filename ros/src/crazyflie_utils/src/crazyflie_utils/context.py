@@ -16,7 +16,6 @@ from crazyflie_utils.timers import (
     SimulatedClock,
     SimulatedTimers,
     SteadyClock,
-    Timer,
     TimerQueue,
 )
 from crazyflie_utils.topics import Publisher, Topics, Transport
@@ -222,21 +221,9 @@ class ProcessContext:
         """Whether the clock is simulated time (/use_sim_time)."""
         return isinstance(self.clock, SimulatedClock)
 
-    def add_timer(
-        self,
-        period: float,
-        work: Callable[[], None],
-        steady: bool = False,
-        stagger: bool = False,
-    ) -> Timer:
-        """Add a timer by the process's clock, or by the machine's if ``steady``.
-
-        ValueError for a period that is negative or not finite; or zero by simulated time, where the
-        moment would never end.
-        """
-        if steady or not self.uses_sim_time:
-            return self._steady.add(period, work, stagger)
-        return self._simulated.add(period, work, stagger)
+    def timers(self, steady: bool = False) -> TimerQueue:
+        """Return the timers by the process's clock, or by the machine's if ``steady``."""
+        return self._steady if steady or not self.uses_sim_time else self._simulated
 
     def clock_publisher(self) -> Callable[..., None]:
         """Return ``set_clock(moment, passed=())``, which moves simulated time to a moment (s).

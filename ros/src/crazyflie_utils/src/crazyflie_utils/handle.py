@@ -298,7 +298,7 @@ class NodeHandle:
                 latest.deliver()
             guarded()
 
-        timer = self._process.add_timer(period, tick, steady, stagger)
+        timer = self._process.timers(steady).add(period, tick, stagger)
         self._undo.append(timer.stop)
         return timer
 

@@ -212,6 +212,7 @@ def test_all_packets_can_be_received_and_a_bad_callback_ends_nothing(vehicle, ma
     while received.get(timeout=LIMIT) != (13, 2, b"app"):
         pass
     assert link.parameters.read("ring.effect") == 6
+    assert "a packet could not be handled" in caplog.text
     assert "a bad callback" in caplog.text
 
 

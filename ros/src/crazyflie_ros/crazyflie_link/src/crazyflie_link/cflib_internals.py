@@ -236,7 +236,7 @@ class _Guarded(Caller):
             try:
                 callback(*args)
             except Exception:
-                _log.warning("a packet could not be understood", exc_info=True)
+                _log.warning("a packet could not be handled", exc_info=True)
 
 
 class SafeCrazyflie(CflibCrazyflie):

@@ -81,3 +81,10 @@ def test_motion_capture_warns_outside_its_rate(made):
 def test_what_is_wrong_is_named_with_its_line(made, old, new, expected):
     with pytest.raises(ParameterError, match=expected):
         made(driver_process.make_nodes, SERVER.replace(old, new))
+
+
+def test_a_misspelt_name_does_not_hide_other_errors(made):
+    wrong = SERVER.replace("[80.0, 120.0]", "[80.0]").replace("_ack_rate", "_ack_rat")
+    with pytest.raises(ParameterError) as error:
+        made(driver_process.make_nodes, wrong)
+    assert len(error.value.complaints) == 2

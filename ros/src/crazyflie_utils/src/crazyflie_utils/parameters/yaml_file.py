@@ -102,6 +102,10 @@ def _error(name, line, reason):
     return ParameterError(f"{where}: {reason}")
 
 
+def _refuse(entry, known):
+    raise entry.error(f"is not known; expected one of {', '.join(sorted(known))}")
+
+
 @dataclass(frozen=True)
 class Entry:
     """A value in a file, and its place, which is part of each `ParameterError`."""
@@ -178,13 +182,13 @@ class Entry:
         self,
         parameters: type[P],
         extra_keys: tuple[str, ...] = (),
-        on_unknown: Callable[["Entry", set[str]], None] | None = None,
+        on_unknown: Callable[["Entry", set[str]], None] = _refuse,
     ) -> P:
         """Return the parameters in a mapping; those of a group are in a mapping of their own.
 
         Keys in ``extra_keys`` are also accepted; they are read elsewhere. The error lists
-        everything that is missing, unknown or invalid; with ``on_unknown(entry, known)`` this
-        function is called with each entry that is unknown instead.
+        everything that is missing, unknown or invalid. ``on_unknown(entry, known)`` is called
+        with each entry that is unknown, and raises the error unless it is accepted.
         """
         names = {declaration.name for declaration in parameters.declarations()}
         known: dict[str, Entry] = {}
@@ -192,13 +196,9 @@ class Entry:
         for path, entry in self._leaves(names):
             if path in names:
                 known[path] = entry
-            elif path in extra_keys:
-                continue
-            elif on_unknown is not None:
-                on_unknown(entry, names | set(extra_keys))
-            else:
-                expected = ", ".join(sorted(names | set(extra_keys)))
-                complaints += entry.error(f"is not known; expected one of {expected}").complaints
+            elif path not in extra_keys:
+                with complaints:
+                    on_unknown(entry, names | set(extra_keys))
 
         def place(name: str) -> str:
             entry = known.get(name, self)

@@ -157,6 +157,23 @@ def test_what_is_too_short_has_no_place():
     assert position(short[:0], short) is None
 
 
+def test_a_damaged_time_is_left_out(run):
+    log = flight(run.folder / "log07")
+    data = bytearray(log.read_bytes())
+    # The highest byte of the time of the last event, of 10 floats, before the check sum.
+    data[-4 - 40 - 1] = 1
+    log.write_bytes(data)
+    status, output, flown = run(bag(run.folder / "a.bag"), log, "--mcap")
+    assert status == 0
+    assert "log07 is laid over cf1" in output
+    assert "its check sum is another one" in output
+    assert flown[2]["figures"]["duration"] == flown[0]["figures"]["duration"]
+    rows = np.column_stack([np.arange(0.0, 20.0, 0.01), np.zeros((2000, 2))])
+    assert position(rows, rows) is not None
+    rows[-1, 0] = 4e9
+    assert position(rows, rows) is None
+
+
 def test_a_log_that_breaks_off_or_is_damaged_is_read_as_far_as_it_goes(tmp_path):
     path = flight(tmp_path / "log07")
     whole = path.read_bytes()

@@ -21,6 +21,7 @@ from crazyflie_reports.bag_file import BagError, Connection
 from crazyflie_reports.bag_topics import ROLES, Role, Row, Topic
 
 MAGIC = 0xBC
+LONGEST = 86_400.0  #: Longest log (s): a later event has a damaged time, and is left out.
 
 _TIMES = {1: ("<HI", 1e-3), 2: ("<HQ", 1e-6)}  # By version: kind and time, and its unit, s.
 _LETTERS = frozenset("?bBhHiIlLqQefd")
@@ -169,10 +170,12 @@ class UsdLogFile:
                 )
                 return
             place += head.size + kind.values.size
+            self.done = place
+            if unit * time > LONGEST:
+                continue
             known = dict(zip(kind.names, map(float, values), strict=True))
             for role, connection in wanted[number]:
                 yield connection, unit * time, _ROWS[role](known)
-            self.done = place
 
     def _kind(self):
         number = self._integer()

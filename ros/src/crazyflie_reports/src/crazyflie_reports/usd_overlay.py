@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from crazyflie_model.angles import quaternion_from_rpy, zyx_from_quaternion
 from crazyflie_reports.bag_flights import Vehicle, vehicles
 from crazyflie_reports.bag_log import BagLog
+from crazyflie_reports.usd_log import LONGEST
 
 PERIOD = 0.01  #: Sampling period of the attitudes that are compared (s).
 LEAST_OVERLAP = 3.0  #: Shortest time that a log and a recording have in common (s).
@@ -60,7 +61,8 @@ def position(
 
 def _resampled(rows):
     """Return roll and pitch every `PERIOD`, without their means, shape (n, 2)."""
-    if not len(rows):
+    # A damaged time of a bag may be years after the others.
+    if not len(rows) or rows[-1, 0] - rows[0, 0] > LONGEST:
         return np.empty((0, 2))
     times = np.arange(rows[0, 0], rows[-1, 0], PERIOD)
     values = np.column_stack([np.interp(times, rows[:, 0], rows[:, k]) for k in (1, 2)])

@@ -6,7 +6,7 @@ import queue
 import pytest
 
 from crazyflie_link.crazyflie import LinkState
-from crazyflie_link.errors import RefusedError, ValueRangeError
+from crazyflie_link.errors import NoReplyError, RefusedError, ValueRangeError
 from crazyflie_link.log import LogBlock
 
 LIMIT = 60.0
@@ -136,3 +136,28 @@ def test_a_block_of_which_a_part_is_refused_is_refused(
     vehicle.answers[5, 1, command] = bytes([command, 1, code])
     with pytest.raises(RefusedError, match=f"'ten': the vehicle answers: {text}"):
         link.add_log_block(log_block("ten", variables=tuple(TEN)))
+
+
+@pytest.mark.parametrize("lost", [1, 2])
+def test_no_variables_are_mixed_up_when_an_answer_is_lost(make_vehicle, make_link, lost):
+    """A block of three packets: a second one that comes twice would displace the third."""
+    variables = {f"many.n{number:02}": ("B", number) for number in range(26)}
+    vehicle = make_vehicle(log=variables)
+    link = make_link(vehicle.uri)
+    link.connect()
+    received, appended = queue.Queue(), []
+
+    def lose(_):
+        port, channel, data = vehicle.received[-1]
+        if (port, channel, data[0]) == (5, 1, APPEND):
+            appended.append(data)
+        return data in appended and len(appended) == lost
+
+    vehicle.lose = lose
+    block = log_block("many", lambda *data: received.put(data), tuple(variables))
+    if lost == 1:
+        with pytest.raises(NoReplyError, match="'many': the vehicle has not replied"):
+            link.add_log_block(block)
+    else:
+        link.add_log_block(block)
+        assert received.get(timeout=LIMIT)[1] == tuple(range(26))

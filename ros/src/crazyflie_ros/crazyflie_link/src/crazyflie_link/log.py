@@ -166,8 +166,15 @@ class Log(Subsystem):
         except (AttributeError, KeyError) as error:
             raise RefusedError(f"{what}: {error}") from None
         for data in packets:
+            # Variables that are appended twice would displace those of the next packet.
+            resend = data[0] != CMD_APPEND_BLOCK_V2 or data is packets[-2]
             request = Request(
-                CRTPPort.LOGGING, CHAN_SETTINGS, data[:2], what, accepts=lambda data: len(data) > 2
+                CRTPPort.LOGGING,
+                CHAN_SETTINGS,
+                data[:2],
+                what,
+                resend,
+                accepts=lambda data: len(data) > 2,
             )
             code = link.request(data, request)[2]
             if code not in (0, _REPEATED.get(data[0])):

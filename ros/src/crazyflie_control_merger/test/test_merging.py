@@ -17,9 +17,9 @@ PUSH = np.array([-0.2, 0.2, 1.0, 12.0])
 
 
 def merged(mode, regular, prioritized, priority):
-    merger = Merger(mode)
+    merger = Merger()
     merger.prioritize(prioritized, priority, 10.0)
-    return merger.merged(regular, 10.0)
+    return merger.merged(regular, 10.0, mode)
 
 
 @given(controls, controls, priorities)
@@ -45,9 +45,9 @@ def test_lqr_and_prioritized_are_the_two_ends(regular, prioritized, p):
 
 @given(controls, arrays(float, 3, elements=st.floats(-20.0, 20.0)), priorities)
 def test_without_yaw_the_yaw_rate_stays_regular(regular, prioritized, p):
-    merger = Merger(MERGE, NO_YAW_ENTRIES)
+    merger = Merger(NO_YAW_ENTRIES)
     merger.prioritize(prioritized, p, 0.0)
-    roll, pitch, yaw_dot, thrust = merger.merged(regular, 0.0)
+    roll, pitch, yaw_dot, thrust = merger.merged(regular, 0.0, MERGE)
     assert yaw_dot == regular[2]
     mixed = (1.0 - p) * regular[[0, 1, 3]] + p * prioritized
     np.testing.assert_allclose([roll, pitch, thrust], mixed)
@@ -60,23 +60,23 @@ def test_priority_is_clipped(priority, end):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_without_a_prioritized_control_the_regular_one_is_left_alone(mode):
-    np.testing.assert_array_equal(Merger(mode).merged(REGULAR, 0.0), REGULAR)
+    np.testing.assert_array_equal(Merger().merged(REGULAR, 0.0, mode), REGULAR)
 
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("age", [0.51, 100.0, -0.01])
 def test_a_stale_prioritized_control_is_no_longer_mixed_in(mode, age):
-    merger = Merger(mode)
+    merger = Merger()
     merger.prioritize(PUSH, 1.0, 10.0)
-    np.testing.assert_array_equal(merger.merged(REGULAR, 10.0 + age), REGULAR)
+    np.testing.assert_array_equal(merger.merged(REGULAR, 10.0 + age, mode), REGULAR)
 
 
 def test_it_counts_for_half_a_second_after_each():
-    merger = Merger(MERGE)
+    merger = Merger()
     for time in (10.0, 10.4):
         merger.prioritize(PUSH, 1.0, time)
-    np.testing.assert_array_equal(merger.merged(REGULAR, 10.89), PUSH)
-    np.testing.assert_array_equal(merger.merged(REGULAR, 10.91), REGULAR)
+    np.testing.assert_array_equal(merger.merged(REGULAR, 10.89, MERGE), PUSH)
+    np.testing.assert_array_equal(merger.merged(REGULAR, 10.91, MERGE), REGULAR)
 
 
 def test_inputs_are_left_alone():

@@ -12,7 +12,6 @@ from crazyflie_control_merger.merging import MERGE, Merger
 from crazyflie_geofence.geofence import (
     MAX_HORIZONTAL,
     MAX_HORIZONTAL_BRAKING,
-    Braking,
     Geofence,
     acceleration_from_control,
     control_from_acceleration,
@@ -22,7 +21,7 @@ from crazyflie_model.units import GRAVITY
 
 LOWER, UPPER = np.array([-1.5, -1.0, 0.3]), np.array([1.5, 1.2, 2.5])
 MARGIN, RATE = 0.5, 1.0
-HORIZONTAL, VERTICAL = Braking(1.5, 0.4), Braking(4.0, 0.2)
+HORIZONTAL, VERTICAL = (1.5, 0.4), (4.0, 0.2)
 FENCE = Geofence(LOWER, UPPER, MARGIN, HORIZONTAL, VERTICAL, RATE)
 MIDDLE = (LOWER + UPPER) / 2.0
 HOVER = np.array([0.0, 0.0, 0.0, GRAVITY])
@@ -48,10 +47,10 @@ def test_stopping_point_is_where_a_braking_vehicle_stops(axis, braking, speed):
     direction = math.copysign(1.0, speed)
 
     def rates(t, x):
-        deceleration = braking.deceleration if t >= braking.reaction_time else 0.0
+        deceleration = braking[0] if t >= braking[1] else 0.0
         return [x[1], -direction * deceleration]
 
-    end = braking.reaction_time + abs(speed) / braking.deceleration
+    end = braking[1] + abs(speed) / braking[0]
     solution = solve_ivp(rates, (0.0, end), [MIDDLE[axis], speed], max_step=1e-3)
     expected = MIDDLE.copy()
     expected[axis] = solution.y[0, -1]
@@ -75,7 +74,7 @@ def test_the_fence_alone_brings_the_stopping_point_back_exponentially(axis, sign
 
     # The stopping point begins on the wall.
     braking = VERTICAL if axis == 2 else HORIZONTAL
-    distance = speed * braking.reaction_time + speed**2 / (2.0 * braking.deceleration)
+    distance = speed * braking[1] + speed**2 / (2.0 * braking[0])
     start = [wall - sign * distance, sign * speed]
     times = np.linspace(0.0, 3.0, 31)
     solution = solve_ivp(rates, (0.0, 3.0), start, t_eval=times, rtol=1e-8, atol=1e-10)
@@ -223,13 +222,13 @@ def test_braking_can_be_had_in_a_corner():
 def test_a_point_mass_never_leaves_whatever_the_regular_controller_does(unit, program, yaw):
     position = MIDDLE + unit * ((UPPER - LOWER) / 2.0 - MARGIN)
     velocity = np.zeros(3)
-    merger = Merger(MERGE)
+    merger = Merger()
     time = 0.0
     for regular, periods in program:
         for _ in range(periods):
             time += PERIOD
             merger.prioritize(*FENCE.control(position, velocity, yaw, regular), time)
-            acceleration = acceleration_from_control(merger.merged(regular, time), yaw)
+            acceleration = acceleration_from_control(merger.merged(regular, time, MERGE), yaw)
             position = position + PERIOD * (velocity + PERIOD * acceleration / 2.0)
             velocity = velocity + PERIOD * acceleration
             assert np.all((position > LOWER) & (position < UPPER))

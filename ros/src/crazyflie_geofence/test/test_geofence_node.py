@@ -8,7 +8,7 @@ import pytest
 import rospkg
 
 from crazyflie_control_merger.merger_nodes import RegularControlMergerNode
-from crazyflie_geofence.geofence import Braking, Geofence
+from crazyflie_geofence.geofence import Geofence
 from crazyflie_geofence.geofence_node import GeofenceNode
 from crazyflie_msgs.msg import (
     Control,
@@ -54,9 +54,7 @@ def test_answers_a_state_with_what_the_fence_says(process):
     publish_regular(process, *REGULAR)
     publish_state(process, *STATE)
     [message] = process.published("/control/geofence")
-    fence = Geofence(
-        (-1.0, -2.0, 0.0), (2.0, 1.0, 3.0), 0.5, Braking(1.5, 0.4), Braking(4.0, 0.2), 1.0
-    )
+    fence = Geofence((-1.0, -2.0, 0.0), (2.0, 1.0, 3.0), 0.5, (1.5, 0.4), (4.0, 0.2), 1.0)
     x = np.array(STATE)
     control, priority = fence.control(x[:3], x[3:6], x[6], np.array(REGULAR))
     np.testing.assert_array_equal(to_vector(message.control.control), control)

@@ -17,7 +17,7 @@ import math
 import numpy as np
 import pytest
 
-from crazyflie_geofence.geofence import Braking, Geofence
+from crazyflie_geofence.geofence import Geofence
 from crazyflie_geofence.geofence_node import GeofenceNode
 from crazyflie_msgs.msg import (
     Control,
@@ -27,7 +27,7 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_utils.testing import FakeProcess
 
-FENCE = Geofence((-1.5, -1.0, 0.3), (1.5, 1.2, 2.5), 0.5, Braking(1.5, 0.4), Braking(4.0, 0.2), 1.0)
+FENCE = Geofence((-1.5, -1.0, 0.3), (1.5, 1.2, 2.5), 0.5, (1.5, 0.4), (4.0, 0.2), 1.0)
 HOVER = np.array([0.0, 0.0, 0.3, 9.81])
 EAST, NORTH, WEST, SOUTH = 0.0, math.pi / 2.0, math.pi, -math.pi / 2.0
 TILT, HALF = 0.12674, 0.06362

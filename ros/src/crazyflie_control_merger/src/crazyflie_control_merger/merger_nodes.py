@@ -29,7 +29,7 @@ class MergerParameters(Parameters):
     )
 
 
-class MergerNode(Node):
+class MergerNode(Node[MergerParameters]):
     """Publish each regular control with the prioritised one mixed in.
 
     A subclass names its prioritised control in class attributes and implements `split`.
@@ -45,13 +45,9 @@ class MergerNode(Node):
         raise NotImplementedError
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(MergerParameters, self._reconfigure)
-        self._merger = Merger(self._parameters.mode, self.entries)
-
-    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
+        self._merger = Merger(self.entries)
         self._publisher = handle.publisher(parameters.merged_topic, ControlStamped)
         handle.subscribe(
             parameters.prioritized_topic,
@@ -62,9 +58,6 @@ class MergerNode(Node):
         handle.subscribe(
             parameters.control_topic, ControlStamped, self._on_control, finite="control"
         )
-
-    def _reconfigure(self, parameters):
-        self._merger.mode = parameters.mode
 
     def _on_prioritized(self, message):
         control, priority = self.split(message.control)
@@ -78,7 +71,8 @@ class MergerNode(Node):
         self._merger.prioritize(control, priority, self._handle.time())
 
     def _on_control(self, message):
-        u = self._merger.merged(to_vector(message.control), self._handle.time())
+        regular, mode = to_vector(message.control), self._parameters.mode
+        u = self._merger.merged(regular, self._handle.time(), mode)
         merged = ControlStamped(control=from_vector(Control, u))
         merged.header.stamp = message.header.stamp
         self._publisher.publish(merged)

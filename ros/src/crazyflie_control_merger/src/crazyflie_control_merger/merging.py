@@ -22,18 +22,11 @@ class Merger:
     """Mix the latest prioritised control into regular ones.
 
     A prioritised control is valid for `crazyflie_model.limits.HOLD_LIMIT`. Without one the
-    regular control is left as it is, in every mode.
-
-    Parameters
-    ----------
-    mode : str
-        One of `MODES`; the attribute may be changed at any time.
-    entries : tuple of int
-        Entries of the control that are mixed; the others stay regular.
+    regular control is left as it is, in every mode. ``entries`` are those of the control that are
+    mixed; the others stay regular.
     """
 
-    def __init__(self, mode: str, entries: tuple[int, ...] = ALL_ENTRIES):
-        self.mode = mode
+    def __init__(self, entries: tuple[int, ...] = ALL_ENTRIES):
         self._entries = list(entries)
         self._prioritized: NDArray[np.float64] = np.zeros(len(entries))
         self._priority = 0.0
@@ -48,17 +41,17 @@ class Merger:
         self._priority = min(max(priority, 0.0), 1.0)
         self._time = time
 
-    def merged(self, regular: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-        """Return (1 - p) regular + p prioritised, shape (4,), at ``time`` (s)."""
-        p = self._weight(time)
+    def merged(self, regular: NDArray[np.float64], time: float, mode: str) -> NDArray[np.float64]:
+        """Return (1 - p) regular + p prioritised, shape (4,), at ``time`` (s), in a mode."""
+        p = self._weight(time, mode)
         if p == 0.0:
             return regular
         merged = regular.copy()
         merged[self._entries] = (1.0 - p) * regular[self._entries] + p * self._prioritized
         return merged
 
-    def _weight(self, time):
+    def _weight(self, time, mode):
         # A time that has stepped back belongs to another run.
         if self._time is None or not 0.0 <= time - self._time < HOLD_LIMIT:
             return 0.0
-        return {MERGE: self._priority, LQR: 0.0, PRIORITIZED: 1.0}[self.mode]
+        return {MERGE: self._priority, LQR: 0.0, PRIORITIZED: 1.0}[mode]

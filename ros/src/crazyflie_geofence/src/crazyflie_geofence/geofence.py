@@ -25,7 +25,6 @@ controller with limited acceleration that steers into the wall is stopped in the
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,16 +44,6 @@ MAX_VERTICAL_BRAKING = min(GRAVITY - MIN_THRUST, MAX_THRUST - GRAVITY)
 Vector = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Braking:
-    """Braking of the vehicle along an axis."""
-
-    #: Reliable deceleration (m/s^2): along x and y at most `MAX_HORIZONTAL_BRAKING`, along z at
-    #: most `MAX_VERTICAL_BRAKING`.
-    deceleration: float
-    reaction_time: float  #: Time from a state until the vehicle decelerates because of it (s).
-
-
 class Geofence:
     """Prioritised controller that keeps a vehicle in a box.
 
@@ -64,8 +53,10 @@ class Geofence:
         Corners of the box, m, fixed frame.
     margin : float
         From the box to the inner box, m; upper - lower >= 2 margin.
-    horizontal, vertical : Braking
-        Of x and y; of z.
+    horizontal, vertical : tuple of float
+        Reliable deceleration along x and y, and along z, m/s^2: at most `MAX_HORIZONTAL_BRAKING`
+        and `MAX_VERTICAL_BRAKING`; and the time from a state until the vehicle decelerates because
+        of it, s.
     recovery_rate : float
         At which the stopping point is brought back to the inner box, 1/s.
     """
@@ -75,16 +66,15 @@ class Geofence:
         lower: ArrayLike,
         upper: ArrayLike,
         margin: float,
-        horizontal: Braking,
-        vertical: Braking,
+        horizontal: tuple[float, float],
+        vertical: tuple[float, float],
         recovery_rate: float,
     ):
         self._inner_lower = np.asarray(lower, dtype=float) + margin
         self._inner_upper = np.asarray(upper, dtype=float) - margin
         self._margin = margin
-        axes = (horizontal, horizontal, vertical)
-        self._deceleration = np.array([axis.deceleration for axis in axes])
-        self._reaction_time = np.array([axis.reaction_time for axis in axes])
+        axes = np.array([horizontal, horizontal, vertical])
+        self._deceleration, self._reaction_time = axes.T
         self._recovery_rate = recovery_rate
 
     def stopping_point(self, position: Vector, velocity: Vector) -> Vector:

@@ -6,12 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
-from crazyflie_geofence.geofence import (
-    MAX_HORIZONTAL_BRAKING,
-    MAX_VERTICAL_BRAKING,
-    Braking,
-    Geofence,
-)
+from crazyflie_geofence.geofence import MAX_HORIZONTAL_BRAKING, MAX_VERTICAL_BRAKING, Geofence
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
@@ -107,13 +102,13 @@ class GeofenceParameters(Parameters):
             self.lower.vector(),
             self.upper.vector(),
             self.margin,
-            Braking(self.horizontal_braking, self.horizontal_reaction_time),
-            Braking(self.vertical_braking, self.vertical_reaction_time),
+            (self.horizontal_braking, self.horizontal_reaction_time),
+            (self.vertical_braking, self.vertical_reaction_time),
             self.recovery_rate,
         )
 
 
-class GeofenceNode(Node):
+class GeofenceNode(Node[GeofenceParameters]):
     """Answer every state with a prioritised control that keeps the vehicle in a box.
 
     Silent until there is a regular control: without one, the merger is silent too.
@@ -125,13 +120,9 @@ class GeofenceNode(Node):
         self._regular: NDArray[np.float64] | None = None
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(GeofenceParameters, self._reconfigure)
-        self._fence = self._parameters.geofence()
-
-    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
+        self._fence = parameters.geofence()
         self._publisher = handle.publisher(parameters.prioritized_topic, PrioritizedControlStamped)
         handle.subscribe(
             parameters.control_topic, ControlStamped, self._on_control, finite="control"

@@ -46,18 +46,14 @@ class CmdVelConverterParameters(Parameters):
     )
 
 
-class CmdVelConverterNode(Node):
+class CmdVelConverterNode(Node[CmdVelConverterParameters]):
     """Publish each control in the form that the radio driver expects."""
 
     needed_in_flight = True
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(CmdVelConverterParameters)
-        self._model = vehicle_model.load(self._parameters.model)
-
-    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
+        self._model = vehicle_model.load(self._parameters.model)
         handle.claim_controls(self._parameters.control_topic, "real")
         self._publisher = handle.publisher(self._parameters.cmd_vel_topic, Twist)
         handle.subscribe(

@@ -37,7 +37,7 @@ class VelocityReferenceParameters(Parameters):
     limits: LimitParameters = group(LimitParameters, "limits")
 
 
-class VelocityReferenceNode(Node):
+class VelocityReferenceNode(Node[VelocityReferenceParameters]):
     """Fly a vehicle by velocity: integrate cmd_vel into references while it flies.
 
     References of other nodes are passed on with the present heading; flight by velocity continues
@@ -52,13 +52,9 @@ class VelocityReferenceNode(Node):
         self._is_moving = False
 
     @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(VelocityReferenceParameters, self._reconfigure)
-        self._reference = VelocityReference(self._parameters.limits, self._parameters.silence)
-
-    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
+        self._reference = VelocityReference(parameters.limits, parameters.silence)
         self._publisher = handle.publisher(
             parameters.controller_reference_topic, PositionVelocityYawStateStamped, latch=True
         )

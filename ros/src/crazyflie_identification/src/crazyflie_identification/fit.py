@@ -73,7 +73,7 @@ class Recording:
     #: Roll and pitch (rad), yaw rate (rad/s, counter-clockwise), thrust (PWM), shape (n, 4).
     commands: Array
     pose_times: Array  #: When poses were measured, shape (m,).
-    #: x, y, z (m), roll, pitch, yaw (rad, Z-Y-X), shape (m, 6); for `predict` and what compares
+    #: x, y, z (m), roll, pitch, yaw (rad, Z-Y-X), shape (m, 6); for `fitted` and what compares
     #: with it, the yaw goes on where it passes pi.
     poses: Array
 
@@ -104,16 +104,14 @@ class Fit:
         return lines
 
 
-def predict(values: Array, kind: QuadrotorParameters, thrust: float, part: Recording) -> Array:
-    """Return the predicted poses of a part, shape (m, 6), from rest at 0 with the heading 0.
+def fitted(values: Array, kind: QuadrotorParameters, thrust: float, part: Recording) -> Array:
+    """Return predicted poses, shape (m, 6), with the best beginning of each window.
 
     ``values`` are those of `NAMES`, ``kind`` the type of the vehicle, ``thrust`` the mean command
-    as a fraction. The initial position and heading must be added to positions and headings, see
-    `fitted`.
+    as a fraction.
     """
-    mass, slope, delay, roll_lag, pitch_lag, yaw_lag, motor, drag, roll_trim, pitch_trim = values[
-        :10
-    ]
+    mass, slope, delay, roll_lag, pitch_lag, yaw_lag, motor, drag, *angles = values
+    roll_trim, pitch_trim, roll_offset, pitch_offset = angles
     start = part.pose_times[0] - SETTLING
     times = start + STEP * np.arange(math.ceil((part.pose_times[-1] - start) / STEP) + 2)
     held = _held(part, times - delay)
@@ -126,8 +124,8 @@ def predict(values: Array, kind: QuadrotorParameters, thrust: float, part: Recor
     lift = _lagged(np.sqrt(np.maximum(force, 0.0)), motor) ** 2
     # The heading is the predicted one, too: noise of the measured one would turn the tilt.
     turned = _integral(turn)
-    difference = part.poses[:, 5] - np.interp(part.pose_times, times, turned)
-    beginnings = _beginnings(difference, part.pose_times, 1.0 / yaw_lag)
+    yaw = np.interp(part.pose_times, times, turned)
+    beginnings = _beginnings(part.poses[:, 5] - yaw, part.pose_times, 1.0 / yaw_lag)
     heading = turned + np.interp(times, part.pose_times, beginnings)
     c, s = np.cos(heading), np.sin(heading)
     ahead, left = lift * np.sin(pitch), -lift * np.sin(roll)
@@ -137,9 +135,15 @@ def predict(values: Array, kind: QuadrotorParameters, thrust: float, part: Recor
         (ahead * s + left * c, drag),
         (lift * np.cos(roll) * np.cos(pitch) - GRAVITY, vertical),
     )
-    columns = [_moved(acceleration, rate) for acceleration, rate in accelerations]
-    columns += [roll + values[10], pitch + values[11], turned]
-    return np.column_stack([np.interp(part.pose_times, times, column) for column in columns])
+    columns = []
+    for measured, (acceleration, rate) in zip(part.poses.T, accelerations, strict=False):
+        moved = np.interp(part.pose_times, times, _moved(acceleration, rate))
+        columns.append(moved + _beginnings(measured - moved, part.pose_times, rate))
+    columns += [
+        np.interp(part.pose_times, times, angle)
+        for angle in (roll + roll_offset, pitch + pitch_offset)
+    ]
+    return np.column_stack([*columns, yaw + beginnings])
 
 
 def _held(part, times):
@@ -178,16 +182,6 @@ def windows(times: Array) -> list[slice]:
     edges = np.searchsorted(times, np.linspace(times[0], times[-1], count + 1))
     edges[-1] = len(times)
     return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b - a > 10]
-
-
-def fitted(values: Array, kind: QuadrotorParameters, thrust: float, part: Recording) -> Array:
-    """Return predicted poses, shape (m, 6), with the best beginning of each window."""
-    predicted = predict(values, kind, thrust, part)
-    drag, yaw_lag = values[7], values[5]
-    vertical = drag * kind.drag_vertical / kind.drag_horizontal
-    for k, rate in ((0, drag), (1, drag), (2, vertical), (5, 1.0 / yaw_lag)):
-        predicted[:, k] += _beginnings(part.poses[:, k] - predicted[:, k], part.pose_times, rate)
-    return predicted
 
 
 def _beginnings(difference, times, rate):

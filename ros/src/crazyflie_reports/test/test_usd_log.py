@@ -106,6 +106,9 @@ def test_a_report_on_a_log_alone(run):
     status, _, (flown,) = run(flight(run.folder / "log07"))
     assert status == 0
     assert (flown["vehicle"], flown["recording"]) == ("log07", "log07")
+    html = (run.folder / "out" / "report.html").read_text()
+    assert '"start": "in time since the vehicle was switched on"' in html
+    assert "in simulated time" not in html
     assert flown["figures"]["height, maximum"]["value"] == pytest.approx(1.0 + bags.OFFSET, 1e-3)
     assert flown["figures"]["duration"]["value"] == pytest.approx(bags.LANDED - bags.TAKEOFF, 1e-2)
     assert flown["figures"]["battery, lowest"]["value"] == pytest.approx(3.9)

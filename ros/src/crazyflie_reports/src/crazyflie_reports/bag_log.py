@@ -79,6 +79,7 @@ class BagLog:
     """The contents of a recording that a report needs."""
 
     name: str  #: Name of the recording.
+    is_on_board: bool = False  #: Whether a vehicle has recorded it, on its micro SD card.
     sources: dict[str, Spool] = field(default_factory=dict)  #: By topic.
     frames: dict[str, Spool] = field(default_factory=dict)  #: `POSE_FIELDS` by child frame of /tf.
     events: EventLog = field(default_factory=EventLog)
@@ -148,6 +149,7 @@ def read(path: Path, folder: Path, names: dict[str, str] | None = None) -> list[
         raise BagError("\n".join([text, f"There are: {', '.join(there)}", *remarks]))
     logs[0].remarks += remarks
     for number, log in enumerate(logs, 1):
+        log.is_on_board = isinstance(files[0], UsdLogFile)
         if len(logs) > 1:
             log.name = f"{name}, start {number} of {len(logs)}"
     return logs

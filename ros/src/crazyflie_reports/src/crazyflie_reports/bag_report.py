@@ -17,7 +17,6 @@ from crazyflie_reports.bag_file import BagError
 from crazyflie_reports.bag_flights import flights, vehicle_namespaces
 from crazyflie_reports.bag_topics import ROLES
 from crazyflie_reports.figures import Figure, figures
-from crazyflie_reports.usd_log import is_usd_log
 from crazyflie_reports.usd_overlay import lay_over
 
 PAGE, FIGURES, EVENTS, DATA = "report.html", "figures.csv", "events.csv", "report.json"
@@ -52,10 +51,14 @@ class Report:
             }
             self._flights.append((entry, found))
         start = f"{datetime.fromtimestamp(log.start, UTC):%Y-%m-%d %H:%M:%S} UTC"
+        if log.is_on_board:
+            start = "in time since the vehicle was switched on"
+        elif log.start <= bag_log.SIMULATED:
+            start = "in simulated time"
         self.recordings.append(
             {
                 "name": log.name,
-                "start": start if log.start > bag_log.SIMULATED else "in simulated time",
+                "start": start,
                 "duration": round(log.end - log.start, 3),
                 "remarks": log.remarks if data else [*log.remarks, *_why_there_is_no_flight(log)],
                 "flights": data,
@@ -112,7 +115,6 @@ def make(
     report, problems, written = Report(), [], []
     own_names = [bag_log.name_of(each) for each in paths]
     logs: list[bag_log.BagLog] = []
-    on_board: list[bag_log.BagLog] = []  # Logs of vehicles' micro SD cards.
     try:
         folder.mkdir(parents=True, exist_ok=True)
         # Next to the report, since /tmp may be in memory.
@@ -127,9 +129,10 @@ def make(
                     # Bags in different folders may have the same name.
                     if own_names.count(name) > 1:
                         log.name = str(path) + log.name.removeprefix(name)
-                (on_board if path.is_file() and is_usd_log(path) else logs).extend(found)
-            alone = [log for log in on_board if not lay_over(log, logs)]
-            for log in [*logs, *alone]:
+                logs += found
+            bags = [log for log in logs if not log.is_on_board]
+            alone = [log for log in logs if log.is_on_board and not lay_over(log, bags)]
+            for log in [*bags, *alone]:
                 report.add(log)
                 if has_mcap:
                     written.append(bag_mcap.write(log, _new_folder(folder / MCAP, log.name)))

@@ -144,6 +144,22 @@ def test_an_infinite_pose_is_no_ground(run):
     assert values(flight)["duration"] == pytest.approx(end - begin, abs=0.03)
 
 
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_a_number_that_is_too_large_to_be_rounded_is_left_out(run, monkeypatch):
+    monkeypatch.setattr(bags, "START", 1.7e9)
+    with bags.written(run.folder / "a.bag") as bag:
+        bags.write_flight(bag)
+        state = bags.PositionVelocityYawState(z=1e306, z_dot=1e306)
+        message = bags.PositionVelocityYawStateStamped(header=bags.header(5.0), state=state)
+        bag.write("/state", message, bags.stamp(5.005))
+    status, _, (flight,) = run(run.folder / "a.bag")
+    assert status == 0
+    assert values(flight)["height, maximum"] == 1e306
+    (recorded,) = page(run.folder)[1]["recordings"][0]["flights"]
+    (z,) = [each for each in recorded["plots"][0]["curves"] if each["name"] == "z"]
+    assert max(each for each in z["v"] if each is not None) == pytest.approx(1.0 + bags.OFFSET)
+
+
 def test_a_flight_with_one_state(run):
     with bags.written(run.folder / "a.bag") as bag:
         bags.write_flight(bag, gap=(-1.0, 99.0))

@@ -139,7 +139,8 @@ def _curve(name, times, values, start, points):
     if not name.endswith("reference"):
         times, values = _broken(times, values)
     times, values = decimated(times, values, points)
-    numbers = [None if math.isnan(v) else v for v in np.round(values, 4).tolist()]
+    # Rounded, numbers above 1e304 are infinite.
+    numbers = [v if math.isfinite(v) else None for v in np.round(values, 4).tolist()]
     return {"name": name, "t": _rounded(times, start), "v": numbers}
 
 
@@ -153,7 +154,7 @@ def _broken(times, values):
 def _path(flight, points):
     """Return poses at equal intervals: position, roll, pitch, yaw (m, rad), and the reference.
 
-    A pose in a gap is None.
+    A pose in a gap is None, and so is one that is too large to be written.
     """
     state, reference = flight.record.state, flight.record.reference.rows
     if not len(state):
@@ -176,7 +177,7 @@ def _path(flight, points):
     return {
         "start": round(float(times[0] - flight.start), 3),
         "period": period,
-        "rows": [None if math.isnan(sum(row)) else row for row in poses.tolist()],
+        "rows": [row if math.isfinite(sum(row)) else None for row in poses.tolist()],
     }
 
 

@@ -2,12 +2,16 @@
 
 import math
 import re
+import time
+from pathlib import Path
 
 import pytest
 from first_flight_rig import FastRig
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
 
 from crazyflie_examples.first_flight import STEPS, fly, report
-from crazyflie_examples.first_flight_program import main
+from crazyflie_examples.first_flight_program import FirstFlightParameters, LiveRig, main
 
 NAMES = [step.name for step in STEPS]
 
@@ -88,3 +92,22 @@ def test_the_report_has_a_verdict_for_each_step_and_the_bag():
     assert page.count("<tr>") == len(STEPS)
     assert page.count("passed") == 2 and page.count("FAILED") == 1
     assert page.count("not done") == len(STEPS) - 3
+
+
+def test_a_flight_that_is_interrupted_without_poses_has_them_for_its_landing(monkeypatch):
+    options = FirstFlightParameters(mocap_frame="vehicle")
+    rig = LiveRig("radio://0/80/2M/E7E7E7E7E7", options, Path())
+    seen = []
+    monkeypatch.setattr(rig, "_on_pose", seen.append)
+    pose = TransformStamped(child_frame_id="vehicle")
+
+    def interrupt(_):
+        rig._on_tf(TFMessage([pose]))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(time, "sleep", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        rig.hide_poses(0.4)
+    assert seen == []
+    rig._on_tf(TFMessage([pose]))
+    assert seen == [pose]

@@ -47,11 +47,11 @@ from crazyflie_utils.parameters.command_line import parse_arguments
 from crazyflie_utils.parameters.types import BOOLEAN, FINITE, FRAME, Text
 from crazyflie_utils.vectors import stamped
 
-PREFIX = "/crazyflie"
+PREFIX = "/crazyflie"  #: Namespace of the driver.
 _RELAYED = "first_flight"  #: Frame that the LQR uses: the relayed poses, until they are hidden.
 _LIMIT = 60.0  #: Timeout of starts and of services (s).
 _CARRY_TIME = 4.0  #: Duration of a virtual vehicle's carrying (s).
-_DURATION = genpy.Duration(2)  #: Namespace of the driver's commands.
+_DURATION = genpy.Duration(2)  #: Duration of each of the driver's movements.
 _HAND = ("handX", "handY", "handZ", "handYaw")
 
 
@@ -231,8 +231,11 @@ class LiveRig:
     def hide_poses(self, duration: float) -> None:
         """Relay no poses for a duration (s)."""
         self._hides = True
-        time.sleep(duration)
-        self._hides = False
+        try:
+            time.sleep(duration)
+        finally:
+            # A flight that is interrupted now also lands by its poses.
+            self._hides = False
         self.run(0.1)
 
     def emergency(self) -> None:

@@ -118,6 +118,17 @@ def test_a_flight_without_motion_tells_no_drag_and_no_lag():
     assert "excite:=true" in text
 
 
+@pytest.mark.parametrize(
+    ("thrust", "expected"),
+    [(0.0, "have no thrust"), (100.0, "does not determine mass"), (2000.0, "determine mass")],
+)
+def test_commands_that_carry_no_vehicle_are_refused(thrust, expected):
+    flight = still(17.0)
+    flight.commands[:, 3] = thrust
+    with pytest.raises(IdentificationError, match=expected):
+        identify(flight, KIND)
+
+
 def test_a_flight_that_is_too_short_is_refused_with_its_length():
     with pytest.raises(IdentificationError, match=r"has 4.0 s of .*; expected at least 15 s"):
         identify(still(4.0), KIND)

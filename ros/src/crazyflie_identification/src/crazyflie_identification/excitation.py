@@ -2,16 +2,15 @@
 
 import math
 
-#: Frequencies of each control, Hz: no one is a multiple of another, so that the axes differ.
-_FREQUENCIES = {
-    "roll": (0.73, 1.91, 3.67),
-    "pitch": (0.83, 2.17, 4.13),
-    "yaw_dot": (0.53, 1.37, 2.89),
-    "thrust": (0.61, 1.73, 3.31),
-}
-#: Amplitude of each sine (rad, rad, rad/s, m/s^2). Their sums stay below 5 degrees, 60 degrees/s
-#: and 1.2 m/s^2.
-AMPLITUDES = {"roll": 0.028, "pitch": 0.028, "yaw_dot": 0.35, "thrust": 0.4}
+#: Amplitude of each sine (rad, rad, rad/s, m/s^2) and the frequencies (Hz) of roll, pitch, yaw_dot
+#: and thrust. No frequency is a multiple of another, so that the axes differ. The sums stay below 5
+#: degrees, 60 degrees/s and 1.2 m/s^2.
+_SINES = (
+    (0.028, (0.73, 1.91, 3.67)),
+    (0.028, (0.83, 2.17, 4.13)),
+    (0.35, (0.53, 1.37, 2.89)),
+    (0.4, (0.61, 1.73, 3.31)),
+)
 
 #: Amplitudes (m) and periods (s) along x, y and z of the reference, whose speed identifies the
 #: drag.
@@ -24,10 +23,8 @@ def controls(t: float) -> tuple[float, float, float, float]:
     """Return what is added to roll, pitch (rad), yaw_dot (rad/s) and thrust (m/s^2) at t (s)."""
     size = min(max(t / RAMP, 0.0), 1.0)
     roll, pitch, yaw_dot, thrust = (
-        size
-        * AMPLITUDES[name]
-        * sum(math.sin(2.0 * math.pi * f * t + k) for k, f in enumerate(frequencies))
-        for name, frequencies in _FREQUENCIES.items()
+        size * amplitude * sum(math.sin(2.0 * math.pi * f * t + k) for k, f in enumerate(all_f))
+        for amplitude, all_f in _SINES
     )
     return roll, pitch, yaw_dot, thrust
 

@@ -227,6 +227,10 @@ def identify(recording: Recording, kind: QuadrotorParameters) -> Fit:
     used = recording.between(times[0] + SETTLING, split)
     unused = recording.between(split, times[-1])
     flown = recording.commands[recording.commands[:, 3] > 0.0, 3]
+    if not len(flown):
+        raise IdentificationError(
+            "the commands of the flight have no thrust; expected those by which the vehicle flies"
+        )
     thrust = float(np.median(flown)) / FULL_PWM
     force = 4.0 * (kind.thrust_linear + kind.thrust_quadratic * thrust) * thrust
     lag = 0.08 if kind.roll_lag is None else kind.roll_lag
@@ -238,7 +242,7 @@ def identify(recording: Recording, kind: QuadrotorParameters) -> Fit:
     for _ in range(3):
         solution = least_squares(
             lambda x, s=sigma: (residuals(x * _SCALES, kind, thrust, used) / s).ravel(),
-            np.clip(first, _LOW * 0.99, _HIGH * 0.99) / _SCALES,
+            np.clip(first, _LOW, _HIGH * 0.99) / _SCALES,
             bounds=(_LOW / _SCALES, _HIGH / _SCALES),
             max_nfev=_MAX_EVALUATIONS,
         )

@@ -128,10 +128,6 @@ class Shape(Parameters):
         """Return the same shape at another place."""
         return replace(self, centre=centre)
 
-    def at(self, time: float) -> Self:
-        """Return the shape ``time`` seconds after paths begin."""
-        return self if self.path is None else self.moved_to(self.path.position(time))
-
 
 class Box(Shape):
     """A box that stands upright."""

@@ -54,7 +54,8 @@ class World(Parameters):
 
     def at(self, time: float) -> Self:
         """Return the world ``time`` seconds after paths begin."""
-        return replace(self, objects=tuple(each.at(time) for each in self.objects))
+        centres = {e.name: e.path.position(time) for e in self.objects if e.path is not None}
+        return self.placed(centres)
 
     def placed(self, centres: Mapping[str, Position]) -> Self:
         """Return the world with some objects at other places, name -> centre (m)."""

@@ -55,7 +55,7 @@ def _object(entry: Entry) -> Shape:
     if ("centre" in entry) == (path is not None):
         raise entry.error("has both a centre and a path, or neither; expected one of them")
     if path is not None:
-        shape = replace(shape, path=path).at(0.0)
+        shape = replace(shape, path=path, centre=path.position(0.0))
     return _with_picture(shape, entry)
 
 

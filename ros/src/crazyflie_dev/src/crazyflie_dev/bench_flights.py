@@ -54,11 +54,10 @@ def wait_for_service(name: str) -> None:
     end = time.monotonic() + _LIMIT
     while time.monotonic() < end:
         # The master may not have started yet.
-        try:
-            if rosgraph.Master(_CALLER).lookupService(name):
-                return
-        except (rosgraph.MasterError, OSError):
-            time.sleep(0.002)
+        with contextlib.suppress(rosgraph.MasterError, OSError):
+            rosgraph.Master(_CALLER).lookupService(name)
+            return
+        time.sleep(0.002)
     raise NotMeasuredError(f"no service {name} after {_LIMIT:g} s")
 
 

@@ -4,6 +4,7 @@ import contextlib
 import socket
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 from natnet_connection import GROUP, LIMIT, connection, is_named, server, wait_for_frame
@@ -13,6 +14,7 @@ from crazyflie_virtual import natnet
 from mocap_optitrack import natnet_source as module
 from mocap_optitrack.natnet_source import NatNetSource
 from mocap_optitrack.parameters import NatNetParameters
+from mocap_optitrack.source import SourceError
 
 
 @contextlib.contextmanager
@@ -99,6 +101,22 @@ def test_the_first_frame_of_a_group_decides_about_its_server(monkeypatch):
         wait_for_frame(source)
         seen = names_while(source, lambda: forge(data_port, GROUP))
     assert seen == {(1, None, (1.0, 2.0, 3.0)), (7, None, (7.0, 2.0, 3.0))}
+
+
+def test_datagrams_that_are_no_answer_do_not_put_off_the_next_request(monkeypatch):
+    now, asked = [0.0], []
+
+    def select(sockets, writers, errors, limit):
+        # Something comes every 0.3 s.
+        now[0] += min(limit, 0.3)
+        return [], [], []
+
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(module, "select", SimpleNamespace(select=select))
+    monkeypatch.setattr(NatNetSource, "_send_connect", lambda *_: asked.append(now[0]))
+    with pytest.raises(SourceError, match="no NatNet server answers"), connection(1):
+        pass
+    assert asked == pytest.approx([0.0, 0.5, 1.0, 1.5])
 
 
 def test_the_answer_of_another_sender_is_ignored():

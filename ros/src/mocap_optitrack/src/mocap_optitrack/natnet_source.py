@@ -164,8 +164,9 @@ class NatNetSource(Source):
         while (now := time.monotonic()) < end:
             if self._is_due(natnet.CONNECT, _ASK_AGAIN):
                 self._send_connect(targets)
-            wait = min(end - now, _ASK_AGAIN)
-            if info := self._receive([self._commands], wait, self._take_answer):
+            # Datagrams that are no answer do not put off the next request.
+            until = min(end, self._done_at[natnet.CONNECT] + _ASK_AGAIN)
+            if info := self._receive([self._commands], until - now, self._take_answer):
                 return info
         # A group has frames even if the server does not answer.
         parameters = self._parameters

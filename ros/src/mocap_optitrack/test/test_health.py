@@ -172,9 +172,10 @@ def test_bodies_that_were_never_seen(health, until, level):
 
 def test_a_body_that_is_missing_is_reported_with_those_that_are_there(health):
     stream(health, 0.0, 1.0, ONE)
-    for other in [(2, "cf2"), (3, None), (None, "wand")]:
+    others = [(2, "cf2"), (3, None), (0, None), (4, ""), (None, ""), (None, None), (None, "wand")]
+    for other in others:
         health.other(SeenBody(*other, (0, 0, 0), (0, 0, 0, 1), True))
-    assert health.report(1.0)[2].message.endswith("not configured: 2 (cf2), 3, wand")
+    assert health.report(1.0)[2].message.endswith("not configured: 2 (cf2), 3, 0, 4 (), , , wand")
 
 
 def test_what_an_earlier_connection_saw_does_not_count(health):

@@ -194,11 +194,7 @@ class Health:
     def _other_bodies(self):
         if not self._others:
             return "it shows no others that are not configured"
-        names = [
-            f"{number} ({name})" if None not in (number, name) else str(name or number)
-            for number, name in self._others
-        ]
-        return "it shows others that are not configured: " + ", ".join(names)
+        return "it shows others that are not configured: " + ", ".join(map(_describe, self._others))
 
 
 @dataclass
@@ -209,6 +205,11 @@ class _BodyCount:
     tracked: int = 0
     last: float = -math.inf  #: Time at which it was tracked last, s.
     why: str = ""  #: Reason if it is not tracked.
+
+
+def _describe(number_and_name):
+    known = [str(part) for part in number_and_name if part is not None]
+    return "{} ({})".format(*known) if len(known) == 2 else "".join(known)
 
 
 def _milliseconds(seconds):

@@ -201,6 +201,40 @@ def test_an_error_in_a_packet_is_told_and_the_vehicle_goes_on(bench, monkeypatch
     caplog.clear()
 
 
+@pytest.mark.parametrize(
+    ("command", "is_on"),
+    [
+        (b"\xfe", True),
+        (b"\xfe\xff", True),
+        (b"\xfe\xf0", True),
+        (b"\xfe\xf0\x00", True),
+        (b"\xfe\x02", False),
+        (b"\xfe\x01", False),
+    ],
+)
+def test_a_restart_ends_when_the_vehicle_is_switched_off(
+    bench, monkeypatch, caplog, command, is_on
+):
+    monkeypatch.setattr(bench.firmware, "step", raise_error)
+    bench.run(0.5)
+    bench.ask(Port.LINK, 3, command)
+    assert bench.vehicle.board is None
+    bench.run(2.0)
+    assert (bench.vehicle.board is not None) == is_on
+    caplog.clear()
+
+
+@pytest.mark.parametrize("command", [b"\xfe\x03", b"\xfe\xf0\x01"])
+def test_a_restart_is_over_when_the_vehicle_is_switched_on(bench, monkeypatch, caplog, command):
+    monkeypatch.setattr(bench.firmware, "step", raise_error)
+    bench.run(0.5)
+    bench.ask(Port.LINK, 3, command)
+    begun = bench.firmware
+    bench.run(2.0)
+    assert bench.firmware is begun
+    caplog.clear()
+
+
 def test_after_an_error_in_a_step_the_vehicle_restarts(bench, monkeypatch, caplog):
     bench.unlock()
     bench.stream(attitude(thrust=50000), 1.0)

@@ -203,6 +203,8 @@ class VirtualVehicle:
         command = data[:2]
         if command in (_ALL_OFF, _OFF, _RESET):
             self.board = None
+        if command in (_ALL_OFF, _OFF):
+            # A reset does not end a restart that has begun.
             self._restart_time = math.inf
             self._is_dead = command == _ALL_OFF
         if data.startswith(_TO_FIRMWARE) or (command == _ON and self.board is None):

@@ -1,10 +1,13 @@
 """PID and the signs of the cascade."""
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_model.inner_loops import Gains
+from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.body import Sensors
 from crazyflie_virtual.firmware.controllers import (
     AttitudeController,
@@ -12,6 +15,7 @@ from crazyflie_virtual.firmware.controllers import (
     PositionController,
     wrap_degrees,
 )
+from crazyflie_virtual.firmware.mellinger import TORQUE_LIMIT, MellingerController
 from crazyflie_virtual.firmware.stabilizer import MELLINGER, Stabilizer
 from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Estimate, Modes, Setpoint
 
@@ -151,6 +155,30 @@ def test_mellingers_attitude_has_the_firmwares_signs():
     stabilizer.update(setpoint, Estimate(), Sensors(noise=False), False, True)
     attitude = (stabilizer.roll, stabilizer.pitch, stabilizer.yaw)
     assert attitude == pytest.approx((3.0, 5.0, 7.0))
+
+
+TO_FULL_STATE = TO_POSITION._replace(yaw=ABSOLUTE)
+RATES = Modes(roll=VELOCITY, pitch=VELOCITY, yaw=VELOCITY)
+
+
+@pytest.mark.parametrize(("mode", "thrust"), [(TO_FULL_STATE, 0.0), (RATES, 30000.0)])
+def test_mellinger_wants_no_attitude_without_a_force(mode, thrust):
+    controller = MellingerController()
+    if mode is RATES:
+        controller.mass = 0.0
+    setpoint = setpoint_at(mode, yaw=30.0, az=-GRAVITY, thrust=thrust)
+    tilted = Estimate(roll=10.0, pitch=5.0, yaw=30.0)
+    outputs = controller.update(setpoint, tilted, Sensors(noise=False))
+    assert outputs == pytest.approx((thrust, 0.0, 0.0, 0.0))
+    assert controller.attitude == pytest.approx((0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("beyond", [{"z": math.inf}, {"vz": math.inf}])
+def test_mellinger_has_no_direction_of_an_infinite_force(beyond):
+    controller = MellingerController()
+    outputs = controller.update(setpoint_at(**beyond), Estimate(), Sensors(noise=False))
+    # As with the firmware, whose limits of NaN are the lower ones.
+    assert outputs == (math.inf, *[-TORQUE_LIMIT] * 3)
 
 
 def test_motors_set_by_parameter():

@@ -140,8 +140,13 @@ def _heading(setpoint: Setpoint, estimate: Estimate) -> float:
 
 def _attitude_along(force: Triple, yaw: float) -> Quaternion:
     # The up axis is along the force; the forward axis is as near to the heading as that permits.
-    c, s = math.cos(yaw), math.sin(yaw)
-    x, y, z = force[0] * c + force[1] * s, force[1] * c - force[0] * s, force[2]
+    if not any(force):
+        # No attitude is wrong: this is none, with which all angles and errors are zero.
+        return 0.0, 0.0, 0.0, 0.0
+    # The direction of an infinite force is NaN, which is limited as with the firmware.
+    c, s, length = math.cos(yaw), math.sin(yaw), math.hypot(*force)
+    a, b, z = (component / length for component in force)
+    x, y = a * c + b * s, b * c - a * s
     roll, pitch = math.atan2(-y, z), math.atan2(x, math.hypot(y, z))
     # The pitch is about the left axis that the roll has tilted.
     tilt = (0.0, math.sin(pitch / 2.0), 0.0, math.cos(pitch / 2.0))

@@ -152,10 +152,12 @@ def test_what_a_real_vehicle_refuses_is_a_warning(swarm, caplog):
     cf.setParam("stabilizer/controller", 9)
     cf.setParam("ring/effect", 300)
     cf.setParam("ring/effect", 7)
+    cf.setParam("hlCommander/groupmask", 256)
     swarm.allcfs.takeoff(1.0, 2.0, groupMask=64)
     assert [record.getMessage() for record in caplog.records] == [
         "cf1.setParam: stabilizer.controller is 9; expected 0 to 2: a real vehicle refuses it",
         "cf1.setParam: ring.effect is 300; expected a uint8_t: a real vehicle refuses it",
+        "cf1.setParam: hlCommander.groupmask is 256; expected a uint8_t: a real vehicle refuses it",
         "allcfs.takeoff: groupMask is 64, and setGroupMask has put no vehicle into these "
         "groups; all vehicles ignore the command",
     ]

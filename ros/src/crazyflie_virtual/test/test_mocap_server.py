@@ -1,6 +1,7 @@
 """The NatNet server, and the observations that it shows."""
 
 import contextlib
+import math
 import socket
 import threading
 import time
@@ -8,7 +9,7 @@ import time
 import pytest
 from natnet import NatNetClient
 
-from crazyflie_virtual.mocap import MocapServer, MocapSettings
+from crazyflie_virtual.mocap import MocapScene, MocapServer, MocapSettings
 from crazyflie_virtual.server import Observation, VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
 
@@ -50,6 +51,17 @@ class Watcher:
 
         self.wait(found)
         return found()[0]
+
+
+@pytest.mark.parametrize("rate", [math.inf, math.nan])
+def test_a_body_whose_rates_are_no_numbers_ends_nothing(rate):
+    scene = MocapScene(MocapSettings())
+    still, upright = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
+    for number, rates in ((1, (0.0, rate, 0.0)), (2, still)):
+        scene.observe(Observation(number, f"cf{number}", 10.0, still, still, upright, rates))
+    wild, good = scene.bodies(10.01)
+    assert all(map(math.isnan, wild.quaternion))
+    assert good.quaternion == pytest.approx(upright)
 
 
 @pytest.fixture

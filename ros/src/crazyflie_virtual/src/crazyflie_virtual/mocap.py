@@ -1,5 +1,6 @@
 """The virtual motion capture system: its settings, its observations, and its NatNet server."""
 
+import math
 import random
 import select
 import socket
@@ -204,7 +205,12 @@ def _extrapolate(observation, time):
     position = tuple(
         p + v * dt for p, v in zip(observation.position, observation.velocity, strict=True)
     )
-    return position, turned(observation.quaternion, [dt * rate for rate in observation.rates])
+    try:
+        attitude = turned(observation.quaternion, [dt * rate for rate in observation.rates])
+    except ValueError:
+        # Sine and cosine refuse infinite angles.
+        attitude = (math.nan,) * 4
+    return position, attitude
 
 
 _CLIENT_LIMIT = 5.0  #: Age of a client's last message above which it receives no frames (s).

@@ -10,7 +10,7 @@ firmware's modes, parameters and log variables.
 import math
 from math import isnan
 
-from crazyflie_model.angles import Triple
+from crazyflie_model.angles import Triple, rotate_by_yaw
 from crazyflie_model.inner_loops import (
     HEADING,
     HEADING_RATE,
@@ -166,22 +166,19 @@ class PositionController:
 
     def update(self, setpoint: Setpoint, estimate: Estimate) -> Triple:
         """Return roll (deg), pitch (deg, the firmware's sign) and thrust (PWM)."""
-        yaw = math.radians(estimate.yaw)
-        c, s = math.cos(yaw), math.sin(yaw)
-        self.body_x = estimate.x * c + estimate.y * s
-        self.body_y = estimate.y * c - estimate.x * s
-        self.body_vx = estimate.vx * c + estimate.vy * s
-        self.body_vy = estimate.vy * c - estimate.vx * s
-
+        back = -math.radians(estimate.yaw)
+        self.body_x, self.body_y = rotate_by_yaw(estimate.x, estimate.y, back)
+        self.body_vx, self.body_vy = rotate_by_yaw(estimate.vx, estimate.vy, back)
+        x, y = rotate_by_yaw(setpoint.x, setpoint.y, back)
         vx, vy, vz = setpoint.vx, setpoint.vy, setpoint.vz
         if not setpoint.velocity_body:
-            vx, vy = vx * c + vy * s, vy * c - vx * s
+            vx, vy = rotate_by_yaw(vx, vy, back)
         if setpoint.mode.x == ABSOLUTE:
             self.x.output_limit = self.vx_max * _OVERHEAD
-            vx = self.x.update(setpoint.x * c + setpoint.y * s, self.body_x)
+            vx = self.x.update(x, self.body_x)
         if setpoint.mode.y == ABSOLUTE:
             self.y.output_limit = self.vy_max * _OVERHEAD
-            vy = self.y.update(setpoint.y * c - setpoint.x * s, self.body_y)
+            vy = self.y.update(y, self.body_y)
         if setpoint.mode.z == ABSOLUTE:
             self.z.output_limit = max(self.vz_max, 0.5) * _OVERHEAD
             vz = self.z.update(setpoint.z, estimate.z)

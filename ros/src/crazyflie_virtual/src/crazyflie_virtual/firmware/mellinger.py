@@ -16,6 +16,7 @@ from crazyflie_model.angles import (
     product,
     quaternion_from_zyx,
     rotate,
+    rotate_by_yaw,
     zyx_from_quaternion,
 )
 from crazyflie_model.inner_loops import PERIOD
@@ -144,9 +145,9 @@ def _attitude_along(force: Triple, yaw: float) -> Quaternion:
         # No attitude is wrong: this is none, with which all angles and errors are zero.
         return 0.0, 0.0, 0.0, 0.0
     # The direction of an infinite force is NaN, which is limited as with the firmware.
-    c, s, length = math.cos(yaw), math.sin(yaw), math.hypot(*force)
-    a, b, z = (component / length for component in force)
-    x, y = a * c + b * s, b * c - a * s
+    length = math.hypot(*force)
+    x, y, z = (component / length for component in force)
+    x, y = rotate_by_yaw(x, y, -yaw)
     roll, pitch = math.atan2(-y, z), math.atan2(x, math.hypot(y, z))
     # The pitch is about the left axis that the roll has tilted.
     tilt = (0.0, math.sin(pitch / 2.0), 0.0, math.cos(pitch / 2.0))

@@ -12,7 +12,7 @@ from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.master import Master
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
-from crazyflie_utils.parameters.types import Integer, Text
+from crazyflie_utils.parameters.types import PORT, Text
 
 _NOT_INSTALLED = "NiceGUI, which the page is made with, is not installed: ./run install dashboard"
 
@@ -23,7 +23,7 @@ class DashboardParameters(Parameters):
     """Parameters of `DashboardNode`."""
 
     host: str = parameter(Text(), "address that the page listens on", "127.0.0.1")
-    port: int = parameter(Integer(1, 65535), "port of the page", 8642)
+    port: int = parameter(PORT, "port of the page", 8642)
     token_file: str = parameter(
         Text(may_be_empty=True),
         "file with the token that a page must present; by default `crazyflie_dashboard_token` in "

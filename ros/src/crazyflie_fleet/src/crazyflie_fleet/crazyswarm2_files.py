@@ -6,7 +6,7 @@ from typing import Any
 from crazyflie_fleet.fleet_parser import Remarks
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters import yaml_file
-from crazyflie_utils.parameters.types import TEXT, ListOf, Number, Text
+from crazyflie_utils.parameters.types import SHARE, TEXT, ListOf, Number, Text
 
 _CONFIGURATIONS = ("marker_configurations", "dynamics_configurations")
 
@@ -20,7 +20,6 @@ _BACKENDS = {
 }
 
 _LINK = "warnings/communication/"
-_SHARE = Number("", minimum=0.0, maximum=1.0)
 #: Settings without effect here, because the driver's diagnostics come once a second, with the
 #: figures of each link; it reads all parameters; and a simulation has a launch file of its own.
 _WITHOUT_EFFECT = ("warnings/frequency", _LINK + "publish_stats", "firmware_params", "sim")
@@ -72,14 +71,12 @@ class ServerSettings(Parameters):
     max_latency: float | None = parameter(
         Number("ms", above=0.0), "of a link", None, _LINK + "max_unicast_latency"
     )
-    min_quality: float | None = parameter(
-        _SHARE, "of packets", None, _LINK + "min_unicast_ack_rate"
-    )
+    min_quality: float | None = parameter(SHARE, "of packets", None, _LINK + "min_unicast_ack_rate")
     min_unicast_rate: float | None = parameter(
-        _SHARE, "received", None, _LINK + "min_unicast_receive_rate"
+        SHARE, "received", None, _LINK + "min_unicast_receive_rate"
     )
     min_broadcast_rate: float | None = parameter(
-        _SHARE, "received", None, _LINK + "min_broadcast_receive_rate"
+        SHARE, "received", None, _LINK + "min_broadcast_receive_rate"
     )
 
 

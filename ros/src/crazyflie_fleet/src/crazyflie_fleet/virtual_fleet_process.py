@@ -3,21 +3,20 @@
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_fleet.mocap_process import bodies
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
-from crazyflie_utils.parameters.types import Integer, Number
+from crazyflie_utils.parameters.types import PORT, Number
 from crazyflie_virtual.nodes import VirtualCrazyflieNode, VirtualMocapNode
 from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO
 from mocap_optitrack.mocap_node import MocapNode
 
-_UDP_PORT = Integer(1, 65535)
 _FRACTION = Number(minimum=-0.5, maximum=0.5)
 
 
 class VirtualFleetParameters(FleetParameters):
     """Parameters of the process."""
 
-    observer_port: int = parameter(_UDP_PORT, "UDP port of the vehicles' true poses", 19800)
-    command_port: int = parameter(_UDP_PORT, "UDP port of motion capture", 1510)
-    data_port: int = parameter(_UDP_PORT, "UDP port of its stream", 1511)
+    observer_port: int = parameter(PORT, "UDP port of the vehicles' true poses", 19800)
+    command_port: int = parameter(PORT, "UDP port of motion capture", 1510)
+    data_port: int = parameter(PORT, "UDP port of its stream", 1511)
     mass_error: float = parameter(_FRACTION, "how much heavier than nominal the vehicles are", 0.05)
     thrust_error: float = parameter(
         _FRACTION, "how much more than nominal their rotors lift", -0.05

@@ -13,7 +13,7 @@ from typing_extensions import override
 from crazyflie_model.angles import Quaternion, Triple, turned
 from crazyflie_simulator.vehicle import MotionCapture
 from crazyflie_utils.parameters.declaration import Parameters, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, TEXT, Integer, Number, Text
+from crazyflie_utils.parameters.types import BOOLEAN, PORT, SHARE, TEXT, Integer, Number, Text
 from crazyflie_virtual import natnet
 from crazyflie_virtual.natnet import VERSIONS, Encoder, StreamedBody
 from crazyflie_virtual.server import (
@@ -25,7 +25,7 @@ from crazyflie_virtual.server import (
     run_server,
     send,
 )
-from crazyflie_virtual.settings import OBSERVER_PORT, switches
+from crazyflie_virtual.settings import OBSERVER_PORT, UDP_PORT, switches
 
 OCCLUSION = 0.3  #: Longest time for which a vehicle is hidden, s.
 _GHOST_MARGIN = 0.3  #: Largest distance of reflections from the vehicles, along each axis (m).
@@ -46,10 +46,8 @@ class MocapSettings(Parameters):
         "address on which the server listens, and address of the interface for multicast",
         "127.0.0.1",
     )
-    command_port: int = parameter(
-        Integer(0, 65535), "UDP port for commands; 0 selects a free one", 1510
-    )
-    data_port: int = parameter(Integer(1, 65535), "UDP port of the multicast stream", 1511)
+    command_port: int = parameter(UDP_PORT, "UDP port for commands; 0 selects a free one", 1510)
+    data_port: int = parameter(PORT, "UDP port of the multicast stream", 1511)
     multicast: bool = parameter(
         BOOLEAN, "stream to the group, not to each client that sends keep-alives", False
     )
@@ -59,7 +57,7 @@ class MocapSettings(Parameters):
     )
     rate: float = parameter(Number("Hz", minimum=1.0, maximum=1000.0), "rate of frames", 120.0)
     observer_port: int = parameter(
-        Integer(0, 65535),
+        UDP_PORT,
         "UDP port at which the vehicles' true poses arrive; 0 selects a free one",
         OBSERVER_PORT,
         "observer/port",
@@ -78,7 +76,7 @@ class MocapSettings(Parameters):
     )
     seed: int = parameter(Integer(0, 2**31 - 1), "seed of the noise", 0)
     dropout: float = parameter(
-        Number(minimum=0.0, maximum=1.0),
+        SHARE,
         "probability with which a body is not tracked in a frame",
         0.0,
         "fault/dropout",

@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 from crazyflie_utils.parameters.declaration import Parameters, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, METRES, TEXT, Integer, Number, Text
+from crazyflie_utils.parameters.types import BOOLEAN, METRES, SHARE, TEXT, Integer, Number, Text
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 
 
@@ -23,15 +23,14 @@ OBSERVER_PORT = 19800  #: UDP port to which the true pose is sent.
 FIRST_PORT = 19850  #: UDP port of the first vehicle: clients scan from here to 19859.
 
 _FRACTION = Number(minimum=-0.5, maximum=1.0)
-_PROBABILITY = Number(minimum=0.0, maximum=1.0)
-_UDP_PORT = Integer(0, 65535)
+UDP_PORT = Integer(0, 65535)  #: Of a server that may choose it, or of none.
 
 
 class VehicleSettings(Parameters):
     """Settings of a virtual vehicle; the live ones are its faults, see `switches`."""
 
     host: str = parameter(TEXT, "address on which the vehicle listens", "127.0.0.1")
-    port: int = parameter(_UDP_PORT, "UDP port; 0 selects a free one, which is printed", FIRST_PORT)
+    port: int = parameter(UDP_PORT, "UDP port; 0 selects a free one, which is printed", FIRST_PORT)
     init_x: float = parameter(METRES, "initial position", 0.0, "init/x")
     init_y: float = parameter(METRES, "initial position", 0.0, "init/y")
     init_yaw: float = parameter(Number("rad"), "initial heading", 0.0, "init/yaw")
@@ -76,9 +75,7 @@ class VehicleSettings(Parameters):
     thrust_error: float = parameter(
         _FRACTION, "how much more than nominal its rotors lift, as a fraction", 0.0
     )
-    battery: float = parameter(
-        Number(minimum=0.0, maximum=1.0), "state of charge at the beginning", 1.0
-    )
+    battery: float = parameter(SHARE, "state of charge at the beginning", 1.0)
     protocol: int = parameter(
         Integer(11, 12),
         "CRTP protocol version; 11 has no supervisor port (9), and no flags of the high-level "
@@ -90,7 +87,7 @@ class VehicleSettings(Parameters):
         TEXT, "host to which the true pose is sent", "127.0.0.1", "observer/host"
     )
     observer_port: int = parameter(
-        _UDP_PORT, "UDP port on that host; 0 sends nothing", OBSERVER_PORT, "observer/port"
+        UDP_PORT, "UDP port on that host; 0 sends nothing", OBSERVER_PORT, "observer/port"
     )
     observer_rate: float = parameter(
         Number("Hz", minimum=1.0, maximum=500.0), "how often", 200.0, "observer/rate"
@@ -108,7 +105,7 @@ class VehicleSettings(Parameters):
         "observer/id",
     )
     loss: float = parameter(
-        _PROBABILITY,
+        SHARE,
         "probability that a packet is lost, in either direction",
         0.0,
         "fault/loss",

@@ -12,14 +12,13 @@ from geometry_msgs.msg import TransformStamped
 from typing_extensions import override
 
 from crazyflie_utils import NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TEXT, Integer, ListOf
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, PORT, TEXT, ListOf
 from mocap_optitrack.bodies import RigidBody
 from mocap_optitrack.frames import Frame
 from mocap_optitrack.mocap_node import MocapNode, transform_of
 from mocap_optitrack.parameters import MocapParameters, NatNetParameters
 
 _VRPN_PORT = 3883
-_PORT = Integer(1, 65535)
 
 
 class ClientNode(MocapNode):
@@ -53,7 +52,7 @@ class VrpnClientParameters(Parameters):
     """Parameters of `VrpnClientNode`."""
 
     server: str = parameter(TEXT, "host name or address of the VRPN server", "localhost")
-    port: int = parameter(_PORT, "TCP port of the server", _VRPN_PORT)
+    port: int = parameter(PORT, "TCP port of the server", _VRPN_PORT)
     frame_id: str = parameter(FRAME, "frame of the coordinates", "world")
     broadcast_tf: bool = parameter(BOOLEAN, "also publish poses on /tf", True)
     trackers: tuple[str, ...] | None = parameter(
@@ -85,7 +84,7 @@ class RosVrpnClientParameters(Parameters):
     """Parameters of `RosVrpnClientNode`."""
 
     ip: str = parameter(TEXT, "host name or address of the VRPN server", "localhost")
-    port: int = parameter(_PORT, "TCP port of the server", _VRPN_PORT)
+    port: int = parameter(PORT, "TCP port of the server", _VRPN_PORT)
     frame_id: str = parameter(FRAME, "frame of the coordinates", "world")
     child_frame_id: str = parameter(
         FRAME, "frame of the tracker; its last part is the tracker's name", "Tracker0"

@@ -9,10 +9,10 @@ from typing_extensions import override
 from crazyflie_utils.parameters.declaration import Parameters, group, parameter
 from crazyflie_utils.parameters.types import (
     DURATION,
+    PORT,
     TEXT,
     TIME_STEP,
     Converted,
-    Integer,
     ListOf,
     Number,
     Text,
@@ -29,8 +29,6 @@ from mocap_optitrack.frames import UP_AXES
 from mocap_optitrack.library_source import SYSTEMS
 
 NATNET = "natnet"  #: Backend of OptiTrack; the others are `library_source.SYSTEMS`.
-
-_PORT = Integer(1, 65535)
 
 
 def _ip_address(value, is_group=False):
@@ -86,9 +84,9 @@ class NatNetParameters(Parameters):
         "natnet: group to which frames are sent, unless the server names one",
         None,
     )
-    command_port: int = parameter(_PORT, "natnet: UDP port of the server", 1510)
+    command_port: int = parameter(PORT, "natnet: UDP port of the server", 1510)
     data_port: int = parameter(
-        _PORT, "natnet: UDP port of the group, unless the server names one", 1511
+        PORT, "natnet: UDP port of the group, unless the server names one", 1511
     )
     version: str | None = parameter(
         STREAM_VERSION,

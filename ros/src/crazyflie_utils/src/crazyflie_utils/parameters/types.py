@@ -200,6 +200,8 @@ def _boolean(value):
 
 FINITE = Number()
 POSITIVE = Number(above=0.0)
+SHARE = Number(minimum=0.0, maximum=1.0)
+PORT = Integer(1, 65535)
 DURATION = Number(unit="s", minimum=0.0)
 #: Shortest period of a node, which could not keep up with a shorter one.
 TIME_STEP = Number(unit="s", minimum=1e-4)

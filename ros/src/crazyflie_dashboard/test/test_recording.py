@@ -7,6 +7,7 @@ import pytest
 
 from crazyflie_dashboard.recording import Recording
 from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.testing.programs import wait_until
 
 LIMIT = 30.0
 
@@ -59,3 +60,18 @@ def test_what_fails_is_reported(recording, tmp_path):
     with pytest.raises(RefusalError, match="nothing was recorded below"):
         recording.stop().result(LIMIT)
     assert recording.text == ""
+
+
+def test_a_recording_whose_report_cannot_be_made_is_ended_and_says_so(recording, tmp_path):
+    def programs(name):
+        if name == "flight_report":
+            raise RefusalError("no flight_report; build the workspace")
+        return record(name)
+
+    record, recording._programs = recording._programs, programs
+    recording.start()
+    made = tmp_path / "flights" / "2026-11-24"
+    wait_until(made.exists)
+    with pytest.raises(RefusalError, match="recording: no flight_report; build the workspace"):
+        recording.stop().result(LIMIT)
+    wait_until(lambda: recording.text == "")

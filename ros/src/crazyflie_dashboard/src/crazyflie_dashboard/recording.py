@@ -69,7 +69,7 @@ class Recording:
         def work():
             try:
                 outcome.set_result(self._finish(recorder))
-            except (OSError, ValueError, subprocess.SubprocessError) as error:
+            except (OSError, ValueError, subprocess.SubprocessError, RefusalError) as error:
                 outcome.set_exception(RefusalError(f"recording: {error}"))
             finally:
                 self.text = ""

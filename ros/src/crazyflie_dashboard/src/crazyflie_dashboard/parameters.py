@@ -148,9 +148,10 @@ class LiveParameters:
             raise RefusalError(
                 f"{owner} has no live parameters; expected one of {', '.join(owners)}"
             )
-        if owner not in self._firmware():
+        driver = self._firmware().get(owner)
+        if driver is None:
             return (yield from self._of_node(owner))
-        top = self._firmware()[owner] or "/"
+        top = driver or "/"
         known = yield self._model.workers.submit(self._model.master.parameters, [top])
         tree = known.get(top)
         return tuple(of_firmware(owner, tree if isinstance(tree, dict) else {}))
@@ -173,9 +174,9 @@ class LiveParameters:
         return {name: top for name, top in drivers.items() if f"{top}/update_params" in services}
 
     def _set_firmware(self, parameter, value):
-        if parameter.owner not in self._firmware():
+        top, name = self._firmware().get(parameter.owner), parameter.name.replace(".", "/")
+        if top is None:
             raise RefusalError(f"{parameter.owner} has no driver; expected one")
-        top, name = self._firmware()[parameter.owner], parameter.name.replace(".", "/")
         full_name = f"{top}/{name}"
         yield self._handle.set_param_later(full_name, value)
         try:

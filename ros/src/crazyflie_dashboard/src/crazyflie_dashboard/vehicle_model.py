@@ -172,14 +172,14 @@ class VehicleModel:
             handle.subscribe(topic, message_type, lambda m: self._note(role, convert(m)))
 
     def _subscribe_logs(self, handle, topics):
-        def subscribe(topic, kind, name):
-            message_type = roslib.message.get_message_class(kind)
-            handle.subscribe(topic, message_type, lambda m: self._plot(name, _LOGS[kind](m)))
-
         for topic, kind in topics.items():
             folder, _, name = topic.rpartition("/")
             if folder == self.vehicle.driver and kind in _LOGS and name != "battery":
-                subscribe(topic, kind, f"log {name}")
+                handle.subscribe(
+                    topic,
+                    roslib.message.get_message_class(kind),
+                    lambda m, name=f"log {name}", row=_LOGS[kind]: self._plot(name, row(m)),
+                )
 
     def _note(self, role, content):
         self._newest[role] = content

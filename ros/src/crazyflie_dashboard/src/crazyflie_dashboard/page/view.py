@@ -5,7 +5,8 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, ClassVar
+from functools import partial
+from typing import Any
 
 from nicegui import context, ui
 from nicegui.events import GenericEventArguments
@@ -80,25 +81,24 @@ class View:
                 button.props(f"dense unelevated icon={icon} color=dark")
 
     def _build_panels(self) -> None:
+        builders: dict[str, Callable[[Session], Any]] = {
+            "Vehicles": partial(VehiclesPanel, scene_view=self._scene_view),
+            "Plots": PlotsPanel,
+            "Parameters": ParametersPanel,
+            "Missions": MissionsPanel,
+            "Messages": MessagesPanel,
+            "Cameras": CamerasPanel,
+        }
         with ui.tabs().props("dense no-caps inline-label") as tabs:
-            for name in self._BUILDERS:
+            for name in builders:
                 ui.tab(name)
         self._tabs = ui.tab_panels(tabs, value="Vehicles", animated=False, keep_alive=True)
         self._panels = {}
         with self._tabs.classes("panels"):
-            for name, build in self._BUILDERS.items():
+            for name, build in builders.items():
                 with ui.tab_panel(name):
-                    self._panels[name] = build(self)
+                    self._panels[name] = build(self._session)
         tabs.on_value_change(self._refresh)
-
-    _BUILDERS: ClassVar[dict[str, Callable[["View"], Any]]] = {
-        "Vehicles": lambda view: VehiclesPanel(view._session, view._scene_view),
-        "Plots": lambda view: PlotsPanel(view._session),
-        "Parameters": lambda view: ParametersPanel(view._session),
-        "Missions": lambda view: MissionsPanel(view._session),
-        "Messages": lambda view: MessagesPanel(view._session),
-        "Cameras": lambda view: CamerasPanel(view._session),
-    }
 
     def _watched(self) -> str | None:
         return self._session.watched or next(iter(self._session.vehicles), None)

@@ -4,6 +4,7 @@ import math
 import time
 from concurrent.futures import Future
 from dataclasses import replace
+from pathlib import Path
 
 from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
@@ -13,7 +14,6 @@ from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.moves import formation
 from crazyflie_dashboard.page_data import (
     DryRunResult,
-    MissionFile,
     ParameterInfo,
     Series,
 )
@@ -197,22 +197,22 @@ class FakeDashboard:
 
     def mission_files(self):
         return (
-            MissionFile("/missions/square.py", "square.py: flies a square", False),
-            MissionFile("/trajectories/eight.csv", "eight.csv", True),
+            Path("/missions/square.py"),
+            Path("/trajectories/eight.csv"),
         )
 
     def dry_run(self, page, mission, vehicles):
-        if mission.is_trajectory:
+        if mission.suffix == ".csv":
             return done(DryRunResult(False, "cf1 and cf2 come as near as 0.1 m at 3.2 s"))
         path = ((0, 0, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1))
         self._scene = replace(self._scene, paths={"cf1": path})
-        return done(DryRunResult(True, "12.0 s, all land", 12.0, (("cf1", path),)))
+        return done(DryRunResult(True, "12.0 s, all land", {"cf1": path}))
 
     def forget_paths(self, page):
         self._scene = replace(self._scene, paths={})
 
     def fly(self, page, mission, vehicles, clicked):
-        self.flown.append(mission.path)
+        self.flown.append(str(mission))
         return done("landed")
 
     def stop_mission(self, page, clicked):

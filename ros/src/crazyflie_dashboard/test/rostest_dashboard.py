@@ -115,7 +115,7 @@ def test_vehicles_fly_and_land(dashboard, operator):
 
 
 def test_a_trajectory_is_rehearsed_flown_and_stopped(dashboard, operator):
-    (mission,) = [each for each in dashboard.mission_files() if each.title == "figure8.csv"]
+    (mission,) = [each for each in dashboard.mission_files() if each.name == "figure8.csv"]
     result = dashboard.dry_run(operator, mission, ("cf2",)).result(LIMIT)
     assert result.passed, result.text
     wait_until(lambda: len(dashboard.scene().paths.get("cf2", ())) > 20, "its path", LIMIT)

@@ -3,6 +3,7 @@
 import math
 import threading
 from concurrent.futures import Future
+from pathlib import Path
 
 import pytest
 from dynamic_reconfigure.encoding import encode_config
@@ -12,7 +13,7 @@ from fake_fleet import FakeFleet, FakeLane
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.master import MasterError
-from crazyflie_dashboard.page_data import Command, DryRunResult, MissionFile
+from crazyflie_dashboard.page_data import Command, DryRunResult
 from crazyflie_dashboard.snapshot import Action
 from crazyflie_driver import srv
 from crazyflie_msgs.msg import FlightStatus
@@ -304,13 +305,13 @@ def test_hold_keeps_vehicles_where_they_are(fleet):
 def test_paths_of_a_dry_run_are_in_the_scene_until_the_page_with_control_removes_them(
     fleet, monkeypatch
 ):
-    result, answer = DryRunResult(True, "", 1.0, (("cf1", ((0.0, 0.0, 1.0),)),)), Future()
+    result, answer = DryRunResult(True, "", {"cf1": ((0.0, 0.0, 1.0),)}), Future()
     answer.set_result(result)
     monkeypatch.setattr("crazyflie_dashboard.missions.Missions.dry_run", lambda *_: answer)
-    mission = MissionFile("/square.py", "square.py", False)
+    mission = Path("/square.py")
     assert fleet.dashboard.dry_run(fleet.page, mission, ("cf1",)).result(0) is result
     other = fleet.dashboard.pages.open(fleet.texts.append)
-    for page, paths in ((other, dict(result.paths)), (fleet.page, {})):
+    for page, paths in ((other, result.paths), (fleet.page, {})):
         fleet.dashboard.forget_paths(page)
         fleet.process.advance(0.05)
         assert fleet.dashboard.scene().paths == paths

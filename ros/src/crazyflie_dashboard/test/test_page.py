@@ -305,12 +305,12 @@ def test_a_mission_flies_after_its_dry_run_has_passed(browser, server):
     browser.press("Dry run")
     browser.has("cf1 and cf2 come as near as 0.1 m at 3.2 s")
     assert not browser.button("Fly").is_enabled()
-    browser.select("mission or trajectory", "square.py: flies a square")
+    browser.select("mission or trajectory", "square.py")
     browser.press("Dry run")
     browser.has("The dry run has passed: 12.0 s, all land")
     wait_for(lambda: browser.button("Fly").is_enabled(), "Fly can be pressed")
     browser.press("Fly")
-    browser.has("square.py: flies a square: landed")
+    browser.has("square.py: landed")
     assert server.dashboard.flown == ["/missions/square.py"]
 
 
@@ -322,7 +322,7 @@ def test_the_path_of_a_dry_run_is_drawn_once_until_another_mission_is_chosen(bro
     browser.take_control()
     browser.choose("cf1")
     browser.tab("Missions")
-    browser.select("mission or trajectory", "square.py: flies a square")
+    browser.select("mission or trajectory", "square.py")
     browser.press("Dry run")
     browser.has("The dry run has passed: 12.0 s, all land")
     wait_for_lines(1)
@@ -338,7 +338,7 @@ def test_a_dry_run_that_ends_after_another_mission_was_chosen_is_not_shown(
     browser.take_control()
     browser.choose("cf1")
     browser.tab("Missions")
-    browser.select("mission or trajectory", "square.py: flies a square")
+    browser.select("mission or trajectory", "square.py")
     browser.press("Dry run")
     wait_for(lambda: begun, "the beginning of the dry run")
     result = dry_run(*begun[0]).result()

@@ -52,7 +52,7 @@ class PageControl:
             Another page has control, and the operator has not confirmed that it is taken over.
         """
         with self._lock:
-            self._expect_open(page)
+            self.expect_open(page)
             before = self._controller
             if before not in (None, page) and not is_confirmed:
                 raise RefusalError(
@@ -77,7 +77,7 @@ class PageControl:
     def expect_control(self, page: int) -> None:
         """Raise `RefusalError` unless a page has control."""
         with self._lock:
-            self._expect_open(page)
+            self.expect_open(page)
             if self._controller != page:
                 has = "no page" if self._controller is None else f"page {self._controller}"
                 raise RefusalError(f"this page can only watch: {has} has control; take it first")
@@ -93,7 +93,8 @@ class PageControl:
         with self._lock:
             return tuple(self._tell)
 
-    def _expect_open(self, page):
+    def expect_open(self, page: int) -> None:
+        """Raise `RefusalError` unless a page is open."""
         if page not in self._tell:
             raise RefusalError(f"page {page} is closed; load it again")
 

@@ -17,7 +17,6 @@ from crazyflie_dashboard.messages import examine
 from crazyflie_dashboard.page_data import (
     Command,
     DryRunResult,
-    MissionFile,
     Outcomes,
     ParameterInfo,
     Series,
@@ -158,19 +157,19 @@ class Dashboard:
         what = f"set {parameter.name} of {parameter.owner} to {text!r}"
         return self._control(page, what, self._parameters.set, parameter, text)
 
-    def mission_files(self) -> tuple[MissionFile, ...]:
+    def mission_files(self) -> tuple[Path, ...]:
         """Return the missions and trajectories that can be flown."""
         return missions.listed(self._folders)
 
     def dry_run(
-        self, page: int, mission: MissionFile, vehicles: tuple[str, ...]
+        self, page: int, mission: Path, vehicles: tuple[str, ...]
     ) -> "Future[DryRunResult]":
         """Fly a mission with ideal vehicles that stand where the real ones are."""
 
         def do():
             self.pages.expect_control(page)
             result = yield self._missions.dry_run(mission, vehicles, self._places(vehicles))
-            self._model.paths = dict(result.paths)
+            self._model.paths = result.paths
             return result
 
         return self._do(do)
@@ -185,15 +184,15 @@ class Dashboard:
         self._submit(do)
 
     def fly(
-        self, page: int, mission: MissionFile, vehicles: tuple[str, ...], clicked: float
+        self, page: int, mission: Path, vehicles: tuple[str, ...], clicked: float
     ) -> "Future[str]":
         """Fly a mission after its dry run has passed; the future is done when it has ended."""
 
         def do():
-            expect_fresh(mission.title, self._clock() - clicked)
+            expect_fresh(mission.name, self._clock() - clicked)
             return self._missions.fly(mission, vehicles, self._places(vehicles))
 
-        return self._control(page, f"fly {mission.path} for {listed(vehicles)}", do)
+        return self._control(page, f"fly {mission} for {listed(vehicles)}", do)
 
     def stop_mission(self, page: int, clicked: float) -> "Future[None]":
         """End the mission that flies; its vehicles land."""
@@ -286,8 +285,7 @@ class Dashboard:
         return {n: known[n].position for n in names if n in known and known[n].position}
 
     def _page(self, number):
-        if number not in self.pages.pages:
-            raise RefusalError(f"page {number} is closed; load it again")
+        self.pages.expect_open(number)
         return self._open.setdefault(number, PageState(self._handle, self._workers, self._clock))
 
     def _follow_pages(self):

@@ -17,7 +17,7 @@ from typing import Any
 
 import rospkg
 
-from crazyflie_dashboard.page_data import DryRunResult, MissionFile
+from crazyflie_dashboard.page_data import DryRunResult
 from crazyflie_dashboard.snapshot import Triple
 from crazyflie_utils.refusal import RefusalError
 
@@ -34,22 +34,19 @@ _POLL = 0.2  #: Period in which the output of a mission is read (s).
 _MAX_DISTANCE = 0.2  #: Distance that vehicles may have moved since the dry run (m).
 _SOURCES = (".py", ".csv", ".yaml", ".yml")  #: Suffixes of files that a script may read.
 
-_CRAZYSWARM = ("pycrazyswarm", "crazyflie_py")
+#: APIs of missions; scripts of the others, which are Crazyswarm's, fly without the runner.
+_OWN_API = "crazyflie_mission_api"
+_APIS = (_OWN_API, "pycrazyswarm", "crazyflie_py")
 
 
-def listed(folders: Iterable[str | Path]) -> tuple[MissionFile, ...]:
+def listed(folders: Iterable[str | Path]) -> tuple[Path, ...]:
     """Return scripts and trajectories in folders, by name; folders that are missing hold none."""
-    found = []
-    for folder in folders:
-        for path in sorted(Path(folder).expanduser().glob("*")):
-            if path.suffix not in (".py", ".csv") or not path.is_file():
-                continue
-            text = path.read_text(errors="replace") if path.suffix == ".py" else ""
-            if path.suffix == ".csv" or any(
-                each in text for each in ("crazyflie_mission_api", *_CRAZYSWARM)
-            ):
-                found.append(MissionFile(str(path), path.name, path.suffix == ".csv"))
-    return tuple(found)
+    return tuple(
+        path
+        for folder in folders
+        for path in sorted(Path(folder).expanduser().glob("*"))
+        if path.is_file() and (path.suffix == ".csv" or _apis(path))
+    )
 
 
 class MissionFlight:
@@ -182,18 +179,20 @@ class Missions:
             return tuple(f"{each.title} {each.command}".strip() for each in self._flights)
 
     def dry_run(
-        self, mission: MissionFile, vehicles: tuple[str, ...], places: Mapping[str, Triple]
+        self, mission: Path, vehicles: tuple[str, ...], places: Mapping[str, Triple]
     ) -> "Future[DryRunResult]":
         """Fly a mission with ideal vehicles; ``places`` (m) are where the real ones are."""
         result: Future[DryRunResult] = Future()
-        command = [self._python, *_RUNNER, "dry_run", mission.path, *vehicles]
-        if not mission.is_trajectory and _is_crazyswarm(mission.path):
-            command = [self._python, mission.path, "--sim"]
+        command = self._command("dry_run", mission, vehicles)
         environment = _environment(vehicles) | {"CRAZYFLIE_PY_DRY_RUN": "1"}
         key = _key(mission, vehicles)
 
         def work():
-            done = _run(command, environment, _DRY_RUN_TIMEOUT)
+            try:
+                done = _run(command, environment, _DRY_RUN_TIMEOUT)
+            except OSError as error:
+                result.set_exception(error)
+                return
             if done.passed:
                 with self._lock:
                     self._passed[key] = dict(places)
@@ -203,7 +202,7 @@ class Missions:
         return result
 
     def fly(
-        self, mission: MissionFile, vehicles: tuple[str, ...], places: Mapping[str, Triple]
+        self, mission: Path, vehicles: tuple[str, ...], places: Mapping[str, Triple]
     ) -> "Future[str]":
         """Fly a mission; the future has "" at its end, or fails with its last output.
 
@@ -214,24 +213,22 @@ class Missions:
             since, or another mission flies.
         """
         end: Future[str] = Future()
-        command = [self._python, *_RUNNER, "fly", mission.path, *vehicles]
-        if not mission.is_trajectory and _is_crazyswarm(mission.path):
-            command = [self._python, mission.path]
+        command = self._command("fly", mission, vehicles)
         with self._lock:
             if self._flights:
                 title = self._flights[0].title
                 raise RefusalError(f"{title} is still flying; wait for its end, or stop it")
             before = self._passed.get(_key(mission, vehicles))
             if before is None:
-                raise RefusalError(f"{mission.title}: expected a dry run of it that has passed")
+                raise RefusalError(f"{mission.name}: expected a dry run of it that has passed")
             for name, place in before.items():
                 if math.dist(place, places.get(name, (math.inf,) * 3)) > _MAX_DISTANCE:
                     raise RefusalError(
-                        f"{mission.title}: {name} is not where it was at the dry run; expected "
+                        f"{mission.name}: {name} is not where it was at the dry run; expected "
                         "another one"
                     )
         environment = _environment(vehicles)
-        flight = MissionFlight.begin(self._folder, mission.title, command, environment)
+        flight = MissionFlight.begin(self._folder, mission.name, command, environment)
 
         def finish(status):
             # Stopped while Python itself was starting: nothing has flown.
@@ -258,6 +255,12 @@ class Missions:
             raise RefusalError("stop: no mission that a dashboard has started is flying")
         for flight in flights:
             flight.stop()
+
+    def _command(self, what, mission, vehicles):
+        apis = _apis(mission)
+        if apis and _OWN_API not in apis:
+            return [self._python, str(mission), *(["--sim"] if what == "dry_run" else [])]
+        return [self._python, *_RUNNER, what, str(mission), *vehicles]
 
     def _follow(self, flight: MissionFlight, finish: Callable[[int], None]) -> None:
         with self._lock:
@@ -291,8 +294,8 @@ def _run(command: list[str], environment: Mapping[str, str], limit: float) -> Dr
     for line in output.splitlines():
         if line.startswith(_RESULT):
             found = json.loads(line)["dry_run"]
-            paths = tuple((name, tuple(map(tuple, path))) for name, path in found["paths"].items())
-            return DryRunResult(found["passed"], found["text"], found["duration"], paths)
+            paths = {name: tuple(map(tuple, path)) for name, path in found["paths"].items()}
+            return DryRunResult(found["passed"], found["text"], paths)
     if process.returncode == 0 and "--sim" in command:
         return DryRunResult(True, "flown by ideal vehicles")
     return DryRunResult(False, _last(output, process.returncode))
@@ -327,18 +330,19 @@ def _last(output: str, status: int) -> str:
     return output.strip()[-_MAX_OUTPUT:] or f"it has ended with status {status}"
 
 
-def _is_crazyswarm(path):
+def _apis(path):
+    """Return the APIs that a script names; none if it cannot be read, or is a trajectory."""
     with contextlib.suppress(OSError):
-        text = Path(path).read_text(errors="replace")
-        return "crazyflie_mission_api" not in text and any(each in text for each in _CRAZYSWARM)
-    return False
+        text = path.read_text(errors="replace") if path.suffix == ".py" else ""
+        return [api for api in _APIS if api in text]
+    return []
 
 
-def _key(mission: MissionFile, vehicles: tuple[str, ...]) -> tuple[Any, ...]:
+def _key(mission: Path, vehicles: tuple[str, ...]) -> tuple[Any, ...]:
     """Return a value that changes with a mission, its vehicles, and the files in its folder."""
     try:
-        files = {Path(mission.path), *Path(mission.path).parent.iterdir()}
+        files = {mission, *mission.parent.iterdir()}
         times = [(str(f), f.stat().st_mtime_ns) for f in files if f.suffix in _SOURCES]
     except OSError as error:
-        raise RefusalError(f"{mission.title}: {error.strerror}") from None
-    return mission.path, tuple(sorted(times)), vehicles
+        raise RefusalError(f"{mission.name}: {error.strerror}") from None
+    return mission, tuple(sorted(times)), vehicles

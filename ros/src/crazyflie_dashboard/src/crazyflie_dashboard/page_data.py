@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from crazyflie_dashboard.snapshot import Action, Triple
@@ -57,15 +57,6 @@ class ParameterInfo:
 
 
 @dataclass(frozen=True)
-class MissionFile:
-    """A script of missions, or a trajectory (CSV), that can be flown."""
-
-    path: str
-    title: str
-    is_trajectory: bool
-
-
-@dataclass(frozen=True)
 class DryRunResult:
     """The result of a dry run: ``text`` is the reason if it has not passed, or a summary.
 
@@ -74,8 +65,7 @@ class DryRunResult:
 
     passed: bool
     text: str
-    duration: float = 0.0
-    paths: tuple[tuple[str, tuple[Triple, ...]], ...] = ()
+    paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

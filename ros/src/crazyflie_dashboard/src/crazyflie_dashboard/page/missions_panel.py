@@ -1,10 +1,11 @@
 """Missions and trajectories: a dry run first, then the flight."""
 
+from pathlib import Path
+
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from crazyflie_dashboard.page.session import CLICKED, Session
-from crazyflie_dashboard.page_data import MissionFile
 from crazyflie_dashboard.snapshot import Scene
 
 
@@ -13,7 +14,7 @@ class MissionsPanel:
 
     def __init__(self, session: Session):
         self._session = session
-        self._files: dict[str, MissionFile] = {}
+        #: The mission and the vehicles whose dry run has passed.
         self._passed: tuple[str, tuple[str, ...]] | None = None
         self._choice = ui.label().classes("choice")
         self._file = ui.select({}, label="mission or trajectory", on_change=self._forget)
@@ -34,8 +35,8 @@ class MissionsPanel:
 
     def list_files(self) -> None:
         """Show the missions and trajectories that there are now."""
-        self._files = {each.path: each for each in self._session.dashboard.mission_files()}
-        self._file.set_options({path: each.title for path, each in self._files.items()})
+        files = self._session.dashboard.mission_files()
+        self._file.set_options({str(path): path.name for path in files})
 
     def refresh(self, scene: Scene) -> None:
         """Show the vehicles of the mission, and whether it may fly."""
@@ -55,32 +56,31 @@ class MissionsPanel:
 
     async def _start_dry_run(self) -> None:
         names = self._session.chosen_names
-        mission = self._files.get(self._file.value or "")
-        if mission is None or not names:
+        chosen = self._file.value
+        if not chosen or not names:
             self._session.say("dry run: choose a mission and its vehicles first", "warning")
             return
         self._forget()
         self._dry_run.props(add="loading")
-        future = self._session.dashboard.dry_run(self._session.page, mission, names)
+        future = self._session.dashboard.dry_run(self._session.page, Path(chosen), names)
         result = await self._session.result(future)
         self._dry_run.props(remove="loading")
         if result is None:
             return
-        if self._file.value != mission.path:
+        if self._file.value != chosen:
             self._forget()
             return
         self._tell(
             f"The dry run has passed: {result.text}" if result.passed else result.text,
             "good" if result.passed else "bad",
         )
-        self._passed = (mission.path, names) if result.passed else None
+        self._passed = (chosen, names) if result.passed else None
 
     async def _start(self, event: GenericEventArguments) -> None:
         if self._passed is None:
             return
-        path, names = self._passed
-        dashboard = self._session.dashboard
-        future = dashboard.fly(self._session.page, self._files[path], names, event.args)
+        mission, names = Path(self._passed[0]), self._passed[1]
+        future = self._session.dashboard.fly(self._session.page, mission, names, event.args)
         text = await self._session.result(future)
         if text is not None:
-            self._session.say(f"{self._files[path].title}: {text}", "positive")
+            self._session.say(f"{mission.name}: {text}", "positive")

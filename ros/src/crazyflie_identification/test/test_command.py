@@ -1,6 +1,7 @@
 """The command identify, on bags."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -75,6 +76,17 @@ def test_roll_and_pitch_are_those_in_the_heading_frame(bag, recording):
     for k in (3, 4, 5):
         expected = np.interp(found.pose_times, times, recording.poses[:, k])
         np.testing.assert_allclose(found.poses[:, k], expected, atol=1e-4)
+
+
+def test_commands_that_are_not_finite_are_left_out(recording, bag, tmp_path):
+    commands = recording.commands.copy()
+    commands[[700, 800, 900, 1000], range(4)] = math.nan, math.inf, -math.inf, math.nan
+    path = tmp_path / "flight.bag"
+    write(path, dataclasses.replace(recording, commands=commands))
+    good, found = of_bag(bag, KIND), of_bag(path, KIND)
+    kept = np.delete(good.commands, [700, 800, 900, 1000], axis=0)
+    np.testing.assert_allclose(found.commands, kept)
+    assert len(found.command_times) == len(kept)
 
 
 def test_a_bag_becomes_a_model_that_can_be_flown(bag, vehicle, tmp_path, capsys):

@@ -47,14 +47,16 @@ def of_bag(path: Path, kind: QuadrotorParameters, name: str = "") -> Recording:
 
 def _recording(path, vehicle, kind):
     poses = vehicle.attitude
-    rows = vehicle.command if len(vehicle.command) else vehicle.control
+    is_driven = len(vehicle.command) > 0
+    rows = vehicle.command if is_driven else vehicle.control
+    # Every node rejects commands that are not finite; the one before holds.
+    rows = rows[np.isfinite(rows[:, :5]).all(axis=1)]
     for what, there in (("poses with an attitude (/tf or pose)", poses), ("commands", rows)):
         if len(there) < 2:
             raise IdentificationError(
                 f"{path} has no {what} of {vehicle.name}; expected {LEAST_TIME:g} s of them"
             )
     commands = rows[:, 1:].copy()
-    is_driven = len(vehicle.command) > 0
     commands[:, 3] = pwm_from_thrust(rows[:, 4]) if is_driven else kind.pwm(rows[:, 4])
     # The time of a pose is its stamp, if the stamp is of the same clock.
     stamps = vehicle.pose_stamps

@@ -68,11 +68,14 @@ class Recording:
 
         def work():
             try:
-                outcome.set_result(self._finish(recorder))
+                try:
+                    report = self._finish(recorder)
+                finally:
+                    # Before the outcome: who waits for it may record again.
+                    self.text = ""
+                outcome.set_result(report)
             except (OSError, ValueError, subprocess.SubprocessError, RefusalError) as error:
                 outcome.set_exception(RefusalError(f"recording: {error}"))
-            finally:
-                self.text = ""
 
         threading.Thread(target=work, daemon=True).start()
         return outcome

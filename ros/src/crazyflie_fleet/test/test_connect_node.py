@@ -97,6 +97,32 @@ def test_a_slow_master_blocks_no_callback(monkeypatch):
     assert process.exit_status == 1
 
 
+def test_a_master_that_does_not_answer_is_waited_for_with_a_limit(monkeypatch):
+    process = FakeProcess()
+    driver = Driver(process)
+    writes = []
+
+    def set_later(name, value):
+        writes.append(Future())
+        return writes[-1]
+
+    monkeypatch.setattr(process.transport, "set_param_later", set_later)
+    assert process.launch(FleetConnectNode(), "/fleet_add", {"fleet/file": str(EXAMPLE)})
+    process.advance(59.0)
+    assert process.exit_status is None
+    process.advance(2.0)
+    assert process.exit_status == 1
+    assert driver.updated == {}
+    assert "has not been written within 60 s" in process.logged("error")[0]
+    errors = process.logged("error")
+    # An answer that comes after the limit changes nothing.
+    for written in writes:
+        written.set_result(None)
+    process.advance(1.0)
+    assert driver.updated == {}
+    assert process.logged("error") == errors
+
+
 def test_who_is_not_there_is_named_and_the_others_are_added():
     process, driver, _ = add(missing=("cf1",))
     assert process.exit_status == 1

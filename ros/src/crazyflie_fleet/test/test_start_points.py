@@ -60,3 +60,18 @@ def test_takeoffs_end_above_where_the_vehicle_is_seen():
     scene.process.publish("/c/ref", there)
     followed = scene.process.published("/c/ref_safe")[-1].state
     assert (followed.x, followed.y, followed.z) == (3.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("failing", ["references_node.close_pairs", "landing.SafeDescents.begin"])
+def test_references_pass_while_the_check_of_starts_or_a_descent_fails(failing, monkeypatch):
+    def fail(*arguments):
+        raise ValueError("fails")
+
+    scene = Scene()
+    monkeypatch.setattr(f"crazyflie_fleet.{failing}", fail)
+    scene.see(a=(0.0, 0.0), b=(2.0, 1.0), c=(3.0, 0.0))
+    scene.process.publish("/c/ref_descent", PositionVelocityStateStamped())
+    assert "fails" in scene.process.logged("error")[0]
+    there = PositionVelocityStateStamped(state=PositionVelocityState(x=3.5, z=1.0))
+    scene.process.publish("/c/ref", there)
+    assert scene.process.published("/c/ref_safe")[-1].state.x == 3.5

@@ -1,6 +1,7 @@
 """Connects the vehicles of a fleet by the driver."""
 
 from collections.abc import Iterable
+from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from typing_extensions import override
 
 from crazyflie_driver.add_node import command_again
 from crazyflie_driver.parameters import (
+    ADD,
     POSITIONING_PARAMETER,
     STANDARD_TOPICS,
     VehicleParameters,
@@ -24,7 +26,7 @@ from crazyflie_driver.srv import (
 from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_fleet.vehicle_nodes import PLACE
-from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
+from crazyflie_utils import Node, NodeHandle, ParameterError, ServiceError, parameter
 from crazyflie_utils.parameters.types import TEXT, ListOf
 from crazyflie_utils.steps import follow
 
@@ -59,8 +61,6 @@ class BatteryReportNode(Node):
                 )
                 return
 
-
-ADD = "/add_crazyflie"
 
 TIMEOUT = 60.0  #: Timeout of the driver's start, connections, and writing of parameters (s).
 
@@ -158,9 +158,34 @@ class FleetConnectNode(Node):
             params = {**start, **params, "kalman.resetEstimation": 1}
         if params:
             values = {key.replace(".", "/"): value for key, value in params.items()}
-            yield from [handle.set_param_later(f"/{name}/{key}", x) for key, x in values.items()]
+            yield from [self._write(f"/{name}/{key}", value) for key, value in values.items()]
             request = UpdateParamsRequest([*values])
             yield handle.call_service(f"/{name}/update_params", UpdateParams, request, TIMEOUT)
+
+    def _write(self, name, value):
+        """Return the future of a parameter's writing; it fails if the master does not answer."""
+        outcome: Future[None] = Future()
+
+        def give_up():
+            timer.stop()
+            if not outcome.done():
+                text = f"parameter {name} has not been written within {TIMEOUT:g} s"
+                outcome.set_exception(ServiceError(text))
+
+        def finish(written):
+            timer.stop()
+            if outcome.done():
+                return
+            if error := written.exception():
+                outcome.set_exception(error)
+            else:
+                outcome.set_result(None)
+
+        timer = self._handle.timer(TIMEOUT, give_up, steady=True)
+        written = self._handle.set_param_later(name, value)
+        # The writer's own future stays its own: it may complete it after the limit.
+        written.add_done_callback(partial(self._handle.submit, finish))
+        return outcome
 
     def _finish(self, vehicle, done):
         if (error := done.exception()) is None:

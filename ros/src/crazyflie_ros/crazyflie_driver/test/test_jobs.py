@@ -69,6 +69,23 @@ def test_an_urgent_job_goes_beside_one_that_cannot_be_given_up(jobs, slow):
     assert writing.result(LIMIT) == "done"
 
 
+def test_a_running_job_that_is_too_late_to_be_given_up_tells_how_it_ended(jobs):
+    """A caller is not told that a command failed which the vehicle has accepted meanwhile."""
+    begun, free = threading.Event(), threading.Event()
+
+    def send(job):
+        begun.set()
+        free.wait(LIMIT)
+        return job.may_send()
+
+    go_to = jobs.submit("test", send, is_flight=True)
+    assert begun.wait(LIMIT)
+    jobs.supersede("a landing of other vehicles")
+    assert not go_to.done()
+    free.set()
+    assert go_to.result(LIMIT) is False
+
+
 def test_what_nobody_waits_for_is_not_begun_and_what_runs_is_told(jobs, slow):
     running, begun = jobs.submit("test", slow), []
     waiting = jobs.submit("test", lambda _: begun.append(1))

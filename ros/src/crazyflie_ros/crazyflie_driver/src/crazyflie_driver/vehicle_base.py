@@ -37,6 +37,7 @@ class Job:
 
     work: Callable[["Job"], Any]
     superseded_by: str = ""
+    is_begun: bool = False
     done: Future[Any] = field(default_factory=Future)
 
     def may_send(self) -> bool:
@@ -56,6 +57,7 @@ class Job:
 
     def run(self) -> None:
         """Call `work`; result or error go to `done`."""
+        self.is_begun = True
         # It may have been cancelled or superseded meanwhile.
         with contextlib.suppress(InvalidStateError):
             try:
@@ -68,8 +70,8 @@ class Job:
 class Jobs:
     """A queue with a lane for urgent jobs; a thread for each lane does its jobs in their order.
 
-    Urgent jobs supersede every flight job that was submitted before them. When a job fails,
-    ``on_error(text)`` is called in its thread.
+    Urgent jobs supersede every flight job that was submitted before them: one that has not begun is
+    given up, a running one is marked. When a job fails, ``on_error(text)`` is called in its thread.
     """
 
     def __init__(self, name: str, on_error: Callable[[str], None] = lambda text: None):
@@ -124,13 +126,18 @@ class Jobs:
         return job.done
 
     def supersede(self, what: str) -> None:
-        """Give up all flight jobs for something else; their callers are told at once."""
+        """Give up all flight jobs for something else.
+
+        Callers of those that have not begun are told at once. A running one may be carried out
+        already, which its end tells.
+        """
         with self._lock:
             flights, self._flights = self._flights, []
         for job in flights:
             job.superseded_by = what
-            # It does nothing but fail, here and in its turn.
-            job.run()
+            if not job.is_begun:
+                # It does nothing but fail, here and in its turn.
+                job.run()
 
     def close(self) -> None:
         """Take no more jobs; the threads end once the queue is empty."""

@@ -18,9 +18,9 @@ from std_srvs.srv import EmptyRequest, SetBoolRequest
 
 from crazyflie_driver.srv import GoToRequest, NotifySetpointsStopRequest, StopRequest
 from crazyflie_link.address import Address
-from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_utils import ServiceError
-from crazyflie_utils.testing.programs import wait_until
+from crazyflie_utils.testing.programs import LIMIT, wait_until
 
 
 @pytest.fixture
@@ -165,6 +165,40 @@ def test_a_takeoff_that_happens_after_its_refusal_is_landed(server, vehicle):
     commands = server.node._vehicles[vehicle.uri].commands
     wait_until(lambda: commands._unanswered is None, "the end of it")
     assert vehicle.flight.starts == 1
+
+
+def test_a_takeoff_without_a_reply_that_was_landed_is_not_landed_again(server, vehicle):
+    commands = server.node._vehicles[vehicle.uri].commands
+    vehicle.lose = lambda _: vehicle.received[-1][0] == 8 and vehicle.received[-1][2][0] == 7
+    takeoff = server.process.call("/cf1/takeoff", TAKEOFF)
+    vehicle.wait_for_packets(8, 0)
+    wait_until(lambda: vehicle.flight.motors_run, "the takeoff")
+    server.process.advance(1.0)
+    server.call("/cf1/land", LAND)
+    with pytest.raises(ServiceError, match="given up for land"):
+        takeoff.result(LIMIT)
+    wait_until(lambda: commands._unanswered is None, "a look at the state")
+    errors = server.process.logged("error")
+    assert not any("is carried out: landing" in text for text in errors)
+    assert [data[0] for data in vehicle.packets(8, 0)] == [7, 8]
+
+
+def test_a_takeoff_that_is_tried_again_is_not_taken_for_the_first_one(server, vehicle):
+    crazyflie = server.node._vehicles[vehicle.uri].crazyflie
+    vehicle.deaf.add((8, 0, b"\x07"))
+    takeoff = server.process.call("/cf1/takeoff", TAKEOFF)
+    vehicle.wait_for_packets(8, 0)
+    vehicle.is_frozen = True
+    with pytest.raises(ServiceError, match="is heard again, it is landed if it obeys"):
+        takeoff.result(LIMIT)
+    vehicle.deaf.clear()
+    loses_replies(vehicle, 2)
+    vehicle.is_frozen = False
+    wait_until(lambda: crazyflie.state is LinkState.CONNECTED, "the link's return")
+    server.call("/cf1/takeoff", TAKEOFF)
+    assert vehicle.flight.starts == 1
+    wait_for_words(server, "flying: on high-level commands")
+    assert not vehicle.flight.is_landing
 
 
 def test_a_takeoff_that_does_not_arrive_is_refused_with_the_state(server, vehicle):

@@ -3,7 +3,7 @@
 import enum
 import time
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 from crazyflie_driver.commands import (
@@ -88,10 +88,13 @@ class FlightCommands:
     _feeds_watchdog: bool = False
     # The landing under way, to be followed to the ground; None after any other command.
     _touchdown: Touchdown | None = None
-    # A command that was not answered and was refused to its caller, which may still be carried out;
-    # and when the vehicle was first heard after that (s).
-    _unanswered: Command | None = None
+    # A command that was not answered and was refused to its caller, which may still be carried out,
+    # with its number; and when the vehicle was first heard after that (s).
+    _unanswered: tuple[int, Command] | None = None
     _heard: float | None = None
+    # The end of the latest command that is sent, and the number of the latest one that is accepted.
+    _latest: Future[None] = field(default_factory=Future)
+    _accepted: int = 0
     # A landing of the driver's own: its reason, its latest command, and the times at which that was
     # sent and should have been carried out (s).
     _reason: Reason | None = None
@@ -296,11 +299,12 @@ class FlightCommands:
         gate, handle = self._vehicle.gate, self._vehicle.handle
         begin = handle.time()
         number = gate.high_level(begin)
+        self._latest = job.done
         if command.name != LAND:
             self._touchdown = None
         is_accepted = True
         try:
-            self._send_and_look_up(command, job)
+            self._send_and_look_up(command, job, number)
         except AlreadyLandingError:
             # A success as well.
             is_accepted = False
@@ -310,7 +314,8 @@ class FlightCommands:
             raise
         # A command whose caller waits no longer was refused as well.
         is_refused = job.done.cancelled() and not command.ends_flight
-        self._unanswered, self._heard = command if is_refused else None, None
+        self._unanswered, self._heard = (number, command) if is_refused else None, None
+        self._accepted = max(self._accepted, number)
         self._setpoints.high_level_end = handle.time() + command.duration
         if command.height is not None and (is_accepted or self._touchdown is None):
             self._touchdown = Touchdown(begin, command.height, command.duration)
@@ -335,7 +340,7 @@ class FlightCommands:
             self._flight.motion_sent()
         return True
 
-    def _send_and_look_up(self, command, job):
+    def _send_and_look_up(self, command, job, number):
         was_at_rest = self._flight.is_at_rest()
         is_sent = False
 
@@ -352,7 +357,7 @@ class FlightCommands:
                 raise
             state, obeys = self._state_after(command, job, was_at_rest)
             if state is None:
-                self._unanswered, self._heard = command, None
+                self._unanswered, self._heard = (number, command), None
                 raise NoReplyError(
                     f"{error}; when the vehicle is heard again, it is landed if it obeys"
                 ) from None
@@ -387,12 +392,13 @@ class FlightCommands:
         return was_at_rest and self._flight.is_moving(state)
 
     def _obeys_late(self, state):
-        # Whether the vehicle carries out what was refused, once.
-        command, now = self._unanswered, self._vehicle.handle.time()
-        if command is None:
+        # Whether the vehicle carries out what was refused, once. It may show a later command, too.
+        if self._unanswered is None or not self._latest.done():
             return False
+        (number, command), now = self._unanswered, self._vehicle.handle.time()
         self._heard = now if self._heard is None else self._heard
-        is_replaced = self._vehicle.gate.is_emergency or self._setpoints.is_streaming
+        is_streaming, is_emergency = self._setpoints.is_streaming, self._vehicle.gate.is_emergency
+        is_replaced = number < self._accepted or is_streaming or is_emergency
         obeys = not is_replaced and self._is_obeyed(command, state, True)
         if obeys or is_replaced or now >= self._heard + _LOG_DELAY:
             self._unanswered = self._heard = None

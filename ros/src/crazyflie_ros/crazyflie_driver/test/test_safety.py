@@ -26,6 +26,7 @@ from crazyflie_driver.srv import (
     StopRequest,
     UploadTrajectoryRequest,
 )
+from crazyflie_driver.vehicle_base import ConnectionState
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.peer import wait_until
 
@@ -156,13 +157,17 @@ def test_one_emergency_stops_all(server):
 def test_an_emergency_while_connecting_is_kept(server):
     vehicle = server.make_vehicle()
     vehicle.deaf.add((4, 0, b""))
-    adding = server.begin_adding(vehicle.uri)
+    adding = server.begin_adding(vehicle.uri, enable_parameters=True)
     vehicle.wait_for_packets(4, 0)
     server.process.publish("/all/emergency", Empty())
     vehicle.deaf.clear()
     adding.result(timeout=LIMIT)
     vehicle.wait_for_packets(9, 1)
     assert vehicle.packets(3, 0) == []
+    # All else is as without it.
+    driven = server.node._vehicles[vehicle.uri]
+    assert server.process.transport.parameters["/cf1/ring/effect"] == 6
+    assert driven.state is ConnectionState.READY
 
 
 # Battery and watchdog.

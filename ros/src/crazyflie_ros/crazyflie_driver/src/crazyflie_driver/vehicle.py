@@ -146,11 +146,12 @@ class DriverVehicle(BaseVehicle):
     def _set_up(self):
         # Once on each link.
         count = self.crazyflie.connection_count
-        if self.gate.is_emergency or self._connection_count == count:
+        if self._connection_count == count:
             return
-        for problem in self._mirror.reapply_parameters():
-            self.warn(f"not written again: {problem}")
-        self.setpoints.open_thrust_lock(self.flight.read())
+        if not self.gate.is_emergency:
+            for problem in self._mirror.reapply_parameters():
+                self.warn(f"not written again: {problem}")
+            self.setpoints.open_thrust_lock(self.flight.read())
         # If it fails before, it is done when the vehicle is heard again.
         self._connection_count = count
         if self.parameters.enable_parameters:

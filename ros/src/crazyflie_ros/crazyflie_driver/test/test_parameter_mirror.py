@@ -75,10 +75,12 @@ def test_a_master_that_is_frozen_does_not_block_the_jobs_of_a_vehicle(server, ve
     answers = threading.Event()
     monkeypatch.setattr(server.process.transport, "get_param", lambda name: answers.wait(20.0))
     monkeypatch.setattr("crazyflie_driver.services.MASTER_LIMIT", 0.1)
-    update = server.process.call("/cf1/update_params", UpdateParamsRequest(["ring/effect"]))
+    names = ["effect", "ring/effect", "ring/neopixel"]
+    update = server.process.call("/cf1/update_params", UpdateParamsRequest(names))
     following = server.process.call("/cf1/arm", SetBoolRequest(True))
     try:
-        with pytest.raises(ServiceError, match="master .*/cf1/ring/effect within 0.1 s: is it fr"):
+        text = "'effect' is no .*; the ROS master .*/cf1/ring/effect within 0.1 s: is it frozen.$"
+        with pytest.raises(ServiceError, match=text):
             update.result(10.0)
         assert following.result(10.0).success
     finally:

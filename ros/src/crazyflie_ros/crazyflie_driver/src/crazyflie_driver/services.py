@@ -91,8 +91,9 @@ class ParameterMirror:
     def write(self, names: list[str]) -> None:
         """Write parameters, named GROUP/NAME, with the values of the ROS parameters.
 
-        All are tried, and a `ServiceError` names those that could not be written; the ROS
-        parameters are then what the firmware has confirmed. See `MASTER_LIMIT`.
+        All are tried, unless the ROS master does not answer (see `MASTER_LIMIT`), and a
+        `ServiceError` names those that could not be written; the ROS parameters are then what the
+        firmware has confirmed.
         """
         problems = []
         for name in names:
@@ -101,6 +102,9 @@ class ParameterMirror:
                 self.set(known, self._on_master(known))
             except (CrazyflieError, ParameterError) as error:
                 problems.append(str(error))
+            except TimeoutError as error:
+                problems.append(str(error))
+                break
         if problems:
             raise ServiceError("; ".join(problems))
 
@@ -116,7 +120,7 @@ class ParameterMirror:
         try:
             return asked.start("ask-master").result(MASTER_LIMIT)
         except TimeoutError:
-            raise ServiceError(
+            raise TimeoutError(
                 f"the ROS master has not told the parameter {self._full_name(name)} within "
                 f"{MASTER_LIMIT:g} s: is it frozen?"
             ) from None

@@ -114,7 +114,7 @@ def test_nothing_is_added_twice(server, vehicle):
     with pytest.raises(ServiceError, match="has been added already, as cf1"):
         server.add(vehicle.uri, "cf2")
     with pytest.raises(ServiceError, match="tf_prefix 'cf1' is in use"):
-        server.add("udp://127.0.0.1:1", "/cf1/")
+        server.add("udp://127.0.0.1:1", " /cf1/\n")
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Parameters of the driver, and of each vehicle: as parameters and as fields of AddCrazyflie."""
 
+import string
 from collections.abc import Callable
 from typing import Any, Self
 
@@ -128,8 +129,8 @@ POSITIONING_PARAMETER = "positioning"
 
 
 def _namespace(value):
-    """Return a name, empty for the root, without the slashes around it."""
-    name = value.strip("/ ") if isinstance(value, str) else None
+    """Return a name, empty for the root, without slashes and white space around it."""
+    name = value.strip(f"/{string.whitespace}") if isinstance(value, str) else None
     if name is None or not rosgraph.names.is_legal_name("/" + name):
         raise ValueError
     return name

@@ -168,6 +168,13 @@ def test_commands_for_other_groups_leave_the_stream_alone(streaming, call, mask)
     assert_flies_on(server, vehicle)
 
 
+def test_a_landing_vehicle_whose_groups_another_client_has_changed_goes_on_landing(flight):
+    server, vehicle = flight
+    vehicle.answers[8, 0, 8] = b"\x08\x00\x00\x01"
+    server.call("/cf1/land", LandRequest(0xFF & ~GROUPS, 0.0, Duration(2)))
+    assert len(vehicle.packets(8, 0)) == 1
+
+
 def test_commands_for_some_groups_are_refused_where_those_of_the_vehicle_are_not_known(hovering):
     server, vehicle = hovering
     with pytest.raises(ServiceError, match="Call set_group_mask first"):

@@ -1,5 +1,6 @@
 """High-level commands to one vehicle, and its landings, until it is on the ground."""
 
+import contextlib
 import enum
 import time
 from concurrent.futures import Future
@@ -125,7 +126,9 @@ class FlightCommands:
         def work(job: Job) -> None:
             need = self._check(command, job)
             if need is Need.NOT_ADDRESSED:
-                command.send(self._vehicle.crazyflie.high_level.guarded(job.may_send))
+                # Another client may have changed the groups.
+                with contextlib.suppress(AlreadyLandingError):
+                    command.send(self._vehicle.crazyflie.high_level.guarded(job.may_send))
             elif need is not Need.ON_GROUND:
                 self._execute(command, job)
 

@@ -5,7 +5,6 @@ import enum
 import time
 from concurrent.futures import Future
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 from crazyflie_driver.commands import (
     LAND,
@@ -26,8 +25,6 @@ from crazyflie_link.supervisor import Supervisor
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import ServiceError
 from crazyflie_utils.timers import Timer
-
-Result = TypeVar("Result")
 
 #: Time within which the notice that setpoints stop needs its command, s.
 NOTIFY_WINDOW = 0.5

@@ -21,10 +21,7 @@ from crazyflie_driver.parameters import (
     CrazyflieServerParameters,
     VehicleParameters,
 )
-from crazyflie_driver.srv import (
-    AddCrazyflie,
-    RemoveCrazyflie,
-)
+from crazyflie_driver.srv import AddCrazyflie, RemoveCrazyflie
 from crazyflie_driver.status import diagnostics
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_driver.vehicle_base import Job

@@ -13,8 +13,8 @@ from crazyflie_utils.testing.programs import wait_until
 
 LIMIT = 60.0
 
-REARMING = 0x206
-"""For 0.16 s, 3 s after a landing: a takeoff waits."""
+DISARMED, REARMING = 0x201, 0x206
+"""The second for 0.16 s, 3 s after a landing: a takeoff waits."""
 
 
 @pytest.mark.parametrize(("service", "request_"), [("land", LAND), ("stop", StopRequest())])
@@ -28,6 +28,20 @@ def test_a_takeoff_that_waits_until_the_vehicle_is_ready(server, vehicle, servic
         takeoff.result(LIMIT)
     assert 7 not in [data[0] for data in vehicle.packets(8, 0)]
     assert not vehicle.flight.motors_run
+
+
+def test_a_takeoff_of_all_that_arms_a_vehicle_which_is_landed(server, vehicle):
+    """The command, which is sent after the check, would follow the landing."""
+    is_(vehicle, DISARMED)
+    vehicle.deaf.add((9, 1, b"\x01"))
+    takeoff = server.process.call("/crazyflie_server/all/takeoff", TAKEOFF)
+    vehicle.wait_for_packets(9, 1)
+    server.call("/cf1/land", LAND)
+    is_(vehicle, None)
+    vehicle.send(9, 1, b"\x81\x01\x01")
+    with pytest.raises(ServiceError, match="sent to no vehicle.* given up for land"):
+        takeoff.result(LIMIT)
+    assert vehicle.packets(8, 0) == []
 
 
 @pytest.mark.parametrize("service", ["stop", "emergency"])

@@ -140,7 +140,10 @@ class FlightCommands:
         """
 
         def work(job: Job) -> Need:
-            return self._check(command, job)
+            need = self._check(command, job)
+            # The command is a job of its own, which follows what has superseded this one.
+            job.check()
+            return need
 
         what = f"checking {command.name}"
         return self._vehicle.jobs.submit(what, work, is_flight=True, urgent=command.ends_flight)

@@ -7,7 +7,8 @@ from genpy import Duration
 from safety_helpers import LAND, TAKEOFF, is_
 from std_srvs.srv import EmptyRequest
 
-from crazyflie_driver.srv import GoToRequest, StopRequest
+from crazyflie_driver.msg import TrajectoryPolynomialPiece
+from crazyflie_driver.srv import GoToRequest, StopRequest, UploadTrajectoryRequest
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.programs import wait_until
 
@@ -42,6 +43,31 @@ def test_a_takeoff_of_all_that_arms_a_vehicle_which_is_landed(server, vehicle):
     with pytest.raises(ServiceError, match="sent to no vehicle.* given up for land"):
         takeoff.result(LIMIT)
     assert vehicle.packets(8, 0) == []
+
+
+PIECE = TrajectoryPolynomialPiece([0.0] * 8, [0.0] * 8, [0.0] * 8, [0.0] * 8, Duration(1))
+
+
+@pytest.mark.parametrize(
+    ("service", "request_", "unanswered"),
+    [
+        ("takeoff", TAKEOFF, (9, 1, b"\x01")),
+        ("upload_trajectory", UploadTrajectoryRequest(1, 0, [PIECE]), (4, 2, b"")),
+    ],
+)
+def test_the_reason_of_what_is_held_back_is_the_landing(
+    server, vehicle, service, request_, unanswered
+):
+    is_(vehicle, DISARMED)
+    vehicle.deaf.add(unanswered)
+    held_back = server.process.call(f"/cf1/{service}", request_)
+    vehicle.wait_for_packets(*unanswered[:2])
+    server.call("/cf1/land", LAND)
+    with pytest.raises(ServiceError, match="^given up for land$"):
+        held_back.result(LIMIT)
+    assert f"/crazyflie_server: cf1: {service} failed: given up for land" in (
+        server.process.logged("error")
+    )
 
 
 @pytest.mark.parametrize("service", ["stop", "emergency"])

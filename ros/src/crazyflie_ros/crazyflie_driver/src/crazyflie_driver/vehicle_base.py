@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from crazyflie_driver.parameters import CrazyflieServerParameters, VehicleParameters
 from crazyflie_driver.setpoint_gate import SetpointGate
 from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.errors import CrazyflieError
+from crazyflie_link.errors import CrazyflieError, LinkLostError, NoReplyError
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.topics import Publisher
 
@@ -26,6 +26,8 @@ Result = TypeVar("Result")
 #: some 300 packets a second.
 MOST_JOBS = 64
 MAX_WAITING = 1000
+
+_UNANSWERED = LinkLostError, NoReplyError
 
 
 @dataclass(eq=False)
@@ -47,8 +49,11 @@ class Job:
     def check(self) -> None:
         """Raise `ServiceError` unless it may send."""
         if not self.may_send():
-            reason = self.superseded_by or "its caller, who waits no longer"
-            raise ServiceError(f"given up for {reason}")
+            raise ServiceError(self.end_text())
+
+    def end_text(self) -> str:
+        """Return why it may not send."""
+        return f"given up for {self.superseded_by or 'its caller, who waits no longer'}"
 
     def start(self, name: str) -> Future[Any]:
         """Do the job in a thread of its own with a name; return the future of its result."""
@@ -102,8 +107,11 @@ class Jobs:
             try:
                 return work(job)
             except (CrazyflieError, ParameterError, ServiceError) as error:
-                self._on_error(f"{what} failed: {error}")
-                raise ServiceError(str(error)) from None
+                # A request that is held back ends like an unanswered one.
+                is_held_back = job.superseded_by and isinstance(error, _UNANSWERED)
+                text = job.end_text() if is_held_back else str(error)
+                self._on_error(f"{what} failed: {text}")
+                raise ServiceError(text) from None
             except Exception as error:
                 # Nobody may look at the future.
                 self._on_error(f"{what} failed: {error!r}")

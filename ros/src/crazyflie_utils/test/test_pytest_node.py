@@ -15,13 +15,26 @@ def test_runs():
 def test_is_not_reached():
     pass
 """
+MARKED = """
+import pytest
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_runs():
+    pass
+"""
 PROGRAM = """
 import sys
 import pytest
-from crazyflie_utils.testing.pytest_node import InterruptIsFailure
+from crazyflie_utils.testing.pytest_node import InterruptIsFailure, pytest_arguments
 
-sys.exit(pytest.main(sys.argv[1:], plugins=[InterruptIsFailure()]))
+sys.exit(pytest.main(pytest_arguments(sys.argv[1:]), plugins=[InterruptIsFailure()]))
 """
+
+
+def run(*arguments):
+    command = [sys.executable, "-c", PROGRAM, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, timeout=120)
 
 
 def test_results_go_where_rostest_looks_for_them():
@@ -36,11 +49,16 @@ def test_text_mode_has_no_results():
 def test_an_interrupt_is_a_failure(tmp_path):
     tests, results = tmp_path / "test_interrupted.py", tmp_path / "results.xml"
     tests.write_text(INTERRUPTED)
-    arguments = [str(tests), f"--junit-xml={results}", "-p", "no:cacheprovider"]
-    run = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *arguments], capture_output=True, timeout=120
-    )
-    assert run.returncode == 1
+    assert run(tests, f"--gtest_output=xml:{results}").returncode == 1
     [case] = ElementTree.parse(results).getroot().iter("testcase")
     assert case.get("name") == "test_runs"
     assert "has a required node died?" in case.find("failure").get("message")
+
+
+def test_a_package_has_its_own_markers_beside_that_of_long_tests(tmp_path):
+    tests = tmp_path / "test_marked.py"
+    tests.write_text(MARKED)
+    (tmp_path / "pytest.ini").write_text(
+        "[pytest]\naddopts = --strict-markers\nmarkers = slow: takes time\n"
+    )
+    assert run(tests).returncode == 0

@@ -25,7 +25,6 @@ def pytest_arguments(arguments: list[str]) -> list[str]:
     converted = [each.replace(_OUTPUT, "--junit-xml=") for each in arguments if each != _TEXT]
     # The plugin of anyio, which the dashboard brings, costs each test 0.1 s.
     converted += ["-p", "no:cacheprovider", "-p", "no:anyio", "-v"]
-    converted += ["-o", "markers=long: takes long; only in ./run tests --all"]
     # rospy calls notifyAll, which Python 3.10 has deprecated, with every /clock.
     return [*converted, "-W", "ignore:notifyAll:DeprecationWarning"]
 
@@ -33,9 +32,15 @@ def pytest_arguments(arguments: list[str]) -> list[str]:
 class InterruptIsFailure:
     """Plugin of pytest: an interrupt fails the running test, and ends the run.
 
+    It also knows the marker of long tests.
+
     roslaunch interrupts the tests when a required node dies. To pytest by itself that is
     no failure, so that rostest would count the tests that were not run as passed.
     """
+
+    def pytest_configure(self, config: pytest.Config) -> None:
+        """Declare the marker of tests that `./run tests` skips, beside those of a package."""
+        config.addinivalue_line("markers", "long: takes long; only in ./run tests --all")
 
     def pytest_sessionstart(self, session: pytest.Session) -> None:
         """Install the signal handler."""

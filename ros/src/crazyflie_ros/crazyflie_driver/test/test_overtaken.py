@@ -45,6 +45,22 @@ def test_a_takeoff_of_all_that_arms_a_vehicle_which_is_landed(server, vehicle):
     assert vehicle.packets(8, 0) == []
 
 
+def test_a_takeoff_of_all_that_arms_another_vehicle(server, vehicle):
+    """One that has been checked, and is landed meanwhile, would take off after the landing."""
+    other = server.make_vehicle()
+    server.add(other.uri, "cf2")
+    is_(other, DISARMED)
+    other.deaf.add((9, 1, b"\x01"))
+    takeoff = server.process.call("/crazyflie_server/all/takeoff", TAKEOFF)
+    other.wait_for_packets(9, 1)
+    server.call("/cf1/land", LAND)
+    is_(other, None)
+    other.send(9, 1, b"\x81\x01\x01")
+    with pytest.raises(ServiceError, match="sent to no vehicle.* cf1: given up for land"):
+        takeoff.result(LIMIT)
+    assert vehicle.packets(8, 0) == other.packets(8, 0) == []
+
+
 PIECE = TrajectoryPolynomialPiece([0.0] * 8, [0.0] * 8, [0.0] * 8, [0.0] * 8, Duration(1))
 
 

@@ -230,19 +230,26 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
             raise ServiceError(f"{name} of all vehicles: none is connected; expected one or more")
         # Started here, in the order of the calls.
         checks = {vehicle: vehicle.commands.check(command) for vehicle in ready}
-        return Job(lambda _: self._send(command, channels, checks)).start(f"all-{name}")
+        before = {vehicle: vehicle.jobs.superseded for vehicle in ready}
+        return Job(lambda _: self._send(command, channels, checks, before)).start(f"all-{name}")
 
     def _send(
         self,
         command: Command,
         channels: list[Channel],
         checks: Mapping[DriverVehicle, Future[Need]],
+        before: Mapping[DriverVehicle, tuple[int, str]],
     ) -> None:
         needs, refusals = _results(checks, not command.ends_flight)
-        if refusals and not command.ends_flight:
-            raise ServiceError(
-                f"{command.name} was sent to no vehicle: {refusals_text(refusals, len(checks))}"
-            )
+        if not command.ends_flight:
+            # While others were checked, a vehicle may have been landed.
+            for vehicle in needs:
+                if vehicle.jobs.superseded != before[vehicle]:
+                    _, reason = vehicle.jobs.superseded
+                    refusals[vehicle.parameters.name] = f"given up for {reason}"
+            if refusals:
+                text = refusals_text(refusals, len(checks))
+                raise ServiceError(f"{command.name} was sent to no vehicle: {text}")
         sent = {}
         for channel in channels:
             shared = channel.share(needs)

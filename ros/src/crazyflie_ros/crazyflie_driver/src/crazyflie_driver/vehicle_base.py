@@ -81,6 +81,8 @@ class Jobs:
 
     def __init__(self, name: str, on_error: Callable[[str], None] = lambda text: None):
         self._on_error = on_error
+        #: How often flight jobs were superseded, and by what at last.
+        self.superseded: tuple[int, str] = 0, ""
         self._lock = threading.Lock()
         # A lane ends with None.
         self._lane: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
@@ -141,6 +143,7 @@ class Jobs:
         """
         with self._lock:
             flights, self._flights = self._flights, []
+            self.superseded = self.superseded[0] + 1, what
         for job in flights:
             job.superseded_by = what
             if not job.is_begun:

@@ -72,6 +72,8 @@ def test_a_script_that_cannot_be_read_is_not_listed(script):
     mission = script("one.py")
     # A regular file, without any data at its beginning.
     mission.with_name("unreadable.py").symlink_to("/proc/self/mem")
+    for name in ("beyond.py", "beyond.csv", "beyond"):
+        mission.with_name(name).symlink_to("x" * 300)
     assert listed([mission.parent]) == (mission,)
 
 

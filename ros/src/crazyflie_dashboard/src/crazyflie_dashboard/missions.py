@@ -45,7 +45,8 @@ def listed(folders: Iterable[str | Path]) -> tuple[Path, ...]:
         path
         for folder in folders
         for path in sorted(Path(folder).expanduser().glob("*"))
-        if path.is_file() and (path.suffix == ".csv" or _apis(path))
+        # Path.is_file raises the errors of a link that cannot be followed.
+        if os.path.isfile(path) and (path.suffix == ".csv" or _apis(path))
     )
 
 

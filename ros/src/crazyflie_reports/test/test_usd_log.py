@@ -15,7 +15,7 @@ from crazyflie_model.angles import (
     rpy_from_quaternion,
 )
 from crazyflie_reports.bag_file import BagError
-from crazyflie_reports.usd_log import UsdLogFile
+from crazyflie_reports.usd_log import LONGEST, UsdLogFile
 from crazyflie_reports.usd_overlay import PERIOD, position
 
 SWITCHED_ON = 37.25  #: Time of the log at which the flight begins, s.
@@ -175,6 +175,15 @@ def test_a_damaged_time_is_left_out(run):
     assert position(rows, rows) is not None
     rows[-1, 0] = 4e9
     assert position(rows, rows) is None
+
+
+def test_a_vehicle_may_have_been_on_for_days(tmp_path):
+    values = (0.0,) * 10
+    kinds = {(3, "fixedFrequency"): (*POSE, *ANGLES, *TARGET)}
+    later = 3.0 * LONGEST
+    times = [1e13, later + 0.1, later + 0.2, 2.0, later + 0.3, 9e9, later + 0.4, 1e13]
+    found, _ = rows(written(tmp_path / "log07", kinds, [(3, time, values) for time in times]))
+    assert [time - later for time, _ in found["state"]] == pytest.approx([0.1, 0.2, 0.3, 0.4])
 
 
 def test_a_log_that_breaks_off_or_is_damaged_is_read_as_far_as_it_goes(tmp_path):

@@ -15,13 +15,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from crazyflie_model.angles import quaternion_from_zyx, rpy_from_quaternion
 from crazyflie_model.units import thrust_from_pwm
 from crazyflie_reports.bag_file import BagError, Connection
 from crazyflie_reports.bag_topics import ROLES, Role, Row, Topic
 
 MAGIC = 0xBC
-LONGEST = 86_400.0  #: Longest log (s): a later event has a damaged time, and is left out.
+#: Longest log (s): an event further from the middle one has a damaged time, and is left out.
+LONGEST = 86_400.0
 
 _TIMES = {1: ("<HI", 1e-3), 2: ("<HQ", 1e-6)}  # By version: kind and time, and its unit, s.
 _LETTERS = frozenset("?bBhHiIlLqQefd")
@@ -150,15 +153,28 @@ class UsdLogFile:
         self, is_wanted: Callable[[Connection], bool]
     ) -> Iterator[tuple[Connection, float, Any]]:
         """Yield connection, time since the vehicle was switched on (s), and row of each event."""
-        layout, unit = _TIMES[self._version]
-        head, data, place, end = struct.Struct(layout), self._data, self._place, self.size - _END
-        if place <= end and zlib.crc32(data[:end]) != struct.unpack_from("<I", data, end)[0]:
+        data, end = self._data, self.size - _END
+        if self._place <= end and zlib.crc32(data[:end]) != struct.unpack_from("<I", data, end)[0]:
             self.interruption = f"{self._path}: its check sum is another one: it is damaged"
         wanted = {
             number: [(role, c) for role, c in kind.connections.items() if is_wanted(c)]
             for number, kind in self._kinds.items()
         }
-        while place < end:
+        times = np.fromiter((time for _, _, time, _ in self._events()), float)
+        middle = float(np.median(times)) if len(times) else 0.0
+        for place, number, time, values in self._events():
+            self.done = place
+            if abs(time - middle) > LONGEST:
+                continue
+            known = dict(zip(self._kinds[number].names, map(float, values), strict=True))
+            for role, connection in wanted[number]:
+                yield connection, time, _ROWS[role](known)
+
+    def _events(self):
+        """Yield place of the end, number of the kind, time (s) and values of each event."""
+        layout, unit = _TIMES[self._version]
+        head, data, place = struct.Struct(layout), self._data, self._place
+        while place < self.size - _END:
             try:
                 number, time = head.unpack_from(data, place)
                 kind = self._kinds[number]
@@ -170,12 +186,7 @@ class UsdLogFile:
                 )
                 return
             place += head.size + kind.values.size
-            self.done = place
-            if unit * time > LONGEST:
-                continue
-            known = dict(zip(kind.names, map(float, values), strict=True))
-            for role, connection in wanted[number]:
-                yield connection, unit * time, _ROWS[role](known)
+            yield place, number, unit * time, values
 
     def _kind(self):
         number = self._integer()

@@ -130,13 +130,19 @@ def test_no_velocity_is_known_of_a_pose_between_two_gaps(run):
 
 
 @pytest.mark.filterwarnings("error")
-def test_an_infinite_pose_is_no_ground(run):
+@pytest.mark.parametrize("has_states", [False, True])
+@pytest.mark.parametrize("beyond", [float("-inf"), float("inf"), float("nan")])
+def test_an_infinite_pose_is_no_ground(run, has_states, beyond):
     with bags.written(run.folder / "a.bag") as bag:
         for number, time in bags.steps():
+            z = beyond if number == 30 else bags.height(time)[0]
             pose = bags.PoseStamped(header=bags.header(time, number))
-            pose.pose.position.z = float("-inf") if number == 30 else bags.height(time)[0]
+            pose.pose.position.z = z
             pose.pose.orientation.w = 1.0
-            bag.write("/cf1/pose", pose, bags.stamp(time))
+            state = bags.PositionVelocityYawState(z=z)
+            message = bags.PositionVelocityYawStateStamped(pose.header, state)
+            topic = ("/cf1/state", message) if has_states else ("/cf1/pose", pose)
+            bag.write(*topic, bags.stamp(time))
     _, _, (flight,) = run(run.folder / "a.bag")
     # In flight from 0.1 m on.
     begin = bags.TAKEOFF + 0.1 / bags.SPEED

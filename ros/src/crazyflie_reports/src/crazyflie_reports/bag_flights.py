@@ -289,8 +289,8 @@ def _airborne(vehicle):
     if len(vehicle.control):
         times = vehicle.control[vehicle.control[:, 4] > 0.0, 0]
     else:
-        height = vehicle.state[:, 3]
-        times = vehicle.state[height > np.fmin.reduce(height, initial=np.inf) + LIFT, 0]
+        states = vehicle.state[np.isfinite(vehicle.state[:, 3])]
+        times = states[states[:, 3] > states[:, 3].min(initial=np.inf) + LIFT, 0]
     if not len(times):
         return []
     pauses = np.flatnonzero(np.diff(times) > PAUSE)

@@ -10,6 +10,7 @@ import pytest
 from natnet import NatNetClient
 
 from crazyflie_virtual.mocap import MocapScene, MocapServer, MocapSettings
+from crazyflie_virtual.natnet import Encoder
 from crazyflie_virtual.server import Observation, VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
 
@@ -62,6 +63,19 @@ def test_a_body_whose_rates_are_no_numbers_ends_nothing(rate):
     wild, good = scene.bodies(10.01)
     assert all(map(math.isnan, wild.quaternion))
     assert good.quaternion == pytest.approx(upright)
+
+
+@pytest.mark.parametrize("number", [math.inf, math.nan, 1e39, -1e300])
+@pytest.mark.parametrize("markers", ["", "1"])
+def test_a_pose_that_is_too_large_for_the_stream_ends_nothing(number, markers):
+    scene = MocapScene(MocapSettings(single_markers=markers))
+    still, upright = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
+    wild = (number, 0.0, 0.0), (0.0, number, 0.0), (0.0, 0.0, 0.0, number), still
+    for body_id, state in ((1, wild), (2, (still, still, upright, still))):
+        scene.observe(Observation(body_id, f"cf{body_id}", 10.0, *state))
+    bodies = scene.bodies(10.01)
+    Encoder("3.0").frame(1, bodies, 10.0, 10.0, 10.0, scene.markers(10.01))
+    assert bodies[-1].quaternion == pytest.approx(upright)
 
 
 @pytest.fixture

@@ -28,6 +28,7 @@ from crazyflie_virtual.server import (
 from crazyflie_virtual.settings import OBSERVER_PORT, UDP_PORT, switches
 
 OCCLUSION = 0.3  #: Longest time for which a vehicle is hidden, s.
+_LARGEST = 3.4e38  #: Largest number of the stream.
 _GHOST_MARGIN = 0.3  #: Largest distance of reflections from the vehicles, along each axis (m).
 _STALE = 0.5  #: Age of the last observation above which a body is not tracked (s).
 
@@ -190,10 +191,15 @@ class MocapScene:
             camera = self._cameras[body_id]
             camera.measure(time, *_extrapolate(observation, time))
             _, position, quaternion = camera.arrivals(time)[-1]
-            self._seen[body_id] = (position, quaternion)
+            self._seen[body_id] = tuple(map(_streamed, position)), tuple(map(_streamed, quaternion))
         never = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
         position, quaternion = self._seen.get(body_id, never)
         return StreamedBody(body_id, name, position, quaternion, not lost)
+
+
+def _streamed(number):
+    # The stream's floats have 32 bits: struct refuses what is too large for them.
+    return number if abs(number) <= _LARGEST else math.nan
 
 
 def _extrapolate(observation, time):

@@ -23,7 +23,8 @@ if word == "dry_run":
     result = dict(passed=passed, text="far" if passed else "cf1: y is 3 m", duration=4.0)
     result["paths"] = dict(cf1=[[0, 0, 0], [0, 0, 1]])
     print("from crazyflie_mission_api: loading")
-    print(json.dumps(dict(dry_run=result)))
+    line = json.dumps(dict(dry_run=result))
+    print(line[:-30] if "killed" in path else line)
     sys.exit(0 if passed else 1)
 if "waits" in path:
     print("    1.5 s  takeoff: cf1", flush=True)
@@ -81,6 +82,12 @@ def test_a_dry_run_that_cannot_be_started_says_so(script, tmp_path):
     missions = Missions(str(tmp_path / "no python"), tmp_path / "flights")
     with pytest.raises(FileNotFoundError):
         missions.dry_run(script("one.py"), ("cf1",), {}).result(LIMIT)
+
+
+def test_a_dry_run_whose_result_breaks_off_has_not_passed(missions, script):
+    result = missions.dry_run(script("killed.py"), ("cf1",), {}).result(LIMIT)
+    assert (result.passed, result.paths) == (False, {})
+    assert result.text.startswith('its result is damaged: {"dry_run": ')
 
 
 def test_a_dry_run_has_a_result_and_paths(missions, script):

@@ -294,7 +294,10 @@ def _run(command: list[str], environment: Mapping[str, str], limit: float) -> Dr
         return DryRunResult(False, f"the dry run did not end within {limit:g} s")
     for line in output.splitlines():
         if line.startswith(_RESULT):
-            found = json.loads(line)["dry_run"]
+            try:
+                found = json.loads(line)["dry_run"]
+            except ValueError:
+                return DryRunResult(False, f"its result is damaged: {line[:_MAX_OUTPUT]}")
             paths = {name: tuple(map(tuple, path)) for name, path in found["paths"].items()}
             return DryRunResult(found["passed"], found["text"], paths)
     if process.returncode == 0 and "--sim" in command:

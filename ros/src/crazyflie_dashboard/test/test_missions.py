@@ -90,6 +90,12 @@ def test_a_dry_run_whose_result_breaks_off_has_not_passed(missions, script):
     assert result.text.startswith('its result is damaged: {"dry_run": ')
 
 
+def test_a_mission_that_is_open_in_an_editor_can_be_rehearsed(missions, script):
+    mission = script("one.py")
+    mission.with_name(".#one.py").symlink_to("somebody@somewhere.4711")
+    assert missions.dry_run(mission, ("cf1",), {}).result(LIMIT).passed
+
+
 def test_a_dry_run_has_a_result_and_paths(missions, script):
     result = missions.dry_run(script("one.py"), ("cf1",), {}).result(LIMIT)
     assert (result.passed, result.text) == (True, "far")

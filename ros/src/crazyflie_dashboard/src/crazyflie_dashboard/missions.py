@@ -345,8 +345,9 @@ def _apis(path):
 def _key(mission: Path, vehicles: tuple[str, ...]) -> tuple[Any, ...]:
     """Return a value that changes with a mission, its vehicles, and the files in its folder."""
     try:
-        files = {mission, *mission.parent.iterdir()}
-        times = [(str(f), f.stat().st_mtime_ns) for f in files if f.suffix in _SOURCES]
+        # An editor's lock is a link to nowhere.
+        others = [f for f in mission.parent.iterdir() if f.suffix in _SOURCES and os.path.isfile(f)]
+        times = [(str(f), f.stat().st_mtime_ns) for f in {mission, *others}]
     except OSError as error:
         raise RefusalError(f"{mission.name}: {error.strerror}") from None
     return mission, tuple(sorted(times)), vehicles

@@ -10,17 +10,24 @@ from crazyflie_driver.srv import (
     UpdateParamsResponse,
     WriteLighthouseResponse,
 )
-from crazyflie_fleet.connect_node import FleetConnectNode
+from crazyflie_fleet.connect_node import FLEET_LIMIT, FLEET_SERVICES, FleetConnectNode
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
 EXAMPLE = Path(rospkg.RosPack().get_path("crazyflie_fleet")) / "config" / "example.yaml"
 
 
+def offer_fleet(process, *names):
+    """Offer the services of vehicles of a running fleet."""
+    for name in names:
+        process.transport.services |= {f"/{name}/{each}": None for each in FLEET_SERVICES}
+
+
 class Driver:
-    """A driver that knows some addresses."""
+    """A driver that knows some addresses; the fleet is running."""
 
     def __init__(self, process, missing=()):
+        offer_fleet(process, "cf1", "cf2")
         self.missing = missing
         self.added = {}
         self.updated = {}
@@ -67,6 +74,33 @@ def test_vehicles_are_added_and_their_parameters_written():
     expected = ["stabilizer/estimator", "stabilizer/controller", "locSrv/extPosStdDev"]
     assert driver.updated == {"cf1": expected, "cf2": expected}
     assert process.transport.parameters["/cf1/locSrv/extPosStdDev"] == 0.001
+
+
+def test_the_fleet_has_its_names_before_the_driver():
+    # Of two nodes with a service of one name, callers reach the one that has registered it last.
+    process = FakeProcess()
+    driver = Driver(process)
+    del process.transport.services["/cf2/go_to"]
+    assert process.launch(FleetConnectNode(), "/fleet_add", {"fleet/file": str(EXAMPLE)})
+    process.advance(5.0)
+    assert driver.added == {}
+    offer_fleet(process, "cf2")
+    process.advance(0.5)
+    assert list(driver.added) == ["cf1", "cf2"]
+    assert process.logged("warn") == []
+
+
+def test_vehicles_are_added_without_a_fleet_after_a_while():
+    process = FakeProcess()
+    driver = Driver(process)
+    del process.transport.services["/cf2/go_to"]
+    assert process.launch(FleetConnectNode(), "/fleet_add", {"fleet/file": str(EXAMPLE)})
+    process.advance(FLEET_LIMIT + 0.5)
+    assert list(driver.added) == ["cf1", "cf2"]
+    assert process.logged("warn") == [
+        "/fleet_add: the fleet does not offer /cf2/go_to after 20 s; if it starts later, its "
+        "services and the driver's take each other's names"
+    ]
 
 
 def test_a_slow_master_blocks_no_callback(monkeypatch):

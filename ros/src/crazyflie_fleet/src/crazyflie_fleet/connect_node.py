@@ -62,6 +62,12 @@ class BatteryReportNode(Node):
                 return
 
 
+#: Services of each vehicle that the fleet offers, and the driver, too, below /NAME/driver if the
+#: fleet's are there first: the master knows the latest node only.
+FLEET_SERVICES = ("takeoff", "land", "go_to", "emergency")
+FLEET_LIMIT = 20.0  #: Longest wait for them (s).
+_FLEET_PERIOD = 0.2  #: Period at which the master is asked for them (s).
+
 TIMEOUT = 60.0  #: Timeout of the driver's start, connections, and writing of parameters (s).
 
 
@@ -133,6 +139,24 @@ class FleetConnectNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._open = {vehicle.name for vehicle in self._vehicles}
         self._failed: list[str] = []
+        self._wait = FLEET_LIMIT
+        self._timer = handle.timer(_FLEET_PERIOD, self._add_after_fleet, steady=True)
+        self._add_after_fleet()
+
+    def _add_after_fleet(self):
+        """Add the vehicles once the fleet offers its services."""
+        handle, services = self._handle, self._handle.service_nodes()
+        wanted = [f"/{each.name}/{name}" for each in self._vehicles for name in FLEET_SERVICES]
+        missing = [name for name in wanted if name not in services]
+        self._wait -= _FLEET_PERIOD
+        if missing and self._wait > 0.0:
+            return
+        self._timer.stop()
+        if missing:
+            handle.warn(
+                f"the fleet does not offer {missing[0]} after {FLEET_LIMIT:g} s; if it starts "
+                "later, its services and the driver's take each other's names"
+            )
         for vehicle in self._vehicles:
             connection = self._connections[vehicle.name]
             handle.set_param(f"{connection.prefix}/{POSITIONING_PARAMETER}", connection.positioning)

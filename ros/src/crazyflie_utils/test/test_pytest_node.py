@@ -19,8 +19,12 @@ MARKED = """
 import pytest
 
 @pytest.mark.slow
+def test_is_slow():
+    pass
+
+# ./run tests deselects it.
 @pytest.mark.long
-def test_runs():
+def test_is_long():
     pass
 """
 PROGRAM = """

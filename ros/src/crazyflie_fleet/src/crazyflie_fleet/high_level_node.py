@@ -1,6 +1,7 @@
 """The driver's high-level services for a vehicle that the workspace's controller flies."""
 
 import math
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
@@ -64,7 +65,8 @@ class HighLevelNode(Node[HighLevelParameters]):
         self._status = FlightStatus()
         self._groups = 0  # Mask of the groups of the vehicle; at first it has no group.
         self._takeoff: _Takeoff | None = None
-        self._next: tuple[Any, ...] | None = None  # A command received in a takeoff, for its end.
+        # Begins a command that was received in a takeoff, at its end.
+        self._next: Callable[[], None] | None = None
         self._landings: list[Future[Any]] = []
 
     @override
@@ -154,9 +156,9 @@ class HighLevelNode(Node[HighLevelParameters]):
         if takeoff is not None and not takeoff.is_followed:
             takeoff.is_followed = True
             self._climb(takeoff)
-        command, self._next = self._next, None
-        if command is not None:
-            self._begin_or_log(*command)
+        begin_next, self._next = self._next, None
+        if begin_next is not None:
+            begin_next()
 
     def _climb(self, takeoff):
         if takeoff.handover is not None:
@@ -281,7 +283,7 @@ class HighLevelNode(Node[HighLevelParameters]):
         if self._handle.name not in message.data.split():
             return
         if self._status.state == FlightStatus.FLYING:
-            self._begin_or_log(False, CommandFollower.start, 0)
+            self._begin_or_log(CommandFollower.start, 0)
         else:
             self._handle.error(f"not started: the vehicle is {WORDS[self._status.state]}")
 
@@ -307,11 +309,13 @@ class HighLevelNode(Node[HighLevelParameters]):
             self._references.begin(command, *arguments)
         elif self._status.state == FlightStatus.TAKING_OFF:
             self._references.planned(command, *arguments)
-            self._next = (self._is_to_land(), command, *arguments)
+            self._next = partial(
+                self._begin_or_log, command, *arguments, is_of_landing=self._is_to_land()
+            )
         else:
             raise RefusalError(f"the vehicle is {WORDS[self._status.state]}; expected it to fly")
 
-    def _begin_or_log(self, is_of_landing, command, *arguments):
+    def _begin_or_log(self, command, *arguments, is_of_landing=False):
         try:
             if not is_of_landing:
                 self._refuse_if_to_land()

@@ -174,7 +174,7 @@ class Log(Subsystem):
                 data[:2],
                 what,
                 resend,
-                accepts=lambda data: len(data) > 2,
+                accepts=lambda answer: len(answer) > 2,
             )
             code = link.request(data, request)[2]
             if code not in (0, _REPEATED.get(data[0])):

@@ -15,7 +15,7 @@ from crazyflie_lqr.gain_file import GainFileError, load_matrix
 from crazyflie_model.limits import CRASH_TILT
 from crazyflie_state_estimator import motion
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameters.types import DURATION, METRES, TEXT, Integer, Number, Text
+from crazyflie_utils.parameters.types import DURATION, METRES, SHARE, TEXT, Integer, Number, Text
 from crazyflie_utils.parameters.types import FINITE as ANY
 from crazyflie_utils.parameters.yaml_file import Entry, load
 from crazyflie_utils.text import shortened
@@ -47,9 +47,7 @@ class FlightParameters(Parameters):
         "from a pose to its arrival, rounded up to whole periods",
         0.0,
     )
-    dropout: float = parameter(
-        Number(minimum=0.0, maximum=1.0), "probability that a pose is lost", 0.0
-    )
+    dropout: float = parameter(SHARE, "probability that a pose is lost", 0.0)
     position_gain: float = parameter(_NOT_NEGATIVE, "factor of the gains of x and y", 1.0)
     velocity_gain: float = parameter(_NOT_NEGATIVE, "factor of the gains of x_dot and y_dot", 1.0)
     height_gain: float = parameter(_NOT_NEGATIVE, "factor of the gains of z", 1.0)

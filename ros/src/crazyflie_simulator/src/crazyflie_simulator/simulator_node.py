@@ -25,6 +25,7 @@ from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FRAME,
     METRES,
+    SHARE,
     TIME_STEP,
     Integer,
     Number,
@@ -86,9 +87,7 @@ class MotionCaptureParameters(Parameters):
         0.0,
         live=True,
     )
-    dropout: float = parameter(
-        Number(minimum=0.0, maximum=1.0), "probability that a pose is not broadcast", 0.0, live=True
-    )
+    dropout: float = parameter(SHARE, "probability that a pose is not broadcast", 0.0, live=True)
 
 
 class ClockParameters(Parameters):

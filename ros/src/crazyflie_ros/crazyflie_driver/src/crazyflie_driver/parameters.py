@@ -22,6 +22,7 @@ from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, group,
 from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FRAME,
+    SHARE,
     TEXT,
     Converted,
     Integer,
@@ -32,7 +33,6 @@ from crazyflie_utils.parameters.types import (
 
 _VOLTS = Number("V", minimum=0.0)
 _SECONDS = Number("s", minimum=0.0)
-_SHARE = Number("", minimum=0.0, maximum=1.0)
 
 
 ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"  #: Services of the server.
@@ -41,16 +41,16 @@ ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"  #: Services of the server.
 class LinkLimits(Parameters):
     """Limits of a link, beyond which the diagnostics warn."""
 
-    min_quality: float = parameter(_SHARE, "with less of the pings answered they warn", 0.8)
+    min_quality: float = parameter(SHARE, "with less of the pings answered they warn", 0.8)
     max_latency: float | None = parameter(
         Number("s", above=0.0), "with more they warn; without it they do not", None
     )
     min_unicast_rate: float = parameter(
-        _SHARE,
+        SHARE,
         "with less of the packets of a second received by the vehicle, as its log says, they warn",
         0.0,
     )
-    min_broadcast_rate: float = parameter(_SHARE, "the same of broadcast packets", 0.0)
+    min_broadcast_rate: float = parameter(SHARE, "the same of broadcast packets", 0.0)
 
 
 class BroadcastParameters(Parameters):

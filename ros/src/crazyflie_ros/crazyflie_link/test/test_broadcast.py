@@ -137,9 +137,16 @@ def test_a_go_to_that_may_be_on_its_way_is_not_repeated(by_udp):
 def test_a_broadcast_that_would_come_too_late_is_not_sent(by_udp, caplog):
     """Each vehicle has been sent its own command by then, and would obey twice."""
     vehicles, links, broadcaster = by_udp
-    free = threading.Event()
-    # As a dongle that hangs for a moment.
-    broadcaster.put_latest("poses", lambda: free.wait(60.0) and [])
+    begun, free = threading.Event(), threading.Event()
+
+    def hang():
+        begun.set()
+        free.wait(60.0)
+        return []
+
+    # As a dongle that hangs for a moment; commands go before poses that wait.
+    broadcaster.put_latest("poses", hang)
+    assert begun.wait(60.0)
     errors = begin_together(
         broadcaster, links, 3, lambda h: h.go_to((1.0, 0.0, 0.0), 0.0, 2.0, relative=True)
     )

@@ -96,7 +96,9 @@ def test_a_descent_without_states_goes_on_for_as_long_as_it_takes(bad):
     assert thrusts(process)[0] == GRAVITY
     advance(1.0)
     assert future.done()
-    assert len(process.logged("warn")) == (0 if bad is None else 1)
+    # As often as the machine's clock permits, which is not that of the flight.
+    text = "/takeoff_server: ignoring a message on /state: its state is not finite"
+    assert {*process.logged("warn")} == ({text} if bad else set())
 
 
 def test_speed_zero_is_the_bare_ramp():

@@ -135,6 +135,23 @@ def test_references_beside_those_of_the_takeoff_server(descent, parameters):
     ]
 
 
+@pytest.mark.parametrize(
+    ("prefix", "topic", "number", "is_found"),
+    [
+        ("/cf1", "external_pose", 1, True),
+        ("", "external_position", 1, True),
+        ("/cf1", "external_pose", 2, False),
+        ("/cf1", "pose", 1, False),
+    ],
+)
+def test_poses_for_an_estimator_that_ignores_them(prefix, topic, number, is_found):
+    parameters = {f"{prefix}/stabilizer/estimator": number}
+    graph_ = but(parameters=parameters, publishers={f"{prefix}/{topic}": {"/mocap"}})
+    texts = [text for _, text in found(graph.check_estimators(graph_))]
+    assert len(texts) == is_found
+    assert all(f"ignores {prefix}/{topic}" in text for text in texts)
+
+
 def test_two_drivers_of_one_vehicle():
     uri = "radio://0/80/2M"
     twice = but(parameters={"/cf1/add/uri": uri, "/cf2/add/uri": uri, "/cf3/add/uri": "udp://x:1"})

@@ -16,6 +16,7 @@ GOOD = VehicleFacts(
     latency=0.004,
     decks=("bcFlow2",),
     firmware="2026.08",
+    estimator=2,
     deviations=(0.01, 0.01, 0.01),
     changes=(0.0, 0.0, 0.0),
     motors=ALL_MOTORS,
@@ -42,6 +43,7 @@ def test_nothing_is_wrong_with_a_good_vehicle():
         ({"deviations": (0.0, 2.0, 0.0)}, "error", "deviation of 2.00 m/s at rest"),
         ({"changes": (0.0, 0.5, 0.0)}, "error", "has changed by 0.50 m/s"),
         ({"deviations": (), "changes": ()}, "warn", "its variance is not logged"),
+        ({"estimator": 1}, "error", "the complementary filter estimates, which ignores poses"),
         ({"motors": 0b1011}, "error", "motor 3 fails its self test"),
         ({"battery_passed": False}, "error", "its voltage sags too far"),
         ({"failure": "the radio gets no answer"}, "error", "the radio gets no answer"),
@@ -64,6 +66,7 @@ def test_a_virtual_vehicle_is_examined():
     assert facts.quality > 0.95
     assert "bcFlow2" in facts.decks and "bcLighthouse4" not in facts.decks
     assert facts.firmware.startswith("2026.08")
+    assert facts.estimator == 2
     assert all(0.0 < each < 0.1 for each in facts.deviations)
     assert facts.motors == 0b1101
     assert facts.battery_passed is True

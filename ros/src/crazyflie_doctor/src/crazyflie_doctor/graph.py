@@ -23,6 +23,8 @@ STATES_AND_REFERENCES = {
     "crazyflie_msgs/PositionVelocityYawStateStamped",
 }
 
+COMPLEMENTARY = 1  #: Number of the firmware's estimator that knows no position.
+
 #: Optional inputs of nodes, by the ends of their parameters' names.
 _OPTIONAL = {"prioritized_control"}
 
@@ -186,6 +188,22 @@ def _takeoff_servers(graph, reference):
         if key == "descent_reference" and f"{node}/topics/reference" in graph.topics[reference]:
             topics.add("/" + str(value).strip("/"))
     return {node for topic in topics for node in graph.publishers.get(topic, ())}
+
+
+def check_estimators(graph: Graph) -> Iterator[Finding]:
+    """Find vehicles that are sent poses which their estimator ignores."""
+    end = "/stabilizer/estimator"
+    for name, value in sorted(graph.parameters.items()):
+        if not name.endswith(end) or value != COMPLEMENTARY:
+            continue
+        prefix = name.removesuffix(end)
+        for topic in (f"{prefix}/external_pose", f"{prefix}/external_position"):
+            if graph.publishers.get(topic):
+                yield error(
+                    f"the estimator of {prefix or '/'} ignores {topic}: {name} is {COMPLEMENTARY} "
+                    "(complementary)",
+                    "set it to 2 (Kalman), by the launch file or update_params",
+                )
 
 
 def check_drivers(graph: Graph, reported: Mapping[str, set[str]]) -> Iterator[Finding]:

@@ -93,6 +93,7 @@ def _checks(duration: float) -> Iterator[Check]:
     yield Check("tf rate", "poses come often and fresh", timing.check_tf_rate(running, recording))
     yield Check("gains", "fit the delay", timing.check_gains(running, recording))
     yield Check("drivers", "one for a vehicle", graph.check_drivers(running, recording.reported))
+    yield Check("estimators", "use the poses that come", graph.check_estimators(running))
     yield _radio([*running.uris, *recording.reported])
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from crazyflie_doctor.finding import Check, Finding, error, warn
+from crazyflie_doctor.graph import COMPLEMENTARY
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.log import LogBlock
@@ -24,6 +25,8 @@ MAX_DEVIATION, MAX_CHANGE = 0.1, 0.03
 #: Releases of the firmware that this workspace was flown against.
 KNOWN_FIRMWARE = ("2026.08",)
 ALL_MOTORS = 0b1111  #: Bit mask in health.motorPass.
+
+_ESTIMATOR = "stabilizer.estimator"  #: Parameter with the number of the estimator.
 
 _PERIOD_MS = 100
 _SELF_TEST_LIMIT = 10.0  #: s.
@@ -48,6 +51,7 @@ class VehicleFacts:
     firmware: str = ""  # Release.
     # Standard deviations of the estimated velocity along each axis (m/s).
     deviations: tuple[float, ...] = ()
+    estimator: float | None = None  # Number of the firmware's estimator.
     changes: tuple[float, ...] = ()  # Changes of these while the vehicle was watched (m/s).
     motors: int | None = None  # Bit mask of those that have passed their test; None: not tested.
     battery_passed: bool | None = None  # None: not tested.
@@ -110,6 +114,14 @@ def _firmware(facts: VehicleFacts) -> Iterator[Finding]:
 
 
 def _estimate(facts: VehicleFacts) -> Iterator[Finding]:
+    if facts.estimator == COMPLEMENTARY:
+        yield error(
+            "the complementary filter estimates, which ignores poses from motion capture and knows "
+            "no position; normal is the Kalman filter",
+            f"set {_ESTIMATOR} to 2, by the launch file or update_params; a flight on attitude and "
+            "thrust alone does not need it",
+        )
+        return
     if not facts.deviations:
         yield warn("its variance is not logged", "set stabilizer.estimator to 2, or update")
         return
@@ -186,6 +198,7 @@ def _watch(
         latency=vehicle.latency(),
         decks=tuple(sorted(name for prefix, _, name in decks if prefix == "deck")),
         firmware=versions[-1].decode(errors="replace") if versions else "",
+        estimator=vehicle.parameters.known(_ESTIMATOR),
         deviations=deviations[-1] if deviations else (),
         changes=tuple(max(axis) - min(axis) for axis in zip(*deviations, strict=True)),
     )

@@ -49,12 +49,12 @@ def test_standard_topics_are_those_of_the_cpp_driver(server, logging):
     assert published(server, "/cf1/heading")[0].data == pytest.approx(1.5707963)
 
 
-def test_standard_topics_need_four_log_blocks(logging):
-    """Status, imu, pose, and the slow ones together: 16 there are."""
+def test_standard_topics_need_five_log_blocks(logging):
+    """Status, estimate, imu, pose, and the slow ones together: 16 there are."""
     created = [data for data in logging.packets(5, 1) if data[0] == 6]
     started = [data[2] for data in logging.packets(5, 1) if data[0] == 3]
-    assert len(created) == 4
-    assert sorted(started) == [1, 1, 10, 10]
+    assert len(created) == 5
+    assert sorted(started) == [1, 1, 10, 10, 50]
 
 
 def test_stamps_of_the_vehicle_s_time_go_on_when_its_24_bits_are_full(server):
@@ -96,7 +96,7 @@ def test_the_frequency_of_a_custom_block_is_a_period_in_ms(server, log_block):
     blocks = [log_block("motors", 20, "motor.m1", "pm.vbat"), log_block("slow", 1000, "mag.x")]
     server.add(vehicle.uri, enable_logging=True, log_blocks=blocks)
     started = [data[2] for data in vehicle.packets(5, 1) if data[0] == 3]
-    assert sorted(started) == [2, 10, 100]
+    assert sorted(started) == [2, 10, 50, 100]
     message = published(server, "/cf1/motors", 2)[0]
     assert message.values == [4321.0, 3.75]
     assert message.header.frame_id == "cf1/base_link"
@@ -107,7 +107,7 @@ def test_a_period_between_two_steps_is_the_shorter_one_and_said(server, log_bloc
     """Launch files of the C++ driver, which cuts it silently, go on working."""
     vehicle = server.make_vehicle()
     server.add(vehicle.uri, enable_logging=True, log_blocks=[log_block("motors", 25, "motor.m1")])
-    assert sorted(data[2] for data in vehicle.packets(5, 1) if data[0] == 3) == [2, 10]
+    assert sorted(data[2] for data in vehicle.packets(5, 1) if data[0] == 3) == [2, 10, 50]
     (warning,) = server.process.logged("warn")
     assert "log block motors: its period is 25 ms" in warning
     assert "it comes every 20 ms" in warning
@@ -129,10 +129,10 @@ def test_stamps_of_the_vehicle(server, log_block):
     assert stamps[-1] > stamps[0]
 
 
-def test_without_logging_there_are_only_status_and_packets(server, log_block):
+def test_without_logging_there_are_only_status_estimate_and_packets(server, log_block):
     vehicle = server.make_vehicle()
     server.add(vehicle.uri, log_blocks=[log_block("test", 10, "mag.x")], **ALL)
-    assert len([data for data in vehicle.packets(5, 1) if data[0] == 6]) == 1
+    assert len([data for data in vehicle.packets(5, 1) if data[0] == 6]) == 2
     assert set(server.process.transport.publishers) == {
         "/diagnostics",
         "/flights",

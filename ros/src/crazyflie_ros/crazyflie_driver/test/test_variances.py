@@ -14,7 +14,7 @@ from crazyflie_virtual.testing import virtual_vehicle
 
 NAMES = ("kalman.varPX", "kalman.varPY", "kalman.varPZ")
 VARIANCES = {name: ("f", 1e-4) for name in NAMES}
-KALMAN, COMPLEMENTARY = ({"stabilizer.estimator": ("B", kind, 0)} for kind in (2, 1))
+KALMAN, UNSCENTED = ({"stabilizer.estimator": ("B", kind, 0)} for kind in (2, 3))
 
 
 def watched(samples):
@@ -67,7 +67,7 @@ def test_a_takeoff_waits_for_the_filter(server):
 
 
 @pytest.mark.parametrize(
-    ("estimator", "log"), [(KALMAN, {}), ({}, VARIANCES), (COMPLEMENTARY, VARIANCES)]
+    ("estimator", "log"), [(KALMAN, {}), ({}, VARIANCES), (UNSCENTED, VARIANCES)]
 )
 def test_without_a_kalman_filter_nothing_is_refused(server, estimator, log):
     vehicle = add(server, estimator, log)

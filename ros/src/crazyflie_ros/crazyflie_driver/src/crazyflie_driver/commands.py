@@ -9,6 +9,7 @@ from typing import Any
 
 from crazyflie_driver import srv
 from crazyflie_driver.log_topics import LogTopics
+from crazyflie_driver.positioning import ESTIMATOR, KALMAN
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.broadcast import SharedCommand
@@ -99,8 +100,6 @@ class Need(enum.Enum):
     NOT_ADDRESSED = enum.auto()  #: No packet: the command is for other groups.
 
 
-#: Parameter of the firmware, and its value for the extended Kalman filter.
-_ESTIMATOR, _KALMAN = "stabilizer.estimator", 2
 #: Largest age of a logged state, s: the firmware's supervisor runs at 25 Hz, its log at 10 Hz.
 REPORT_LAG = 0.2
 _LOGGED_STATE_LIMIT = 1.0  #: Time limit of log data with the state, s; they come every 0.1 s.
@@ -141,10 +140,10 @@ class FlightState:
         ):
             return problem
         try:
-            estimator = self._vehicle.crazyflie.parameters.values().get(_ESTIMATOR)
+            estimator = self._vehicle.crazyflie.parameters.known(ESTIMATOR)
         except LinkLostError:
             return ""
-        return self._log.variances.problem() if estimator == _KALMAN else ""
+        return self._log.variances.problem() if estimator == KALMAN else ""
 
     def motion_sent(self) -> None:
         """Record that the planner is commanded to move."""

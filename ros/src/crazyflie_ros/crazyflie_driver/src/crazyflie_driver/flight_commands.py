@@ -233,12 +233,14 @@ class FlightCommands:
         command.send(self._vehicle.crazyflie.high_level.dry_run())
         if not self._is_addressed(command):
             return Need.NOT_ADDRESSED
-        if command.name == TAKEOFF:
-            self._check_and_arm(job)
-        elif command.name == LAND and self._flight.is_on_ground():
+        if command.name == LAND and self._flight.is_on_ground():
             text = "land is not sent, the vehicle is on the ground: it would start its motors"
             self._vehicle.info(text)
             return Need.ON_GROUND
+        if command.name != STOP:
+            self._check_estimate(command)
+        if command.name == TAKEOFF:
+            self._check_and_arm(job)
         elif not command.ends_flight:
             self._check_motion(command)
         return Need.SETPOINTS_STOP if self._setpoints.is_streaming else Need.COMMAND
@@ -252,6 +254,14 @@ class FlightCommands:
                 "ignored the command. Call set_group_mask first, or use the group mask 0"
             )
         return is_addressed is not False
+
+    def _check_estimate(self, command):
+        # Where a flight by the estimate goes on, a landing by it is the best that is left.
+        problem = self._log.estimate_problem()
+        if problem and command.name == LAND and self._setpoints.control is not Control.THRUST:
+            self._vehicle.warn(f"land may end elsewhere: {problem}")
+        elif problem:
+            raise ServiceError(f"no {command.name}: {problem}")
 
     def _check_motion(self, command):
         battery, state = self._log.battery, self._log.supervisor

@@ -14,8 +14,18 @@ from std_msgs.msg import Float32, Header, String
 from crazyflie_driver.monitors import VARIANCES, VARIANCES_PERIOD_MS, BatteryMonitor, Variances
 from crazyflie_driver.msg import GenericLogData, crtpPacket
 from crazyflie_driver.parameters import POSITIONING_TOPIC
-from crazyflie_driver.positioning import PERIOD_MS, SYSTEMS, Positioning, check_deck
+from crazyflie_driver.positioning import (
+    ESTIMATE,
+    ESTIMATOR,
+    PERIOD_MS,
+    SYSTEMS,
+    PoseAgreement,
+    Positioning,
+    check_deck,
+    estimator_problem,
+)
 from crazyflie_driver.vehicle_base import BaseVehicle
+from crazyflie_link.errors import LinkLostError
 from crazyflie_link.log import PERIOD_STEP_MS, LogBlock, quaternion_from_compressed
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_model.units import GRAVITY
@@ -63,7 +73,7 @@ _IMU = StandardTopic("imu", Imu, ("acc.x", "acc.y", "acc.z", "gyro.x", "gyro.y",
 _POSE = StandardTopic(
     "pose",
     PoseStamped,
-    ("stateEstimate.x", "stateEstimate.y", "stateEstimate.z", "stateEstimateZ.quat"),
+    (*ESTIMATE, "stateEstimateZ.quat"),
     _pose,
     in_world=True,
 )
@@ -137,6 +147,8 @@ class LogTopics:
     supervisor: SupervisorState | None = None
     #: Variances of the vehicle's Kalman filter, if it has one.
     variances: Variances = field(default_factory=Variances)
+    #: The external poses that it is sent, beside its estimate.
+    agreement: PoseAgreement = field(default_factory=PoseAgreement)
     #: The state of its own positioning; None where it is flown by motion capture.
     positioning: Positioning | None = None
     _packets: Publisher | None = None
@@ -165,11 +177,7 @@ class LogTopics:
             self._packets = self._vehicle.publisher("packets", crtpPacket)
         known = self._vehicle.crazyflie.log.variables()
         self._start_status(known)
-        self.variances.is_logged = all(name in known for name in VARIANCES)
-        if self.variances.is_logged:
-            self._log(
-                "variances", VARIANCES_PERIOD_MS, VARIANCES, lambda _, v: self.variances.add(v)
-            )
+        self._start_filter(known)
         topics = parameters.topics
         if parameters.is_own_estimate:
             self._start_positioning(parameters.positioning, known)
@@ -180,6 +188,20 @@ class LogTopics:
         if parameters.enable_logging:
             for block in parameters.log_blocks:
                 self._start_custom(block)
+
+    def estimate_problem(self) -> str:
+        """Return why the vehicle's own position is a wrong one; empty if that is not known.
+
+        The planner, and setpoints with a reference, would fly it elsewhere.
+        """
+        return self.estimator_problem() or self.agreement.problem(self._vehicle.handle.time())
+
+    def estimator_problem(self) -> str:
+        """Return why its estimator knows no position; empty if it does, or is not known."""
+        try:
+            return estimator_problem(self._vehicle.crazyflie.parameters.known(ESTIMATOR))
+        except LinkLostError:
+            return ""
 
     def forget_state(self) -> None:
         """Forget the state and the variances: those from before a loss are outdated."""
@@ -226,6 +248,32 @@ class LogTopics:
 
         if variables:
             self._log("status", STATUS_PERIOD_MS, variables, deliver)
+
+    def _start_filter(self, known):
+        # In one block of 24 bytes: the firmware has room for 16 blocks.
+        logs_variances, logs_position = (
+            all(name in known for name in names) for names in (VARIANCES, ESTIMATE)
+        )
+        self.variances.is_logged = logs_variances
+        size = len(VARIANCES) if logs_variances else 0
+        variables = (*VARIANCES[:size], *(ESTIMATE if logs_position else ()))
+
+        def deliver(_, values):
+            if logs_variances:
+                self.variances.add(values[:size])
+            if logs_position:
+                self._vehicle.delivery.submit_data(self._note_estimate, values[size:])
+
+        if variables:
+            self._log("filter", VARIANCES_PERIOD_MS, variables, deliver)
+
+    def _note_estimate(self, position):
+        now = self._vehicle.handle.time()
+        before = self.agreement.problem(now)
+        self.agreement.estimate(now, position)
+        text = self.agreement.problem(now)
+        if text and not before and self.is_flying:
+            self._vehicle.warn(text)
 
     def _start_positioning(self, source, known):
         vehicle, system = self._vehicle, SYSTEMS[source]

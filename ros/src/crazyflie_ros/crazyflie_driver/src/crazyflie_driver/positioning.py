@@ -1,6 +1,7 @@
-"""Whether a vehicle's own estimate can be flown by: its decks, their state and the filter's."""
+"""Whether a vehicle's own estimate can be flown by: its decks, their state, the filter, its poses."""
 
 import math
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -29,6 +30,73 @@ OUT_OF_REACH = 32000
 _POSITION = ("kalman.varX", "kalman.varY", "kalman.varZ")
 
 Values = Mapping[str, float]
+
+ESTIMATOR = "stabilizer.estimator"  #: Parameter of the firmware: number of its estimator.
+#: Numbers of the complementary filter, which a vehicle without decks begins with, and of the
+#: extended Kalman filter.
+COMPLEMENTARY, KALMAN = 1, 2
+
+#: Log variables of the estimated position, m, fixed frame.
+ESTIMATE = ("stateEstimate.x", "stateEstimate.y", "stateEstimate.z")
+#: Largest distance of the estimate from the poses that a vehicle is sent, m; a Kalman filter
+#: follows them within a few mm.
+MAX_POSE_DISTANCE = 0.3
+#: Age up to which a pose may be the one of an estimate: the filter and the link are late, s.
+_POSE_WINDOW = 0.5
+_MAX_ESTIMATE_AGE = 1.5  #: An estimate that is older is not known, s: three periods of its log.
+
+
+def estimator_problem(number: float | None) -> str:
+    """Return why a vehicle with this estimator has no position; empty if it has, or unknown."""
+    if number != COMPLEMENTARY:
+        return ""
+    return (
+        f"{ESTIMATOR} is {COMPLEMENTARY} (complementary): it ignores external poses, x and y are "
+        f"always 0, and z is that of the barometer; expected {KALMAN} (Kalman), set it with "
+        "update_params"
+    )
+
+
+class PoseAgreement:
+    """Whether a vehicle's estimate is where the external poses say; times in s of one clock."""
+
+    def __init__(self) -> None:
+        self._poses: deque[tuple[float, Sequence[float]]] = deque()
+        self._time = -math.inf
+        self._text = ""
+
+    def pose(self, now: float, position: Sequence[float]) -> None:
+        """Record a position (m) that the vehicle is sent."""
+        self._forget_old(now)
+        self._poses.append((now, tuple(position)))
+
+    def estimate(self, now: float, position: Sequence[float]) -> None:
+        """Record an estimated position (m), and compare it with the poses of the last 0.5 s."""
+        self._forget_old(now)
+        self._time, self._text = now, ""
+        if not self._poses:
+            return
+        distances = [math.dist(position, pose) for _, pose in self._poses]
+        # NaN is not within any limit.
+        if any(distance <= MAX_POSE_DISTANCE for distance in distances):
+            return
+        self._text = (
+            f"the vehicle estimates its position as {_place(position)} m, and is sent "
+            f"{_place(self._poses[-1][1])} m, {distances[-1]:.2f} m from it; expected at most "
+            f"{MAX_POSE_DISTANCE:g} m: is it the pose of this vehicle, and in the right frame?"
+        )
+
+    def problem(self, now: float) -> str:
+        """Return the difference that is too large; empty without one, or if it is not known."""
+        return self._text if now - self._time <= _MAX_ESTIMATE_AGE else ""
+
+    def _forget_old(self, now):
+        while self._poses and now - self._poses[0][0] > _POSE_WINDOW:
+            self._poses.popleft()
+
+
+def _place(position):
+    return "({})".format(", ".join(f"{part:.2f}" for part in position))
 
 
 def _flow(values: Values) -> str:

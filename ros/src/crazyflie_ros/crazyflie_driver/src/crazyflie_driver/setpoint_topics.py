@@ -27,6 +27,9 @@ CMD_VEL, CMD_STOP = "cmd_vel", "cmd_stop"
 _THROTTLE = 1.0
 _RATE_WINDOW = 1.0
 
+#: Period of the warning of an estimator that ignores poses, s.
+_ESTIMATOR_PERIOD = 30.0
+
 #: Silence after zero thrust that ends a stream, s, and the period of the check, s.
 _REST, _REST_PERIOD = 0.5, 0.1
 
@@ -41,6 +44,14 @@ class Sender(NamedTuple):
     message_type: type
     send: Callable[[Crazyflie, Any], None]
     height_and_yaw: Callable[[Any], tuple[float | None, float | None]] = lambda _: (None, None)
+
+
+class ExternalSender(NamedTuple):
+    """The same of a topic with measured positions; ``position(message)`` returns one, m."""
+
+    message_type: type
+    send: Callable[[Crazyflie, Any], None]
+    position: Callable[[Any], tuple[float, float, float]]
 
 
 def _full_state(crazyflie, message):
@@ -78,8 +89,12 @@ SETPOINTS = {
 
 #: The same of measured positions.
 EXTERNAL = {
-    "external_position": Sender(PointStamped, lambda c, m: c.localization.position(*_xyz(m.point))),
-    "external_pose": Sender(PoseStamped, _external_pose),
+    "external_position": ExternalSender(
+        PointStamped,
+        lambda c, m: c.localization.position(*_xyz(m.point)),
+        lambda m: _xyz(m.point),
+    ),
+    "external_pose": ExternalSender(PoseStamped, _external_pose, lambda m: _xyz(m.pose.position)),
 }
 
 
@@ -176,8 +191,10 @@ class SetpointTopics:
 
     def can_land_autonomously(self) -> bool:
         """Return whether the vehicle's planner can land it, as far as its inputs show."""
+        if self.control is not Control.THRUST:
+            return True
         is_fed = self._vehicle.handle.time() - self._external_time <= _RATE_WINDOW
-        return is_fed or self.control is not Control.THRUST
+        return is_fed and not self._log.estimate_problem()
 
     def send_zero_thrust(self) -> None:
         """Send zero thrust a hundred times, and that setpoints stop; blocks."""
@@ -262,13 +279,18 @@ class SetpointTopics:
                 f"ignoring {name}: its positioning is {self._log.positioning.source}", 5.0, name
             )
             return
-        self._external_time = self._vehicle.handle.time()
-        self._send(name, sender, message)
+        now = self._external_time = self._vehicle.handle.time()
+        if self._send(name, sender, message):
+            self._log.agreement.pose(now, sender.position(message))
+            if problem := self._log.estimator_problem():
+                self._vehicle.warn(f"{name}: {problem}", _ESTIMATOR_PERIOD, "estimator")
 
     def _on_setpoint(self, name, sender, message):
         now = self._vehicle.handle.time()
         at_rest = name == CMD_STOP or (name == CMD_VEL and message.linear.z <= 0.0)
         with self._vehicle.gate.passing(now, at_rest) as refusal:
+            key = "gate" if refusal else "estimate"
+            refusal = refusal or self._wrong_estimate(name)
             is_sent = not refusal and self._send(name, sender, message)
             if is_sent:
                 if name == CMD_STOP:
@@ -277,7 +299,7 @@ class SetpointTopics:
                 moving = Control.THRUST if name == CMD_VEL else Control.REFERENCE
                 self.control, self._topic = Control.ZERO_THRUST if at_rest else moving, name
         if refusal:
-            self._warn(f"ignoring {name}: {refusal}", key="gate")
+            self._warn(f"ignoring {name}: {refusal}", key=key)
         if not is_sent:
             self.ignored += 1
             return
@@ -286,6 +308,15 @@ class SetpointTopics:
             self._check_heading()
         if now < self.high_level_end:
             self._warn(f"{name} overrides the high-level command", key="override")
+
+    def _wrong_estimate(self, name):
+        # Returns why a setpoint would lead the vehicle elsewhere. A flight by such setpoints goes
+        # on: without them the vehicle would fall.
+        problem = self._log.estimate_problem() if name in SETPOINTS else ""
+        if problem and self.control is Control.REFERENCE and self._log.is_flying:
+            self._warn(f"{name} in flight: {problem}", key="estimate")
+            return ""
+        return problem
 
     def _send(self, name, sender, message):
         try:

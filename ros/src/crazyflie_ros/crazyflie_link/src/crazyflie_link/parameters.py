@@ -41,6 +41,13 @@ class FirmwareParameters(Subsystem):
             if element.name in param.values.get(element.group, {})
         }
 
+    def known(self, name: str) -> int | float | None:
+        """Return one of them, such as "ring.effect"; None if the vehicle does not have it."""
+        param = self._current_link().cflib.param
+        group, _, parameter = name.partition(".")
+        text = param.values.get(group, {}).get(parameter)
+        return None if text is None else _number(param.toc.get_element(group, parameter), text)
+
     def read(self, name: str) -> int | float:
         """Ask the vehicle for a parameter, such as "ring.effect"; blocks."""
         link = self._current_link()

@@ -8,7 +8,7 @@ from crazyflie_utils.refusal import RefusalError
 
 TREE = {
     "stabilizer": {"estimator": 2, "stop": 0},
-    "kalman": {"mNBaro": 2.0},
+    "kalman": {"mNBaro": "2e0"},
     "lqr_controller": {"K_file": "K.txt", "x_dim": 7},
     "takeoff_server": {"hover": {"z": 1.0}},
     "uri": "radio://0/80/2M",
@@ -18,7 +18,8 @@ TREE = {
 def test_firmware_parameters_are_groups_of_numbers():
     found = {each.name: each for each in of_firmware("cf1", TREE)}
     assert found.keys() == {"stabilizer.estimator", "stabilizer.stop", "kalman.mNBaro"}
-    assert found["kalman.mNBaro"].kind == "float"
+    # As rosparam has set it.
+    assert (found["kalman.mNBaro"].kind, found["kalman.mNBaro"].value) == ("float", 2.0)
     assert found["stabilizer.estimator"].is_firmware
 
 
@@ -26,7 +27,10 @@ def test_firmware_parameters_are_groups_of_numbers():
     ("kind", "text", "value"),
     [
         ("float", " 0.5 ", 0.5),
+        ("float", "0x10", 16.0),
         ("int", "0x10", 16),
+        ("int", "010", 10),
+        ("int", "1e3", 1000),
         ("bool", "True", True),
         ("bool", "0", False),
         ("str", "radio", "radio"),

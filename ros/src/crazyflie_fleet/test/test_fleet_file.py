@@ -236,6 +236,51 @@ def test_what_is_wrong_is_named_with_its_line(load, text, expected):
     assert complaints_of(load, text)[0].startswith(expected)
 
 
+def test_vehicles_may_merge_what_they_have_in_common(load):
+    fleet = load("""\
+defaults: &cf
+  enabled: true
+  type: cf21
+  initial_position: [0, 0, 0]
+robots:
+  cf1:
+    <<: *cf
+    uri: radio://0/80/2M/E7E7E7E701
+  cf2:
+    <<: *cf
+    uri: radio://0/80/2M/E7E7E7E702
+    initial_position: [1, 0, 0]
+robot_types:
+  cf21: {big_quad: false}
+""")
+    assert fleet.names == ("cf1", "cf2")
+    assert fleet["cf2"].position == (1.0, 0.0, 0.0)
+    assert not any("defaults" in text for text in fleet.warnings)
+
+
+def test_numbers_are_written_as_people_do(load):
+    fleet = load("""\
+robots:
+  cf1:
+    uri: radio://0/80/2M/e7e7e7e701
+    initial_position: [0, '0', 1e-3]
+    type: cf21
+    buffer: 2e-1
+    firmware_params:
+      kalman: {pNAcc_xy: .5, pNAcc_z: 1.}
+      ring: {effect: 0x07, headlightEnable: true, glowstep: 010}
+robot_types:
+  cf21: {battery: {voltage_warning: 38e-1, voltage_critical: 3.7}}
+""")
+    vehicle = fleet["cf1"]
+    assert vehicle.position == (0.0, 0.0, 0.001)
+    assert (vehicle.buffer, vehicle.voltage_warning) == (0.2, 3.8)
+    params = vehicle.firmware_params
+    assert (params["kalman.pNAcc_xy"], params["kalman.pNAcc_z"]) == (0.5, 1.0)
+    assert (params["ring.effect"], params["ring.headlightEnable"]) == (7, 1)
+    assert params["ring.glowstep"] == 10
+
+
 @pytest.mark.parametrize("value", ["'1_0'", "1e400", "nan", "0x" + "f" * 4000, "[1]", "'٣'"])
 def test_firmware_parameters_are_finite_numbers(load, value):
     text = TWO + f"all: {{firmware_params: {{a: {{b: {value}}}}}}}\n"

@@ -164,7 +164,7 @@ def test_all_that_is_wrong_with_a_command_line_is_reported(capsys):
     for text in (
         "--hover-z is 'high'; expected a finite number (m)",
         "--noisy is 'perhaps'; expected true or false",
-        "--motors is 9; expected an integer from 1 to 4",
+        "--motors is '9'; expected an integer from 1 to 4",
         "--PIDs-X-kp is not set",
     ):
         assert text in said

@@ -11,6 +11,7 @@ from crazyflie_utils.parameters.types import (
     BOOLEAN,
     DURATION,
     FINITE,
+    FIRMWARE_NUMBER,
     FRAME,
     METRES,
     POSITIVE,
@@ -26,7 +27,20 @@ from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.text import shown
 
 NUMBERS = [FINITE, METRES, POSITIVE, DURATION, TIME_STEP, Number(minimum=-1.0, maximum=1.0)]
-NOT_NUMBERS = ["1.0", "", True, False, None, [1.0], {"x": 1.0}, math.nan, math.inf, -math.inf]
+NOT_NUMBERS = [
+    "1,0",
+    "1_0",
+    "1:30",
+    "",
+    True,
+    False,
+    None,
+    [1.0],
+    {"x": 1.0},
+    math.nan,
+    math.inf,
+    -math.inf,
+]
 MODE = Text(choices=("MERGE", "LQR"))
 SEVEN = Integer(7, 7)
 FEW = Integer(1, 5)
@@ -41,6 +55,14 @@ GOOD = [
     (Number(minimum=-1.0, maximum=1.0), 1, 1.0),
     (SEVEN, 7, 7),
     (SEVEN, 7.0, 7),
+    *[(FINITE, text, 0.001) for text in ("1e-3", "0.001", "+.1E-2", " 10e-4 ")],
+    *[(SEVEN, text, 7) for text in ("7", "0x07", "007", "7.", "0.7e1")],
+    (FIRMWARE_NUMBER, 7, 7),
+    (FIRMWARE_NUMBER, 7.0, 7.0),
+    (FIRMWARE_NUMBER, True, 1),
+    (FIRMWARE_NUMBER, "1e-3", 0.001),
+    (FIRMWARE_NUMBER, "0x07", 7),
+    (FIRMWARE_NUMBER, "1e39", 1e39),
     (FEW, 1, 1),
     (BOOLEAN, True, True),
     (BOOLEAN, False, False),

@@ -99,6 +99,114 @@ boxes:
     ]
 
 
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        ("1e-3", 0.001),
+        ("38E-1", 3.8),
+        ("1e3", 1000.0),
+        (".5", 0.5),
+        ("1.", 1.0),
+        ("+2.5", 2.5),
+        ("0x07", 7),
+        ("007", 7),
+        ("010", 10),
+        ("08", 8),
+        ("-010", -10),
+        ("'1e-3'", "1e-3"),
+        ("1_000", "1_000"),
+        ("1:30", "1:30"),
+        ("0x", "0x"),
+        ("e3", "e3"),
+        ("E7E7E7E701", "E7E7E7E701"),
+    ],
+)
+def test_numbers_are_read_as_everywhere(load, text, number):
+    value = load(f"size: {text}\n")["size"].value
+    assert (value, type(value)) == (number, type(number))
+
+
+def test_infinity_and_nan_are_refused_as_numbers(load):
+    for text in (".inf", "-.inf", ".nan", "nan", "inf"):
+        (found,) = complaints_of(
+            load, f"size: {text}\n", lambda file: file["size"].checked(POSITIVE)
+        )
+        assert found.endswith("; expected a finite number > 0")
+
+
+MERGED = """\
+defaults: &box
+  size: 0.5
+  noise: {deviation: 0.5}
+colours:
+  red: &red {colour: red, solid: false}
+  white: &white {colour: white, size: 9}
+boxes:
+  table: &table
+    <<: *box
+    center: [1, 2, 1]
+  chair:
+    size: 2e-1
+    <<: [*red, *white, *table]
+"""
+
+
+class ColourParameters(Parameters):
+    """Without the keys of the templates."""
+
+    frame: str = parameter(TEXT, "fixed frame", default="world")
+
+
+def test_an_entry_merges_others(load):
+    lab = load(MERGED)
+    table, chair = lab["boxes"]["table"], lab["boxes"]["chair"]
+    assert table.value == {"size": 0.5, "noise": {"deviation": 0.5}, "center": [1, 2, 1]}
+    assert table.read(BoxParameters).noise.deviation == 0.5
+    read = chair.read(BoxParameters)
+    # Its own keys have precedence, then those of the first of the list.
+    assert (read.size, read.colour, read.is_solid) == (0.2, "red", False)
+    assert read.center == (1.0, 2.0, 1.0)
+    # Reading the value has changed nothing.
+    assert chair.value["size"] == 0.2
+    assert [*chair.entries()].count("size") == 1
+
+
+def test_what_is_wrong_in_a_merged_entry_is_named_with_its_own_line(load):
+    assert complaints_of(load, MERGED.replace("size: 0.5", "size: -1"))[0].startswith(":2) is -1")
+
+
+def test_templates_are_no_unknown_keys(load):
+    assert load(MERGED).read(ColourParameters, ("boxes",)).frame == "world"
+    text = MERGED.replace("[*red, *white, *table]", "[*red, *table]")
+    assert complaints_of(load, text, lambda lab: lab.read(ColourParameters, ("boxes",))) == [
+        ":5: colours is not known; expected one of boxes, frame"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("a: &a {b: 1}\nc:\n  <<: 3\n", ":3: is not a mapping; << expects one, or a list"),
+        ("a: &a {b: 1}\nc:\n  <<: [*a, [1]]\n", ":3: is not a mapping; << expects one, or a list"),
+        ("a: &a {b: 1}\nc:\n  <<: *a\n  <<: *a\n", ":3: has << twice in a mapping"),
+        ("a: &a {b: 1, b: 2}\nc: {<<: *a}\n", ":1: c/b occurs twice, first in line 1"),
+        ("c: &c\n  <<: *c\n", ":2: has the alias *c within the node"),
+        ("c: {<<: *no}\n", ":1: is not valid YAML: found undefined alias"),
+    ],
+)
+def test_what_cannot_be_merged_is_named(load, text, complaint):
+    (found,) = complaints_of(load, text, lambda file: file["c"].entries())
+    assert found.startswith(complaint)
+
+
+def test_merged_entries_count_as_values(load):
+    text = "a0: &a0 {x: 1, y: 2}\n" + "".join(
+        f"a{k}: &a{k} {{b{k}: {{<<: *a{k - 1}}}, c{k}: {{<<: *a{k - 1}}}}}\n" for k in range(1, 30)
+    )
+    (found,) = complaints_of(load, text)
+    assert "has too many values" in found
+
+
 def test_keys_that_somebody_else_reads(load):
     table = load("center: [0, 0, 1]\nwheels: 4\n")
     assert table.read(BoxParameters, extra_keys=("wheels",)).center == (0.0, 0.0, 1.0)

@@ -45,6 +45,20 @@ def write(tmp_path):
     return write
 
 
+def test_objects_may_merge_others(write):
+    world = world_file.load(
+        write("""\
+floor: {size: [4, 3]}
+boxes: &box {type: box, size: [2e-1, 0.3, 1], yaw: 5e-1}
+objects:
+  - {<<: *box, name: first, centre: [1, 0, 0.5]}
+  - {<<: *box, name: second, centre: [2, 0, 0.5], yaw: 0}
+""")
+    )
+    assert world["first"].extent == world["second"].extent == (0.2, 0.3, 1.0)
+    assert (world["first"].yaw, world["second"].yaw) == (0.5, 0.0)
+
+
 def test_what_is_in_it(write):
     world = world_file.load(write(GOOD))
     assert world.frame == "world"

@@ -16,6 +16,7 @@ from crazyflie_dashboard.page_data import ParameterInfo
 from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
 from crazyflie_utils import ServiceError
 from crazyflie_utils.parameters.server import config_message
+from crazyflie_utils.parameters.types import FIRMWARE_NUMBER
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.steps import Steps
 from crazyflie_utils.text import number_from_text
@@ -68,9 +69,11 @@ def of_firmware(vehicle: str, tree: Mapping[str, Any]) -> Iterator[ParameterInfo
     for group, parameters in sorted(tree.items()):
         if not isinstance(parameters, dict):
             continue
-        if not all(isinstance(value, (int, float)) for value in parameters.values()):
+        try:
+            numbers = {name: FIRMWARE_NUMBER(value) for name, value in parameters.items()}
+        except ValueError:
             continue
-        for name, value in sorted(parameters.items()):
+        for name, value in sorted(numbers.items()):
             kind = "float" if isinstance(value, float) else "int"
             yield ParameterInfo(vehicle, f"{group}.{name}", kind, value, is_firmware=True)
 
@@ -88,10 +91,12 @@ def parsed(parameter: ParameterInfo, text: str) -> bool | int | float | str:
     try:
         if parameter.kind == "bool":
             value: Any = {"true": True, "1": True, "false": False, "0": False}[word.lower()]
-        elif parameter.kind == "int":
-            value = int(word, 0)
-        elif parameter.kind == "float":
+        elif parameter.kind in ("int", "float"):
             value = number_from_text(word)
+            if parameter.kind == "int":
+                if not value.is_integer():
+                    raise ValueError
+                value = int(value)
         else:
             value = text
     except (KeyError, ValueError):

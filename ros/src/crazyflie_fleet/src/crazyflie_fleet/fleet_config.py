@@ -17,7 +17,6 @@ from crazyflie_model.quadrotor import TYPES
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.types import (
     BOOLEAN,
-    FINITE,
     FRAME,
     POSITION,
     TEXT,
@@ -29,7 +28,6 @@ from crazyflie_utils.parameters.types import (
     matching,
 )
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
-from crazyflie_utils.text import number_from_text
 
 #: Help of settings that are read and only reported in a remark.
 WITHOUT_EFFECT = "crazyswarm2's; has no effect here"
@@ -90,18 +88,6 @@ _START_POSITION = Converted(
     _start_position, f"{POSITION}, z at least 0", POSITION.label, POSITION.unit, "z >= 0"
 )
 
-
-def _firmware_number(value):
-    if isinstance(value, str):
-        value = number_from_text(value)
-    if isinstance(value, bool):
-        return int(value)
-    FINITE(value)
-    return value
-
-
-#: The value of a firmware parameter; 1e-3, which is a text in YAML, is a number here.
-FIRMWARE_NUMBER = Converted(_firmware_number, "a finite number", "float")
 
 #: Dynamics in simulation; on hardware they are the default type of vehicle.
 DYNAMICS = ("near_hover", "coupled_7d", "quadrotor")

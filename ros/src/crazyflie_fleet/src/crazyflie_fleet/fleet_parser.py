@@ -11,7 +11,6 @@ import numpy as np
 from crazyflie_fleet.fleet_config import (
     DEFAULT_TOPICS,
     DYNAMICS,
-    FIRMWARE_NUMBER,
     LOCAL,
     VEHICLE_NAME,
     WITHOUT_EFFECT,
@@ -28,7 +27,7 @@ from crazyflie_fleet.fleet_config import (
 from crazyflie_model.quadrotor import TYPES
 from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters.declaration import Complaints
-from crazyflie_utils.parameters.types import BOOLEAN, ParameterType
+from crazyflie_utils.parameters.types import BOOLEAN, FIRMWARE_NUMBER, ParameterType
 from crazyflie_utils.parameters.vehicle_model import load
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_utils.text import shortened, shown
@@ -168,7 +167,7 @@ class FleetParser:
 
     def _check_keys(self, entries, known):
         for key, entry in entries.items():
-            if key not in known:
+            if key not in known and not entry.is_template:
                 with self._errors:
                     self.remarks.unknown(entry, known)
 

@@ -32,6 +32,8 @@ def integer(where: str, name: str, value: Any, low: int, high: int) -> int:
 def _checked(where: str, name: str, value: Any, kind: ParameterType) -> Any:
     """Return a number of a type, also one in an array of size 1."""
     plain = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
+    if isinstance(plain, str):
+        raise _error(where, name, value, str(kind))
     try:
         return kind(float(plain) if isinstance(plain, numbers.Real) else plain)
     except ValueError:

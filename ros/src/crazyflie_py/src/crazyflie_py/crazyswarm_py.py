@@ -12,6 +12,7 @@ from crazyflie_py import fleet
 from crazyflie_py.buttons import Input
 from crazyflie_py.crazyflie import CrazyflieServer
 from crazyflie_py.swarm import Swarm, TimeHelper
+from crazyflie_utils.text import number_from_text
 
 
 def build_argparser(
@@ -42,14 +43,14 @@ def build_argparser(
 
 
 def _period(text):
-    value = float(text)
+    value = number_from_text(text)
     if not 1e-4 <= value <= 10.0:
         raise argparse.ArgumentTypeError(f"{text}; expected 0.0001 to 10 (s)")
     return value
 
 
 def _speed(text):
-    value = float(text)
+    value = number_from_text(text)
     if not value >= 0.0:
         raise argparse.ArgumentTypeError(f"{text}; expected a number >= 0 (m/s)")
     return value

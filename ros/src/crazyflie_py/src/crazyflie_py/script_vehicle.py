@@ -7,7 +7,6 @@ from concurrent.futures import Future
 from typing import Any
 
 from crazyflie_driver import srv
-from crazyflie_fleet.fleet_config import FIRMWARE_NUMBER
 from crazyflie_fleet.separation import LOOK_AHEAD
 from crazyflie_mission_api import Fleet
 from crazyflie_mission_api.mission_vehicle import (
@@ -27,6 +26,7 @@ from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.simulated_parameters import SimulatedParameters
 from crazyflie_py.swarm import STATUS_FIELDS, Order, ParameterStore, ScriptState
 from crazyflie_utils import NodeHandle, ParameterError
+from crazyflie_utils.parameters.types import FIRMWARE_NUMBER
 
 _ANSWER_LIMIT = 15.0  #: Timeout of the answer to a command (s of the machine's clock).
 _STATE_TIMEOUT = 10.0  #: Timeout of a pose (s of the vehicles' time).

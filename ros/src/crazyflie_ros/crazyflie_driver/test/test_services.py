@@ -237,6 +237,25 @@ def test_parameters_that_cannot_be_written_do_not_stop_the_others(server):
     assert vehicle.packets(2, 2) == [b"\x03\x00\x05"]
 
 
+def test_texts_are_numbers_or_the_firmware_s_values_again(server):
+    """``rosparam set`` sets texts for 1e-3 and 0x1g."""
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri, enable_parameters=True)
+    parameters = server.process.transport.parameters
+    before = dict(parameters)
+    parameters["/cf1/pid_rate/roll_kp"] = "1e-3"
+    bad = {"/cf1/ring/effect": "0x1g", "/cf1/motor/trim": 1000, "/cf1/cpu/id0": "1"}
+    parameters.update(bad)
+    names = [name.removeprefix("/cf1/") for name in parameters if parameters[name] != before[name]]
+    with pytest.raises(
+        ServiceError, match="parameter /cf1/ring/effect is '0x1g'; expected a finite"
+    ):
+        server.call("/cf1/update_params", UpdateParamsRequest(names))
+    assert vehicle.packets(2, 2) == [b"\x01\x00" + struct.pack("<f", 1e-3)]
+    assert parameters["/cf1/pid_rate/roll_kp"] == pytest.approx(1e-3)
+    assert {name: parameters[name] for name in bad} == {name: before[name] for name in bad}
+
+
 def test_without_parameters_there_are_none(flying):
     server, vehicle = flying
     assert server.process.transport.parameters == {}

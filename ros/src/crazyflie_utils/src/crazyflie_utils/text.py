@@ -40,16 +40,19 @@ def shortened(text: str, length: int = _NAME_LENGTH) -> str:
     return f"{text[: length - 3 - end]}...{text[len(text) - end :]}"
 
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+DECIMAL = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"  #: Pattern: 7, 010, .5, 1e-3.
+HEXADECIMAL = r"[+-]?0[xX][0-9a-fA-F]{1,16}"  #: Pattern: 0x07.
 
 
 def number_from_text(text: str) -> float:
-    """Return the number in a text by the common rules: 1e-3, but not 1_000.
+    """Return the number in a text by the common rules: 1e-3, 010 is 10, 0x10 is 16; not 1_000.
 
     ``nan`` and ``inf`` are numbers that the caller may refuse. ValueError if the text is not a
     number.
     """
     word = text.strip()
-    if _NUMBER.fullmatch(word) or word.lower().lstrip("+-") in ("nan", "inf", "infinity"):
+    if re.fullmatch(DECIMAL, word) or word.lower().lstrip("+-") in ("nan", "inf", "infinity"):
         return float(word)
+    if re.fullmatch(HEXADECIMAL, word):
+        return float.fromhex(word)
     raise ValueError(f"{shown(text)} is not a number")

@@ -74,7 +74,7 @@ def _piece(cells, where):
     for cell in cells:
         if not _is_number(cell):
             raise TrajectoryError(f"{where}: {shown(cell)} is not a finite number")
-    duration, *coefficients = map(float, cells)
+    duration, *coefficients = map(number_from_text, cells)
     if duration <= 0.0:
         raise TrajectoryError(f"{where}: the duration is {duration:g}; expected more than 0 s")
     return PolynomialPiece(duration, *np.reshape(coefficients, (4, COEFFICIENTS)).tolist())

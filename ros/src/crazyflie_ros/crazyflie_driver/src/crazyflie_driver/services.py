@@ -1,5 +1,6 @@
 """Services of one vehicle, their names, and the firmware parameters that they write."""
 
+import contextlib
 import math
 import time
 from collections.abc import Callable
@@ -20,7 +21,7 @@ from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
-from crazyflie_utils.parameters.types import Converted
+from crazyflie_utils.parameters.types import FIRMWARE_NUMBER, Converted
 
 #: Period and limit of the wait for a controller that has parameters, s.
 CONTROLLER_PERIOD, CONTROLLER_LIMIT = 0.1, 3.0
@@ -49,7 +50,6 @@ def _instance_of(types: type | tuple[type, ...], words: str) -> Converted:
     return Converted(convert, words)
 
 
-_FIRMWARE_VALUE = _instance_of((bool, int, float), "a number")
 _NAMESPACE = _instance_of(dict, "a namespace")
 
 
@@ -99,9 +99,14 @@ class ParameterMirror:
         for name in names:
             try:
                 known = parsed_name(name)
+            except ParameterError as error:
+                problems.append(str(error))
+                continue
+            try:
                 self.set(known, self._on_master(known))
             except (CrazyflieError, ParameterError) as error:
                 problems.append(str(error))
+                self._restore(known)
             except TimeoutError as error:
                 problems.append(str(error))
                 break
@@ -114,9 +119,16 @@ class ParameterMirror:
         self._written[name] = value
         self._set_on_master({self._full_name(name): _portable(confirmed)})
 
+    def _restore(self, name):
+        """Set a ROS parameter to the value that the firmware has, if that is known."""
+        with contextlib.suppress(CrazyflieError):
+            values = self._crazyflie.parameters.values()
+            if name in values:
+                self._set_on_master({self._full_name(name): _portable(values[name])})
+
     def _on_master(self, name):
         # A frozen master never answers; the thread that asks it is left behind.
-        asked = Job(lambda _: self._handle.get_param(self._full_name(name), _FIRMWARE_VALUE))
+        asked = Job(lambda _: self._handle.get_param(self._full_name(name), FIRMWARE_NUMBER))
         try:
             return asked.start("ask-master").result(MASTER_LIMIT)
         except TimeoutError:

@@ -33,7 +33,7 @@ def argument(parse: Callable[[str], Any], expected: str = "") -> Callable[[str],
 
 
 #: Type of a time, s.
-SECONDS = argument(lambda text: POSITIVE(float(text)), "a number of seconds above 0")
+SECONDS = argument(POSITIVE, "a number of seconds above 0")
 
 
 def make_parser(

@@ -13,7 +13,7 @@ import crazyflie_link
 from crazyflie_link.address import DEFAULT_ADDRESS, radio_address
 from crazyflie_link.errors import NoAnswerError
 from crazyflie_tools.program import FINE, LIMIT, SECONDS, argument, make_parser, run
-from crazyflie_utils.parameters.types import FINITE
+from crazyflie_utils.parameters.types import FIRMWARE_NUMBER
 
 _CHECK_PERIOD = 0.1
 
@@ -90,7 +90,7 @@ def set_param(arguments: list[str] | None = None) -> int:
     parser.add_argument("name", type=_name, metavar="GROUP.NAME", help="such as ring.effect")
     parser.add_argument(
         "value",
-        type=argument(_number, "a finite number"),
+        type=argument(FIRMWARE_NUMBER, "a finite number"),
         metavar="VALUE",
         help="a number; one like -1e-3 only after --",
     )
@@ -161,13 +161,6 @@ def _talk(parser, arguments, work):
 def _name(text):
     # GROUP/NAME is what the driver's update_params and ROS call it.
     return text.strip("/").replace("/", ".")
-
-
-def _number(text):
-    try:
-        return int(text, 0)
-    except ValueError:
-        return FINITE(float(text))
 
 
 def _short(c_type):

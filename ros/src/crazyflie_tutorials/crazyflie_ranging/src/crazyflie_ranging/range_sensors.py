@@ -89,7 +89,7 @@ def load(path: str | Path) -> tuple[RangeSensor, ...]:
     complaints = Complaints()
     lines: dict[str, dict[str, int]] = {"name": {}, "frame_id": {}}
     for key, entry in file.entries().items():
-        if key != "sensors":
+        if key != "sensors" and not entry.is_template:
             complaints += entry.error("is not known; expected sensors").complaints
     for entry in file["sensors"].elements():
         with complaints:

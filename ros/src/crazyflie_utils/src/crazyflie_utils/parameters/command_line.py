@@ -1,12 +1,10 @@
 """Command lines of declared parameters."""
 
 import argparse
-import contextlib
 from typing import TypeVar
 
 from crazyflie_utils.parameters.declaration import REQUIRED, ParameterError, Parameters
-from crazyflie_utils.parameters.types import BOOLEAN, Integer, Number
-from crazyflie_utils.text import number_from_text
+from crazyflie_utils.parameters.types import BOOLEAN
 
 P = TypeVar("P", bound=Parameters)
 
@@ -40,15 +38,8 @@ def parse_arguments(parameters: type[P], arguments: list[str], program: str, des
 
 def _raw(parameter_type, text):
     """Return the raw value of a word on a command line."""
-    with contextlib.suppress(ValueError):
-        if isinstance(parameter_type, Number):
-            return number_from_text(text)
-        # Only Python allows underscores in numbers.
-        if isinstance(parameter_type, Integer) and "_" not in text:
-            return int(text, 0)
     if parameter_type is BOOLEAN:
         return {"true": True, "false": False}.get(text.lower(), text)
-    # The type refuses a text that is no number, too, and names the expected value.
     return text
 
 

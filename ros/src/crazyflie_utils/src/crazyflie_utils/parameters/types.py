@@ -1,5 +1,6 @@
 """Types of parameters: the allowed values, and their description (``str(type)``)."""
 
+import contextlib
 import math
 import re
 import sys
@@ -9,7 +10,7 @@ from typing import Any
 
 from typing_extensions import override
 
-from crazyflie_utils.text import shown
+from crazyflie_utils.text import number_from_text, shown
 
 
 class ParameterType:
@@ -40,7 +41,10 @@ def checked(expected: ParameterType, raw: Any) -> Any:
 
 @dataclass(frozen=True)
 class Number(ParameterType):
-    """A finite float: greater than ``above``, not outside ``minimum`` and ``maximum``."""
+    """A finite float: greater than ``above``, not outside ``minimum`` and ``maximum``.
+
+    Texts are read by `number_from_text`: 1e-3 is a text in YAML 1.1, and so for rosparam.
+    """
 
     unit: str = ""
     above: float = -math.inf
@@ -60,6 +64,9 @@ class Number(ParameterType):
 
     @override
     def __call__(self, value: Any) -> float:
+        if isinstance(value, str):
+            with contextlib.suppress(ValueError):
+                value = number_from_text(value)
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not (is_number and abs(value) <= sys.float_info.max):
             raise ValueError
@@ -198,7 +205,19 @@ def _boolean(value):
     return value
 
 
+def _firmware_number(value):
+    if isinstance(value, bool):
+        return int(value)
+    number = FINITE(value)
+    if not isinstance(value, str):
+        return value
+    is_integer = number.is_integer() and abs(number) < 2.0**53
+    return int(number) if is_integer else number
+
+
 FINITE = Number()
+#: The value of a firmware parameter, an int or a float; true is 1.
+FIRMWARE_NUMBER = Converted(_firmware_number, str(FINITE), "float")
 POSITIVE = Number(above=0.0)
 SHARE = Number(minimum=0.0, maximum=1.0)
 PORT = Integer(1, 65535)

@@ -1,12 +1,13 @@
 """Settings in a YAML file: declared parameters, and errors with file and line.
 
 For lists of many similar entries, such as the vehicles of a fleet, which do not fit the
-parameter server::
+parameter server. An entry may merge others (``<<: *other``)::
 
     for name, entry in yaml_file.load("lab.yaml")["boxes"].entries().items():
         boxes[name] = entry.read(BoxParameters)
 """
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing_extensions import override
 
 from crazyflie_utils.parameters.declaration import Complaints, ParameterError, Parameters
 from crazyflie_utils.parameters.types import ParameterType, checked
-from crazyflie_utils.text import shortened, shown
+from crazyflie_utils.text import DECIMAL, HEXADECIMAL, number_from_text, shortened, shown
 from crazyflie_utils.text_file import TextFileError, read_text
 
 MAX_SIZE = 1_000_000  #: Largest file (bytes): three times that of a thousand vehicles.
@@ -58,6 +59,67 @@ class _Loader(yaml.SafeLoader):
 
     def _error(self, event, reason):
         return _error(self.name, event.start_mark.line + 1, reason)
+
+    @override
+    def compose_mapping_node(self, anchor: str) -> yaml.MappingNode:
+        node = super().compose_mapping_node(anchor)
+        merges = [value for key, value in node.value if key.tag == _MERGE]
+        own = [pair for pair in node.value if pair[0].tag != _MERGE]
+        if len(merges) > 1:
+            raise self._error(node, "has << twice in a mapping; expected it once, with a list")
+        for merge in merges:
+            sources = merge.value if isinstance(merge, yaml.SequenceNode) else [merge]
+            node.value = [*self._merged(sources, own), *own]
+        return node
+
+    def _merged(self, sources, own):
+        """Return the pairs of mappings whose keys are not in ``own``, nor in an earlier mapping."""
+        taken = {_key(pair) for pair in own}
+        pairs = []
+        for source in sources:
+            if not isinstance(source, yaml.MappingNode):
+                raise self._error(source, "is not a mapping; << expects one, or a list of them")
+            source.is_merged = True
+            pairs += [pair for pair in source.value if _key(pair) not in taken]
+            taken.update(map(_key, source.value))
+        return pairs
+
+
+def _key(pair):
+    # Keys that are no texts or numbers are refused later.
+    return pair[0].value if isinstance(pair[0], yaml.ScalarNode) else id(pair[0])
+
+
+_MERGE = "tag:yaml.org,2002:merge"
+_INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
+
+# Numbers are those of `number_from_text`. YAML 1.1 reads 1e-3 as a text, 010 as 8 and 1:30 as 90.
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in (_INT, _FLOAT)]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+for _tag, _pattern, _first in (
+    (_INT, f"[+-]?[0-9]+|{HEXADECIMAL}", "+-0123456789"),
+    (_FLOAT, DECIMAL, "+-.0123456789"),
+    (_FLOAT, r"[+-]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)", "+-."),
+):
+    _Loader.add_implicit_resolver(_tag, re.compile(f"(?:{_pattern})$"), list(_first))
+
+
+class _Constructor(yaml.constructor.SafeConstructor):
+    @override
+    def construct_yaml_int(self, node: yaml.Node) -> int:
+        word = self.construct_scalar(node)
+        return int(word, 16 if re.fullmatch(HEXADECIMAL, word) else 10)
+
+    @override
+    def construct_yaml_float(self, node: yaml.Node) -> float:
+        # YAML's infinity is .inf, and its NaN is .nan.
+        return number_from_text(re.sub(r"\.(?=[a-zA-Z])", "", self.construct_scalar(node)))
+
+
+_Constructor.add_constructor(_INT, _Constructor.construct_yaml_int)
+_Constructor.add_constructor(_FLOAT, _Constructor.construct_yaml_float)
 
 
 P = TypeVar("P", bound=Parameters)
@@ -102,6 +164,12 @@ def _error(name, line, reason):
     return ParameterError(f"{where}: {reason}")
 
 
+def _is_template(node):
+    if not isinstance(node, yaml.MappingNode) or not node.value:
+        return False
+    return getattr(node, "is_merged", False) or all(_is_template(each) for _, each in node.value)
+
+
 def _refuse(entry, known):
     raise entry.error(f"is not known; expected one of {', '.join(sorted(known))}")
 
@@ -125,15 +193,20 @@ class Entry:
 
     @property
     def value(self) -> Any:
-        """The value by YAML's rules, which refuse some texts, such as a date in a 13th month."""
-        loader = yaml.SafeLoader("")
+        """The value by YAML's rules, which refuse some texts, such as a date in a 13th month.
+
+        Numbers are those of `number_from_text`.
+        """
         try:
-            return loader.construct_document(self.node)
+            return _Constructor().construct_document(self.node)
         except (yaml.YAMLError, ValueError, TypeError, LookupError, AttributeError) as error:
             # PyYAML raises LookupError or AttributeError for a text that does not fit its tag.
             raise self.error(f"cannot be read: {shortened(str(error))}") from None
-        finally:
-            loader.dispose()
+
+    @property
+    def is_template(self) -> bool:
+        """Whether it is there for others, which merge it by ``<<``, or only contains such ones."""
+        return _is_template(self.node)
 
     def error(self, text: str) -> ParameterError:
         """Return an error about the entry: file, line and name, then the text."""
@@ -186,8 +259,8 @@ class Entry:
     ) -> P:
         """Return the parameters in a mapping; those of a group are in a mapping of their own.
 
-        Keys in ``extra_keys`` are also accepted; they are read elsewhere. The error lists
-        everything that is missing, unknown or invalid. ``on_unknown(entry, known)`` is called
+        Keys in ``extra_keys``, which are read elsewhere, and templates are also accepted. The error
+        lists everything that is missing, unknown or invalid. ``on_unknown(entry, known)`` is called
         with each entry that is unknown, and raises the error unless it is accepted.
         """
         names = {declaration.name for declaration in parameters.declarations()}
@@ -196,7 +269,7 @@ class Entry:
         for path, entry in self._leaves(names):
             if path in names:
                 known[path] = entry
-            elif path not in extra_keys:
+            elif path not in extra_keys and not entry.is_template:
                 with complaints:
                     on_unknown(entry, names | set(extra_keys))
 

@@ -2,6 +2,7 @@
 
 import pytest
 from flight_words import states, thrusts, until_on_ground
+from std_msgs.msg import String
 from takeoff_helpers import SERVER, HoverNetwork, state
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped
@@ -169,6 +170,19 @@ def test_a_server_that_is_to_leave_lands_first(network):
     assert network.vehicle.touchdown_speed < 0.6
     assert flights(network)[-1].endswith(" on ground")
     assert network.last("/in_flight_status") == "on ground: the launch is to end"
+
+
+def test_the_end_of_a_node_that_the_flight_needs_is_a_landing(network):
+    begin = network.time
+    network.process("server").publish("/flights", String("/driver is to end: land"))
+    until_on_ground(network)
+    assert network.time - begin < 10.0
+    assert network.vehicle.z == 0.0
+    assert network.vehicle.touchdown_speed < 0.6
+    assert network.last("/in_flight_status") == "on ground: /driver is to end"
+    # The server goes on.
+    network.advance(1.0)
+    network.take_off()
 
 
 def test_from_far_above_a_server_that_is_to_leave_lands_faster():

@@ -204,6 +204,29 @@ def kill_the_driver(flight):
     }
 
 
+def remove_the_vehicle(flight):
+    """Try to remove the vehicle in flight; return the answer and the heights afterwards."""
+    begin = flight.observer.now
+    answer = "ok"
+    try:
+        rospy.ServiceProxy("/remove_crazyflie", RemoveCrazyflie)(flight.vehicle.uri)
+    except rospy.ServiceException as error:
+        answer = str(error)
+    flight.observer.hover(1.0)
+    return {"answer": answer, "heights": flight.observer.range_since(begin)}
+
+
+def end_node(flight, name):
+    """End a node in flight, as with rosnode kill."""
+    begin = flight.observer.now
+    with running("rosnode", "kill", name, stdout=subprocess.DEVNULL):
+        wait_until(lambda: flight.observer.height < 0.03, "the ground", LIMIT)
+    return {
+        "fastest descent": flight.observer.fastest_descent_since(begin),
+        "status": next_message("/in_flight_status", String),
+    }
+
+
 def press_ctrl_c(flight, roslaunch):
     """Press Ctrl-C in flight."""
     begin = flight.observer.now
@@ -266,6 +289,12 @@ def fly(core_command, arguments, folder):
                 add_the_vehicle_again(flight)
                 flight.lift_off()
                 seen["driver killed"] = kill_the_driver(flight)
+        for node in ("crazyflie_server", "mocap_node"):
+            with running(*launch, stdout=output, stderr=output):
+                flight.wait_for_vehicle()
+                flight.lift_off()
+                seen["removed"] = remove_the_vehicle(flight)
+                seen[f"{node} asked to end"] = end_node(flight, f"/{node}")
     return seen
 
 

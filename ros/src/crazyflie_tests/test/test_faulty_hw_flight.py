@@ -94,6 +94,17 @@ def test_without_a_driver_the_vehicle_comes_down_and_is_locked(seen):
     assert seen["driver killed"]["locked"]
 
 
+def test_a_vehicle_in_flight_is_not_removed(seen):
+    assert "land first" in seen["removed"]["answer"]
+    assert min(seen["removed"]["heights"]) > 0.4
+
+
+@pytest.mark.parametrize("node", ["crazyflie_server", "mocap_node"])
+def test_the_end_of_driver_or_motion_capture_is_a_landing(seen, node):
+    assert seen[f"{node} asked to end"]["fastest descent"] < 0.7
+    assert f"/{node} is to end" in seen[f"{node} asked to end"]["status"]
+
+
 def test_lands_at_ctrl_c(seen):
     assert seen["Ctrl-C"]["status of roslaunch"] == 0
     assert seen["Ctrl-C"]["height"] < 0.03

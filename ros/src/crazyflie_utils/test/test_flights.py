@@ -93,6 +93,41 @@ def test_a_handle_that_is_closed_has_no_flights(process):
     assert told(process)[-1] == f"{PILOT} on ground"
 
 
+@pytest.mark.parametrize(
+    ("asking", "asked"),
+    [
+        ("/driver", ["/cf/pilot", "/cf2/pilot"]),
+        ("/cf/sensors/instrument", ["/cf/pilot"]),
+        ("/cf3/sensors/instrument", []),
+    ],
+)
+def test_who_flies_is_asked_to_land_for_a_node_that_is_to_end(process, asking, asked):
+    landed = []
+    for pilot in ("/cf/pilot", "/cf2/pilot", "/cf/other"):
+        handle = process.handle(pilot)
+        handle.inhibit_shutdown(lambda name, pilot=pilot: landed.append((pilot, name)))(
+            pilot.endswith("pilot")
+        )
+    other = FakeProcess()
+    other.handle("/other").inhibit_shutdown()(True)
+    other.handle(asking).advertise_landing_request()()
+    process.publish("/flights", other.published("/flights")[-1])
+    assert landed == [(pilot, asking) for pilot in asked]
+    # What it says later of its own flights asks no more.
+    other.prepare_shutdown({})
+    process.publish("/flights", other.published("/flights")[-1])
+    assert len(landed) == len(asked)
+
+
+def test_who_asks_for_a_landing_has_no_flight_of_its_own(process, flights):
+    other = FakeProcess()
+    other.handle("/cf/driver").inhibit_shutdown()(True)
+    process.publish("/flights", other.published("/flights")[-1])
+    other.handle("/cf/driver").advertise_landing_request()()
+    process.publish("/flights", other.published("/flights")[-1])
+    assert flights.in_flight == ["/cf/driver"]
+
+
 class Pilot(Node):
     needed_in_flight = True
 

@@ -13,6 +13,7 @@ from geometry_msgs.msg import (
     Twist,
     Vector3,
 )
+from std_msgs.msg import String
 from std_srvs.srv import EmptyRequest
 from tf2_msgs.msg import TFMessage
 
@@ -95,6 +96,19 @@ def test_lands_before_its_process_ends():
     assert process.logged("info")[-1] == "/crazyflie/controller: idle"
     assert last(process) == (0.0, 0.0, 0.0, 0.0)
     assert process.published("/flights")[-1].data == "/crazyflie/controller on ground"
+
+
+def test_lands_before_a_node_that_it_needs_ends():
+    process = launch()
+    show(process)
+    call(process, "takeoff")
+    show(process)
+    show(process, z=0.1)
+    process.publish("/flights", String("/crazyflie_server is to end: land"))
+    for _ in range(60):
+        show(process)
+    assert process.logged("info")[-1] == "/crazyflie/controller: idle"
+    assert last(process) == (0.0, 0.0, 0.0, 0.0)
 
 
 def test_does_not_take_off_when_its_process_is_to_end():

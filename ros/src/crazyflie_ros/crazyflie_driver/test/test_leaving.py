@@ -3,6 +3,7 @@
 import struct
 
 import pytest
+from geometry_msgs.msg import Pose, PoseStamped, Quaternion
 from safety_helpers import (
     FLYING,
     HIGH_LEVEL,
@@ -17,12 +18,14 @@ from safety_helpers import (
     thrust,
     wait_for_words,
 )
+from std_msgs.msg import String
 
 from crazyflie_driver.srv import NotifySetpointsStopRequest
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.peer import wait_until
 
 LIMIT = 60.0
+POSE = Pose(orientation=Quaternion(w=1.0))
 
 
 def test_a_vehicle_on_the_ground_is_left_unlocked(server, vehicle):
@@ -80,14 +83,67 @@ def test_ctrl_c_while_the_link_is_silent_is_a_landing_all_the_same(server, vehic
     wait_until(has_told, "the end of the flight")
 
 
-def test_a_flight_on_thrust_cannot_be_landed_by_the_vehicle(server, vehicle):
+@pytest.fixture
+def on_thrust(server, vehicle):
+    """Return a server and a vehicle that flies on thrust."""
     is_(vehicle, FLYING)
     wait_for_words(server, "flying")
     thrust(server)
     vehicle.wait_for_packets(3, 0)
     vehicle.received.clear()
+    return server, vehicle
+
+
+def test_a_flight_on_thrust_cannot_be_landed_by_the_vehicle(on_thrust):
+    server, vehicle = on_thrust
+    # The stream has ended.
+    server.process.advance(0.5)
     server.remove(vehicle.uri)
     assert commands(vehicle) == UNLOCKED
+
+
+@pytest.mark.parametrize("is_fed", [False, True])
+def test_a_vehicle_that_flies_on_thrust_is_not_removed(on_thrust, is_fed):
+    server, vehicle = on_thrust
+    if is_fed:
+        server.process.publish("/cf1/external_pose", PoseStamped(pose=POSE))
+    with pytest.raises(ServiceError, match="flies on the thrust of /cf1/cmd_vel.*land first"):
+        server.remove(vehicle.uri)
+    assert commands(vehicle) == []
+    thrust(server, 0.0)
+    server.remove(vehicle.uri)
+
+
+def test_whoever_flies_a_vehicle_is_asked_to_land_before_the_driver_ends(on_thrust):
+    server, vehicle = on_thrust
+    server.process.advance(0.2)
+    assert server.process.published("/flights")[-1].data == "/crazyflie_server in flight"
+    server.node.prepare_shutdown()
+    last = server.process.published("/flights")[-1].data
+    assert last.splitlines()[-1] == "/crazyflie_server is to end: land"
+    # It waits for the end of the stream.
+    thrust(server, 0.0)
+    server.process.advance(0.2)
+    assert server.process.published("/flights")[-1].data == "/crazyflie_server on ground"
+    assert len(vehicle.wait_for_packets(3, 0)) == 1
+
+
+@pytest.mark.parametrize(("node", "lands"), [("/mocap", True), ("/cf1/a", True), ("/b/a", False)])
+def test_the_end_of_a_node_lands_the_vehicles_that_need_it(server, vehicle, node, lands):
+    server.call("/cf1/takeoff", TAKEOFF)
+    is_(vehicle, FLYING | HIGH_LEVEL)
+    wait_for_words(server, "flying: on high-level commands")
+    server.process.advance(0.2)
+    vehicle.received.clear()
+    server.process.publish("/flights", String(f"{node} is to end: land"))
+    if lands:
+        assert vehicle.wait_for_packets(8, 0)[0][0] == 8
+        assert (
+            "a node that the flight needs is to end: landing" in server.process.logged("error")[-1]
+        )
+    else:
+        vehicle.wait_for_packets(15, 0, 2)
+        assert vehicle.packets(8, 0) == []
 
 
 def test_a_removal_without_a_link_says_what_it_could_not_do(server, vehicle):

@@ -180,7 +180,7 @@ def test_a_vehicle_that_is_removed_leaves_nothing_and_can_come_again(server, veh
     of_all = {name for name in transport.services if name.startswith("/crazyflie_server/all/")}
     assert set(transport.services) - of_all == {"/add_crazyflie", "/remove_crazyflie"}
     heard = {topic for topic, listeners in transport.subscribers.items() if listeners}
-    assert heard == {"/clock", "/all/emergency"}
+    assert heard == {"/clock", "/all/emergency", "/flights"}
     with pytest.raises(ServiceError, match="known: none"):
         server.remove(vehicle.uri)
     server.add(vehicle.uri)

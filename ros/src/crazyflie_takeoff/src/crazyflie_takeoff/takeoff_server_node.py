@@ -115,7 +115,7 @@ class TakeoffServerNode(Node):
         self._status = handle.publisher(parameters.flight_status_topic, FlightStatus, latch=True)
         self._text = handle.publisher(parameters.status_topic, String, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
-        self._inhibit_shutdown = handle.inhibit_shutdown()
+        self._inhibit_shutdown = handle.inhibit_shutdown(self._on_end_of_node)
         handle.advertise_service(parameters.takeoff_service, EmptyService, self._on_takeoff)
         handle.advertise_service(parameters.land_service, EmptyService, self._on_land)
         handle.subscribe(parameters.filter_status_topic, FilterStatus, self._on_filter_status)
@@ -154,7 +154,13 @@ class TakeoffServerNode(Node):
     @override
     def prepare_shutdown(self) -> None:
         """Begin a landing, with a descent of at most `LEAVE_LIMIT`."""
-        self._land("the launch is to end", f"{self._handle.name} is to end")
+        self._land_soon("the launch is to end", f"{self._handle.name} is to end")
+
+    def _on_end_of_node(self, name):
+        self._land_soon(f"{name} is to end")
+
+    def _land_soon(self, reason, failure=""):
+        self._land(reason, failure)
         self._flight.limit_descent(LEAVE_LIMIT)
         self._set_pace()
 

@@ -23,29 +23,42 @@ from crazyflie_utils.topics import Publisher, Topics, Transport
 FLIGHTS_TOPIC = "/flights"  #: Topic of nodes that start and end flights, latched.
 
 _IN_FLIGHT, _TO_END, _ON_GROUND = "in flight", "in flight, to end", "on ground"
+_LAND = "is to end: land"  # Of a node without which other nodes' flights end.
 
 
 class OwnFlights:
     """The flights that nodes of this process start and end, which inhibit the end of processes.
 
     All are in one message, a line each: a process that starts later is sent only the last message.
+    So are requests to land, which a node sends that is to end, and without which flights end.
     """
 
     def __init__(self, topics: Topics):
         self._topics = topics
         self._publisher: Publisher | None = None
         self._states: dict[str, str] = {}
+        self._landings: dict[str, Callable[[str], None]] = {}
 
     @property
     def in_flight(self) -> list[str]:
         """Names of the nodes of this process that are in flight."""
         return [node for node, state in self._states.items() if state != _ON_GROUND]
 
-    def inhibit_shutdown(self, node: str) -> Callable[[bool], None]:
-        """Return ``publish(in_flight)`` for a node, named absolutely."""
-        if self._publisher is None:
-            self._publisher = self._topics.publisher(FLIGHTS_TOPIC, String, latch=True)
+    def inhibit_shutdown(self, node: str, land: Callable[[str], None]) -> Callable[[bool], None]:
+        """Return ``publish(in_flight)`` for a node, named absolutely.
+
+        ``land(name)`` is called when another node, which its flight needs, is to end.
+        """
+        self._advertise()
+        if not self._landings:
+            self._topics.subscribe(FLIGHTS_TOPIC, String, self._on_flights)
+        self._landings[node] = land
         return lambda in_flight: self._publish({node: _IN_FLIGHT if in_flight else _ON_GROUND})
+
+    def advertise_landing_request(self, node: str) -> Callable[[], None]:
+        """Return ``request()``, which asks to end the flights that need a node."""
+        publisher = self._advertise()
+        return lambda: publisher.publish(String("\n".join([*self._lines(), f"{node} {_LAND}"])))
 
     def publish_ending(self) -> None:
         """Publish that the flights, if any, are ending because their process is to end."""
@@ -54,15 +67,29 @@ class OwnFlights:
     def _publish(self, states):
         if self._publisher is not None and not states.items() <= self._states.items():
             self._states |= states
-            lines = (f"{node} {state}" for node, state in self._states.items())
-            self._publisher.publish(String("\n".join(lines)))
+            self._publisher.publish(String("\n".join(self._lines())))
+
+    def _lines(self):
+        return [f"{node} {state}" for node, state in self._states.items()]
+
+    def _advertise(self):
+        if self._publisher is None:
+            self._publisher = self._topics.publisher(FLIGHTS_TOPIC, String, latch=True)
+        return self._publisher
+
+    def _on_flights(self, message):
+        for asking, state in _parsed(message):
+            if state == _LAND:
+                for node, land in list(self._landings.items()):
+                    if node in self.in_flight and are_related(asking, node):
+                        land(asking)
 
 
 class Flights:
     """The flights that concern nodes, by absolute name: in their namespaces, above and below."""
 
     def __init__(self, topics: Topics, nodes: Iterable[str]):
-        self._namespaces = [_namespace(node) for node in nodes]
+        self._nodes = list(nodes)
         self._in_flight: dict[str, bool] = {}
         self._to_end_since: dict[str, float] = {}
         topics.subscribe(FLIGHTS_TOPIC, String, self._note)
@@ -78,17 +105,21 @@ class Flights:
         return [name for name in self.in_flight if self._to_end_since.get(name, since) <= since]
 
     def _note(self, message: String) -> None:
-        for line in message.data.splitlines():
-            name, _, state = line.partition(" ")
-            here = _namespace(name)
-            if any(here.startswith(each) or each.startswith(here) for each in self._namespaces):
+        for name, state in _parsed(message):
+            if state != _LAND and any(are_related(name, node) for node in self._nodes):
                 self._in_flight[name] = state in (_IN_FLIGHT, _TO_END)
                 if state == _TO_END:
                     self._to_end_since[name] = time.monotonic()
 
 
-def _namespace(name):
-    return name.rpartition("/")[0] + "/"
+def _parsed(message):
+    return [line.partition(" ")[::2] for line in message.data.splitlines()]
+
+
+def are_related(one: str, other: str) -> bool:
+    """Return whether the namespace of one absolute name is, or is in, that of the other."""
+    here, there = (name.rpartition("/")[0] + "/" for name in (one, other))
+    return here.startswith(there) or there.startswith(here)
 
 
 _MAX_KEYS = 64

@@ -330,14 +330,25 @@ class NodeHandle:
         """Whether the process ends as soon as its flights have ended: none may begin."""
         return self._process.is_ending
 
-    def inhibit_shutdown(self) -> Callable[[bool], None]:
+    def inhibit_shutdown(
+        self, land: Callable[[str], None] = lambda name: None
+    ) -> Callable[[bool], None]:
         """Return ``publish(in_flight)``, which publishes whether this node has a flight.
 
         Processes with nodes that are needed in flight do not end at SIGINT before it has ended.
+        ``land(name)`` is called in flight when another node that the flight needs is to end.
         """
-        publish = self._process.flights.inhibit_shutdown(self.name)
+        publish = self._process.flights.inhibit_shutdown(self.name, partial(self.submit, land))
         self._undo.append(lambda: publish(False))
         return publish
+
+    def advertise_landing_request(self) -> Callable[[], None]:
+        """Return ``request()``, for `Node.prepare_shutdown` of a node that flights need.
+
+        It asks the nodes that inhibit shutdown to end these flights. Announced beforehand, since
+        ``rosnode kill`` leaves no time for that.
+        """
+        return self._process.flights.advertise_landing_request(self.name)
 
     def on_fault(self, enter_safe_state: Callable[[], None]) -> None:
         """Call ``enter_safe_state()`` after a callback of this node has raised."""

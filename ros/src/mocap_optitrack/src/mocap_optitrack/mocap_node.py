@@ -73,6 +73,7 @@ class MocapNode(Node[MocapParameters]):
         if any(body.child_frame_id for body in bodies):
             self._broadcast = handle.broadcast_transforms()
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
+        self._request_landing = handle.advertise_landing_request()
         handle.timer(_REPORT_PERIOD, self._report, steady=True)
         handle.info(
             f"connecting to {parameters.backend}; axis {parameters.up_axis} of its stream points up"
@@ -101,6 +102,10 @@ class MocapNode(Node[MocapParameters]):
             on_silence=partial(handle.submit, self.on_silence),
             on_failure=partial(handle.submit, self.on_failure),
         )
+
+    @override
+    def prepare_shutdown(self) -> None:
+        self._request_landing()
 
     @override
     def shutdown(self) -> None:

@@ -63,7 +63,7 @@ class ControllerNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("cmd_vel", Twist)
-        self._inhibit_shutdown = handle.inhibit_shutdown()
+        self._inhibit_shutdown = handle.inhibit_shutdown(lambda _: self.prepare_shutdown())
         self._source = PoseSource(handle, self._parameters)
         handle.advertise_service("takeoff", Empty, self._on_takeoff)
         handle.advertise_service("land", Empty, self._on_land)

@@ -52,6 +52,7 @@ class Reason(enum.Enum):
     #: A process waits 10 s for a flight, and the last metre needs part of that.
     POSITIONING = "the vehicle's positioning is lost", 7.0
     SHUTDOWN = "the driver is to end", 7.0
+    NEEDED_NODE = "a node that the flight needs is to end", 7.0
     REMOVAL = "the vehicle is being removed", 7.0
     #: The caller of the command was told that it failed.
     NO_ANSWER = "a command that was refused as not answered is carried out", 7.0

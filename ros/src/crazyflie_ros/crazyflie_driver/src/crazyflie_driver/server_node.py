@@ -21,6 +21,7 @@ from crazyflie_driver.parameters import (
     CrazyflieServerParameters,
     VehicleParameters,
 )
+from crazyflie_driver.setpoint_topics import CMD_VEL
 from crazyflie_driver.srv import AddCrazyflie, RemoveCrazyflie
 from crazyflie_driver.status import diagnostics
 from crazyflie_driver.vehicle import DriverVehicle
@@ -32,6 +33,7 @@ from crazyflie_link.link import Link
 from crazyflie_link.localization import PackedPoses
 from crazyflie_link.supervisor import BROADCAST_STOP
 from crazyflie_utils import Node, NodeHandle, ServiceError
+from crazyflie_utils.context import are_related
 from crazyflie_utils.refusal import refusals_text
 
 _DIAGNOSTICS_PERIOD = 1.0
@@ -140,13 +142,15 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
             handle.advertise_service(f"~all/{name}", service_type, partial(self._on_command, name))
         handle.advertise_service("~all/emergency", std_srvs.Empty, self._on_emergency)
         handle.subscribe(self._parameters.emergency_topic, Empty, self._on_emergency)
-        self._inhibit_shutdown = handle.inhibit_shutdown()
+        self._request_landing = handle.advertise_landing_request()
+        self._inhibit_shutdown = handle.inhibit_shutdown(self._on_end_of_node)
         handle.timer(_DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         handle.timer(_FLIGHTS_PERIOD, self._follow_flights)
 
     @override
     def prepare_shutdown(self) -> None:
         self._is_shutting_down = True
+        self._request_landing()
         self._follow_flights()
 
     def shutdown(self) -> None:
@@ -159,15 +163,23 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
             channel.broadcaster.close()
 
     def _follow_flights(self):
-        # Flights on setpoints are ended by the node that sends these.
         vehicles = self._vehicles.values()
         flying = [each for each in vehicles if each.commands.is_high_level_flight_active]
-        if bool(flying) != self._in_flight:
-            self._in_flight = bool(flying)
-            self._inhibit_shutdown(self._in_flight)
+        # A flight on thrust is ended by the node that streams it.
+        in_flight = bool(flying) or any(each.setpoints.is_flown_on_thrust for each in vehicles)
+        if in_flight != self._in_flight:
+            self._in_flight = in_flight
+            self._inhibit_shutdown(in_flight)
         if self._is_shutting_down:
             for each in flying:
                 each.commands.land(Reason.SHUTDOWN)
+
+    def _on_end_of_node(self, name):
+        for each in self._vehicles.values():
+            if each.commands.is_high_level_flight_active and are_related(
+                name, f"{each.parameters.prefix}/"
+            ):
+                each.commands.land(Reason.NEEDED_NODE)
 
     def _on_add(self, request):
         requested = VehicleParameters.from_request(request)
@@ -208,6 +220,11 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
             raise ServiceError(f"no vehicle {request.uri!r} has been added; known: {known}")
         if vehicle.is_closing():
             raise ServiceError(f"{request.uri} is being removed already")
+        if vehicle.setpoints.is_flown_on_thrust:
+            raise ServiceError(
+                f"{request.uri} flies on the thrust of {vehicle.parameters.prefix}/{CMD_VEL}, and "
+                "would fall: land first, or end that stream"
+            )
         removed = vehicle.remove(self._parameters.landing_limit)
         return self._when_done(removed, self._finish_removing, vehicle)
 

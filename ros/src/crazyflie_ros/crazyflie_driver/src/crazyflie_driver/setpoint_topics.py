@@ -19,7 +19,7 @@ from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
-from crazyflie_model.limits import MAX_SETPOINT_PWM, OFF_AGE
+from crazyflie_model.limits import LEVEL_AGE, MAX_SETPOINT_PWM, OFF_AGE
 from crazyflie_model.supervisor import SupervisorState
 
 CMD_VEL, CMD_STOP = "cmd_vel", "cmd_stop"
@@ -178,6 +178,14 @@ class SetpointTopics:
     def runs_motors(self) -> bool:
         """Whether the latest of them runs the motors."""
         return self.control in (Control.THRUST, Control.REFERENCE)
+
+    @property
+    def is_flown_on_thrust(self) -> bool:
+        """Whether the vehicle may fly, on a stream of thrust, which only its sender can land."""
+        state = self._log.supervisor
+        may_fly = state is None or SupervisorState.FLYING in state
+        is_streamed = self._vehicle.handle.time() - self.last_time < LEVEL_AGE
+        return may_fly and is_streamed and self.control is Control.THRUST
 
     @property
     def last_time(self) -> float:

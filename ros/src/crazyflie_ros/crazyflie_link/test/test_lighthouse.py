@@ -1,6 +1,7 @@
 """Writing and storing the memory of base stations, on a link without a vehicle."""
 
 import struct
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -96,6 +97,24 @@ def test_stations_that_are_not_stored_are_refused(path, answer):
         Lighthouse(lambda: vehicle).write_file(write_lighthouse_file(path, 0), vehicle)
 
 
+def test_a_file_written_by_hand_is_read_as_all_others(path):
+    """With numbers that are texts in YAML 1.1, and with what two sweeps have in common."""
+    path.write_text("""\
+type: lighthouse_system_configuration
+version: '1'
+sweep: &sweep {phase: 1e-3, tilt: -5e-2, curve: 0, gibmag: 0, gibphase: 0, ogeemag: 0, ogeephase: 0}
+geos:
+  0: {origin: [1e-3, 2e0, 2], rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
+calibs:
+  0: {uid: 1000, sweeps: [*sweep, {<<: *sweep, tilt: 0}]}
+""")
+    vehicle = Vehicle()
+    assert Lighthouse(lambda: vehicle).write_file(str(path), vehicle) == 1
+    assert struct.unpack_from("<3f", vehicle.pages[0]) == pytest.approx((0.001, 2.0, 2.0))
+    tilts = struct.unpack_from("<2f20x2f", vehicle.pages[CALIBRATIONS])
+    assert tilts == pytest.approx((0.001, -0.05, 0.001, 0.0))
+
+
 def test_files_that_cannot_be_written_change_nothing(path):
     vehicle = Vehicle(room=16)
     for file, text in (
@@ -104,5 +123,28 @@ def test_files_that_cannot_be_written_change_nothing(path):
     ):
         with pytest.raises(ValueRangeError, match=text):
             Lighthouse(lambda: vehicle).write_file(file, vehicle)
+    assert vehicle.parameters == {"lighthouse.systemType": 1}
+    assert vehicle.pages == {}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("- 1.0", "- much", "required argument is not a float"),
+        ("- 1.0\n    - 2.0\n", "- 1.0\n", "out of range"),
+        ("version: '1'", "version: '2'", "version is '2'; expected 1"),
+        ("type: lighthouse", "type: warehouse", "type is 'warehouse_system_configuration'"),
+        ("origin:", "place:", "origin"),
+        ("geos:", "geos: [", ":21: is not valid YAML"),
+    ],
+)
+def test_a_file_with_something_else_changes_nothing(path, old, new, reason):
+    text = Path(write_lighthouse_file(path, 0)).read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    vehicle = Vehicle(room=16)
+    with pytest.raises(ValueRangeError, match=reason) as caught:
+        Lighthouse(lambda: vehicle).write_file(str(path), vehicle)
+    assert str(path) in str(caught.value)
     assert vehicle.parameters == {"lighthouse.systemType": 1}
     assert vehicle.pages == {}

@@ -31,6 +31,8 @@ from crazyflie_link.link import Link
 from crazyflie_link.parameters import FirmwareParameters
 from crazyflie_link.subsystem import Subsystem, check_finite, find_memory, write_memory
 from crazyflie_link.transmission import Request
+from crazyflie_utils.parameters import yaml_file
+from crazyflie_utils.parameters.declaration import ParameterError
 
 #: Time for which the poses of one frame of the motion capture are collected, s.
 FRAME_WINDOW = 0.005
@@ -198,25 +200,7 @@ class Lighthouse(Subsystem):
         The data of all other stations become invalid. Returns the number of stations in the file.
         Raises `ValueRangeError` about the file, `CrazyflieError` if the vehicle does not take it.
         """
-        try:
-            geometries, calibrations, system_type = LighthouseConfigFileManager.read(path)
-            numbers = {*geometries, *calibrations}
-            unknown = [number for number in numbers if number not in range(STATIONS)]
-        except Exception as error:
-            # cflib raises bare exceptions, and any error of an invalid file.
-            reason = " ".join(str(error).split())
-            raise ValueRangeError(
-                f"lighthouse file {path}: {reason}; expected a lighthouse_system_configuration, as "
-                "cfclient and cflib write it"
-            ) from None
-        if not geometries:
-            raise ValueRangeError(
-                f"lighthouse file {path}: the geometry of no base station; expected at least one"
-            )
-        if unknown:
-            raise ValueRangeError(
-                f"lighthouse file {path}: base station {unknown[0]!r}; expected 0 to {STATIONS - 1}"
-            )
+        geometries, calibrations, system_type = _read_file(path)
         if parameters.values().get(_TYPE) != system_type:
             # cflib's reader forgets all stations.
             parameters.write(_TYPE, system_type)
@@ -227,7 +211,7 @@ class Lighthouse(Subsystem):
             calibrations, LighthouseBsCalibration(), LighthouseMemory.CALIB_START_ADDR
         )
         self._store(geometry_mask, calibration_mask)
-        return len(numbers)
+        return len({*geometries, *calibrations})
 
     def _write_all(self, given: Mapping[int, Any], none: Any, first: int) -> int:
         # Returns the mask of the stations that the vehicle has room for.
@@ -257,3 +241,44 @@ class Lighthouse(Subsystem):
         )
         if len(answer) < 2 or not answer[1]:
             raise RefusedError(f"{what}: the vehicle refuses it")
+
+
+def _read_file(path):
+    """Return geometries and calibrations by number, and the system type; see `write_file`."""
+    layout = LighthouseConfigFileManager
+    try:
+        content = yaml_file.load(path).value
+        for key, expected in ((layout.TYPE_ID, layout.TYPE), (layout.VERSION_ID, layout.VERSION)):
+            if str(content.get(key)) != expected:
+                raise ValueError(f"{key} is {content.get(key)!r}; expected {expected}")
+        geometries, calibrations = (
+            {
+                number: kind.from_file_object(each)
+                for number, each in (content.get(key) or {}).items()
+            }
+            for key, kind in (
+                (layout.GEOS_ID, LighthouseBsGeometry),
+                (layout.CALIBS_ID, LighthouseBsCalibration),
+            )
+        )
+        # Texts, and too few numbers, are found before anything is written.
+        for each in (*geometries.values(), *calibrations.values()):
+            each.add_mem_data(bytearray())
+        unknown = [n for n in (*geometries, *calibrations) if n not in range(STATIONS)]
+    except ParameterError as error:
+        raise ValueRangeError(f"lighthouse file {error}") from None
+    except Exception as error:
+        # cflib raises any error of an invalid file.
+        raise ValueRangeError(
+            f"lighthouse file {path}: {error!r}; expected a lighthouse_system_configuration, as "
+            "cfclient and cflib write it"
+        ) from None
+    if not geometries:
+        raise ValueRangeError(
+            f"lighthouse file {path}: the geometry of no base station; expected at least one"
+        )
+    if unknown:
+        raise ValueRangeError(
+            f"lighthouse file {path}: base station {unknown[0]!r}; expected 0 to {STATIONS - 1}"
+        )
+    return geometries, calibrations, content.get(layout.SYSTEM_TYPE_ID, layout.SYSTEM_TYPE_V2)

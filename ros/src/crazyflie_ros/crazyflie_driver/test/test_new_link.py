@@ -20,7 +20,7 @@ from safety_helpers import (
 )
 
 from crazyflie_driver.services import ParameterMirror, VehicleServices
-from crazyflie_driver.srv import UpdateParamsRequest
+from crazyflie_driver.srv import SetGroupMaskRequest, UpdateParamsRequest
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import LinkLostError
 from crazyflie_model.supervisor import SupervisorState
@@ -177,10 +177,10 @@ def test_a_link_that_is_silent_while_it_is_taken_up_is_taken_up_when_it_is_heard
     vehicle = server.make_vehicle()
     server.add(vehicle.uri)
     crazyflie = server.node._vehicles[vehicle.uri].crazyflie
-    reapply, is_lost = ParameterMirror.reapply_parameters, threading.Event()
+    lost, is_lost = ParameterMirror.lost, threading.Event()
 
     def lose_link(_):
-        monkeypatch.setattr(ParameterMirror, "reapply_parameters", reapply)
+        monkeypatch.setattr(ParameterMirror, "lost", lost)
         vehicle.is_frozen = True
         wait_until(lambda: crazyflie.state is LinkState.LOST, "the silence")
         vehicle.received.clear()
@@ -188,7 +188,7 @@ def test_a_link_that_is_silent_while_it_is_taken_up_is_taken_up_when_it_is_heard
         vehicle.is_frozen = False
         raise LinkLostError("no link to the vehicle")
 
-    monkeypatch.setattr(ParameterMirror, "reapply_parameters", lose_link)
+    monkeypatch.setattr(ParameterMirror, "lost", lose_link)
     vehicle.is_frozen = True
     wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
     vehicle.is_frozen = False
@@ -228,10 +228,48 @@ def test_a_parameter_that_is_refused_later_does_not_keep_the_thrust_locked(serve
     vehicle.is_frozen = True
     crazyflie = server.node._vehicles[vehicle.uri].crazyflie
     wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
-    code, value, _ = vehicle.parameters["ring.effect"]
-    vehicle.parameters["ring.effect"] = (code, value, READ_ONLY)
+    code, _, _ = vehicle.parameters["ring.effect"]
+    vehicle.parameters["ring.effect"] = (code, 6, READ_ONLY)
     vehicle.received.clear()
     vehicle.is_frozen = False
     vehicle.wait_for_packets(3, 0, 100)
     text = "parameter ring.effect can only be read"
     assert any(text in line for line in server.process.logged("warn"))
+
+
+WRITTEN = {
+    "health.startPropTest": ("B", 0, 0),
+    "motorPowerSet.enable": ("B", 0, 0),
+    "ring.effect": ("B", 6, 0),
+}
+
+
+def change_battery(server, vehicle, state):
+    """Take the vehicle's battery out, and find it in a state on the new link."""
+    vehicle.is_frozen = True
+    crazyflie = server.node._vehicles[vehicle.uri].crazyflie
+    wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
+    vehicle.parameters.update(WRITTEN)
+    is_(vehicle, state)
+    vehicle.received.clear()
+    vehicle.is_frozen = False
+    wait_until(lambda: crazyflie.state is LinkState.CONNECTED, "the new link")
+    # A job after those of the new link.
+    server.call("/cf1/set_group_mask", SetGroupMaskRequest(1))
+
+
+@pytest.mark.parametrize(("state", "is_on_ground"), [(READY, True), (FLYING, False)])
+def test_a_changed_battery_runs_no_motors_and_a_flight_gets_nothing(server, state, is_on_ground):
+    vehicle = server.make_vehicle(parameters=dict(WRITTEN))
+    is_(vehicle, READY)
+    server.add(vehicle.uri, enable_parameters=True)
+    names = [name.replace(".", "/") for name in WRITTEN]
+    for name in names:
+        server.process.transport.parameters[f"/cf1/{name}"] = 1
+    server.call("/cf1/update_params", UpdateParamsRequest(names))
+    assert len(vehicle.packets(2, 2)) == 3
+    change_battery(server, vehicle, state)
+    # The third parameter is written, and nothing else.
+    assert vehicle.packets(2, 2) == ([b"\2\0\1"] if is_on_ground else [])
+    text = "not written again, as the vehicle may be flying: ring.effect; call update_params"
+    assert any(text in line for line in server.process.logged("warn")) is not is_on_ground

@@ -8,12 +8,14 @@ import rospy
 from geometry_msgs.msg import PoseStamped
 
 from crazyflie_driver.positioning import OUT_OF_REACH, SYSTEMS, Positioning
-from crazyflie_driver.srv import TakeoffRequest
+from crazyflie_driver.srv import TakeoffRequest, UpdateParamsRequest
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
 TAKEOFF = TakeoffRequest(height=0.5, duration=rospy.Duration(2))
+#: Port, channel and data of the packet by which a radio restarts the firmware.
+RESTART = (15, 3, b"\xfe\xf0\x01")
 GOOD = {
     "flow": (300.0, 1e-3, 1e-3),
     "lighthouse": (3.0, 3.0, 3.0, 1e-6, 1e-6, 1e-6),
@@ -131,6 +133,51 @@ def test_the_estimate_is_on_tf_and_ends_when_no_base_station_is_seen(server):
         before, count = len(transforms(server)), len(poses)
         pass_time(server, lambda: len(poses) > count + 20)
         assert len(transforms(server)) == before
+
+
+def distances(server, begin=0):
+    """Return the distances of the transforms, from a number on, to the true position (2, 1), m."""
+    places = [each.transform.translation for each in transforms(server)[begin:]]
+    return [math.hypot(place.x - 2.0, place.y - 1.0) for place in places]
+
+
+def test_a_flow_vehicle_whose_battery_is_changed_is_at_its_initial_position_again(server):
+    values = {"initialX": 2.0, "initialY": 1.0, "resetEstimation": 1}
+    for name, value in values.items():
+        server.process.transport.parameters[f"/cf1/kalman/{name}"] = value
+    with virtual_vehicle(positioning="flow", init_x=2.0, init_y=1.0) as (virtual, uri):
+        add(server, uri, "flow")
+        update = UpdateParamsRequest([f"kalman/{name}" for name in values])
+        server.call("/cf1/update_params", update)
+        pass_time(server, lambda: distances(server)[-1:] and distances(server)[-1] < 0.1)
+        before, begin = virtual.vehicle.board, len(transforms(server))
+        crazyflie = server.node._vehicles[uri].crazyflie
+        crazyflie.send_packet(*RESTART)
+        wait_until(lambda: virtual.vehicle.board is not before, "the restart")
+        pass_time(server, lambda: crazyflie.connection_count == 2)
+        count = len(transforms(server))
+        pass_time(server, lambda: len(transforms(server)) > count + 20)
+        # Not one of them is where the estimate has begun.
+        assert max(distances(server, begin)) < 0.1
+        assert server.process.published("/cf1/positioning")[-1].data == ""
+
+
+def test_an_estimate_that_has_begun_elsewhere_is_not_used_until_it_is_reset():
+    positioning = Positioning("flow")
+    positioning.update(10.0, GOOD["flow"])
+    assert positioning.is_usable(10.0)
+    positioning.suspend("elsewhere")
+    positioning.update(10.1, GOOD["flow"])
+    assert positioning.problem(10.1) == "elsewhere"
+    assert not positioning.is_usable(10.1)
+    # A flight goes on: what is wrong is not the deck.
+    assert not positioning.is_lost(10.1)
+    positioning.resume(10.3)
+    assert positioning.problem(10.2) == "its estimate has been reset"
+    assert not positioning.is_usable(10.2)
+    positioning.update(10.3, GOOD["flow"])
+    assert positioning.problem(10.3) == ""
+    assert positioning.is_usable(10.3)
 
 
 def pass_time(server, condition):

@@ -24,7 +24,7 @@ from crazyflie_driver.positioning import (
     check_deck,
     estimator_problem,
 )
-from crazyflie_driver.vehicle_base import BaseVehicle
+from crazyflie_driver.vehicle_base import BaseVehicle, ConnectionState
 from crazyflie_link.errors import LinkLostError
 from crazyflie_link.log import PERIOD_STEP_MS, LogBlock, quaternion_from_compressed
 from crazyflie_model.supervisor import SupervisorState
@@ -307,7 +307,8 @@ class LogTopics:
 
     def _start_estimate(self, positioning):
         """Publish the vehicle's pose also as motion capture publishes one, with its own time."""
-        handle, frame = self._vehicle.handle, self._vehicle.parameters.estimate_frame
+        vehicle = self._vehicle
+        handle, frame = vehicle.handle, vehicle.parameters.estimate_frame
         publisher = self._vehicle.publisher(_POSE.name, PoseStamped)
         broadcast = handle.broadcast_transforms()
 
@@ -318,7 +319,9 @@ class LogTopics:
         def publish(stamp, values):
             message = _pose(self._header(stamp, True), values)
             publisher.publish(message)
-            if not positioning.is_lost(handle.time()):
+            # On a new link the estimate may have begun elsewhere, until the vehicle is set up.
+            is_set_up = vehicle.state not in (ConnectionState.LOST, ConnectionState.RESUMING)
+            if is_set_up and positioning.is_usable(handle.time()):
                 place, orientation = message.pose.position, message.pose.orientation
                 transform = Transform(Vector3(place.x, place.y, place.z), orientation)
                 broadcast([TransformStamped(message.header, frame, transform)])

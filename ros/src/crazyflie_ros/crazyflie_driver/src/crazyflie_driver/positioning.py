@@ -198,6 +198,9 @@ class Positioning:
     _problem: str = "the state of its positioning has not come"
     _time: float = -math.inf
     _good: float = -math.inf  # Last time without a problem.
+    # Why the estimate may be that of another place, and when it is that of the right one again.
+    _suspended: str = ""
+    _begin: float = -math.inf
 
     def update(self, now: float, values: Sequence[float]) -> None:
         """Record the values of the system's variables."""
@@ -207,8 +210,24 @@ class Positioning:
         if not self._problem:
             self._good = now
 
+    def suspend(self, reason: str) -> None:
+        """Do not use the estimate until `resume`: the vehicle may believe that it is elsewhere."""
+        self._suspended = reason
+
+    def resume(self, begin: float = -math.inf) -> None:
+        """Use the estimate again, from a time (s) on."""
+        self._begin, self._suspended = begin, ""
+
+    def is_usable(self, now: float) -> bool:
+        """Return whether the estimate may be published as the vehicle's pose."""
+        return not (self._suspended or now < self._begin or self.is_lost(now))
+
     def problem(self, now: float) -> str:
         """Return why a flight must not begin, or must end; empty if it may go on."""
+        if self._suspended:
+            return self._suspended
+        if now < self._begin:
+            return "its estimate has been reset"
         if now - self._time > MAX_AGE and not math.isinf(self._time):
             return f"the state of its positioning has not come for {now - self._time:.1f} s"
         return self._problem

@@ -3,7 +3,7 @@
 import contextlib
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from concurrent.futures import wait
 from dataclasses import dataclass, field
 from functools import partial
@@ -18,6 +18,7 @@ from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.vehicle_base import BaseVehicle, Job
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError, LinkLostError
+from crazyflie_link.parameters import is_trigger
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
@@ -37,8 +38,9 @@ _UPLOADS = {"upload_trajectory", "upload_compressed_trajectory"}  #: They end be
 _SOLID_COLOR = 7  #: The firmware's ring.effect for a given color.
 _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 
-#: Parameters that trigger an action instead of keeping a value: not for a vehicle in the air.
-_COMMANDS = ("kalman.resetEstimation",)
+#: Where the vehicle's estimate begins (m, m, m, rad) after a start of the firmware, and after a reset.
+_START = frozenset(f"kalman.initial{part}" for part in ("X", "Y", "Z", "Yaw"))
+_RESET = "kalman.resetEstimation"
 
 
 def _instance_of(types: type | tuple[type, ...], words: str) -> Converted:
@@ -60,24 +62,50 @@ class ParameterMirror:
     _handle: NodeHandle
     _prefix: str
     _crazyflie: Crazyflie
+    _on_estimate_reset: Callable[[], None] = lambda: None
     _written: dict[str, int | float] = field(default_factory=dict)
 
-    def reapply_parameters(self) -> list[str]:
-        """Write what `write` has written since the start: a vehicle that was off has forgotten it.
+    def lost(self) -> dict[str, int | float]:
+        """Return what was written, and what a vehicle on a new link has not kept: it was off.
 
-        Returns why parameters could not be written; all are tried, unless the link is lost.
+        What triggers an action, such as the self test of the motors, is never part of it.
         """
-        problems = []
-        for name, value in self._written.items():
-            if name in _COMMANDS:
-                continue
-            try:
-                self._crazyflie.parameters.write(name, value)
-            except LinkLostError:
-                raise
-            except CrazyflieError as error:
-                problems.append(str(error))
-        return problems
+        known = self._crazyflie.parameters.known
+        return {
+            name: value
+            for name, value in self._written.items()
+            if not is_trigger(name) and known(name) != value
+        }
+
+    def reapply(self, lost: dict[str, int | float]) -> list[str]:
+        """Write parameters again that are `lost`; the vehicle must be on the ground.
+
+        An estimate that has begun elsewhere is reset, if that was asked for before. Returns why
+        parameters could not be written; all are tried, unless the link is lost.
+        """
+        problems = {}
+        for name, value in lost.items():
+            if problem := self._try(name, value):
+                problems[name] = problem
+        if self.begins_elsewhere(lost) and not self.begins_elsewhere(problems):
+            if problem := self._try(_RESET, 1):
+                problems[_RESET] = problem
+            else:
+                self._on_estimate_reset()
+        return [*problems.values()]
+
+    def begins_elsewhere(self, lost: Collection[str]) -> bool:
+        """Return whether an estimate has begun at another place than was asked for, and a reset."""
+        return _RESET in self._written and not _START.isdisjoint(lost)
+
+    def _try(self, name, value):
+        try:
+            self._crazyflie.parameters.write(name, value)
+        except LinkLostError:
+            raise
+        except CrazyflieError as error:
+            return str(error)
+        return ""
 
     def publish(self) -> None:
         """Set the ROS parameters to the firmware's values; see `MASTER_LIMIT`."""
@@ -116,7 +144,9 @@ class ParameterMirror:
     def set(self, name: str, value: float) -> None:
         """Write a parameter, named GROUP.NAME; the ROS parameter is then what is confirmed."""
         confirmed = self._crazyflie.parameters.write(name, value)
-        self._written[name] = value
+        self._written[name] = confirmed
+        if name == _RESET:
+            self._on_estimate_reset()
         self._set_on_master({self._full_name(name): _portable(confirmed)})
 
     def _restore(self, name):

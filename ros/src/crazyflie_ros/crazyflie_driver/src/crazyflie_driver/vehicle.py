@@ -35,6 +35,12 @@ from crazyflie_utils.parameters.types import Text
 
 _EMERGENCY_LIMIT = 1.0  #: Time limit of the vehicle's confirmation of an emergency stop, s.
 _LOOK_PERIOD = 0.1
+_RESET_TIME = 0.2  #: Time after which no estimate from before its reset comes any more, s.
+_CALL_AGAIN = "call update_params once it is on the ground"
+_ELSEWHERE = (
+    "the vehicle has restarted, and its estimate has not begun at its initial position; call "
+    "update_params with kalman/initialX and so on, and kalman/resetEstimation"
+)
 _REACTION_TIME = 0.3  #: Time after which the vehicle has begun to land, s.
 
 
@@ -70,7 +76,9 @@ class DriverVehicle(BaseVehicle):
         self.flight = FlightState(self, self.log, self.setpoints)
         self.status = StatusPublisher(self, self.log, self.setpoints)
         self.commands = FlightCommands(self, self.log, self.setpoints, self.flight)
-        self._mirror = ParameterMirror(own, parameters.prefix, self.crazyflie)
+        self._mirror = ParameterMirror(
+            own, parameters.prefix, self.crazyflie, self._on_estimate_reset
+        )
         self._services = VehicleServices(
             self, self.flight, self.commands, self._mirror, self.latch_emergency
         )
@@ -148,14 +156,31 @@ class DriverVehicle(BaseVehicle):
         count = self.crazyflie.connection_count
         if self._connection_count == count:
             return
+        lost = self._mirror.lost()
+        if self.log.positioning is not None and self._mirror.begins_elsewhere(lost):
+            self.log.positioning.suspend(_ELSEWHERE)
         if not self.gate.is_emergency:
-            for problem in self._mirror.reapply_parameters():
-                self.warn(f"not written again: {problem}")
+            self._restore_parameters(lost)
             self.setpoints.open_thrust_lock(self.flight.read())
         # If it fails before, it is done when the vehicle is heard again.
         self._connection_count = count
         if self.parameters.enable_parameters:
             self._mirror.publish()
+
+    def _restore_parameters(self, lost):
+        if not lost:
+            return
+        state = self.flight.read()
+        if state is None or SupervisorState.FLYING in state:
+            names = ", ".join(lost)
+            self.warn(f"not written again, as the vehicle may be flying: {names}; {_CALL_AGAIN}")
+            return
+        for problem in self._mirror.reapply(lost):
+            self.warn(f"not written again: {problem}")
+
+    def _on_estimate_reset(self):
+        if self.log.positioning is not None:
+            self.log.positioning.resume(self.handle.time() + _RESET_TIME)
 
     def _resume(self, _: Job) -> None:
         try:

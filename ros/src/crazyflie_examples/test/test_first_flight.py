@@ -1,18 +1,30 @@
 """A first flight on a virtual vehicle: it passes, and each fault stops it at its step by name."""
 
 import math
+import os
+import pty
 import re
-import time
+import signal
+import sys
+from concurrent.futures import Future
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+import rospkg
 from first_flight_rig import FastRig
-from geometry_msgs.msg import TransformStamped
+from genpy import Time
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped
+from std_msgs.msg import Header
+from std_srvs.srv import Empty, EmptyRequest
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_examples.first_flight import STEPS, fly, report
+from crazyflie_driver.msg import GenericLogData
+from crazyflie_examples.first_flight import STEPS, Stop, fly, report
 from crazyflie_examples.first_flight_program import FirstFlightParameters, LiveRig, main
+from crazyflie_utils.testing.launch_files import expand
 
+LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch"
 NAMES = [step.name for step in STEPS]
 
 
@@ -94,20 +106,111 @@ def test_the_report_has_a_verdict_for_each_step_and_the_bag():
     assert page.count("not done") == len(STEPS) - 3
 
 
-def test_a_flight_that_is_interrupted_without_poses_has_them_for_its_landing(monkeypatch):
-    options = FirstFlightParameters(mocap_frame="vehicle")
-    rig = LiveRig("radio://0/80/2M/E7E7E7E7E7", options, Path())
-    seen = []
-    monkeypatch.setattr(rig, "_on_pose", seen.append)
-    pose = TransformStamped(child_frame_id="vehicle")
+class Live:
+    """A `LiveRig` in flight by motion capture, with a clock moved by hand and a terminal."""
 
-    def interrupt(_):
-        rig._on_tf(TFMessage([pose]))
-        raise KeyboardInterrupt
+    def __init__(self, monkeypatch):
+        options = FirstFlightParameters(mocap_frame="vehicle")
+        self.rig = LiveRig("radio://0/80/2M/E7E7E7E7E7", options, Path())
+        self.now, self.published = 100.0, []
+        publisher = SimpleNamespace(publish=self.published.append)
+        self.rig._handle = SimpleNamespace(time=lambda: self.now, call_service=lambda *_: Future())
+        self.rig._tf = self.rig._external = publisher
+        self.rig._landing = lambda: None
+        self._keys, terminal = pty.openpty()
+        monkeypatch.setattr(sys, "stdin", os.fdopen(terminal))
+        self.log()
+        self.pose()
 
-    monkeypatch.setattr(time, "sleep", interrupt)
-    with pytest.raises(KeyboardInterrupt):
-        rig.hide_poses(0.4)
-    assert seen == []
-    rig._on_tf(TFMessage([pose]))
-    assert seen == [pose]
+    def log(self):
+        """Receive a log of the vehicle."""
+        self.rig._on_log(GenericLogData(values=[0.0] * 6))
+
+    def pose(self, stamp=None):
+        """Receive a pose."""
+        header = Header(stamp=Time.from_sec(self.now if stamp is None else stamp))
+        attitude = Transform(rotation=Quaternion(w=1.0))
+        pose = TransformStamped(header, "vehicle", attitude)
+        self.rig._on_tf(TFMessage([pose]))
+
+    def type(self, text):
+        """Type a text."""
+        os.write(self._keys, text)
+
+
+@pytest.fixture
+def live(monkeypatch):
+    return Live(monkeypatch)
+
+
+def test_a_key_ends_a_call(live):
+    live.type(b"x\n")
+    with pytest.raises(Stop, match="ended by the pilot"):
+        live.rig._call("/takeoff", Empty, EmptyRequest())
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_a_flight_and_then_its_landing(live, number):
+    live.rig.note(number)
+    with pytest.raises(Stop, match=f"ended by {number.name}"):
+        live.rig.run(60.0)
+    live.rig.note(number)
+    with pytest.raises(Stop, match=f"ended by {number.name}"):
+        live.rig.land()
+
+
+def test_a_key_ends_no_landing(live):
+    live.type(b"x\n")
+    answer = Future()
+    answer.set_result(None)
+    live.rig._handle.call_service = lambda *_: answer
+    live.rig.land()
+
+
+@pytest.mark.parametrize(("silent", "words"), [("pose", "no pose in"), ("log", "no log of")])
+def test_silence_ends_a_flight_also_while_a_person_is_asked(live, silent, words):
+    live.now += 1.5
+    live.log() if silent == "pose" else live.pose()
+    for act in (lambda: live.rig.run(60.0), lambda: live.rig.ask("go on?")):
+        with pytest.raises(Stop, match=f"{words} .* has come for 1 s in flight"):
+            act()
+
+
+def test_a_person_answers_in_flight(live):
+    live.type(b"\nno\n")
+    assert live.rig.ask("go on?")
+    assert not live.rig.ask("go on?")
+
+
+def test_speeds_are_by_the_stamps_of_the_poses(live):
+    # All arrive at once, one of them twice.
+    for stamp in (100.01, 100.02, 100.02, 100.03):
+        live.pose(stamp)
+    assert [sample.time for sample in live.rig.samples] == pytest.approx(
+        [100.0, 100.01, 100.02, 100.03]
+    )
+
+
+def test_a_flight_that_is_ended_without_poses_has_them_for_its_landing(live):
+    def press(duration):
+        live.pose()
+        live.type(b"x\n")
+
+    live.published.clear()
+    live.rig._check = lambda: press(0.4)
+    with pytest.raises(Stop, match="ended by the pilot"):
+        live.rig.hide_poses(60.0)
+    assert live.published == []
+    live.now += 0.1
+    live.pose()
+    assert len(live.published) == 2
+
+
+def test_the_driver_stays_and_feeds_the_watchdog():
+    nodes, parameters = expand(LAUNCH / "first_flight.launch", uri="udp://127.0.0.1:19999")
+    assert {"/crazyflie_server", "/crazyflie_add"} == {*nodes}
+    assert parameters["/crazyflie_server/emergency_watchdog"] is True
+    # A second driver would be refused the vehicle.
+    stack, _ = expand(LAUNCH / "hw_hover.launch", driver="false", rviz="false")
+    assert not [name for name in stack if name.startswith("/crazyflie")]
+    assert "/takeoff_server" in stack

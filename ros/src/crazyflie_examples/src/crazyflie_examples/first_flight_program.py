@@ -1,13 +1,15 @@
 """The command `first_flight`: the protocol with a vehicle, by the driver and then by the LQR."""
 
-import contextlib
 import math
+import os
 import select
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -49,7 +51,11 @@ from crazyflie_utils.vectors import stamped
 
 PREFIX = "/crazyflie"  #: Namespace of the driver.
 _RELAYED = "first_flight"  #: Frame that the LQR uses: the relayed poses, until they are hidden.
-_LIMIT = 60.0  #: Timeout of starts and of services (s).
+_LIMIT = 60.0  #: Timeout of starts, of services and of ends (s).
+_REACH_LIMIT = 5.0  #: Timeout of reaching a service, whose process may have died (s).
+_POLL = 0.1  #: Longest time until a key, a signal or a fault is noticed (s).
+_MAX_SILENCE = 1.0  #: Time without poses or log in flight after which the flight ends (s).
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _CARRY_TIME = 4.0  #: Duration of a virtual vehicle's carrying (s).
 _DURATION = genpy.Duration(2)  #: Duration of each of the driver's movements.
 _HAND = ("handX", "handY", "handZ", "handYaw")
@@ -71,22 +77,29 @@ class FirstFlightParameters(Parameters):
 class LiveRig:
     """Moves a vehicle by the driver, or by hw_hover.launch, and records it from ROS.
 
-    All methods block.
+    All methods block, and raise `Stop` at a key or a signal. The driver is launched once: a new one
+    would feed the emergency-stop watchdog too late, and the vehicle would be locked.
     """
 
     def __init__(self, uri: str, options: FirstFlightParameters, folder: Path):
         self.samples: list[Sample] = []
         self._uri, self._options, self._folder = uri, options, folder
-        self._launched: subprocess.Popen[bytes] | None = None
+        self._launched: list[subprocess.Popen[bytes]] = []
+        self._signals: list[int] = []
         self._log: tuple[float, ...] = (0.0,) * 6
+        # Stamp of the last pose; arrival of the last log and of the last pose (s).
+        self._stamp = self._log_time = self._pose_time = -math.inf
         self._hides = self._is_connected = False
         self._end_node: Callable[[], None] = lambda: None
+        #: Lands the vehicle; None while it does not fly.
         self._landing: Callable[[], None] | None = None
         is_mocap = options.positioning == MOCAP
         self._frame = options.mocap_frame if is_mocap else f"{PREFIX[1:]}/estimate"
 
     def begin(self) -> None:
-        """Connect to the graph, which roscore or a launch of this command has started."""
+        """Connect to the graph."""
+        if not self._wait(rosgraph.is_master_online, _LIMIT):
+            raise Stop(f"no ROS master at {rosgraph.get_master_uri()} for {_LIMIT:g} s")
         process, self._end_node = begin_script("first_flight")
         self._handle = handle = process.handle("/first_flight")
         self._tf = handle.publisher("/tf", TFMessage)
@@ -98,7 +111,7 @@ class LiveRig:
         process.start()
 
     def _on_log(self, message):
-        self._log = message.values
+        self._log, self._log_time = message.values, self._handle.time()
 
     def _on_connected(self, message):
         self._is_connected = message.data
@@ -112,34 +125,93 @@ class LiveRig:
         place, q = pose.transform.translation, pose.transform.rotation
         yaw = zyx_from_quaternion((q.x, q.y, q.z, q.w))[2]
         m1, m2, m3, m4, gyro, voltage = self._log
-        now, motors = self._handle.time(), (m1, m2, m3, m4)
-        self.samples.append(
-            Sample(now, place.x, place.y, place.z, yaw, math.radians(gyro), voltage, motors)
-        )
+        stamp, motors = pose.header.stamp.to_sec(), (m1, m2, m3, m4)
+        # On a busy computer poses arrive together, and speeds by their arrival would be wrong.
+        if stamp > self._stamp:
+            self._stamp, self._pose_time = stamp, self._handle.time()
+            self.samples.append(
+                Sample(stamp, place.x, place.y, place.z, yaw, math.radians(gyro), voltage, motors)
+            )
         self._tf.publish(TFMessage([TransformStamped(pose.header, _RELAYED, pose.transform)]))
         if self._options.positioning == MOCAP:
             external = PoseStamped(header=pose.header)
             external.pose.position, external.pose.orientation = Point(place.x, place.y, place.z), q
             self._external.publish(external)
 
+    # What ends the protocol.
+
+    def note(self, number: int) -> None:
+        """Note a signal: the next check ends what is going on, which is nowhere interrupted."""
+        self._signals.append(number)
+
+    def _check_signals(self):
+        if self._signals:
+            name = signal.Signals(self._signals[-1]).name
+            self._signals.clear()
+            raise Stop(f"ended by {name}")
+
+    def _check(self):
+        self._check_signals()
+        if any(launched.poll() is not None for launched in self._launched):
+            raise Stop("the launch has ended; see its log above")
+        if self._landing is None:
+            return
+        now = self._handle.time()
+        for what, last in (
+            (f"log of the vehicle on {PREFIX}/first_flight", self._log_time),
+            (f"pose in the frame {self._frame}", self._pose_time),
+        ):
+            if now - last > _MAX_SILENCE:
+                raise Stop(f"no {what} has come for {_MAX_SILENCE:g} s in flight")
+
+    def _wait(self, is_over, limit, ends_at_key=True):
+        """Wait until a condition holds, or for a time (s); return whether the condition holds."""
+        end = time.monotonic() + limit
+        while not is_over():
+            left = end - time.monotonic()
+            if left <= 0.0:
+                return False
+            if not ends_at_key:
+                time.sleep(min(left, _POLL))
+                self._check_signals()
+                continue
+            if sys.stdin.isatty():
+                if _line(min(left, _POLL)) is not None:
+                    raise Stop("ended by the pilot")
+            else:
+                time.sleep(min(left, _POLL))
+            self._check()
+        return True
+
+    def ask(self, text: str) -> bool:
+        """Ask a person, also in flight; return whether the answer is yes."""
+        return self._options.yes or self._confirm(text)
+
+    def _confirm(self, text):
+        print(f"{text}\n  Enter for yes, anything else ends: ", end="", flush=True)
+        while (answer := _line(_POLL)) is None:
+            self._check()
+        return answer == b"\n"
+
     # The rig.
 
     def examine(self) -> VehicleFacts:
         """Return the facts of the doctor, without the self tests, which spin fast."""
-        return examine(self._uri)
+        examined: Future[VehicleFacts] = Future()
+
+        def work():
+            try:
+                examined.set_result(examine(self._uri))
+            except Exception as error:
+                examined.set_exception(error)
+
+        threading.Thread(target=work, daemon=True).start()
+        self._wait(examined.done, math.inf)
+        return examined.result()
 
     def run(self, duration: float) -> None:
-        """Wait for a duration (s); any key ends the protocol."""
-        end = time.monotonic() + duration
-        while (left := end - time.monotonic()) > 0.0:
-            if self._launched is not None and self._launched.poll() is not None:
-                raise Stop("the launch has ended; see its log above")
-            if sys.stdin.isatty():
-                if select.select([sys.stdin], [], [], min(left, 0.1))[0]:
-                    sys.stdin.readline()
-                    raise Stop("ended by the pilot")
-            else:
-                time.sleep(min(left, 0.1))
+        """Wait for a duration (s)."""
+        self._wait(lambda: False, duration)
 
     def spin(self, motor: int, pwm: int) -> None:
         """Turn one motor for a second, by a separate link."""
@@ -165,14 +237,17 @@ class LiveRig:
 
     def carry(self, x: float, y: float, z: float, yaw: float) -> None:
         """Ask a person to carry the vehicle; a virtual one is moved by its parameters."""
-        self._launch("first_flight.launch", f"positioning:={self._options.positioning}")
+        if not self._launched:
+            self._launch("first_flight.launch", f"positioning:={self._options.positioning}")
+            self._await_poses()
         name = f"{PREFIX}/virtual/{_HAND[0]}"
         if self._handle.get_param(name, FINITE, math.inf) == math.inf:
             ways = zip((x, y, z), ("forward", "left", "up"), strict=True)
             goal = [f"{way:g} m {name}" for way, name in ways if way]
             goal += [f"turned {yaw:g} degrees to the left"] if yaw else []
             where = f"Carry it from its place: {' '.join(goal)}" if goal else "Put it in its place"
-            input(f"{where}; press Enter when it is still. ")
+            if not self._confirm(f"{where}; is it there, and still?"):
+                raise Stop("ended by the pilot")
             return
         for name, value in zip(_HAND, (x, y, z, yaw), strict=True):
             self._handle.set_param(f"{PREFIX}/virtual/{name}", float(value))
@@ -196,24 +271,24 @@ class LiveRig:
     def driver_land(self) -> None:
         """Land by the driver."""
         self._landing = None
-        self._call("land", Land, LandRequest(height=0.0, duration=_DURATION))
-        time.sleep(5.0)
+        request = LandRequest(height=0.0, duration=_DURATION)
+        self._call("land", Land, request, ends_at_key=False)
+        self._wait(lambda: False, 5.0, ends_at_key=False)
 
     def take_off(self) -> None:
         """Launch the hover stack and take off."""
-        self.end()
         self._launch(
             "hw_hover.launch",
+            "driver:=false",
             f"positioning:={self._options.positioning}",
             f"pose_frame:={_RELAYED}",
             f"takeoff_hover_z:={HEIGHT}",
             "rviz:=false",
             "record:=true",
             f"record_folder:={self._folder.resolve()}",
-            "genericLogTopics:=[first_flight]",
-            "genericLogTopicFrequencies:=[10]",
-            f"genericLogTopicVariables_file:={_package() / 'config/first_flight.yaml'}",
         )
+        if not self._wait(lambda: "/takeoff" in self._handle.service_nodes(), _LIMIT):
+            raise Stop(f"there is no service /takeoff {_LIMIT:g} s after the launch")
         self._landing = self.land
         self._call("/takeoff", Empty, EmptyRequest())
 
@@ -225,16 +300,16 @@ class LiveRig:
     def land(self) -> None:
         """Land by the takeoff server."""
         self._landing = None
-        self._call("/land", Empty, EmptyRequest())
-        self.run(1.0)
+        self._call("/land", Empty, EmptyRequest(), ends_at_key=False)
+        self._wait(lambda: False, 1.0, ends_at_key=False)
 
     def hide_poses(self, duration: float) -> None:
         """Relay no poses for a duration (s)."""
         self._hides = True
         try:
-            time.sleep(duration)
+            self.run(duration)
         finally:
-            # A flight that is interrupted now also lands by its poses.
+            # A flight that is ended now also lands by its poses.
             self._hides = False
         self.run(0.1)
 
@@ -242,54 +317,79 @@ class LiveRig:
         """Stop the motors for good."""
         self._call("emergency", Empty, EmptyRequest())
 
-    def end(self) -> None:
-        """Land, if the vehicle flies, and end the launched processes."""
-        if self._landing is not None:
-            with contextlib.suppress(Stop):
-                self._landing()
-        if self._launched is not None:
-            self._launched.send_signal(signal.SIGINT)
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self._launched.wait(_LIMIT)
-            self._launched = None
-        self._landing = None
-
     def close(self) -> None:
-        """End the launched processes, and the node."""
-        self.end()
-        self._end_node()
+        """Land, if the vehicle flies, and end the launched processes and the node.
+
+        A signal ends the wait for the landing: the nodes land the vehicle when their launch ends.
+        """
+        self._signals.clear()
+        try:
+            if self._landing is not None:
+                self._landing()
+        except Stop as reason:
+            print(f"first_flight: the landing: {reason}", file=sys.stderr)
+        finally:
+            for launched in reversed(self._launched):
+                _end_launch(launched)
+            self._end_node()
 
     def _launch(self, name, *arguments):
-        if self._launched is not None:
-            return
         command = ["roslaunch", str(_package() / "launch" / name), f"uri:={self._uri}", *arguments]
-        self._launched = subprocess.Popen(
-            command, stdout=sys.stderr, stdin=subprocess.DEVNULL, start_new_session=True
-        )
-        self._is_connected = False
-        before, end = len(self.samples), time.monotonic() + _LIMIT
-        while not (self._is_connected and len(self.samples) > before + 10):
-            self.run(0.1)
-            if time.monotonic() > end:
-                raise Stop(
-                    f"no pose in the frame {self._frame} within {_LIMIT:g} s of the launch; does "
-                    "motion capture see the vehicle, and is it connected?"
-                )
+        self._launched.append(_start(command))
 
-    def _call(self, name: str, service: Any, request: Any) -> None:
+    def _await_poses(self):
+        self._is_connected = False
+        before = len(self.samples)
+        if not self._wait(lambda: self._is_connected and len(self.samples) > before + 10, _LIMIT):
+            raise Stop(
+                f"no pose in the frame {self._frame} within {_LIMIT:g} s of the launch; does "
+                "motion capture see the vehicle, and is it connected?"
+            )
+
+    def _call(self, name: str, service: Any, request: Any, ends_at_key: bool = True) -> None:
         full = name if name.startswith("/") else f"{PREFIX}/{name}"
+        reply = self._handle.call_service(full, service, request, _LIMIT, _REACH_LIMIT)
+        self._wait(reply.done, math.inf, ends_at_key)
         try:
-            self._handle.call_service(full, service, request, _LIMIT).result()
+            reply.result()
         except ServiceError as error:
             raise Stop(f"{full}: {error}") from None
 
 
+def _line(limit: float) -> bytes | None:
+    """Return the next line of the keyboard; None if none comes within a time (s)."""
+    descriptor = sys.stdin.fileno()
+    if not select.select([descriptor], [], [], limit)[0]:
+        return None
+    # Not by `sys.stdin`: select does not see what that has read ahead.
+    line = b""
+    while not line.endswith(b"\n") and (byte := os.read(descriptor, 1)):
+        line += byte
+    return line
+
+
+def _start(command: list[str]) -> subprocess.Popen[bytes]:
+    # In a session of its own: Ctrl-C would end it before the landing.
+    return subprocess.Popen(
+        command, stdout=sys.stderr, stdin=subprocess.DEVNULL, start_new_session=True
+    )
+
+
+def _end_launch(launched: subprocess.Popen[bytes]) -> None:
+    """End a roslaunch, whose nodes land a vehicle that flies before they end."""
+    launched.send_signal(signal.SIGINT)
+    try:
+        launched.wait(_LIMIT)
+    except subprocess.TimeoutExpired:
+        launched.kill()
+        print(
+            f"first_flight: roslaunch has not ended within {_LIMIT:g} s; its nodes may still run",
+            file=sys.stderr,
+        )
+
+
 def _package() -> Path:
     return Path(rospkg.RosPack().get_path("crazyflie_examples"))
-
-
-def _ask(text: str) -> bool:
-    return input(f"{text}\n  Enter for yes, anything else ends: ") == ""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -311,30 +411,31 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     folder = Path(options.out) / datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
     folder.mkdir(parents=True)
-    core = None
-    if not rosgraph.is_master_online():
-        port = urlsplit(rosgraph.get_master_uri()).port
-        core = subprocess.Popen(["roscore", "-p", str(port)], stdout=sys.stderr)
     rig = LiveRig(uri, options, folder)
+    for number in _SIGNALS:
+        signal.signal(number, lambda number, _: rig.note(number))
+    core = None
     verdicts = []
     try:
-        end = time.monotonic() + _LIMIT
-        while not rosgraph.is_master_online() and time.monotonic() < end:
-            time.sleep(0.1)
+        if not rosgraph.is_master_online():
+            port = urlsplit(rosgraph.get_master_uri()).port
+            core = _start(["roscore", "-p", str(port)])
         rig.begin()
-        for verdict in fly(rig, (lambda _: True) if options.yes else _ask):
+        for verdict in fly(rig, rig.ask):
             verdicts.append(verdict)
             print(f"{'passed' if verdict.passed else 'FAILED'}  {verdict.step}: {verdict.text}")
             sys.stdout.flush()
-    except KeyboardInterrupt:
-        print("first_flight: interrupted", file=sys.stderr)
+    except Stop as reason:
+        print(f"first_flight: {reason}", file=sys.stderr)
     finally:
-        rig.close()
-        if core is not None:
-            core.terminate()
-            core.wait()
-    path = folder / "report.html"
-    path.write_text(report(verdicts, f"First flight of {uri}", str(folder)))
-    print(f"the report is in {path}")
+        try:
+            rig.close()
+        finally:
+            if core is not None:
+                core.terminate()
+                core.wait()
+            path = folder / "report.html"
+            path.write_text(report(verdicts, f"First flight of {uri}", str(folder)))
+            print(f"the report is in {path}")
     is_done = bool(verdicts) and verdicts[-1].passed and verdicts[-1].step == "emergency"
     return 0 if is_done else 1

@@ -184,8 +184,10 @@ def test_custom_log_blocks():
 
 @pytest.mark.parametrize("name", ["test_high_level", "execute_trajectory"])
 def test_high_level_flights(name):
-    nodes, _ = expand(f"{name}.launch")
+    nodes, parameters = expand(f"{name}.launch")
     assert types(nodes) == {**ONE, f"/crazyflie/{name}": f"{name}.py"}
+    # A hover by the planner has no end of its own.
+    assert parameters["/crazyflie_server/emergency_watchdog"] is True
 
 
 def tree(parameters, prefix):

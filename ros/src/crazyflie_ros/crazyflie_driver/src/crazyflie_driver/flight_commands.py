@@ -17,6 +17,7 @@ from crazyflie_driver.commands import (
 )
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import STEP, STEP_TIME, Charge, Next, Touchdown, landing_duration
+from crazyflie_driver.positioning import PATIENCE
 from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.setpoint_topics import Control, SetpointTopics
 from crazyflie_driver.vehicle_base import BaseVehicle, Job
@@ -51,6 +52,7 @@ class Reason(enum.Enum):
     BATTERY = "the battery is critical", 5.0
     #: A process waits 10 s for a flight, and the last metre needs part of that.
     POSITIONING = "the vehicle's positioning is lost", 7.0
+    POSES = f"external poses have not come for {PATIENCE:g} s", 7.0
     SHUTDOWN = "the driver is to end", 7.0
     NEEDED_NODE = "a node that the flight needs is to end", 7.0
     REMOVAL = "the vehicle is being removed", 7.0
@@ -97,6 +99,8 @@ class FlightCommands:
     # A landing of the driver's own: its reason, its latest command, and the times at which that was
     # sent and should have been carried out (s).
     _reason: Reason | None = None
+    # When the vehicle was first seen to fly by its estimate, in this flight (s).
+    _active_since: float | None = None
     _landing: Future[None] | None = None
     _begin: float = 0.0
     _end: float = 0.0
@@ -198,10 +202,16 @@ class FlightCommands:
         is_critical = self._log.battery.charge is Charge.CRITICAL
         is_active = self._is_active(state)
         obeys_late = self._obeys_late(state)
+        if not is_active:
+            self._active_since = None
+        elif self._active_since is None:
+            self._active_since = self._vehicle.handle.time()
         if is_active and is_critical:
             self.land(Reason.BATTERY)
         elif is_active and self._is_position_lost():
             self.land(Reason.POSITIONING)
+        elif is_active and self._are_poses_lost():
+            self.land(Reason.POSES)
         elif obeys_late:
             self.land(Reason.NO_ANSWER)
         elif is_active and self._reason is not None:
@@ -429,6 +439,11 @@ class FlightCommands:
     def _is_position_lost(self):
         positioning = self._log.positioning
         return positioning is not None and positioning.is_lost(self._vehicle.handle.time())
+
+    def _are_poses_lost(self):
+        begin = self._active_since
+        now = self._vehicle.handle.time()
+        return begin is not None and self._log.agreement.is_lost(now, begin)
 
     def _is_logged(self):
         # Whether the log shows what was sent.

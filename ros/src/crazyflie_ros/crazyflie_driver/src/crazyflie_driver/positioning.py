@@ -17,8 +17,12 @@ PERIOD_MS = 100  #: Period at which the state of the decks is logged, ms.
 MAX_AGE = 0.5  #: A state of the decks that is older, s, is not known.
 
 #: Duration of a problem after which the flight ends (s): no more poses are published, and the nodes
-#: that fly the vehicle by them react as to the loss of motion capture.
+#: that fly the vehicle by them react as to the loss of motion capture. Also the longest gap between
+#: external poses.
 PATIENCE = 0.5
+#: Duration of a stream of external poses that a flight depends on (s): a pose that is sent once, to
+#: set the estimate, is none.
+MIN_STREAM = 1.0
 
 #: Largest standard deviation of the filter: position by Lighthouse and Loco (m), horizontal
 #: velocity by optical flow (m/s). A converged filter has less than half of the least of them.
@@ -64,11 +68,21 @@ class PoseAgreement:
         self._poses: deque[tuple[float, Sequence[float]]] = deque()
         self._time = -math.inf
         self._text = ""
+        # Begin and latest pose of the present, or last, stream.
+        self._stream_begin = self._latest = -math.inf
 
     def pose(self, now: float, position: Sequence[float]) -> None:
         """Record a position (m) that the vehicle is sent."""
         self._forget_old(now)
         self._poses.append((now, tuple(position)))
+        if now - self._latest > PATIENCE:
+            self._stream_begin = now
+        self._latest = now
+
+    def is_lost(self, now: float, begin: float) -> bool:
+        """Return whether a stream of poses has stopped in a flight that began at ``begin``."""
+        is_stream = self._latest - self._stream_begin >= MIN_STREAM
+        return is_stream and now - self._latest > PATIENCE >= begin - self._latest
 
     def estimate(self, now: float, position: Sequence[float]) -> None:
         """Record an estimated position (m), and compare it with the poses of the last 0.5 s."""

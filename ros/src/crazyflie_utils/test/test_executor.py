@@ -107,13 +107,13 @@ def test_first_come_first_served_from_outside(executor):
     assert running.wait(LIMIT)
     threads = []
     for number in range(5):
-        submitted = len(executor._queue)
+        submitted = len(executor._inputs)
         thread = threading.Thread(
             target=executor.submit, args=(lambda number=number: order.append(number),), daemon=True
         )
         thread.start()
         threads.append(thread)
-        while len(executor._queue) == submitted:
+        while len(executor._inputs) == submitted:
             thread.join(0.001)
     assert order == []
     go_on.set()

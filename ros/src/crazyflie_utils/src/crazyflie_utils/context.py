@@ -203,21 +203,31 @@ class FaultHandler:
 class ProcessContext:
     """One executor, one clock, one set of topics and one tf buffer for all nodes of a process.
 
-    With ``use_sim_time`` the clock is simulated time, which stands still until it is set; a test
-    passes its own ``clock``.
+    With ``use_sim_time`` the clock is simulated time, which stands still until it is set; a process
+    without ROS passes its own ``clock`` and ``executor``. A ``recorder`` writes the journal.
     """
 
     def __init__(
-        self, transport: Transport, use_sim_time: bool, clock: SimulatedClock | None = None
+        self,
+        transport: Transport,
+        use_sim_time: bool,
+        clock: SimulatedClock | SteadyClock | None = None,
+        recorder: Any = None,
+        executor: Executor | None = None,
     ):
-        self.transport = transport
-        self.executor = Executor()
+        self.executor, given = executor or Executor(), transport
         transport.is_in_callback = lambda: self.executor.is_running_here
+        self.recorder = recorder  #: A `Recorder`, whose module is loaded only if there is one.
+        machine_clock = SteadyClock()
+        if recorder is not None:
+            transport = recorder.attach(transport, self.executor)
+            machine_clock = recorder.clock
+        self.transport = transport
         self.topics = Topics(transport)
         self.clock: SimulatedClock | SteadyClock = clock or (
-            SimulatedClock() if use_sim_time else SteadyClock()
+            SimulatedClock() if use_sim_time else machine_clock
         )
-        transport.time = self.clock.time
+        given.time = transport.time = self.clock.time
         tf_log = NodeLog(transport, "/tf")
         self.transforms = Transforms(
             self.topics,
@@ -227,7 +237,7 @@ class ProcessContext:
         )
         # The poses of all vehicles that are simulated in one tick form one message.
         tf = self.transforms.gather, self.transforms.send_gathered
-        self._steady = TimerQueue(self.executor, SteadyClock(), *tf)
+        self._steady = TimerQueue(self.executor, machine_clock, *tf)
         self._simulated = SimulatedTimers(self.executor, self.clock, *tf)
         self._clock_publisher: Publisher | None = None
         self.flights = OwnFlights(self.topics)

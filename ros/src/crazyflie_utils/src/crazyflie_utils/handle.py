@@ -298,13 +298,18 @@ class NodeHandle:
                 latest.deliver()
             guarded()
 
+        tick.__qualname__ = getattr(callback, "__qualname__", tick.__qualname__)
         timer = self._process.timers(steady).add(period, tick, stagger)
         self._undo.append(timer.stop)
         return timer
 
     def submit(self, callback: Callable[..., None], *arguments: Any) -> None:
         """Queue a call ``callback(*arguments)``; from any thread of the node."""
-        self._submit(self.guard(callback), *arguments)
+        process, guarded = self._process, self.guard(callback)
+        if process.recorder is None or process.executor.is_in_turn:
+            self._submit(guarded, *arguments)
+        else:
+            process.recorder.submit(self.name, callback, guarded, arguments)
 
     def broadcast_poses(
         self, refresh: Callable[[], None] | None = None

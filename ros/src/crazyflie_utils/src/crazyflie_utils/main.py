@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 import rosgraph
+import rospkg
 import rospy
 
 from crazyflie_utils.context import Flights
@@ -24,6 +25,7 @@ from crazyflie_utils.program import load, missing_module
 from crazyflie_utils.ros1.master_watch import MasterWatch, namesake
 from crazyflie_utils.ros1.transport import RosTransport
 
+JOURNAL_SWITCH = "CRAZYFLIE_JOURNAL"  #: Environment variable; see `crazyflie_utils.journal.start`.
 _END_LIMIT = 5.0  #: Longest time that the shutdown waits for nodes without a flight (s).
 #: Time that a refused node of roslaunch waits before it ends (s): with respawn, it would otherwise
 #: take the processor from the nodes that fly.
@@ -44,7 +46,7 @@ def run(node_class: type | str, default_name: str) -> None:
         make = _node_class(node_class) if isinstance(node_class, str) else node_class
         return {handle.name: make()}
 
-    run_nodes(default_name, make_node)
+    _begin_and_run(default_name, make_node, node_class)
 
 
 def composed_nodes(handle: NodeHandle) -> dict[str, Node]:
@@ -66,8 +68,20 @@ def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, No
     with status 1. The launch file may give another name than ``default_name`` to the process's own
     node.
     """
+    _begin_and_run(default_name, make_nodes, make_nodes)
+
+
+def _begin_and_run(default_name, make_nodes, program):
     signals = catch_signals()
-    _run(begin(default_name, signals), make_nodes, signals)
+    _run(begin(default_name, signals, _path(program)), make_nodes, signals)
+
+
+def _path(program):
+    """Return a class or function as "package.module:name"; "" if it has no such name."""
+    if isinstance(program, str):
+        return program
+    name = getattr(program, "__qualname__", "<")
+    return "" if "<" in name or program.__module__ == "__main__" else f"{program.__module__}:{name}"
 
 
 def _node_classes(value):
@@ -110,11 +124,12 @@ def _node_class(path):
     return found
 
 
-def begin(default_name: str, signals: list[int] | None = None) -> Process:
+def begin(default_name: str, signals: list[int] | None = None, program: str = "") -> Process:
     """Make this process a ROS node; return the `Process`, not yet started.
 
-    Exits with status 1 without a ROS master, if another node of this name is alive (which the
-    master would shut down), and at ``signals``, see `catch_signals`.
+    With ``program``, "package.module:name" of what makes the nodes, it may have a journal. Exits
+    with status 1 without a ROS master, if another node of this name is alive (which the master
+    would shut down), and at ``signals``, see `catch_signals`.
     """
     # rospy's log is not flushed: the last texts of a node that dies would be lost in a pipe.
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -128,7 +143,7 @@ def begin(default_name: str, signals: list[int] | None = None) -> Process:
         _pause_refused(signals)
         sys.exit(1)
     rospy.init_node(default_name, disable_signals=signals is not None)
-    return ros_process()
+    return ros_process(program)
 
 
 def _pause_refused(signals):
@@ -161,8 +176,8 @@ def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
     return process, end
 
 
-def ros_process() -> Process:
-    """Return the `Process` of a process that is a ROS node already."""
+def ros_process(program: str = "") -> Process:
+    """Return the `Process` of a process that is a ROS node already; see `begin`."""
     value = rospy.get_param("/use_sim_time", False)
     try:
         use_sim_time = BOOLEAN(value)
@@ -173,7 +188,17 @@ def ros_process() -> Process:
     transport = RosTransport(limits_rate=not use_sim_time)
     if use_sim_time:
         transport.follow_clock()
-    return Process(transport, use_sim_time)
+    return Process(transport, use_sim_time, recorder=_recorder(program, use_sim_time))
+
+
+def _recorder(program, use_sim_time):
+    if not (program and os.environ.get(JOURNAL_SWITCH)):
+        return None
+    begin_journal = load("crazyflie_utils.journal.start:begin_journal")
+    clock = "simulated" if use_sim_time else "steady"
+    log = rospy.names.get_mappings().get("__log")
+    folder = os.path.dirname(log) if log else rospkg.get_log_dir()
+    return begin_journal(rospy.get_name(), program, clock, folder, rospy.logwarn)
 
 
 def _wait_for_master(signals=None):
@@ -229,6 +254,8 @@ def _run(process, make_nodes, signals):
     rospy.signal_shutdown(f"signal {signals}" if signals else "the node has ended")
     # If another process requests it, a thread of rospy may run the shutdown.
     shutdown.has_ended.wait(_END_LIMIT)
+    if process.recorder is not None:
+        process.recorder.close()
     if shutdown.is_stuck:
         exit_at_once(1)
     sys.exit(process.exit_status or 0)

@@ -97,8 +97,10 @@ class Process(ProcessContext):
 
     def start(self) -> None:
         """Start to run callbacks: every node is complete."""
-        self._steady.start()
+        if self.recorder is not None:
+            self.recorder.end_start()
         self.executor.start()
+        self._steady.start()
 
     def stop(self) -> None:
         """Stop all timers."""
@@ -107,13 +109,25 @@ class Process(ProcessContext):
 
     def prepare_shutdown(self, nodes: dict[str, Node]) -> None:
         """Call `prepare_shutdown` of every node, and publish that flights are to end."""
-        self.is_ending = True
-        self.executor.submit(self.flights.publish_ending)
-        for name, node in nodes.items():
-            self.executor.submit(self.handle(name).guard(node.prepare_shutdown))
+
+        def begin():
+            self.is_ending = True
+            self.flights.publish_ending()
+
+        works = [self.handle(name).guard(node.prepare_shutdown) for name, node in nodes.items()]
+        self._post_all("PREPARE_SHUTDOWN", [begin, *works])
 
     def shut_down(self, nodes: dict[str, Node]) -> None:
         """Stop all timers, and make the vehicle of every node safe."""
-        self.stop()
-        for name, node in nodes.items():
-            self.executor.submit(self.handle(name).guard(node.shutdown))
+        works = [self.handle(name).guard(node.shutdown) for name, node in nodes.items()]
+        self._post_all("SHUTDOWN", [self.stop, *works])
+
+    def _post_all(self, kind, works):
+        def run():
+            for work in works:
+                self.executor.submit(work)
+
+        if self.recorder is None:
+            self.executor.submit(run)
+        else:
+            self.recorder.post(kind, run)

@@ -1,5 +1,6 @@
 """Text files in UTF-8, of limited size."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 MAX_SIZE = 10_000_000  #: Largest text file (bytes).
@@ -13,6 +14,15 @@ class TextFileError(Exception):
         self.line = line
 
 
+def _content(path: str, most: int) -> bytes:
+    with open(path, "rb") as file:
+        return file.read(most)
+
+
+#: ``content(path, most)`` returns the first bytes of a file; a journal keeps what it has returned.
+content: Callable[[str, int], bytes] = _content
+
+
 def read_text(path: str | Path, max_size: int = MAX_SIZE) -> str:
     """Return the text of a file in UTF-8, without a byte order mark.
 
@@ -20,17 +30,16 @@ def read_text(path: str | Path, max_size: int = MAX_SIZE) -> str:
     NUL.
     """
     try:
-        with open(path, "rb") as file:
-            content = file.read(max_size + 1)
+        data = content(str(path), max_size + 1)
     except OSError as error:
         raise TextFileError(f"cannot be read: {error.strerror}") from None
     except ValueError as error:
         # A path with a NUL.
         raise TextFileError(f"cannot be read: {error}") from None
-    if len(content) > max_size:
+    if len(data) > max_size:
         raise TextFileError(f"is too long; expected at most {max_size} bytes")
     try:
-        text = content.decode("utf-8-sig")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         # The bytes that failed are counted without the byte order mark.
         failed = error.object[: error.start]

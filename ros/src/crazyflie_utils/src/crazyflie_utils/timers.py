@@ -56,6 +56,11 @@ class SteadyClock:
 
     def nanoseconds(self, moment: float | None = None) -> int:
         """Return the same as `stamp` in whole ns."""
+        now = time.monotonic_ns()
+        return (now if moment is None else round(moment * 1e9)) + self.measure_offset()
+
+    def measure_offset(self) -> int:
+        """Return wall clock minus this clock, ns."""
         before = time.monotonic_ns()
         offset = time.time_ns() - before
         # Between two readings another thread may run for milliseconds; a
@@ -63,7 +68,7 @@ class SteadyClock:
         is_quiet = time.monotonic_ns() - before < _QUIET
         if is_quiet and abs(offset - self._offset) > _OFFSET_TOLERANCE:
             self._offset = offset
-        return (before if moment is None else round(moment * 1e9)) + self._offset
+        return self._offset
 
 
 class SimulatedClock:
@@ -134,19 +139,27 @@ class _FairLock:
 
 
 class Executor:
-    """Run submitted work one piece at a time, first come, first served.
+    """Run submitted work one piece at a time.
 
-    Nothing runs before `start`. Work must not raise; `NodeHandle` ensures that.
+    Work that comes from outside is an input, and inputs run in the order in which they come. What
+    running work submits follows from it, and runs in its order before the next input. So the inputs
+    alone decide everything that happens. Nothing runs before `start`. Work must not raise;
+    `NodeHandle` ensures that.
     """
 
     def __init__(self) -> None:
-        self._queue: deque[tuple[Callable[..., None], tuple[Any, ...]]] = deque()
+        #: Called with true before the first of the timers that are due, and with false before each
+        #: later one.
+        self.on_timers: Callable[[bool], None] | None = None
+        self._inputs: deque[tuple[Callable[..., None], tuple[Any, ...]]] = deque()
+        self._consequences: deque[tuple[Callable[..., None], tuple[Any, ...]]] = deque()
         self._running = _FairLock()
         self._runner: int | None = None
         self._started = False
+        self._home = threading.get_ident()
 
     def start(self) -> None:
-        """Begin to run work, in the order of submission."""
+        """Begin to run work, first what was submitted by the thread that made the executor."""
         self._started = True
         # Running work would wait for its own end.
         if not self.is_running_here:
@@ -157,25 +170,40 @@ class Executor:
         """Whether this thread runs work at present."""
         return self._runner == threading.get_ident()
 
+    @property
+    def is_in_turn(self) -> bool:
+        """Whether this thread runs work, or prepares all that will run."""
+        here = threading.get_ident()
+        return self._runner == here or (not self._started and self._home == here)
+
     def submit(self, work: Callable[..., None], *arguments: Any) -> None:
-        """Run ``work(*arguments)`` after all that was submitted before it.
+        """Run ``work(*arguments)``: as an input, or after the running work that submits it.
 
         From outside, returns when the work is done. From inside running work,
         and before `start`, returns at once.
         """
-        self._queue.append((work, arguments))
-        if self._runner != threading.get_ident():
+        here = threading.get_ident()
+        if self._runner == here or (not self._started and self._home == here):
+            self._consequences.append((work, arguments))
+        else:
+            self._inputs.append((work, arguments))
+            self._drain()
+
+    def post(self, work: Callable[..., None], *arguments: Any) -> None:
+        """Run ``work(*arguments)`` as an input, also from inside running work; see `submit`."""
+        self._inputs.append((work, arguments))
+        if not self.is_running_here:
             self._drain()
 
     def submit_all(self, works: Iterable[Callable[[], None]]) -> None:
-        """Submit several pieces of work; see `submit`.
+        """Submit several pieces of work; see `submit`. They are looked for in their turn.
 
         From outside, each begins after all that the one before has submitted.
         """
         if self._started and self._runner != threading.get_ident():
             self._drain(works)
         else:
-            self._queue.extend((work, ()) for work in works)
+            self._consequences.extend((work, ()) for work in works)
 
     def _drain(self, works=()):
         if not self._started:
@@ -184,18 +212,25 @@ class Executor:
             self._runner = threading.get_ident()
             try:
                 self._run_queued()
+                is_first = True
+                if works and self.on_timers is not None:
+                    self.on_timers(True)
                 for work in works:
-                    self._running.give_way()
-                    self._runner = threading.get_ident()
+                    if not is_first:
+                        self._running.give_way()
+                        self._runner = threading.get_ident()
+                        if self.on_timers is not None:
+                            self.on_timers(False)
+                    is_first = False
                     work()
                     self._run_queued()
             finally:
                 self._runner = None
 
     def _run_queued(self):
-        queue = self._queue
-        while queue:
-            work, arguments = queue.popleft()
+        inputs, consequences = self._inputs, self._consequences
+        while consequences or inputs:
+            work, arguments = (consequences or inputs).popleft()
             work(*arguments)
 
 
@@ -347,19 +382,21 @@ class TimerQueue:
         with self._lock:
             return self._heap[0][0] if self._heap else math.inf
 
-    def run_due(self, now: float, times: int = 1) -> None:
-        """Submit every timer that is due at ``now`` (s), in order, each once.
+    def run_due(self, now: float | None = None, times: int = 1) -> None:
+        """Submit every timer that is due at ``now`` (s), by default in its turn, each once.
 
         Those with a period of zero are submitted ``times`` times. A timer that is late by more than
         a period skips the missed ticks and keeps its phase.
         """
         self._is_running = True
-        due = self._take_due(now)
+        self._executor.submit_all(self._due_works(now, times))
+
+    def _due_works(self, now, times):
+        due = self._take_due(self._clock.time() if now is None else now)
         works = [timer.fire for timer in due for _ in range(1 if timer.period > 0.0 else times)]
         if len(due) > 1:
             works = [*filter(None, (self._before, *works, self._after))]
-        if works:
-            self._executor.submit_all(works)
+        yield from works
 
     def rebase(self, now: float) -> None:
         """Set every deadline one period after ``now`` (s): time has been reset."""
@@ -388,8 +425,9 @@ class TimerQueue:
             wait = self.next_deadline() - self._clock.time()
             if wait > 0.0:
                 self._news.acquire(timeout=min(wait, 1.0))
-            # To find a timer that is due takes as long as a short callback.
-            self.run_due(self._clock.time(), times=10)
+            if self.next_deadline() <= self._clock.time() + _TOLERANCE:
+                # To find a timer that is due takes as long as a short callback.
+                self.run_due(times=10)
 
     def _push(self, timer):
         heapq.heappush(self._heap, (timer.deadline, timer.number, timer))

@@ -30,6 +30,9 @@ def never() -> bool:
 class ExternalPublisher(ABC):
     """Publishes one topic to other processes."""
 
+    #: Called with every message that is published, also if nobody outside subscribes.
+    note: Callable[[genpy.Message], None] | None = None
+
     @abstractmethod
     def has_subscribers(self) -> bool:
         """Return whether another process subscribes."""
@@ -187,6 +190,8 @@ class Publisher:
             )
         if self._is_closed:
             return
+        if self._external.note is not None:
+            self._external.note(message)
         if self._latch:
             self.latched = message
         if self._latch or self._external.has_subscribers():

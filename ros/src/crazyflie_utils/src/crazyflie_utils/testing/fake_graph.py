@@ -10,9 +10,10 @@ from typing import Any
 
 import genpy
 
+from crazyflie_utils.journal.recording import Recorder, copy_outcome
 from crazyflie_utils.node import Node
 from crazyflie_utils.testing.fake_process import FakeProcess, pass_time
-from crazyflie_utils.testing.fake_transport import FakeTransport, copy_outcome, refuse
+from crazyflie_utils.testing.fake_transport import FakeTransport, refuse
 from crazyflie_utils.topics import Condition, ExternalPublisher, ExternalSubscriber, Receiver, never
 
 #: Largest number of messages that wait for a frozen process on one connection; of later ones only
@@ -24,10 +25,16 @@ class FakeGraph:
     """Processes with a node each, and the connections between them.
 
     ``parameters`` are those of all processes, full name to raw value; ``start`` is the time at the
-    beginning, s.
+    beginning, s. ``recorder(process, time)`` returns the recorder of a process, if it is to have a
+    journal.
     """
 
-    def __init__(self, parameters: dict[str, object], start: float = 100.0):
+    def __init__(
+        self,
+        parameters: dict[str, object],
+        start: float = 100.0,
+        recorder: Callable[[str, float], Recorder | None] = lambda process, time: None,
+    ):
         #: Present time (s). Faults of topics: ``fault(message)`` returns the messages that arrive
         #: in its place.
         self.time = start
@@ -35,6 +42,7 @@ class FakeGraph:
         #: Pairs of process and topic whose messages do not reach this process.
         self.unheard: set[tuple[str, str]] = set()
         self.log: list[tuple[str, str]] = []  #: Level and text of what nodes have logged.
+        self._recorder = recorder
         self._wall_offset = 0.0
         self._headers: dict[tuple[str, str], dict[str, str]] = {}
         self._parameters = parameters
@@ -45,14 +53,18 @@ class FakeGraph:
 
     def start(self, name: str, node: Node) -> None:
         """Start a process with one node; RuntimeError if the node could not be initialized."""
-        process = self._processes[name] = _GraphProcess(name, self, self._parameters, node)
+        recorder = self._recorder(name, self.time)
+        process = _GraphProcess(name, self, self._parameters, node, recorder)
+        self._processes[name] = process
         process.clock.wall_offset = self._wall_offset
         if not process.launch(node, name):
             raise RuntimeError(f"{name} was not initialized: {self.log[-1:]}")
 
     def kill(self, name: str) -> None:
         """Kill a process as SIGKILL does: it sends nothing more."""
-        del self._processes[name]
+        process = self._processes.pop(name)
+        if process.recorder is not None:
+            process.recorder.close()
 
     def interrupt(self, name: str) -> None:
         """Ask a process to prepare its end, as SIGINT and ``rosnode kill`` do; it continues."""
@@ -172,8 +184,16 @@ class _GraphProcess(FakeProcess):
 
     transport: _GraphTransport
 
-    def __init__(self, name: str, graph: FakeGraph, parameters: dict[str, object], node: Node):
-        super().__init__(transport=_GraphTransport(name, graph, parameters), start=graph.time)
+    def __init__(
+        self,
+        name: str,
+        graph: FakeGraph,
+        parameters: dict[str, object],
+        node: Node,
+        recorder: Recorder | None,
+    ):
+        transport = _GraphTransport(name, graph, parameters)
+        super().__init__(transport=transport, start=graph.time, recorder=recorder)
         self.name = name
         self.node = node
         self.is_frozen = False

@@ -2,71 +2,52 @@
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from typing import Any
 
 import genpy
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
-from typing_extensions import override
 
-from crazyflie_utils.node import Node, Process
+from crazyflie_utils.node import Node
+from crazyflie_utils.offline_process import OfflineProcess
 from crazyflie_utils.testing.fake_transport import FakeTransport
-from crazyflie_utils.timers import SimulatedClock, TimerQueue
+from crazyflie_utils.timers import Executor, TimerQueue
 
 #: Period at which a timer of period 0 fires here (s); on a real machine it fires as often as
 #: possible.
 _SHORTEST_PERIOD = 1e-4
 
 
-class WallClock(SimulatedClock):
-    """Simulated time whose stamps are those of a wall clock that can be set."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.wall_offset = 0.0  #: Wall clock minus `time`, s.
-
-    @override
-    def nanoseconds(self, moment: float | None = None) -> int:
-        return super().nanoseconds(moment) + round(self.wall_offset * 1e9)
-
-
-class FakeProcess(Process):
-    """A process for tests: the real node handle, executor, timers and tf buffer.
+class FakeProcess(OfflineProcess):
+    """A process for tests.
 
     The parameters are full name to raw value, such as {"/simulator/time_step": 0.01}; a
-    ``transport`` replaces one with these parameters. ``start`` is the time at the beginning, s, of
-    both clocks: ``clock`` is simulated time, and ``machine_clock`` that of the machine, for
-    ``steady`` timers and timeouts of calls. `advance` moves both, `advance_machine` and
-    ``clock.set`` one of them. Stamps are those of ``clock`` plus its ``wall_offset`` (s): a change
-    of it is a step of the wall clock.
+    ``transport`` replaces one with these parameters. `advance` moves both clocks,
+    `advance_machine` and ``set_clock`` one of them. A ``recorder`` writes the journal.
     """
 
     transport: FakeTransport
-    clock: WallClock
 
     def __init__(
         self,
         parameters: dict[str, object] | None = None,
         start: float = 100.0,
         transport: FakeTransport | None = None,
+        recorder: Any = None,
     ):
-        super().__init__(transport or FakeTransport(parameters or {}), True, WallClock())
-        self.clock.set(start)
-        self.machine_clock = SimulatedClock()
-        self.machine_clock.set(start)
-        tf = self.transforms.gather, self.transforms.send_gathered
-        self._steady = TimerQueue(self.executor, self.machine_clock, *tf)
-        self.machine_clock.on_change(lambda now, _: self._steady.run_due(now))
-        self.transport.machine_timers = self._steady
-        self.executor.start()
+        fake = transport or FakeTransport(parameters or {})
+        super().__init__(fake, start, recorder)
+        # The timeouts of calls are no timers of the process.
+        apart = Executor()
+        apart.start()
+        timers = fake.machine_timers = TimerQueue(apart, self.machine_clock)
+        self.machine_clock.on_change(lambda now, _: timers.run_due(now))
 
     def launch(self, node: Node, name: str, parameters: dict[str, object] | None = None) -> bool:
         """Initialize a node with private parameters; return what ``node.initialize`` returned."""
         for key, value in (parameters or {}).items():
             self.transport.parameters[f"{name}/{key}"] = value
-        outcome: list[bool] = []
-        # Queued as work: a latched message must wait until the node is complete.
-        self.executor.submit(lambda: outcome.append(node.initialize(self.handle(name))))
-        return outcome[0]
+        return self.initialize(node, name)
 
     def publish(self, topic: str, message: genpy.Message) -> None:
         """Publish from outside the process."""
@@ -100,18 +81,22 @@ class FakeProcess(Process):
     def advance_machine(self, duration: float) -> None:
         """Advance the machine's clock (s), while simulated time is not published."""
         machine = self.machine_clock
-        pass_time(duration, machine.time, self._steady.next_deadline, machine.set)
+        pass_time(duration, machine.time, self._machine_deadline, self.set_machine_clock)
+
+    def _machine_deadline(self):
+        calls = self.transport.machine_timers
+        return min(self._steady.next_deadline(), calls.next_deadline())
 
     def next_deadline(self) -> float:
         """Return the time at which the next timer of either clock is due, in simulated time (s)."""
         ahead = self.machine_clock.time() - self.clock.time()
-        return min(self._simulated.next_deadline(), self._steady.next_deadline() - ahead)
+        return min(self._simulated.next_deadline(), self._machine_deadline() - ahead)
 
     def move_to(self, moment: float) -> None:
         """Move both clocks, at once, until simulated time is ``moment`` (s)."""
         ahead = self.machine_clock.time() - self.clock.time()
-        self.clock.set(moment)
-        self.machine_clock.set(moment + ahead)
+        self.set_clock(moment)
+        self.set_machine_clock(moment + ahead)
 
 
 def pass_time(

@@ -9,6 +9,7 @@ from typing import Any
 import genpy
 from rosmaster.paramserver import ParamDictionary
 
+from crazyflie_utils.journal.recording import copy_outcome
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.timers import TimerQueue
 from crazyflie_utils.topics import (
@@ -166,13 +167,3 @@ def refuse(service: str) -> Callable[[Any], Future[Any]]:
     refusal: Future[Any] = Future()
     refusal.set_exception(ServiceError(f"there is no service {service}"))
     return lambda request: refusal
-
-
-def copy_outcome(answer: Future[Any], reply: Future[Any]) -> None:
-    """Complete a reply with the outcome of an answer, unless it is done or cancelled."""
-    if reply.done() or answer.cancelled():
-        return
-    if answer.exception() is None:
-        reply.set_result(answer.result())
-    else:
-        reply.set_exception(answer.exception())

@@ -1,0 +1,479 @@
+"""Writes the journal of a process: what it is given by its clock, its transport and its threads.
+
+Everything that comes from outside is passed on in turn with all other work, as an input, and is
+written when its turn comes; so is everything that callbacks read, and a checksum of every message
+that they publish. Other threads read and publish without being recorded.
+
+While an input is processed, the clock stands still: callbacks see the moment at which it began.
+"""
+
+import builtins
+import io
+import json
+import struct
+import time
+import zlib
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import AbstractContextManager
+from functools import partial
+from typing import Any
+
+import genpy
+from typing_extensions import override
+
+from crazyflie_utils.journal.journal_file import JournalWriter, Kind
+from crazyflie_utils.timers import Executor, SteadyClock
+from crazyflie_utils.topics import (
+    Condition,
+    ExternalPublisher,
+    ExternalSubscriber,
+    Receiver,
+    Serve,
+    Transport,
+    never,
+)
+
+_U64, _I64, _MOMENT = struct.Struct("<Q"), struct.Struct("<q"), struct.Struct("<d")
+SAME_COLLECTION = 0xFFFFFFFF  #: Value of `Kind.COLLECTED` for more messages of one collection.
+PLAIN = 0x80  #: Bit of the first byte of a message: it came decoded. The others: its caller, or 0.
+_MAX_CALLERS = 127
+_LONGEST = 0xFFFFFFFF  #: Longest time between two inputs that is written (us).
+
+
+def keeps_data(message_type: Any) -> Any:
+    """Return a type of the same messages that keep the bytes from which they were read."""
+    if "raw" in message_type.__slots__:
+        return message_type
+    if (known := _keeping.get(message_type)) is None:
+
+        def deserialize(self: Any, data: bytes) -> Any:
+            self.raw = data
+            return message_type.deserialize(self, data)
+
+        members = {"__slots__": ("raw",), "deserialize": deserialize}
+        known = _keeping[message_type] = type(message_type.__name__, (message_type,), members)
+    return known
+
+
+_keeping: dict[type, type] = {}
+
+
+def plain_type(message_type: Any) -> Any:
+    """Return the type of a message as ROS generated it."""
+    return message_type.__mro__[1] if "raw" in message_type.__slots__ else message_type
+
+
+def serialized(message: genpy.Message) -> bytes:
+    """Return a message as bytes; empty if it cannot be serialized."""
+    buffer = io.BytesIO()
+    try:
+        message.serialize(buffer)
+    except (genpy.SerializationError, struct.error, TypeError):
+        # Whoever sends it will say so.
+        return b""
+    return buffer.getvalue()
+
+
+class Digest:
+    """The CRC of all messages that a process has published."""
+
+    def __init__(self) -> None:
+        self.value = 0
+
+    def add(self, message: genpy.Message) -> int:
+        """Add a message, without the sequence number, which rospy sets; return the last byte."""
+        data = getattr(message, "raw", None) or serialized(message)
+        self.value = zlib.crc32(data[4:] if message._has_header else data, self.value)
+        return self.value & 0xFF
+
+
+class RecordedClock(SteadyClock):
+    """The machine's clock, which stands still for callbacks while an input is processed."""
+
+    def __init__(self, recorder: "Recorder", executor: Executor):
+        super().__init__()
+        self.now = 0  #: Moment of the present input, ns.
+        self.wall_offset = self._offset  #: Wall clock minus this clock then, ns.
+        self._recorder, self._executor = recorder, executor
+
+    def begin(self, moment: int) -> int:
+        """Begin an input at a moment (ns of the machine); return wall clock minus this one."""
+        self.now = moment
+        self.wall_offset = self.measure_offset()
+        return self.wall_offset
+
+    def _read(self):
+        if self._executor.is_running_here:
+            return self.now
+        moment = time.monotonic_ns()
+        if self._executor.is_in_turn:
+            self._recorder.row(Kind.TIME, 0, 0, _U64.pack(moment))
+            self._recorder.note_wall(self.begin(moment))
+        return moment
+
+    @override
+    def time(self) -> float:
+        return self._read() * 1e-9
+
+    @override
+    def nanoseconds(self, moment: float | None = None) -> int:
+        if not self._executor.is_in_turn:
+            return super().nanoseconds(moment)
+        now = self._read()
+        return (now if moment is None else round(moment * 1e9)) + self.wall_offset
+
+
+class Recorder:
+    """Writes the rows of one process by a `JournalWriter`; an error of it ends the journal only."""
+
+    def __init__(self, writer: JournalWriter):
+        self._writer = writer
+        self.row = writer.row
+        self.executor: Executor
+        self.clock: RecordedClock
+        #: ``begin(moment)`` begins an input at a moment (ns), and returns the clock's wall offset.
+        self.begin: Callable[[int], int]
+        self._last: int = writer.header["us"]
+        self._wall = 0
+        self._digest = Digest()
+        self._callers: dict[str, int] = {"": 0}
+
+    def attach(self, transport: Transport, executor: Executor) -> "RecordingTransport":
+        """Begin to record; return the transport that the process is to use."""
+        self.executor = executor
+        self.clock = RecordedClock(self, executor)
+        self.begin = self.clock.begin
+        executor.on_timers = self._on_timers
+        return RecordingTransport(transport, self)
+
+    def input(self, kind: Kind, number: int = 0, data: bytes | None = None) -> None:
+        """Begin an input, in its turn."""
+        now = time.monotonic_ns() // 1000
+        wall = self.begin(now * 1000)
+        try:
+            self._writer.pause(now * 1e-6)
+            self.note_wall(wall)
+            passed, self._last = now - self._last, now
+            self.row(kind, number, min(passed, _LONGEST), data)
+        except Exception as error:
+            self._writer.end(repr(error))
+
+    def note_wall(self, offset: int) -> None:
+        """Write that the wall clock is another time (ns) ahead of the machine's."""
+        if offset != self._wall:
+            self._wall = offset
+            self.row(Kind.WALL, 0, 0, _I64.pack(offset))
+
+    def submit(self, node: str, callback: Callable[..., Any], work: Any, arguments: Any) -> None:
+        """Run a callback that another thread has submitted for a node."""
+
+        def run():
+            known = [node, getattr(callback, "__qualname__", ""), repr(arguments)]
+            self.input(Kind.SUBMITTED, 0, json.dumps(known).encode())
+            work(*arguments)
+
+        self.executor.post(run)
+
+    def post(self, kind: str, work: Callable[[], None]) -> None:
+        """Do work as an input of a `Kind`, by its name."""
+
+        def run():
+            self.input(Kind[kind])
+            work()
+
+        self.executor.post(run)
+
+    def launch(self, node: Any, name: str) -> None:
+        """Write that a node is initialized in an `OfflineProcess`."""
+        path = f"{type(node).__module__}:{type(node).__qualname__}"
+        self.input(Kind.LAUNCH, 0, json.dumps([name, path]).encode())
+
+    def set_clock(self, number: int, moment: float) -> None:
+        """Write that a clock of a `FakeProcess` is set: its own (0) or the machine's (1); s."""
+        self.input(Kind.CLOCK, number, _MOMENT.pack(moment))
+
+    def file(self, read: Callable[[str, int], bytes], path: str, most: int) -> bytes:
+        """Return what ``read`` returns for a file, and write it."""
+        if not self.executor.is_in_turn:
+            return read(path, most)
+        name = json.dumps(path).encode()
+        try:
+            content = read(path, most)
+        except (OSError, ValueError) as error:
+            known = [type(error).__name__, getattr(error, "errno", None), str(error)]
+            self.row(Kind.FILE, 0, 0, name + b"\n" + json.dumps(known).encode())
+            raise
+        self.row(Kind.FILE, 1, 0, name + b"\n" + content)
+        return content
+
+    def published(self, number: int, message: genpy.Message) -> None:
+        """Write that a callback publishes a message."""
+        if self.executor.is_in_turn:
+            try:
+                self.row(Kind.PUBLISHED, number, self._digest.add(message))
+            except Exception as error:
+                self._writer.end(repr(error))
+
+    def end_start(self) -> None:
+        """Write that all nodes are initialized."""
+        self._writer.end_start()
+
+    def close(self) -> None:
+        """End the journal."""
+        self._writer.close()
+
+    def data(self, message: Any, is_plain: bool) -> bytes:
+        """Return a received message with its origin."""
+        header = getattr(message, "_connection_header", None) or {}
+        name = header.get("callerid", "")
+        number = self._callers.get(name)
+        if number is None:
+            # Later ones are not told apart.
+            number = self._callers[name] = min(len(self._callers), _MAX_CALLERS)
+            self.name(Kind.CALLER, number, name, header.get("topic", ""))
+        first = bytes((number | PLAIN if is_plain else number,))
+        return first + (getattr(message, "raw", None) or serialized(message))
+
+    def name(self, kind: Kind, number: int, *names: str) -> None:
+        """Write the name of something that has a number."""
+        if self.executor.is_in_turn:
+            self.row(kind, number, 0, json.dumps(names).encode())
+
+    def value(self, what: str, read: Callable[[], Any]) -> Any:
+        """Return what is read, and write it."""
+        if not self.executor.is_in_turn:
+            return read()
+        try:
+            value = read()
+        except Exception as error:
+            kind = type(error).__name__
+            kind = kind if hasattr(builtins, kind) or kind == "ServiceError" else "OSError"
+            self.row(Kind.VALUE, 0, 0, json.dumps([what, False, kind, str(error)]).encode())
+            raise
+        self.row(Kind.VALUE, 0, 0, json.dumps([what, True, value], default=str).encode())
+        return value
+
+    def _on_timers(self, is_first):
+        self.input(Kind.TIMERS if is_first else Kind.TIMER)
+
+
+class _Flag:
+    """A condition of which only changes are written."""
+
+    def __init__(self, recorder: Recorder, number: int, read: Condition):
+        self._recorder, self._number, self._read = recorder, number, read
+        self._value, self._same = False, 0
+
+    def __call__(self) -> bool:
+        value = self._read()
+        if self._recorder.executor.is_in_turn:
+            if value == self._value:
+                self._same += 1
+            else:
+                self._recorder.row(Kind.FLAG, self._number, self._same)
+                self._value, self._same = value, 0
+        return value
+
+
+class _RecordedPublisher(ExternalPublisher):
+    def __init__(self, recorder: Recorder, number: int, external: ExternalPublisher, flag: _Flag):
+        self._external, self._flag = external, flag
+        self.note = partial(recorder.published, number)
+
+    def has_subscribers(self) -> bool:
+        return self._flag()
+
+    def publish(self, *messages: genpy.Message) -> None:
+        self._external.publish(*messages)
+
+    def close(self) -> None:
+        self._external.close()
+
+
+class _RecordedSubscriber(ExternalSubscriber):
+    """A subscription; what comes while `collect` runs is passed on at once."""
+
+    def __init__(self, recorder: Recorder, number: int, plain: Any, deliver: Receiver):
+        self.external: ExternalSubscriber
+        self.flag: _Flag
+        self._recorder, self._number = recorder, number
+        self._plain_type, self._deliver = plain, deliver
+        self._is_collecting, self._empty = False, 0
+
+    def receive(self, message: Any) -> None:
+        """Write a message and pass it on, in turn unless it was waiting."""
+        recorder = self._recorder
+        if self._is_collecting and recorder.executor.is_running_here:
+            data = recorder.data(message, type(message) is self._plain_type)
+            recorder.row(Kind.COLLECTED, self._number, self._empty, data)
+            self._empty = SAME_COLLECTION
+            self._deliver(message)
+        else:
+            recorder.executor.post(self._pass_on, message)
+
+    def _pass_on(self, message):
+        data = self._recorder.data(message, type(message) is self._plain_type)
+        self._recorder.input(Kind.MESSAGE, self._number, data)
+        self._deliver(message)
+
+    def has_publishers(self) -> bool:
+        return self.flag()
+
+    def collect(self) -> None:
+        if not self._recorder.executor.is_running_here:
+            self.external.collect()
+            return
+        self._is_collecting = True
+        try:
+            self.external.collect()
+        finally:
+            self._is_collecting = False
+            self._empty = 0 if self._empty == SAME_COLLECTION else self._empty + 1
+
+    def close(self) -> None:
+        self.external.close()
+
+
+class RecordingTransport(Transport):
+    """Passes everything on to another transport, and writes what comes back."""
+
+    def __init__(self, transport: Transport, recorder: Recorder):
+        self._transport, self._recorder = transport, recorder
+        self._names: dict[str, str] = {}
+        self._publishers = self._subscriptions = self._services = self._requests = self._flags = 0
+
+    def __getattr__(self, name: str) -> Any:
+        # The others, and what tests look at.
+        return getattr(self._transport, name)
+
+    def _flag(self, read: Condition) -> _Flag:
+        self._flags += 1
+        return _Flag(self._recorder, self._flags, read)
+
+    def starting(self) -> AbstractContextManager[None]:
+        """See `Transport.starting`."""
+        return self._transport.starting()
+
+    def remap(self, name: str) -> str:
+        """Return a remapped name; the first time, it is written."""
+        if name not in self._names:
+            self._names[name] = self._transport.remap(name)
+            if self._names[name] != name and self._recorder.executor.is_in_turn:
+                data = json.dumps([name, self._names[name]]).encode()
+                self._recorder.row(Kind.NAME, 0, 0, data)
+        return self._names[name]
+
+    def get_param(self, name: str) -> Any:
+        """Return a parameter."""
+        return self._recorder.value(name, lambda: self._transport.get_param(name))
+
+    def set_param(self, name: str, value: Any) -> None:
+        """Set a parameter."""
+        self._recorder.value(f"set {name}", lambda: self._transport.set_param(name, value))
+
+    def set_param_later(self, name: str, value: Any) -> "Future[None]":
+        """Set a parameter; the future is done as an input."""
+        return self._request(self._transport.set_param_later(name, value), name, repr(value))
+
+    def advertise(self, topic: str, message_type: Any, latch: bool) -> ExternalPublisher:
+        """Announce a topic."""
+        external = self._transport.advertise(topic, message_type, latch)
+        self._publishers += 1
+        self._recorder.name(Kind.ADVERTISED, self._publishers, topic, message_type._type)
+        flag = self._flag(external.has_subscribers)
+        return _RecordedPublisher(self._recorder, self._publishers, external, flag)
+
+    def subscribe(
+        self, topic: str, message_type: Any, deliver: Receiver, may_wait: Condition = never
+    ) -> ExternalSubscriber:
+        """Subscribe to a topic; its messages come in turn."""
+        self._subscriptions += 1
+        self._recorder.name(Kind.SUBSCRIBED, self._subscriptions, topic, message_type._type)
+        # Otherwise a message that came decoded is the same.
+        plain = plain_type(message_type) if plain_type(message_type) != message_type else None
+        own = _RecordedSubscriber(self._recorder, self._subscriptions, plain, deliver)
+        keeping = keeps_data(message_type)
+        # Messages may come before this returns.
+        own.external = self._transport.subscribe(topic, keeping, own.receive, may_wait)
+        own.flag = self._flag(own.external.has_publishers)
+        return own
+
+    def advertise_service(self, name: str, service_type: Any, serve: Serve) -> Callable[[], None]:
+        """Offer a service; its calls come in turn."""
+        self._services += 1
+        number, recorder = self._services, self._recorder
+        recorder.name(Kind.OFFERED, number, name, service_type._type)
+
+        def begin(request: Any, is_withdrawn: Condition) -> Future[Any]:
+            answer: Future[Any] = Future()
+
+            def run():
+                recorder.input(Kind.CALL, number, serialized(request))
+                inner = serve(request, lambda: recorder.value("withdrawn", is_withdrawn))
+                inner.add_done_callback(lambda done: copy_outcome(done, answer))
+
+            recorder.executor.post(run)
+            return answer
+
+        def offer():
+            ends.append(self._transport.advertise_service(name, service_type, begin))
+
+        ends: list[Callable[[], None]] = []
+        recorder.value("offer", offer)
+        return ends[0]
+
+    def call_service(
+        self, name: str, service_type: type, request: Any, limit: float, start_limit: float
+    ) -> Future[Any]:
+        """Call a service; its answer comes in turn."""
+        inner = self._transport.call_service(name, service_type, request, limit, start_limit)
+        return self._request(inner, name, serialized(request))
+
+    def _request(self, inner, name, content):
+        self._requests += 1
+        number, recorder = self._requests % 0x10000, self._recorder
+        outer: Future[Any] = Future()
+        if recorder.executor.is_in_turn:
+            told = content if isinstance(content, bytes) else content.encode()
+            recorder.row(Kind.REQUESTED, number, zlib.crc32(name.encode() + told))
+
+        def settle():
+            error = inner.exception()
+            if error is None:
+                response = inner.result()
+                data = b"\0" + (b"" if response is None else serialized(response))
+            else:
+                data = b"\1" + str(error).encode()
+            recorder.input(Kind.REPLY, number, data)
+            copy_outcome(inner, outer)
+
+        inner.add_done_callback(lambda _: recorder.executor.post(settle))
+        return outer
+
+    def service_nodes(self) -> dict[str, str]:
+        """Return every service and its node."""
+        return self._recorder.value("services", self._transport.service_nodes)
+
+    def living_node(self, name: str) -> str | None:
+        """Return where a node runs."""
+        return self._recorder.value(f"node {name}", lambda: self._transport.living_node(name))
+
+    def log(self, level: str, text: str) -> None:
+        """Log."""
+        self._transport.log(level, text)
+
+    def clock_was_set(self, stamp: genpy.Time) -> None:
+        """Set the transport's clock."""
+        self._transport.clock_was_set(stamp)
+
+
+def copy_outcome(done: "Future[Any]", to: "Future[Any]") -> None:
+    """Complete a future with the outcome of another, unless it is done or cancelled."""
+    if to.done() or done.cancelled():
+        return
+    error = done.exception()
+    if error is None:
+        to.set_result(done.result())
+    else:
+        to.set_exception(error)

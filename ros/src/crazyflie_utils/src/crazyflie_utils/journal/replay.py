@@ -1,0 +1,331 @@
+"""Runs the nodes of a journal again, with the same input, without ROS."""
+
+import builtins
+import collections
+import json
+import struct
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+import genpy
+from typing_extensions import override
+
+from crazyflie_utils import text_file
+from crazyflie_utils.context import Flights
+from crazyflie_utils.handle import NodeHandle
+from crazyflie_utils.journal.journal_file import INPUTS, Journal, JournalError, Kind, Row
+from crazyflie_utils.journal.replay_transport import (
+    DifferenceError,
+    ReplayTransport,
+    Rows,
+    describe,
+)
+from crazyflie_utils.node import Node, Process
+from crazyflie_utils.offline_process import OfflineProcess
+from crazyflie_utils.program import load
+from crazyflie_utils.refusal import ServiceError
+from crazyflie_utils.timers import Executor, SimulatedClock, SteadyClock, TimerQueue
+from crazyflie_utils.topics import Transport
+
+_U64, _I64, _MOMENT = struct.Struct("<Q"), struct.Struct("<q"), struct.Struct("<d")
+
+
+class _ReplayExecutor(Executor):
+    """Runs the timers that are due when the journal says so."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._due: collections.deque[Iterable[Callable[[], None]]] = collections.deque()
+        self._timers: Iterator[Callable[[], None]] = iter(())
+
+    @override
+    def submit_all(self, works: Iterable[Callable[[], None]]) -> None:
+        if self.is_in_turn:
+            super().submit_all(works)
+        else:
+            self._due.append(works)
+
+    def begin_timers(self) -> None:
+        """Find out which timers are due, and run the first one."""
+
+        def run():
+            # In its turn, since that reads the clock.
+            self._timers = iter(list(self._due.popleft()) if self._due else [])
+            first = next(self._timers, None)
+            if first is not None:
+                first()
+
+        self.submit(run)
+
+    def run_timer(self) -> None:
+        """Run the next timer that was due."""
+
+        def run():
+            timer = next(self._timers, None)
+            if timer is None:
+                raise DifferenceError("then a timer was due that is not due now")
+            timer()
+
+        self.submit(run)
+
+
+class _ReplayClock(SteadyClock):
+    """The machine's clock of then."""
+
+    def __init__(self, rows: Rows, executor: Executor):
+        super().__init__()
+        #: now, wall_offset: Moment of the present input, and wall clock minus this clock (ns).
+        self.now = self.wall_offset = 0
+        self._rows, self._executor = rows, executor
+
+    def _read(self):
+        if not self._executor.is_running_here:
+            row = self._rows.expect(Kind.TIME, 0, "reads the clock")
+            (self.now,) = _U64.unpack(row.data)
+            if self._rows.next is not None and self._rows.next.kind is Kind.WALL:
+                (self.wall_offset,) = _I64.unpack(self._rows.take().data)
+        return self.now
+
+    @override
+    def time(self) -> float:
+        return self._read() * 1e-9
+
+    @override
+    def nanoseconds(self, moment: float | None = None) -> int:
+        now = self._read()
+        return (now if moment is None else round(moment * 1e9)) + self.wall_offset
+
+
+class _RosProcess(Process):
+    """A process that was one with ROS."""
+
+    def __init__(self, transport: Transport, clock: str, executor: Executor, rows: Rows):
+        self.machine = _ReplayClock(rows, executor)
+        simulated = SimulatedClock() if clock == "simulated" else self.machine
+        super().__init__(transport, clock == "simulated", simulated, executor=executor)
+        tf = self.transforms.gather, self.transforms.send_gathered
+        self._steady = TimerQueue(executor, self.machine, *tf)
+
+    def move_to(self, moment: int) -> None:
+        """Set the machine's clock (ns)."""
+        self.machine.now = moment
+
+    def set_wall(self, offset: int) -> None:
+        """Set the wall clock minus the machine's (ns)."""
+        self.machine.wall_offset = offset
+
+    def find_due(self) -> None:
+        """Find the timers that are due now by the machine's clock."""
+        self._steady.run_due(times=10)
+
+
+class _OfflineProcess(OfflineProcess):
+    """A process that was one without ROS, too."""
+
+    def __init__(self, transport: Transport, start: float, executor: Executor):
+        super().__init__(transport, start, executor=executor)
+
+    def move_to(self, moment: int) -> None:
+        """Do nothing: both clocks have rows of their own."""
+
+    def set_wall(self, offset: int) -> None:
+        """Set the wall clock minus the process's (ns)."""
+        self.clock.wall_offset = offset * 1e-9
+
+    def find_due(self) -> None:
+        """Do nothing: they are found when a clock is set."""
+
+
+class Replay:
+    """Runs the nodes of a journal again: `start`, then `step` until it returns False.
+
+    These raise `DifferenceError` when the nodes do something else than then, `EndError` when the
+    journal ends within a callback, and `JournalError` when they cannot be run.
+    """
+
+    def __init__(self, journal: Journal):
+        self.journal = journal
+        self.rows = Rows(journal)
+        self.transport = ReplayTransport(self.rows)
+        self.nodes: dict[str, Node] = {}
+        self.input: Row | None = None  #: The input that is processed, or was last.
+        self._executor = _ReplayExecutor()
+        header = journal.header
+        self._us = self._begin = header["us"]
+        self.process: _RosProcess | _OfflineProcess
+        if header["clock"] == "manual":
+            self.process = _OfflineProcess(self.transport, header["start"], self._executor)
+        else:
+            self.process = _RosProcess(self.transport, header["clock"], self._executor, self.rows)
+
+    @property
+    def time(self) -> float:
+        """Time of the present input since the process was started, by its machine's clock (s)."""
+        return (self._us - self._begin) * 1e-6
+
+    @property
+    def input_name(self) -> str:
+        """What the present input is, for people."""
+        row = self.input
+        if row is None:
+            return "the start"
+        if row.kind is Kind.MESSAGE:
+            return f"a message on {self.transport.subscribers[row.number].topic}"
+        if row.kind is Kind.CALL:
+            return f"a call of {self.transport.services[row.number][0]}"
+        return {
+            Kind.TIMERS: "a timer",
+            Kind.TIMER: "a timer",
+            Kind.REPLY: "the answer of a service",
+            Kind.CLOCK: "the clock",
+        }.get(row.kind, row.kind.name.lower().replace("_", " "))
+
+    def start(self) -> bool:
+        """Make and initialize the nodes; return whether that succeeded."""
+        text_file.content = self._file
+        header = self.journal.header
+        if isinstance(self.process, _OfflineProcess):
+            return True
+        handle = self.process.handle(header["node"])
+        make = self._load(header["program"])
+        self.nodes = {handle.name: make()} if isinstance(make, type) else make(handle)
+        for name, node in self.nodes.items():
+            if not node.initialize(self.process.handle(name)):
+                return False
+        if needed := [name for name, node in self.nodes.items() if node.needed_in_flight]:
+            Flights(self.process.topics, needed)
+        self._executor.start()
+        return True
+
+    def step(self) -> bool:
+        """Process the next input; return whether there was one."""
+        row = self.rows.next
+        if row is None:
+            return False
+        if row.kind is Kind.WALL:
+            self.process.set_wall(*_I64.unpack(self.rows.take().data))
+            return True
+        if row.kind not in INPUTS:
+            raise DifferenceError(f"now the callback has ended; then {describe(row)}")
+        self.input = self.rows.take()
+        self._us += row.value
+        self.process.move_to(self._us * 1000)
+        try:
+            self._handlers[row.kind](self, row)
+        except (LookupError, ValueError, struct.error, genpy.DeserializationError) as error:
+            # Exceptions of nodes do not come here.
+            raise JournalError(
+                f"{self.journal.path}: at {self.time:.3f} s, {row.kind.name} {row.number} does "
+                f"not fit these nodes: {error!r}"
+            ) from None
+        return True
+
+    def _load(self, path):
+        """Return a class of nodes, or a function that makes nodes; run nothing else."""
+        if not path:
+            raise JournalError(
+                f"{self.journal.path}: the nodes of {self.journal.header['node']} were made by a "
+                "function without a name; they cannot be made again"
+            )
+        try:
+            make = load(path)
+        except (ImportError, AttributeError, ValueError) as error:
+            raise JournalError(
+                f"{self.journal.path}: there is no {path} any more: {error}"
+            ) from None
+        hints = getattr(make, "__annotations__", {})
+        if (isinstance(make, type) and issubclass(make, Node)) or NodeHandle in hints.values():
+            return make
+        raise JournalError(
+            f"{self.journal.path}: {path} is no node; expected a class derived from Node, or a "
+            "function of a NodeHandle"
+        )
+
+    def _file(self, path, most):
+        row = self.rows.next
+        row = self.rows.expect(Kind.FILE, row.number if row else 0, f"reads the file {path}")
+        name, _, content = row.data.partition(b"\n")
+        if json.loads(name) != path:
+            raise DifferenceError(f"now it reads the file {path}; then {name.decode()}")
+        if row.number:
+            return content
+        kind, number, text = json.loads(content)
+        error = getattr(builtins, kind, OSError)
+        raise error(number, text) if number is not None else error(text)
+
+    def _message(self, row):
+        own = self.transport.subscribers[row.number]
+        self._executor.submit(own.deliver, own.message(row.data))
+
+    def _timers(self, _):
+        self.process.find_due()
+        self._executor.begin_timers()
+
+    def _timer(self, _):
+        self._executor.run_timer()
+
+    def _call(self, row):
+        name, service_type, serve = self.transport.services[row.number]
+        request = service_type._request_class().deserialize(row.data)
+
+        def is_withdrawn():
+            return self.transport.value("withdrawn", f"looks whether a call of {name} is withdrawn")
+
+        def run():
+            serve(request, is_withdrawn)
+
+        self._executor.submit(run)
+
+    def _reply(self, row):
+        service_type, future = self.transport.requests.pop(row.number)
+        if row.data[0]:
+            self._executor.submit(future.set_exception, ServiceError(row.data[1:].decode()))
+        else:
+            response: Any = None
+            if service_type is not None:
+                response = service_type._response_class().deserialize(row.data[1:])
+            self._executor.submit(future.set_result, response)
+
+    def _submitted(self, row):
+        node, function, arguments = json.loads(row.data)
+        raise JournalError(
+            f"{self.journal.path}: a thread of {node} has called {function}{arguments}, "
+            "which cannot be repeated"
+        )
+
+    def _prepare_shutdown(self, _):
+        self.process.prepare_shutdown(self.nodes)
+
+    def _shutdown(self, _):
+        self.process.shut_down(self.nodes)
+
+    def _clock(self, row):
+        offline = self._expect_offline()
+        set_clock = (offline.set_clock, offline.set_machine_clock)[row.number]
+        set_clock(*_MOMENT.unpack(row.data))
+
+    def _launch(self, row):
+        name, path = json.loads(row.data)
+        try:
+            self.nodes[name] = self._load(path)()
+        except TypeError as error:
+            raise JournalError(f"{self.journal.path}: {name} cannot be made: {error}") from None
+        self._expect_offline().initialize(self.nodes[name], name)
+
+    def _expect_offline(self):
+        if isinstance(self.process, _OfflineProcess):
+            return self.process
+        raise ValueError("only a process without ROS has it")
+
+    _handlers = {
+        Kind.MESSAGE: _message,
+        Kind.TIMERS: _timers,
+        Kind.TIMER: _timer,
+        Kind.CALL: _call,
+        Kind.REPLY: _reply,
+        Kind.SUBMITTED: _submitted,
+        Kind.PREPARE_SHUTDOWN: _prepare_shutdown,
+        Kind.SHUTDOWN: _shutdown,
+        Kind.CLOCK: _clock,
+        Kind.LAUNCH: _launch,
+    }

@@ -1,0 +1,292 @@
+"""What a process that is run again reads and sends: it comes from a journal, and is compared."""
+
+import builtins
+import collections
+import json
+import zlib
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+import genpy
+
+from crazyflie_utils.journal.journal_file import INPUTS, NAMES, Journal, JournalError, Kind, Row
+from crazyflie_utils.journal.recording import (
+    PLAIN,
+    SAME_COLLECTION,
+    Digest,
+    keeps_data,
+    plain_type,
+    serialized,
+)
+from crazyflie_utils.refusal import ServiceError
+from crazyflie_utils.topics import (
+    Condition,
+    ExternalPublisher,
+    ExternalSubscriber,
+    Receiver,
+    Serve,
+    Transport,
+    never,
+)
+
+
+class DifferenceError(BaseException):
+    """The process did something else than what was recorded; the text says what.
+
+    Not an `Exception`: callbacks of nodes are guarded against those.
+    """
+
+
+class EndError(BaseException):
+    """The journal has ended while a callback was running."""
+
+
+class Rows:
+    """The rows of a journal, one after the other."""
+
+    def __init__(self, journal: Journal):
+        self._path, self._rows = journal.path, journal.rows()
+        #: Numbers to names, by kind of `NAMES`.
+        self.names: dict[Kind, dict[int, list[str]]] = {kind: {} for kind in NAMES}
+        self.next: Row | None = None  #: The next row; None at the end.
+        self.counts: collections.Counter[Kind] = collections.Counter()
+        self._advance()
+
+    def _advance(self):
+        row = next(self._rows, None)
+        while row is not None and row.kind in NAMES:
+            try:
+                self.names[row.kind][row.number] = json.loads(row.data)
+            except ValueError:
+                raise JournalError(f"{self._path}: a {row.kind.name} is not JSON") from None
+            row = next(self._rows, None)
+        self.next = row
+
+    def take(self) -> Row:
+        """Return the next row, and go on to the one behind it; `EndError` at the end."""
+        row = self.next
+        if row is None:
+            raise EndError
+        self.counts[row.kind] += 1
+        self._advance()
+        return row
+
+    def check_name(self, kind: Kind, number: int, *names: str) -> None:
+        """Raise `DifferenceError` if something with a number had other names."""
+        if self.names[kind].get(number) != list(names):
+            then = self.names[kind].get(number, "nothing more")
+            raise DifferenceError(f"{kind.name.lower()} now: {names}; then: {then}")
+
+    def expect(self, kind: Kind, number: int, doing: str) -> Row:
+        """Return the next row, which must be of a kind and number; `DifferenceError` if it is not.
+
+        ``doing`` says what the process does.
+        """
+        row = self.next
+        if row is not None and (row.kind is not kind or row.number != number):
+            raise DifferenceError(f"now it {doing}; then {describe(row)}")
+        return self.take()
+
+
+def describe(row: Row) -> str:
+    """Return what the process did when a row was written."""
+    if row.kind in INPUTS:
+        return "the callback ended there"
+    texts = {
+        Kind.PUBLISHED: f"it published by publisher {row.number}",
+        Kind.REQUESTED: "it called a service or set a parameter",
+        Kind.VALUE: f"it read the value {row.data[:200].decode(errors='replace')}",
+        Kind.FILE: f"it read the file {row.data[:200].decode(errors='replace')}",
+    }
+    return texts.get(row.kind, f"it read {row.kind.name} {row.number}")
+
+
+class _Flag:
+    def __init__(self, rows: Rows, number: int):
+        self._rows, self._number = rows, number
+        self._value, self._same = False, 0
+
+    def __call__(self) -> bool:
+        row = self._rows.next
+        if (
+            row is not None
+            and row.kind is Kind.FLAG
+            and row.number == self._number
+            and row.value == self._same
+        ):
+            self._rows.take()
+            self._value, self._same = not self._value, 0
+        else:
+            self._same += 1
+        return self._value
+
+
+class _Publisher(ExternalPublisher):
+    def __init__(self, transport: "ReplayTransport", number: int, topic: str, flag: _Flag):
+        self._transport, self._number, self._topic = transport, number, topic
+        self._flag = flag
+
+    def note(self, message: genpy.Message) -> None:
+        transport = self._transport
+        transport.on_publish(self._topic, message)
+        rows, doing = transport.rows, f"publishes on {self._topic}"
+        row = rows.expect(Kind.PUBLISHED, self._number, doing)
+        if row.value != transport.digest.add(message):
+            raise DifferenceError(f"other values are published on {self._topic}")
+
+    def has_subscribers(self) -> bool:
+        return self._flag()
+
+    def publish(self, *messages: genpy.Message) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+class _Subscriber(ExternalSubscriber):
+    def __init__(self, rows: Rows, number: int, topic: str, types: tuple[Any, Any], flag: _Flag):
+        self.topic = topic
+        self.deliver: Receiver
+        self._rows, self._number, self._types, self._flag = rows, number, types, flag
+        self._empty = 0
+
+    def message(self, data: bytes) -> Any:
+        plain, keeping = self._types
+        message = (plain if data[0] & PLAIN else keeping)().deserialize(data[1:])
+        caller = self._rows.names[Kind.CALLER].get(data[0] & ~PLAIN)
+        if caller is not None:
+            message._connection_header = dict(zip(("callerid", "topic"), caller, strict=True))
+        return message
+
+    def has_publishers(self) -> bool:
+        return self._flag()
+
+    def collect(self) -> None:
+        expected, found = self._empty, False
+        while (
+            (row := self._rows.next) is not None
+            and row.kind is Kind.COLLECTED
+            and row.number == self._number
+            and row.value == expected
+        ):
+            self._rows.take()
+            expected, found = SAME_COLLECTION, True
+            self.deliver(self.message(row.data))
+        self._empty = 0 if found else self._empty + 1
+
+    def close(self) -> None:
+        pass
+
+
+class ReplayTransport(Transport):
+    """Answers as the transport did that was recorded."""
+
+    def __init__(self, rows: Rows):
+        self.rows, self.digest = rows, Digest()
+        #: Called with the topic and each message that is published, before it is compared.
+        self.on_publish: Callable[[str, genpy.Message], None] = lambda topic, message: None
+        self.on_log: Callable[[str, str], None] = lambda level, text: None
+        #: subscribers, services: By their numbers in the journal.
+        self.subscribers: dict[int, _Subscriber] = {}
+        self.services: dict[int, tuple[str, Any, Serve]] = {}
+        #: requests: Number to type, or None, and future of the answer.
+        self.requests: dict[int, tuple[Any, Future[Any]]] = {}
+        self._names: dict[str, str] = {}
+        self._publishers = self._requests = self._flags = 0
+
+    def _flag(self):
+        self._flags += 1
+        return _Flag(self.rows, self._flags)
+
+    def value(self, what: str, doing: str) -> Any:
+        """Return what was read then, or raise it; ``doing`` is what the process does now."""
+        row = self.rows.expect(Kind.VALUE, 0, doing)
+        then, is_value, *rest = json.loads(row.data)
+        if then != what:
+            raise DifferenceError(f"now it {doing}; then it read {then}")
+        if is_value:
+            return rest[0]
+        kind, text = rest
+        error = ServiceError if kind == "ServiceError" else getattr(builtins, kind, OSError)
+        raise error(text)
+
+    def remap(self, name: str) -> str:
+        """Return a remapped name."""
+        if name not in self._names:
+            self._names[name], row = name, self.rows.next
+            if row is not None and row.kind is Kind.NAME:
+                first, mapped = json.loads(row.data)
+                if first == name:
+                    self._names[name] = mapped
+                    self.rows.take()
+        return self._names[name]
+
+    def get_param(self, name: str) -> Any:
+        """Return a parameter."""
+        return self.value(name, f"reads the parameter {name}")
+
+    def set_param(self, name: str, value: Any) -> None:
+        """Do nothing, or fail as then."""
+        self.value(f"set {name}", f"sets the parameter {name}")
+
+    def set_param_later(self, name: str, value: Any) -> "Future[None]":
+        """Return a future of the recorded end."""
+        return self._request(None, name, repr(value).encode())
+
+    def advertise(self, topic: str, message_type: Any, latch: bool) -> ExternalPublisher:
+        """Return a publisher whose messages are compared."""
+        self._publishers += 1
+        self.rows.check_name(Kind.ADVERTISED, self._publishers, topic, message_type._type)
+        return _Publisher(self, self._publishers, topic, self._flag())
+
+    def subscribe(
+        self, topic: str, message_type: Any, deliver: Receiver, may_wait: Condition = never
+    ) -> ExternalSubscriber:
+        """Return a subscription whose messages are in the journal."""
+        number = len(self.subscribers) + 1
+        self.rows.check_name(Kind.SUBSCRIBED, number, topic, message_type._type)
+        types = plain_type(message_type), keeps_data(message_type)
+        own = self.subscribers[number] = _Subscriber(self.rows, number, topic, types, self._flag())
+        own.deliver = deliver
+        return own
+
+    def advertise_service(self, name: str, service_type: Any, serve: Serve) -> Callable[[], None]:
+        """Keep a service for the calls in the journal."""
+        number = len(self.services) + 1
+        self.rows.check_name(Kind.OFFERED, number, name, service_type._type)
+        self.services[number] = name, service_type, serve
+        self.value("offer", f"offers the service {name}")
+        return lambda: None
+
+    def call_service(
+        self, name: str, service_type: type, request: Any, limit: float, start_limit: float
+    ) -> Future[Any]:
+        """Return a future of the recorded answer."""
+        return self._request(service_type, name, serialized(request))
+
+    def _request(self, service_type, name, content):
+        self._requests += 1
+        number = self._requests % 0x10000
+        row = self.rows.expect(Kind.REQUESTED, number, f"calls or sets {name}")
+        if row.value != zlib.crc32(name.encode() + content):
+            raise DifferenceError(f"now it calls or sets {name} with something else")
+        future: Future[Any] = Future()
+        self.requests[number] = service_type, future
+        return future
+
+    def service_nodes(self) -> dict[str, str]:
+        """Return the services of then."""
+        return self.value("services", "looks for services")
+
+    def living_node(self, name: str) -> str | None:
+        """Return the process of then."""
+        return self.value(f"node {name}", f"looks for the node {name}")
+
+    def log(self, level: str, text: str) -> None:
+        """Pass a text on."""
+        self.on_log(level, text)
+
+    def clock_was_set(self, stamp: genpy.Time) -> None:
+        """Do nothing."""

@@ -1,0 +1,76 @@
+"""A process without ROS, whose clocks are set by hand: for tests, and for replays of journals."""
+
+from collections.abc import Callable
+from typing import Any
+
+from typing_extensions import override
+
+from crazyflie_utils.node import Node, Process
+from crazyflie_utils.timers import Executor, SimulatedClock, TimerQueue
+from crazyflie_utils.topics import Transport
+
+
+class WallClock(SimulatedClock):
+    """Simulated time whose stamps are those of a wall clock that can be set."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.wall_offset = 0.0  #: Wall clock minus `time`, s.
+
+    @override
+    def nanoseconds(self, moment: float | None = None) -> int:
+        return super().nanoseconds(moment) + round(self.wall_offset * 1e9)
+
+
+class OfflineProcess(Process):
+    """The real node handle, executor, timers and tf buffer with a given transport.
+
+    ``clock`` is simulated time, and ``machine_clock`` that of the machine, for ``steady`` timers;
+    both begin at ``start`` (s). Stamps are those of ``clock`` plus its ``wall_offset`` (s): a
+    change of it is a step of the wall clock.
+    """
+
+    clock: WallClock
+
+    def __init__(
+        self,
+        transport: Transport,
+        start: float,
+        recorder: Any = None,
+        executor: Executor | None = None,
+    ):
+        super().__init__(transport, True, WallClock(), recorder, executor)
+        self.clock.set(start)
+        self.machine_clock = SimulatedClock()
+        self.machine_clock.set(start)
+        tf = self.transforms.gather, self.transforms.send_gathered
+        self._steady = TimerQueue(self.executor, self.machine_clock, *tf)
+        self.machine_clock.on_change(lambda now, _: self._steady.run_due(now))
+        if recorder is not None:
+            recorder.begin = lambda _: round(self.clock.wall_offset * 1e9)
+        self.set_clock: Callable[[float], None] = self._setter(0, self.clock)
+        self.set_machine_clock: Callable[[float], None] = self._setter(1, self.machine_clock)
+        self.executor.start()
+
+    def initialize(self, node: Node, name: str) -> bool:
+        """Initialize a node by its absolute name; return what ``node.initialize`` returned."""
+        outcome: list[bool] = []
+
+        def run():
+            if self.recorder is not None:
+                self.recorder.launch(node, name)
+            outcome.append(node.initialize(self.handle(name)))
+
+        # Queued as work: a latched message must wait until the node is complete.
+        self.executor.submit(run)
+        return outcome[0]
+
+    def _setter(self, number, clock):
+        if self.recorder is None:
+            return clock.set
+
+        def set_recorded(moment):
+            self.recorder.set_clock(number, moment)
+            clock.set(moment)
+
+        return set_recorded

@@ -1,0 +1,303 @@
+"""Journals: what a process was given is written, and gives the same when it is run again."""
+
+import errno
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from std_msgs.msg import Empty, Float64, String
+from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest
+
+from crazyflie_utils import Node
+from crazyflie_utils.journal import journal_file
+from crazyflie_utils.journal.journal_file import (
+    WITH_DATA,
+    Journal,
+    JournalError,
+    JournalWriter,
+    Kind,
+    Row,
+)
+from crazyflie_utils.journal.recording import Recorder
+from crazyflie_utils.journal.replay import Replay
+from crazyflie_utils.journal.replay_transport import DifferenceError, EndError
+from crazyflie_utils.parameters.declaration import Parameters, parameter
+from crazyflie_utils.parameters.types import Number
+from crazyflie_utils.testing import FakeProcess
+
+HEADER = {"node": "/mean", "program": "", "clock": "manual", "start": 100.0, "us": 0}
+
+
+class MeanParameters(Parameters):
+    """Parameters of the node."""
+
+    gain: float = parameter(Number(), "gain", 2.0, live=True)
+
+
+class MeanNode(Node[MeanParameters]):
+    """Uses each kind of input."""
+
+    factor = 1.0
+
+    def __init__(self):
+        self.last = 0.0
+        self.count = 0
+
+    def register_callbacks(self, handle):
+        self.out = handle.publisher("/out", Float64)
+        self.text = handle.publisher("/text", String, latch=True)
+        handle.advertise_service("/set", SetBool, self.on_set)
+        handle.subscribe("/in", Float64, self.on_in)
+        handle.subscribe("/latest", Float64, self.on_latest, latest_only=True)
+        handle.subscribe("/fail", Empty, self.on_fail)
+        handle.timer(0.1, self.on_timer)
+        handle.timer(0.25, self.on_steady, steady=True)
+
+    def on_in(self, message):
+        self.count += 1
+        self.last = self.factor * self._parameters.gain * message.data
+        self.out.publish(Float64(self.last + self._handle.time()))
+
+    def on_latest(self, message):
+        self.last += message.data
+
+    def on_timer(self):
+        if self.out.has_subscribers():
+            self.out.publish(Float64(self.last))
+
+    def on_steady(self):
+        self.text.publish(String(f"{self.count} {self._handle.stamp().to_sec():.3f}"))
+
+    def on_set(self, request):
+        asked = self._handle.call_service("/other", Trigger, TriggerRequest(), 1.0)
+        asked.add_done_callback(lambda done: self.text.publish(String(str(done.exception()))))
+        return SetBoolResponse(request.data, f"{self.count}")
+
+    def on_fail(self, _):
+        raise RuntimeError("as asked")
+
+
+def fly(path, report=print, keep=1e9):
+    """Record a process that is given a bit of everything; it is not ended."""
+    recorder = Recorder(JournalWriter(path, HEADER, keep, report))
+    process = FakeProcess({"/mean/gain": 3.0}, recorder=recorder)
+    assert process.launch(MeanNode(), "/mean")
+    for k in range(20):
+        process.publish("/in", Float64(0.1 * k))
+        process.publish("/latest", Float64(k))
+        process.advance(0.03)
+        if k == 7:
+            assert process.call("/set", SetBoolRequest(True)).message == "8"
+        if k == 10:
+            process.reconfigure("/mean", gain=4.0)
+        if k == 12:
+            process.publish("/fail", Empty())
+        if k == 15:
+            process.clock.wall_offset = 5.0
+    return process
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "mean.journal"
+
+
+@pytest.fixture
+def recorded(path):
+    process = fly(path)
+    process.recorder.close()
+    return path
+
+
+def run_again(path):
+    """Return the replay of a journal, run to its end."""
+    replay = Replay(Journal(path))
+    replay.published = []
+    replay.transport.on_publish = lambda topic, message: replay.published.append((topic, message))
+    assert replay.start()
+    while replay.step():
+        pass
+    return replay
+
+
+def test_a_replay_publishes_the_same(path):
+    process = fly(path)
+    process.recorder.close()
+    replay = run_again(path)
+    for topic in ("/out", "/text"):
+        again = [message for name, message in replay.published if name == topic]
+        assert again == process.published(topic)
+    assert len(again) > 2
+    assert replay.journal.damage == ""
+    assert replay.nodes["/mean"].count == 20
+    assert not (path.parent / "mean.journal.tail").exists()
+
+
+def test_other_code_is_found_with_time_and_callback(recorded, monkeypatch):
+    monkeypatch.setattr(MeanNode, "factor", 1.001)
+    replay = Replay(Journal(recorded))
+    replay.start()
+    with pytest.raises(DifferenceError, match="other values are published on /out"):
+        while replay.step():
+            pass
+    # The first message that is not zero.
+    assert replay.input_name == "a message on /in"
+    assert replay.process.clock.time() == pytest.approx(100.03)
+
+
+def test_other_topics_are_named(recorded, monkeypatch):
+    register = MeanNode.register_callbacks
+
+    def with_one_more(self, handle):
+        handle.publisher("/more", Float64)
+        register(self, handle)
+
+    monkeypatch.setattr(MeanNode, "register_callbacks", with_one_more)
+    replay = Replay(Journal(recorded))
+    replay.start()
+    with pytest.raises(DifferenceError, match="advertised now: .*/more.*; then: .*/out"):
+        while replay.step():
+            pass
+
+
+def test_a_process_that_was_killed_is_run_up_to_its_last_callback(path):
+    process = fly(path)
+    # Nothing was written but the tail in memory, which outlives the process.
+    assert path.stat().st_size < 1000
+    replay = run_again(path)
+    assert replay.nodes["/mean"].count == 20
+    again = [message for topic, message in replay.published if topic == "/out"]
+    assert again == process.published("/out")
+
+
+def test_a_fault_happens_again(recorded):
+    replay, faults = Replay(Journal(recorded)), []
+    replay.transport.on_log = lambda level, text: faults.append(text) if level == "error" else None
+    replay.start()
+    while replay.step():
+        pass
+    assert len(faults) == 1
+    assert "RuntimeError: as asked" in faults[0]
+
+
+@given(st.data())
+def test_a_damaged_journal_is_read_to_the_damage(tmp_path_factory, data):
+    folder = tmp_path_factory.mktemp("damaged")
+    fly(folder / "whole.journal").recorder.close()
+    content = bytearray((folder / "whole.journal").read_bytes())
+    at = data.draw(st.integers(0, len(content) - 1))
+    if data.draw(st.booleans()):
+        del content[at:]
+    else:
+        content[at] ^= data.draw(st.integers(1, 255))
+    path = folder / "damaged.journal"
+    path.write_bytes(content)
+    try:
+        replay = Replay(Journal(path))
+        replay.start()
+        while replay.step():
+            pass
+    except (JournalError, EndError):
+        return
+    except DifferenceError:
+        # Only the header is not covered by a checksum.
+        assert at < content.index(b"\n")
+        return
+    assert replay.journal.damage or at < content.index(b"\n")
+
+
+@given(st.lists(st.tuples(st.sampled_from(Kind), st.integers(0, 5), st.binary(max_size=40))))
+def test_a_mixed_up_journal_is_refused_and_runs_nothing_of_its_own(tmp_path_factory, rows):
+    path = tmp_path_factory.mktemp("hostile") / "hostile.journal"
+    writer = JournalWriter(path, HEADER, 1e9, print)
+    launch = json.dumps(["/mean", "os:abort"]).encode()
+    for kind, number, data in rows:
+        writer.row(kind, number, 0, data if kind in WITH_DATA else None)
+    writer.row(Kind.LAUNCH, 0, 0, launch)
+    writer.close()
+    with pytest.raises((JournalError, DifferenceError, EndError)):
+        replay = Replay(Journal(path))
+        replay.start()
+        while replay.step():
+            pass
+
+
+@pytest.mark.parametrize("program", ["os:abort", "subprocess:run", "no_such_module:Node", "os"])
+def test_only_nodes_are_made(path, program):
+    JournalWriter(path, {**HEADER, "clock": "steady", "program": program}, 1.0, print).close()
+    with pytest.raises(JournalError, match=program):
+        Replay(Journal(path)).start()
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"", "is not a journal"),
+        (b"#ROSBAG V2.0\n", "is not a journal"),
+        (b'{"format": "crazyflie journal 99"}\n', "crazyflie journal 99"),
+        (b'{"format": "crazyflie journal 1", "node": 3}\n', "node is 3; expected str"),
+    ],
+)
+def test_what_is_no_journal_is_named(path, content, reason):
+    path.write_bytes(content)
+    with pytest.raises(JournalError, match=reason):
+        Journal(path)
+
+
+def test_a_full_disk_ends_the_journal_and_not_the_process(path, monkeypatch):
+    reports = []
+
+    def no_space(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(JournalWriter, "_write", no_space)
+    process = fly(path, reports.append)
+    process.recorder._writer._finish(0.0)
+    process.recorder._writer._chunks.put((0, b"", None, 0.0))
+    process.recorder._writer._thread.join(5.0)
+    assert len(reports) == 1
+    assert "No space left on device" in reports[0]
+    before = len(process.published("/out"))
+    process.publish("/in", Float64(1.0))
+    assert len(process.published("/out")) == before + 1
+
+
+def test_a_journal_that_cannot_be_begun_says_why(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(JournalError, match="file/a.journal cannot be written"):
+        JournalWriter(tmp_path / "file" / "a.journal", HEADER, 1.0, print)
+
+
+def test_the_start_and_the_newest_rows_are_kept(path, monkeypatch):
+    monkeypatch.setattr(journal_file, "_MAX_BACKLOG", 1000)
+    writer = JournalWriter(path, HEADER, 60.0, print)
+    writer.row(Kind.VALUE, 0, 0, b'["a", true, 1]')
+    writer.end_start()
+    for second in range(1, 1001):
+        writer.pause(float(second))
+        writer.row(Kind.TIMERS, 0, second)
+    writer.close()
+    journal = Journal(path)
+    chunks = list(journal._chunks())
+    values = [row.value for _, data in chunks[1:] for row in journal._rows(data)]
+    assert chunks[0][1].endswith(b'["a", true, 1]')
+    assert values[-1] == 1000
+    assert 60 <= len(values) <= 120
+    assert len(list(journal.rows())) == 1
+    assert "older ones were dropped" in journal.damage
+
+
+@pytest.mark.parametrize("size", [0, 10, 0xFFFE, 0xFFFF, 200_000, 1_000_000])
+def test_rows_of_any_size(path, size):
+    writer = JournalWriter(path, HEADER, 1e9, print)
+    data = [bytes([k]) * size for k in (1, 2, 3)]
+    for each in data:
+        writer.row(Kind.MESSAGE, 7, 9, each)
+        writer.row(Kind.TIMERS, 0, 1)
+    writer.close()
+    rows = list(Journal(path).rows())
+    assert [row for row in rows if row.kind is Kind.MESSAGE] == [
+        Row(Kind.MESSAGE, 7, 9, each) for each in data
+    ]
+    assert len(rows) == 6

@@ -115,10 +115,14 @@ class States:
         self._states.put((state, text))
 
     def wait_for(self, state):
+        return self.wait_for_first(state)[1]
+
+    def wait_for_first(self, *wanted):
+        """Return the first state of these that comes, and its text."""
         while True:
             seen, text = self._states.get(timeout=LIMIT)
-            if seen is state:
-                return text
+            if seen in wanted:
+                return seen, text
 
 
 @pytest.fixture

@@ -97,6 +97,15 @@ def forget_dead_radios() -> None:
                     radio._rsp_queues.clear()
 
 
+def lacks_safelink(driver: CRTPDriver) -> bool:
+    """Return whether a radio link has no numbered packets (safelink), once it is heard.
+
+    Without them a packet whose acknowledgement is lost arrives twice, and a vehicle that still
+    expects numbers drops packets. cflib asks for them in its first ten packets only.
+    """
+    return isinstance(driver, RadioDriver) and driver.needs_resending
+
+
 def release(driver: CRTPDriver) -> None:
     """End the thread of a radio link, even if a dead dongle blocks it; never blocks."""
     if not isinstance(driver, RadioDriver):

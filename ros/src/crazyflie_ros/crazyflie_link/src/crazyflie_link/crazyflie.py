@@ -19,6 +19,7 @@ from crazyflie_link.errors import (
     CrazyflieError,
     LinkLostError,
     NoAnswerError,
+    NoSafelinkError,
     RefusedError,
     UnknownNameError,
     ValueRangeError,
@@ -303,8 +304,21 @@ class Crazyflie:
                 link.close(reason)
 
     def _open(self):
+        try:
+            self._open_link(needs_safelink=True)
+        except NoSafelinkError:
+            # It hears now. Other firmware may not have it.
+            self._open_link(needs_safelink=False)
+
+    def _open_link(self, needs_safelink):
         folder = table_cache() if self._cache is None else self._cache
-        self._opening = link = Link(self.address, self._limits, folder, self._on_received)
+        self._opening = link = Link(
+            self.address,
+            self._limits,
+            folder,
+            self._on_received,
+            needs_safelink=needs_safelink,
+        )
         link.cflib.packet_sent.add_callback(self._on_sent)
         link.cflib.link_statistics.uplink_rssi_updated.add_callback(self._on_rssi)
         try:

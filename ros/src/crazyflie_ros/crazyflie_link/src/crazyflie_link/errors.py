@@ -23,6 +23,10 @@ class SetupError(CrazyflieError):
     """The vehicle answers, but the connection could not be set up."""
 
 
+class NoSafelinkError(SetupError):
+    """The vehicle was first heard after cflib had given up to ask for numbered packets."""
+
+
 class LinkLostError(CrazyflieError):
     """The connection does not exist, or was lost."""
 

@@ -23,12 +23,19 @@ from cflib.crazyflie.toc import CMD_TOC_INFO_V2, CMD_TOC_ITEM_V2, TOC_CHANNEL
 from cflib.crtp.crtpstack import CRTPPacket, CRTPPort
 
 from crazyflie_link.address import Address
-from crazyflie_link.cflib_internals import SafeCrazyflie, forget_dead_radios, init_drivers, packet
+from crazyflie_link.cflib_internals import (
+    SafeCrazyflie,
+    forget_dead_radios,
+    init_drivers,
+    lacks_safelink,
+    packet,
+)
 from crazyflie_link.errors import (
     UNANSWERED,
     CrazyflieError,
     LinkLostError,
     NoAnswerError,
+    NoSafelinkError,
     SetupError,
     ValueRangeError,
     explain,
@@ -37,6 +44,8 @@ from crazyflie_link.transmission import MaySend, Request, Send, Transmission
 
 LOG_DATA = (CRTPPort.LOGGING, CHAN_LOGDATA)  #: Port and channel of log data.
 
+#: Port and channel of packets that the radio chip sends by itself, without the main processor.
+_NULL = (CRTPPort.LINKCTRL, 3)
 _PING = (CRTPPort.LINKCTRL, ECHO_CHANNEL)
 _SOURCE_PERIOD, _CHECK_PERIOD = 0.1, 0.05
 
@@ -249,7 +258,8 @@ class Link:
     """A connection that is opened once and closed once.
 
     The cache is the folder of the tables; ``on_packet(port, channel, data)`` is called for every
-    packet, in cflib's thread. For ``put``, ``put_latest`` and ``discard`` see `Transmission`.
+    packet, in cflib's thread. With ``needs_safelink`` a radio link without numbered packets is not
+    set up: see `lacks_safelink`. For ``put``, ``put_latest`` and ``discard`` see `Transmission`.
     """
 
     def __init__(
@@ -258,8 +268,10 @@ class Link:
         limits: LinkTimeouts | None = None,
         cache: str | None = None,
         on_packet: OnPacket | None = None,
+        needs_safelink: bool = False,
     ):
         self.address = address
+        self._needs_safelink = needs_safelink
         self._limits = limits or LinkTimeouts()
         self._on_packet = on_packet
         self._setup = LinkSetup(address.uri, self._limits)
@@ -286,7 +298,8 @@ class Link:
     def open(self) -> None:
         """Connect: find the vehicle, read its tables and parameters; blocks.
 
-        Raises `CrazyflieError` with the reason and what to do; the link is closed then.
+        Raises `CrazyflieError` with the reason and what to do, `NoSafelinkError` if another attempt
+        helps at once; the link is closed then.
         """
         try:
             init_drivers()
@@ -401,13 +414,21 @@ class Link:
             else:
                 self.error = cause
 
+    def _check_safelink(self):
+        if self._needs_safelink and lacks_safelink(self.cflib.link):
+            with self._lock:
+                self.error = self.error or NoSafelinkError(f"{self.address.uri}: no safelink")
+
     # cflib's thread goes on after an exception in here.
 
     def _on_received(self, received):
         self._radio_error = ""
         port, channel, data = received.port, received.channel, bytes(received.data)
         if not self._complete.is_set():
-            self._setup.receive(port, channel, data)
+            self._check_safelink()
+            # Of a vehicle that starts, the radio chip is heard before.
+            if (port, channel) != _NULL:
+                self._setup.receive(port, channel, data)
         if (port, channel) == LOG_DATA:
             self.monitor.log_received(time.monotonic())
         elif (port, channel) == _PING:

@@ -2,7 +2,7 @@
 
 import socket
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import usb
@@ -16,12 +16,59 @@ Place = tuple[int, int]  #: Channel, and last byte of the address, of a vehicle.
 
 NULL = 0xF3
 LINK_BITS = 3 << 2
+_UP, _DOWN = 1 << 3, 1 << 2  #: Bits of the numbers of packets, which alternate, in both directions.
+_SAFELINK = 0x05  #: First byte of the request for numbered packets; the second one is on or off.
+
+
+class RadioChip:
+    """The radio chip of a vehicle, behind which its processor is a UDP port of this machine.
+
+    Source: the behaviour of crazyflie2-nrf-firmware. With safelink, on at request, a packet with the
+    number of the one before is acknowledged and dropped: it was sent again because the
+    acknowledgement was lost. So is the data that comes back sent again, until its arrival is
+    confirmed.
+    """
+
+    def __init__(self, port: int):
+        self.link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.link.connect(("127.0.0.1", port))
+        self.link.setblocking(False)
+        self.has_safelink = False
+        self._up = self._down = 0
+        self._answer = b""
+
+    def exchange(self, data: bytes) -> bytes:
+        """Return what comes with the acknowledgement of a packet."""
+        if data[0] & NULL == NULL and data[1:2] == bytes([_SAFELINK]) and len(data) == 3:
+            self.has_safelink = bool(data[2])
+            self._up, self._down, self._answer = _UP, _DOWN, b""
+            return data
+        is_new = not self.has_safelink or data[0] & _UP != self._up
+        is_confirmed = not self.has_safelink or data[0] & _DOWN != self._down
+        self._up, self._down = data[0] & _UP, data[0] & _DOWN
+        if is_new and (data[0] & NULL != NULL or len(data) > 1):
+            # Bits of the numbers.
+            self.link.send(bytes([data[0] | LINK_BITS, *data[1:]]))
+        if is_confirmed:
+            self._answer = self._receive()
+        if not self.has_safelink or not self._answer:
+            return self._answer
+        return bytes([self._answer[0] & ~_DOWN | self._down, *self._answer[1:]])
+
+    def _receive(self):
+        try:
+            return self.link.recv(64)
+        except BlockingIOError:
+            # A real one needs about so long.
+            time.sleep(0.001)
+            return bytes([NULL]) if self.has_safelink else b""
 
 
 class Dongle:
     """A USB device that passes packets on to vehicles, by their places.
 
-    ``ports`` are their UDP ports of this machine.
+    ``ports`` are their UDP ports of this machine. ``silent`` are places where no vehicle hears;
+    ``lose()`` returns whether the next acknowledgement is lost.
     As the real one it gives no answer, and sends to all of the channel, if acknowledgements are
     off and the address is that of broadcasts.
     """
@@ -29,8 +76,9 @@ class Dongle:
     bcdDevice = 0x0053  # noqa: N815
 
     def __init__(self, ports: Mapping[Place, int]):
-        self._peers = ports
-        self._sockets: dict[Place, socket.socket] = {}
+        self.chips = {place: RadioChip(port) for place, port in ports.items()}
+        self.silent: set[Place] = set()
+        self.lose: Callable[[], bool] = lambda: False
         self._channel, self._acknowledges = 2, True
         self._address: tuple[int, ...] = (0xE7,) * 5
         self._answer: bytes | None = None
@@ -67,31 +115,19 @@ class Dongle:
         self._check()
         if not self._acknowledges:
             assert self._address == BROADCAST_ADDRESS
-            for place in self._peers:
-                if place[0] == self._channel:
-                    self._link(place).send(bytes([data[0] & ~LINK_BITS, *data[1:]]))
+            for (channel, _), chip in self.chips.items():
+                if channel == self._channel:
+                    chip.link.send(bytes([data[0] & ~LINK_BITS, *data[1:]]))
             return
         place = (self._channel, self._address[-1])
-        if place not in self._peers:
-            self._answer = b"\0"
-            return
-        link = self._link(place)
-        if data[0] & NULL != NULL:
-            # Bits that cflib's numbering of packets clears.
-            link.send(bytes([data[0] | LINK_BITS, *data[1:]]))
-        try:
-            self._answer = b"\1" + link.recv(64)
-        except BlockingIOError:
-            self._answer = b"\1"
-            # A real one needs about so long.
+        self._answer = b"\0"
+        if place not in self.chips or place in self.silent:
+            # It is tried again and again; a real one needs about so long.
             time.sleep(0.001)
-
-    def _link(self, place):
-        if place not in self._sockets:
-            link = self._sockets[place] = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-            link.connect(("127.0.0.1", self._peers[place]))
-            link.setblocking(False)
-        return self._sockets[place]
+            return
+        answer = self.chips[place].exchange(bytes(data))
+        if not self.lose():
+            self._answer = b"\1" + answer
 
     def read(self, endpoint: int, size: int, timeout: float) -> bytes:
         """Return the answer to the last packet."""

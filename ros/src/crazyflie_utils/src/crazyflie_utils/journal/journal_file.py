@@ -27,8 +27,9 @@ from typing import Any, NamedTuple
 
 FORMAT = "crazyflie journal 1"  #: The first field of the header; another format has another number.
 #: Fields of each header: absolute name of the process's node; "package.module:name" of what made
-#: the nodes; "steady", "simulated" or "manual"; time of the machine's clock at the beginning (us).
-_HEADER = {"node": str, "program": str, "clock": str, "us": int}
+#: the nodes; "steady", "simulated" or "manual"; the machine's clock at the beginning, us; time of a
+#: manual clock at the beginning, s.
+_HEADER = {"node": str, "program": str, "clock": str, "us": int, "start": float}
 SUFFIX = ".journal"  #: Of a journal's file.
 
 _CHUNK = struct.Struct("<4sIIII")  # Mark, number, bytes compressed and not, CRC of the compressed.
@@ -142,14 +143,14 @@ class JournalWriter:
     def __init__(
         self, path: Path, header: dict[str, Any], keep: float, report: Callable[[str], None]
     ):
-        self.path, self.header, self.is_open = path, header, True
+        self.path, self.header, self.is_open = path, {"format": FORMAT, "start": 0.0} | header, True
         self._report, self._keep = report, keep
         self._count, self._starts, self._has_failed = 0, True, False
         self._start_end = 0
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = open(path, "w+b", buffering=0)
-            self._file.write(json.dumps({"format": FORMAT, **header}).encode() + b"\n")
+            self._file.write(json.dumps(self.header).encode() + b"\n")
             self._header_end = self._file.tell()
             self._tail_path = path.with_name(path.name + ".tail")
             tail = os.open(self._tail_path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)

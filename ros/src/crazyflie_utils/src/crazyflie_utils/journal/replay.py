@@ -139,7 +139,8 @@ class _OfflineProcess(OfflineProcess):
 class Replay:
     """Runs the nodes of a journal again: `start`, then `step` until it returns False.
 
-    These raise `DifferenceError` when the nodes do something else than then, `EndError` when the
+    Within its with block, files are read from the journal. These methods raise `DifferenceError`
+    when the nodes do something else than then, `EndError` when the
     journal ends within a callback, and `JournalError` when they cannot be run.
     """
 
@@ -157,6 +158,13 @@ class Replay:
             self.process = _OfflineProcess(self.transport, header["start"], self._executor)
         else:
             self.process = _RosProcess(self.transport, header["clock"], self._executor, self.rows)
+
+    def __enter__(self) -> "Replay":
+        self._read, text_file.content = text_file.content, self._file
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        text_file.content = self._read
 
     @property
     def time(self) -> float:
@@ -182,7 +190,6 @@ class Replay:
 
     def start(self) -> bool:
         """Make and initialize the nodes; return whether that succeeded."""
-        text_file.content = self._file
         header = self.journal.header
         if isinstance(self.process, _OfflineProcess):
             return True

@@ -74,8 +74,10 @@ class Rows:
 
     def check_name(self, kind: Kind, number: int, *names: str) -> None:
         """Raise `DifferenceError` if something with a number had other names."""
-        if self.names[kind].get(number) != list(names):
-            then = self.names[kind].get(number, "nothing more")
+        then = self.names[kind].get(number, "nothing more")
+        if then != list(names):
+            if self.next is None:
+                raise EndError
             raise DifferenceError(f"{kind.name.lower()} now: {names}; then: {then}")
 
     def expect(self, kind: Kind, number: int, doing: str) -> Row:

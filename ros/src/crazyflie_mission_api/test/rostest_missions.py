@@ -3,9 +3,12 @@
 import math
 import re
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+import rosnode
 import rospkg
 from flown import LIMIT, nearest, recorded, run, script
 
@@ -97,6 +100,76 @@ def test_ctrl_c_lands_and_what_is_wrong_is_known_before(tmp_path):
         finally:
             process.kill()
         assert "KeyboardInterrupt" in errors
+        assert landed(tracks)
+
+
+SHUT_DOWN = """
+import pathlib, sys, rospy
+from crazyflie_mission_api import Fleet
+
+with Fleet(["cf1", "cf2"]) as fleet:
+    fleet.takeoff(0.8)
+    pathlib.Path(sys.argv[1]).touch()
+    {ending}
+"""
+NODE = "/flier"
+
+SECOND_NODE = "import rospy; rospy.init_node('flier')"
+
+
+def ctrl_c(process):
+    """Send the signal of Ctrl-C to a script."""
+    process.send_signal(signal.SIGINT)
+
+
+def kill_node(_):
+    """Ask the script's node to shut down, as rosnode kill does."""
+    assert rosnode.kill_nodes([NODE]) == ([NODE], [])
+
+
+def start_second_node(_):
+    """Start another node of the script's name; the master shuts the first one down."""
+    subprocess.run([sys.executable, "-c", SECOND_NODE], check=True, timeout=LIMIT)
+
+
+@pytest.mark.parametrize(
+    ("ending", "end", "status"),
+    [
+        ("rospy.spin()", ctrl_c, 0),
+        ("rospy.spin()", kill_node, 0),
+        ("fleet.wait(1e6)", kill_node, 1),
+        ("fleet.wait(1e6)", start_second_node, 1),
+        ("fleet.wait(1.0); rospy.signal_shutdown('enough')", lambda process: None, 0),
+    ],
+)
+def test_however_ros_is_shut_down_the_mission_lands_before(tmp_path, ending, end, status):
+    path, flies = written(tmp_path, SHUT_DOWN.format(ending=ending)), tmp_path / "flies"
+    arguments = [flies, f"__name:={NODE[1:]}"]
+    with recorded(["cf1", "cf2"]) as tracks, script(path, *arguments) as process:
+        try:
+            peer.wait_until(flies.exists, "takeoff", LIMIT)
+            assert all(track[-1][2] > 0.6 for track in tracks.values())
+            end(process)
+            _, errors = process.communicate(timeout=LIMIT)
+        finally:
+            process.kill()
+        # Later the fleet's process would land them, as it does when a script is killed.
+        assert landed(tracks), errors
+    assert "MAY STILL FLY" not in errors
+    assert process.returncode == status, errors
+
+
+def test_a_mission_whose_terminal_is_closed_lands(tmp_path):
+    path, flies = written(tmp_path, SHUT_DOWN.format(ending="fleet.wait(1e6)")), tmp_path / "flies"
+    with recorded(["cf1", "cf2"]) as tracks, script(path, flies) as process:
+        try:
+            peer.wait_until(flies.exists, "takeoff", LIMIT)
+            # From now on, whatever the script logs fails.
+            process.stderr.close()
+            process.send_signal(signal.SIGHUP)
+            process.wait(LIMIT)
+        finally:
+            process.kill()
         assert landed(tracks)
 
 

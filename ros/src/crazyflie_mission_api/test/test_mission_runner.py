@@ -33,7 +33,7 @@ with Fleet(sys.argv[1:]) as fleet:
 def vehicle(monkeypatch):
     """Return the vehicle of a process that scripts find."""
     process = fake_process(monkeypatch)
-    monkeypatch.setattr(fleet, "begin_script", lambda name: (process, lambda: None))
+    monkeypatch.setattr(fleet, "begin_script", lambda *_: (process, lambda: None))
     monkeypatch.setattr(fleet, "catch_signals", lambda: None)
     monkeypatch.setattr(observer, "of_process", MissionObserver())
     monkeypatch.setattr("sys.argv", [])

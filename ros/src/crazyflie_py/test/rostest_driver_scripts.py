@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 import rospy
-from scripted import EXAMPLES, fly, run
+from scripted import EXAMPLES, ctrl_c, fly, kill_node, run, run_until
+
+from crazyflie_msgs.msg import VehicleStatus
 
 NEAR = 0.15
 """m; the vehicles estimate their positions."""
@@ -33,3 +35,32 @@ def test_setpoints():
     track = fly("velocity_circle.py")[:, 0]
     assert np.ptp(track[:, 0]) == pytest.approx(0.8, abs=0.25)
     assert track[-1, 2] < 0.2
+
+
+STREAMING = """
+import threading
+
+
+def stream():
+    x, y, _ = swarm.allcfs.crazyflies[0].position()
+    while True:
+        swarm.allcfs.crazyflies[0].cmdPosition([x, y, 0.8])
+        rospy.sleep(0.05)
+
+
+thread = threading.Thread(target=stream, daemon=True)
+thread.start()
+rospy.spin()
+"""
+
+
+@pytest.mark.parametrize(("ending", "end"), [("rospy.spin()", ctrl_c), (STREAMING, kill_node)])
+def test_vehicles_of_the_driver_are_landed_before_ros_is_shut_down(tmp_path, ending, end):
+    errors = run_until(tmp_path, ending, end)
+    assert "landing cf1, cf2" in errors
+    assert "MAY STILL FLY" not in errors
+    # Nobody else would land them.
+    status = [rospy.wait_for_message(f"/{n}/vehicle_status", VehicleStatus) for n in ("cf1", "cf2")]
+    assert not any(each.supervisor & VehicleStatus.FLYING for each in status), status
+    # Setpoints during the landing would have stopped it.
+    assert ending != STREAMING or "its vehicles land, and are not commanded any more" in errors

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scripted import fly, run
+from scripted import ctrl_c, fly, kill_node, run, run_until
 
 NEAR = 0.1
 """m; the controllers follow a little behind."""
@@ -131,5 +131,15 @@ def test_the_end_of_a_script_lands(tmp_path):
     assert "logging 1" in printed
     assert "cf1: goTo: z is -1 m, outside the fence; expected 0 to inf m" in printed
     assert "landing cf1, cf2" in printed
+    # On the ground, or the takeoff would be refused.
+    assert fly("hello_world.py")[0, 0, 2] == pytest.approx(1.0, abs=NEAR)
+
+
+@pytest.mark.parametrize("ending", ["rospy.spin()", "swarm.timeHelper.sleep(1e6)"])
+@pytest.mark.parametrize("end", [ctrl_c, kill_node])
+def test_however_ros_is_shut_down_the_script_lands_before(tmp_path, ending, end):
+    errors = run_until(tmp_path, ending, end)
+    assert "landing cf1, cf2" in errors
+    assert "MAY STILL FLY" not in errors
     # On the ground, or the takeoff would be refused.
     assert fly("hello_world.py")[0, 0, 2] == pytest.approx(1.0, abs=NEAR)

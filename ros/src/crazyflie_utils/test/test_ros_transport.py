@@ -43,9 +43,17 @@ def test_a_refusal_is_passed_on():
 
 
 def test_caller_is_not_left_waiting_at_shutdown(monkeypatch):
-    monkeypatch.setattr("rospy.core.is_shutdown_requested", lambda: True)
+    monkeypatch.setattr("rospy.core.is_shutdown", lambda: True)
     with pytest.raises(ServiceError, match="/go: the node is shutting down"):
         wait_for_answer(Future(), "/go", itertools.count().__next__)
+
+
+def test_callers_are_answered_while_hooks_of_the_shutdown_run(monkeypatch):
+    monkeypatch.setattr("rospy.core.is_shutdown_requested", lambda: True)
+    answer = Future()
+    timer = threading.Timer(0.01, answer.set_result, ("landed",))
+    timer.start()
+    assert wait_for_answer(answer, "/land", itertools.count().__next__) == "landed"
 
 
 def test_caller_is_not_left_waiting_by_a_clock_that_stands_still(monkeypatch):

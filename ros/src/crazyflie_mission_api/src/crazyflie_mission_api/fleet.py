@@ -35,6 +35,7 @@ from crazyflie_mission_api.ros_vehicle import (
     flown_vehicles,
     prefix,
 )
+from crazyflie_mission_api.script_end import ScriptEnd
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_utils import NodeHandle, ParameterError
 from crazyflie_utils.main import begin_script
@@ -56,7 +57,10 @@ _YAW_STATE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 
 
 class RosClock(Clock):
-    """The time of a process, real or simulated; ``has_ended()`` is whether ROS has shut down."""
+    """The time of a process, real or simulated.
+
+    ``has_ended()`` is whether the thread that waits must not command vehicles any more.
+    """
 
     def __init__(self, handle: NodeHandle, has_ended: Callable[[], bool]):
         self._handle = handle
@@ -73,7 +77,7 @@ class RosClock(Clock):
         last, moved_at = self.time(), time.monotonic()
         while not (done := condition()) and (now := self.time()) < deadline:
             if self._has_ended():
-                raise MissionError("ROS has shut down before the end of the mission")
+                raise MissionError("ROS shuts down before the end of the mission")
             if now != last:
                 last, moved_at = now, time.monotonic()
             elif time.monotonic() - moved_at > _FROZEN:
@@ -89,7 +93,8 @@ class Fleet(VehicleGroup):
     A vehicle ``NAME`` is flown by the services that it offers: those of a `HighLevelNode`,
     ``/NAME/high_level/go_to`` and so on; or the driver's, ``/NAME/go_to``; or, where there is
     only a takeoff server, by a `HighLevelNode` in this process. ``"/"`` is a vehicle without a
-    namespace. Use it in a with block; at the end of the block, all vehicles land.
+    namespace. Use it in a with block; at the end of the block, all vehicles land. When ROS shuts
+    down before, as after ``rospy.spin()`` and Ctrl-C, they land while services still answer.
 
     Parameters
     ----------
@@ -104,7 +109,8 @@ class Fleet(VehicleGroup):
     startup_timeout : float
         Longest time until all vehicles are found, s of the machine's clock.
     process : Process, optional
-        By default this script is made a node, unless it is one.
+        By default this script is made a node, unless it is one. Whoever gives a process calls
+        `land_at_end` when it shuts down.
 
     Raises
     ------
@@ -126,13 +132,17 @@ class Fleet(VehicleGroup):
     ):
         chosen, buffers = vehicles_of(names)
         self._end: Callable[[], None] = lambda: None
+        #: See `ScriptEnd`.
+        self.ending = ScriptEnd(lambda: process is not None and process.exit_status is not None)
+        # ROS may be shut down from now on: nothing flies yet.
+        self._vehicles, self._commanded = {}, {}
+        self._heartbeat: Timer | None = None
         if process is None:
-            process, self._end = begin_script("mission")
+            process, self._end = begin_script("mission", self._on_shutdown)
             catch_signals()
         self._handle = process.handle("/mission")
         self._mission = f"{_program()}_{uuid.uuid4().hex[:8]}"
         self._missions = MissionWatch(self._handle, own=self._mission)
-        self._heartbeat: Timer | None = None
         self._others: dict[str, RosVehicleState] = {}
         try:
             vehicles, common = _connect(process, self._handle, chosen, startup_timeout)
@@ -141,7 +151,7 @@ class Fleet(VehicleGroup):
             if common not in (None, ALL_OF_FLEET):
                 self._driver = ServiceCommands(self._handle, common)
             self._starts = self._handle.publisher(START_TOPIC, String)
-            clock = RosClock(self._handle, lambda: process.exit_status is not None)
+            clock = RosClock(self._handle, self.ending.is_over)
             # The buffers of the fleet process that flies them, if one does.
             watched = {name: _buffer(self._handle, name) for name in chosen}
             buffers |= {name: max(b, buffers.get(name, b)) for name, b in watched.items() if b}
@@ -197,17 +207,29 @@ class Fleet(VehicleGroup):
     @override
     def __exit__(self, kind: type[BaseException] | None, error: Any, traceback: Any) -> None:
         """Land the vehicles that still fly, also after an error; log those that cannot land."""
+        self.ending.run(lambda: self.land_at_end(kind, error))
+
+    def _on_shutdown(self):
+        error = MissionError("ROS shuts down")
+        self.ending.run(lambda: self.land_at_end(MissionError, error))
+
+    def land_at_end(self, kind: type[BaseException] | None, error: Any) -> None:
+        """Land the vehicles that still fly as `__exit__` does, in a call by `ending`."""
         try:
             if self.flying:
                 why = f" after {error!r}" if error is not None else ""
                 self._handle.warn(f"landing {', '.join(self.flying)}{why}")
-            super().__exit__(kind, error, traceback)
+            super().__exit__(kind, error, None)
         finally:
             if self.flying:
                 self._handle.error(f"MAY STILL FLY: {', '.join(self.flying)}")
             else:
                 self._release()
             self._end()
+
+    @override
+    def _commanding(self):
+        return self.ending.commanding()
 
     @override
     def _start(self, names):
@@ -391,9 +413,18 @@ def _program():
 
 
 def catch_signals() -> None:
-    """Make SIGINT and SIGTERM raise, so that a script lands its vehicles at the end."""
+    """Make SIGINT, SIGTERM and SIGHUP raise, so that a script lands its vehicles at the end.
+
+    A script that nohup has started continues without its terminal.
+    """
     # Also where the script is a node of rospy's.
     if threading.current_thread() is not threading.main_thread():
         return
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    signal.signal(signal.SIGTERM, _exit)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, _exit)
+
+
+def _exit(number, _):
+    sys.exit(128 + number)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import NamedTuple, Self
 
@@ -139,6 +140,10 @@ class GroupState:
         raise_failures("emergency", failures)
 
     # Common parts of commands.
+
+    def _commanding(self) -> AbstractContextManager[None]:
+        """Return a context in which a command is sent; entering it may raise `MissionError`."""
+        return nullcontext()
 
     def _shortest_duration(self, pieces):
         return trajectory.duration(within_limits(pieces, self.rules.limits))

@@ -69,10 +69,11 @@ class _Landing(LandingSide):
         }
         if self._is_checked:
             group._check_apart(moves, may_be_late=True)
-        calls = {
-            name: group._vehicles[name].go_to(Move(goal, yaw, duration))
-            for name, (goal, yaw) in poses.items()
-        }
+        with group._commanding():
+            calls = {
+                name: group._vehicles[name].go_to(Move(goal, yaw, duration))
+                for name, (goal, yaw) in poses.items()
+            }
         failures = group._answers(calls)
         group._commanded.update({n: move for n, move in moves.items() if n not in failures})
         return failures
@@ -93,7 +94,7 @@ class _Landing(LandingSide):
             vehicle = self._group._vehicles[name]
             if vehicle.has_landed():
                 vehicle.stop()
-                del self._group._commanded[name]
+                self._group.release(name)
             elif is_late:
                 late = f"{self.arrival_timeout:g} s after it should be"
                 self.failures[name] = f"not on the ground {late}"
@@ -150,7 +151,8 @@ class _Landing(LandingSide):
         if self._is_checked:
             group._check_apart(descents)
         # A vehicle that refuses does not keep the others in the air.
-        calls = {name: group._vehicles[name].land(None, duration) for name in names}
+        with group._commanding():
+            calls = {name: group._vehicles[name].land(None, duration) for name in names}
         refusals = group._answers(calls)
         self.failures |= refusals
         self._descending = [name for name in names if name not in refusals]

@@ -54,9 +54,10 @@ class VehicleGroup(GroupState):
             climb = straight((x, y, z), goal, heading, heading)
             climbs[name] = stretched(climb, max(_SHORTEST_CLIMB, self._shortest_duration(climb)))
         self._check_climbs(height)
-        # Stored first: vehicles that have begun to take off must be landed after any error.
-        self._commanded.update({n: TimedTrajectory(c, self.time()) for n, c in climbs.items()})
-        calls = {n: self._vehicles[n].takeoff(height, duration(c)) for n, c in climbs.items()}
+        with self._commanding():
+            # Stored first: vehicles that have begun to take off must be landed after any error.
+            self._commanded.update({n: TimedTrajectory(c, self.time()) for n, c in climbs.items()})
+            calls = {n: self._vehicles[n].takeoff(height, duration(c)) for n, c in climbs.items()}
         failures = self._answers(calls)
         for name, climb in climbs.items():
             # A takeoff server answers after some time, before the height is reached.
@@ -269,7 +270,9 @@ class VehicleGroup(GroupState):
         self._check_apart(timed, may_be_late=True)
 
     def _prepare(self, flown, what, stream):
-        calls = {name: self._vehicles[name].prepare(each, stream) for name, each in flown.items()}
+        with self._commanding():
+            vehicles = self._vehicles
+            calls = {name: vehicles[name].prepare(each, stream) for name, each in flown.items()}
         raise_failures(what, self._answers(calls))
 
     def _start(self, names):
@@ -278,7 +281,9 @@ class VehicleGroup(GroupState):
 
     def _fly(self, flown, what, call, wait):
         begin = self.time()
-        failures = self._answers(call())
+        with self._commanding():
+            calls = call()
+        failures = self._answers(calls)
         for name, pieces in flown.items():
             if name not in failures:
                 self._commanded[name] = self._timed(name, pieces, begin)

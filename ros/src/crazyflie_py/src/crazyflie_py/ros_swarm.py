@@ -6,6 +6,7 @@ import re
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 import rosgraph
@@ -59,12 +60,12 @@ class RosSwarm(Swarm):
         process: Process | None = None,
     ):
         self.visualizer = NullVisualizer()
-        self._is_closed = False
+        self._fleet: Fleet | None = None  # Until it is complete: the script flies nothing before.
         self._rates: dict[float, float] = {}
         vehicles = None if crazyflies_yaml is None else fleet_files.load(crazyflies_yaml)
         self._end = lambda: None
         if process is None:
-            process, self._end = _begin()
+            process, self._end = _begin(self.close)
         self._process = process
         handle = process.handle("/crazyswarm")
         try:
@@ -103,6 +104,7 @@ class RosSwarm(Swarm):
                 self._shared = ("takeoff", *_COMMON)
         self._watch_separation()
         handle.subscribe("/fleet/waiting", String, self._on_held)
+        self._fleet = fleet
 
     def _watch_separation(self):
         # A fleet's process keeps its own vehicles apart.
@@ -115,7 +117,7 @@ class RosSwarm(Swarm):
 
     def _look(self, watch):
         # The landing at the end keeps the vehicles apart.
-        if not self._is_closed:
+        if not self._connection.fleet.ending.is_over():
             watch.update()
 
     def _on_held(self, message):
@@ -131,18 +133,20 @@ class RosSwarm(Swarm):
         members = chosen
         if vehicle is None:
             members = [each for each in chosen if each.is_member(order.group_mask)]
-        for each in members:
-            each.prepare(order)
-        is_takeoff = order.name == "takeoff"
-        if order.name != "emergency":
-            for each in chosen:
-                each.end_setpoints()
-        called = {each.name: [each] for each in (members if is_takeoff else chosen)}
-        if vehicle is None and self._common is not None and order.name in self._shared:
-            called = {"allcfs": [*members]}
-            calls = {"allcfs": order.send(self._common)}
-        else:
-            calls = {name: order.send(each.vehicle) for name, (each,) in called.items()}
+        is_takeoff, is_emergency = order.name == "takeoff", order.name == "emergency"
+        ending = self._connection.fleet.ending
+        with nullcontext() if is_emergency else ending.commanding():
+            for each in members:
+                each.prepare(order)
+            if not is_emergency:
+                for each in chosen:
+                    each.end_setpoints()
+            called = {each.name: [each] for each in (members if is_takeoff else chosen)}
+            if vehicle is None and self._common is not None and order.name in self._shared:
+                called = {"allcfs": [*members]}
+                calls = {"allcfs": order.send(self._common)}
+            else:
+                calls = {name: order.send(each.vehicle) for name, (each,) in called.items()}
 
         def has_begun(name):
             return is_takeoff and all(each.has_begun() for each in called[name])
@@ -180,30 +184,28 @@ class RosSwarm(Swarm):
 
     @override
     def close(self) -> None:
-        if self._is_closed:
-            return
-        self._is_closed = True
-        try:
-            self._land()
-        except MissionError as error:
-            self._connection.handle.error(str(error))
-        finally:
-            self._end()
+        if self._fleet is not None:
+            self._fleet.ending.run(self._land)
 
     def _land(self):
         fleet = self._connection.fleet
         vehicles = [each for each in self.vehicles if each.name in fleet.flying]
         landing = [each for each in vehicles if each.is_landing]
         limit = fleet.time() + _LANDING_LIMIT
-        fleet.clock.wait_until(lambda: all(v.vehicle.has_landed() for v in landing), limit)
-        for each in vehicles:
-            if each.vehicle.has_landed():
-                fleet.release(each.name)
-            else:
-                # The landing begins at the present position.
-                fleet.adopt(each.name)
-        # The vehicles land as after an error, whatever their distances.
-        fleet.__exit__(RuntimeError, None, None)
+        try:
+            fleet.clock.wait_until(lambda: all(v.vehicle.has_landed() for v in landing), limit)
+            for each in vehicles:
+                if each.vehicle.has_landed():
+                    fleet.release(each.name)
+                else:
+                    # The landing begins at the present position.
+                    fleet.adopt(each.name)
+            # The vehicles land as after an error, whatever their distances.
+            fleet.land_at_end(RuntimeError, None)
+        except MissionError as error:
+            self._connection.handle.error(str(error))
+        finally:
+            self._end()
 
 
 def running_vehicles(handle: NodeHandle) -> list[str]:
@@ -243,12 +245,12 @@ def ids_of(names: list[str]) -> list[int]:
     return list(range(1, len(names) + 1))
 
 
-def _begin():
+def _begin(close):
     if not rosgraph.is_master_online():
         sys.exit(
             f"no ROS master at {rosgraph.get_master_uri()}, so no vehicle is running; expected, "
             "for example, roslaunch crazyflie_examples sw_swarm.launch, or the option --sim"
         )
-    process, end = begin_script("crazyswarm")
+    process, end = begin_script("crazyswarm", close)
     catch_signals()
     return process, end

@@ -115,9 +115,10 @@ class FirmwareParameters:
         for name in values:
             self[name]
         paths = {key.replace(".", "/"): value for key, value in values.items()}
-        for path, value in paths.items():
-            self._connection.handle.set_param(f"/{self.name}/{path}", value)
-        call = self._vehicle.call("update_params", srv.UpdateParams, [*paths])
+        with self._connection.fleet.ending.commanding():
+            for path, value in paths.items():
+                self._connection.handle.set_param(f"/{self.name}/{path}", value)
+            call = self._vehicle.call("update_params", srv.UpdateParams, [*paths])
         self._connection.finish("update_params", {self.name: call})
 
     def __getitem__(self, name: str) -> float:
@@ -167,8 +168,9 @@ class ScriptVehicle:
 
     def set_group_mask(self, group_mask: int) -> None:
         """Make the vehicle a member of groups, a bit each."""
-        self.end_setpoints()
-        call = self.vehicle.set_group_mask(group_mask)
+        with self._connection.fleet.ending.commanding():
+            self.end_setpoints()
+            call = self.vehicle.set_group_mask(group_mask)
         self._connection.finish("set_group_mask", {self.name: call})
         self.groups = group_mask
 
@@ -187,8 +189,9 @@ class ScriptVehicle:
 
     def send(self, setpoint: Setpoint) -> None:
         """Send a setpoint; while the vehicle is too near to another, send one that holds it."""
-        self.note_flight()
-        self.vehicle.send(self._passed(setpoint))
+        with self._connection.fleet.ending.commanding():
+            self.note_flight()
+            self.vehicle.send(self._passed(setpoint))
 
     def checked_yaw(self, yaw: float) -> float:
         """Return a yaw that the vehicle can have, rad; another is refused."""

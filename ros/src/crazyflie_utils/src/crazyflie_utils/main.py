@@ -154,18 +154,26 @@ def _pause_refused(signals):
         time.sleep(0.05)
 
 
-def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
+def begin_script(
+    default_name: str, on_shutdown: Callable[[], None] = lambda: None
+) -> tuple[Process, Callable[[], None]]:
     """Make a user's script, in which Python handles Ctrl-C, a ROS node, unless it is one already.
 
-    Returns the process, not yet started, which has an exit status when ROS has shut down; and
-    ``end()``, which stops it, and the ROS node if it was made here.
+    Returns the process, not yet started, which has an exit status when ROS shuts down; and
+    ``end()``, which stops it, and the ROS node if it was made here. Whoever shuts ROS down,
+    ``on_shutdown()`` is called first, in that thread, while topics and services still work.
     """
     is_own = not rospy.core.is_initialized()
     if is_own:
         _wait_for_master()
         rospy.init_node(default_name, anonymous=True, disable_signals=True)
     process = ros_process()
-    rospy.on_shutdown(lambda: process.end(0))
+
+    def shut_down() -> None:
+        process.end(0)
+        on_shutdown()
+
+    rospy.on_shutdown(shut_down)
 
     def end() -> None:
         process.stop()

@@ -154,7 +154,8 @@ def wait_for_answer(answer: Future[Any], name: str, time: Callable[[], float]) -
     """
     seen, seen_at = time(), monotonic()
     while not wait([answer], timeout=0.1).done:
-        if rospy.core.is_shutdown_requested():
+        # Until then callbacks run: vehicles may be landed by a service of this very process.
+        if rospy.core.is_shutdown():
             raise ServiceError(f"{name}: the node is shutting down")
         if time() != seen:
             seen, seen_at = time(), monotonic()

@@ -75,7 +75,7 @@ def test_stored_parameters(virtual):
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("ring/solidRed", "storing ring.solidRed: it is no persistent parameter"),
+        ("ring/solidRed", "ring.solidRed is no persistent parameter"),
         ("ring/none", "no parameter 'ring.none'"),
         ("effect", "'effect' is no firmware parameter; expected GROUP/NAME"),
     ],
@@ -83,7 +83,9 @@ def test_stored_parameters(virtual):
 def test_what_cannot_be_stored(virtual, name, text):
     server, _ = virtual
     with pytest.raises(ServiceError, match=text):
-        server.call("/cf9/store_params", UpdateParamsRequest([name]))
+        server.call("/cf9/store_params", UpdateParamsRequest(["ring/effect", name]))
+    # Those before it are not stored, either.
+    assert not server.call("/cf9/param_state", ParamStateRequest("ring/effect")).isStored
 
 
 def test_recovery_from_a_crash(virtual):
@@ -114,12 +116,11 @@ def test_a_wrong_lighthouse_file(virtual, tmp_path):
     path = tmp_path / "wrong.yaml"
     for text in ("type: other", "[]", "a: [", ""):
         path.write_text(text)
-        with pytest.raises(ServiceError, match="wrong.yaml: .*expected a lighthouse_system"):
+        with pytest.raises(ServiceError, match="lighthouse file .*wrong.yaml"):
             server.call("/cf9/write_lighthouse", WriteLighthouseRequest(str(path)))
     with pytest.raises(ServiceError, match="No such file.*none.yaml"):
         server.call("/cf9/write_lighthouse", WriteLighthouseRequest(str(tmp_path / "none.yaml")))
-    # The vehicle has room for four.
-    with pytest.raises(ServiceError, match="writing base station 4.*refuses"):
+    with pytest.raises(ServiceError, match="room for 4 base stations, 0 to 3, .* has number 4"):
         server.call("/cf9/write_lighthouse", base_stations(tmp_path / "five.yaml", 4))
     with pytest.raises(ServiceError, match="base station 16; expected 0 to 15"):
         server.call("/cf9/write_lighthouse", base_stations(tmp_path / "many.yaml", 16))

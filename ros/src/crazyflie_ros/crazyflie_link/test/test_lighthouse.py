@@ -5,7 +5,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from cflib.crazyflie.mem import MemoryElement
+from cflib.crazyflie.mem import CHAN_READ, MemoryElement
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.errors import RefusedError, ValueRangeError
@@ -22,7 +22,7 @@ class Vehicle:
     def __init__(self, room=4):
         self.pages, self.stored = {}, []
         self.parameters, self.answer = {"lighthouse.systemType": 1}, b"\x0b\x01"
-        self._room = room
+        self._room, self.broken = room, ()
         memory = SimpleNamespace(get_mems=self._memories)
         self.cflib = SimpleNamespace(mem=memory)
 
@@ -46,6 +46,10 @@ class Vehicle:
         assert number == 7
         page, offset = divmod(address, 0x100)
         if page % CALIBRATIONS >= self._room:
+            return data[:5] + b"\x05"
+        if request.channel == CHAN_READ:
+            return data[:5] + b"\0" + data[5:]
+        if page in self.broken:
             return data[:5] + b"\x05"
         self.pages.setdefault(page, bytearray())[offset:] = data[5:]
         return data[:5] + b"\0"
@@ -84,9 +88,35 @@ def test_a_type_that_is_right_is_not_written(path):
 
 def test_without_room_for_a_station_of_the_file_nothing_is_stored(path):
     vehicle = Vehicle(room=2)
-    with pytest.raises(RefusedError, match="base station 2"):
+    with pytest.raises(ValueRangeError, match="room for 2 base stations, 0 to 1, .* has number 2"):
         Lighthouse(lambda: vehicle).write_file(write_lighthouse_file(path, 0, 2), vehicle)
     assert vehicle.stored == []
+    # Nothing is written, neither is the type.
+    assert vehicle.pages == {}
+    assert vehicle.parameters == {"lighthouse.systemType": 1}
+
+
+@pytest.mark.parametrize("page", [1, CALIBRATIONS])
+def test_a_write_that_ends_on_its_way_says_what_the_vehicle_may_have(path, page):
+    vehicle = Vehicle()
+    vehicle.broken = (page,)
+    text = "refuses it .*; the vehicle may have a part of the file's base stations: write it again"
+    with pytest.raises(RefusedError, match=text):
+        Lighthouse(lambda: vehicle).write_file(write_lighthouse_file(path, 0), vehicle)
+    assert vehicle.stored == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("- 1.0", "- .nan"), ("- - 0.0", "- - .inf"), ("tilt: 0.0", "tilt: .nan")]
+)
+def test_a_number_that_is_not_finite_changes_nothing(path, old, new):
+    text = Path(write_lighthouse_file(path, 0)).read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    vehicle = Vehicle()
+    with pytest.raises(ValueRangeError, match="is not finite"):
+        Lighthouse(lambda: vehicle).write_file(str(path), vehicle)
+    assert vehicle.pages == {}
 
 
 @pytest.mark.parametrize("answer", [b"\x0b", b"\x0b\x00"])

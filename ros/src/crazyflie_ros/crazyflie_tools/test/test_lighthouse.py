@@ -7,6 +7,7 @@ import pytest
 from cflib.localization import LighthouseConfigFileManager
 from scipy.spatial.transform import Rotation
 
+from crazyflie_link.testing import write_lighthouse_file
 from crazyflie_tools.lighthouse import lighthouse
 from crazyflie_utils.testing.peer import wait_until
 from crazyflie_virtual.firmware.decks import GEOMETRIES
@@ -104,6 +105,17 @@ def test_without_a_geometry_nothing_is_written(operator, occluded, places, reaso
 def test_a_file_without_a_base_station_is_not_stored(operator):
     operator.write({})
     assert "no base station; expected at least one" in operator.fails("--file", str(operator.path))
+
+
+def test_a_file_with_more_stations_than_the_vehicle_has_room_for_changes_nothing(operator):
+    memory = operator.server.vehicle.board.firmware.deck.memory
+    write_lighthouse_file(operator.path, *range(4))
+    assert operator.run("--file", str(operator.path))[::2] == (0, "")
+    before = [memory.page(number) for number in memory._pages]
+    write_lighthouse_file(operator.path, *range(6))
+    error = operator.fails("--file", str(operator.path))
+    assert "the firmware has room for 4 base stations, 0 to 3, the file has number 5" in error
+    assert [memory.page(number) for number in memory._pages] == before
 
 
 def test_a_file_is_not_overwritten(operator):

@@ -1,4 +1,4 @@
-"""Whether a vehicle's own estimate can be flown by: its decks, their state, the filter, its poses."""
+"""Whether a vehicle's own estimate can be flown by: its decks, the filter, and external poses."""
 
 import math
 from collections import deque

@@ -38,7 +38,7 @@ _UPLOADS = {"upload_trajectory", "upload_compressed_trajectory"}  #: They end be
 _SOLID_COLOR = 7  #: The firmware's ring.effect for a given color.
 _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 
-#: Where the vehicle's estimate begins (m, m, m, rad) after a start of the firmware, and after a reset.
+#: Where the estimate begins (m, m, m, rad) when the firmware starts, and after a reset.
 _START = frozenset(f"kalman.initial{part}" for part in ("X", "Y", "Z", "Yaw"))
 _RESET = "kalman.resetEstimation"
 
@@ -251,8 +251,8 @@ class VehicleServices:
                 lambda _, r: crazyflie.high_level.set_group_mask(r.groupMask),
             ),
             "set_led_color": (srv.SetLedColor, self._set_led_color),
-            "store_params": (srv.UpdateParams, partial(_for_each, crazyflie.parameters.store)),
-            "clear_params": (srv.UpdateParams, partial(_for_each, crazyflie.parameters.clear)),
+            "store_params": (srv.UpdateParams, partial(self._for_each, crazyflie.parameters.store)),
+            "clear_params": (srv.UpdateParams, partial(self._for_each, crazyflie.parameters.clear)),
             "param_state": (srv.ParamState, self._state),
             "write_lighthouse": (srv.WriteLighthouse, self._write_lighthouse),
         }
@@ -372,6 +372,14 @@ class VehicleServices:
             request.file, self._vehicle.crazyflie.parameters
         )
 
+    def _for_each(self, act, _, request):
+        names = [parsed_name(each) for each in request.params]
+        for name in names:
+            # Before the first one is changed.
+            self._vehicle.crazyflie.parameters.check_persistent(name)
+        for name in names:
+            act(name)
+
     def _reboot(self, *_):
         try:
             state = self._flight.read()
@@ -389,8 +397,3 @@ class VehicleServices:
                 f"fall; its state is: {state.words()}"
             )
         self._vehicle.crazyflie.reboot()
-
-
-def _for_each(act, _, request):
-    for name in map(parsed_name, request.params):
-        act(name)

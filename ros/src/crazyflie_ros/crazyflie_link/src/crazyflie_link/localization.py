@@ -4,6 +4,7 @@ Poses are sent to one vehicle, or packed for all of a channel. The geometry and 
 base stations are in the vehicle, which measures angles to them.
 """
 
+import itertools
 import math
 import queue
 import struct
@@ -26,10 +27,21 @@ from cflib.utils.encoding import compress_quaternion
 
 from crazyflie_link.broadcast import Broadcaster
 from crazyflie_link.cflib_internals import packet
-from crazyflie_link.errors import NoReplyError, RefusedError, ValueRangeError
+from crazyflie_link.errors import (
+    CrazyflieError,
+    NoReplyError,
+    RefusedError,
+    ValueRangeError,
+)
 from crazyflie_link.link import Link
 from crazyflie_link.parameters import FirmwareParameters
-from crazyflie_link.subsystem import Subsystem, check_finite, find_memory, write_memory
+from crazyflie_link.subsystem import (
+    Subsystem,
+    check_finite,
+    find_memory,
+    has_memory,
+    write_memory,
+)
 from crazyflie_link.transmission import Request
 from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.declaration import ParameterError
@@ -198,49 +210,55 @@ class Lighthouse(Subsystem):
         """Write a configuration as cfclient writes it, and store it; blocks.
 
         The data of all other stations become invalid. Returns the number of stations in the file.
-        Raises `ValueRangeError` about the file, `CrazyflieError` if the vehicle does not take it.
+        Raises `ValueRangeError` about the file, before anything is written; `CrazyflieError` if the
+        vehicle does not take it.
         """
         geometries, calibrations, system_type = _read_file(path)
+        numbers = {*geometries, *calibrations}
+        link = self._current_link()
+        memory = find_memory(link, MemoryElement.TYPE_LH, "base stations").id
+        room = _room(link, memory)
+        if max(numbers) >= room:
+            raise ValueRangeError(
+                f"lighthouse file {path}: the firmware has room for {room} base stations, 0 to "
+                f"{room - 1}, the file has number {max(numbers)}; nothing is written"
+            )
         if parameters.values().get(_TYPE) != system_type:
             # cflib's reader forgets all stations.
             parameters.write(_TYPE, system_type)
-        geometry_mask = self._write_all(
-            geometries, LighthouseBsGeometry(), LighthouseMemory.GEO_START_ADDR
-        )
-        calibration_mask = self._write_all(
-            calibrations, LighthouseBsCalibration(), LighthouseMemory.CALIB_START_ADDR
-        )
-        self._store(geometry_mask, calibration_mask)
-        return len({*geometries, *calibrations})
+        try:
+            for given, none, first in (
+                (geometries, LighthouseBsGeometry(), LighthouseMemory.GEO_START_ADDR),
+                (calibrations, LighthouseBsCalibration(), LighthouseMemory.CALIB_START_ADDR),
+            ):
+                for number in range(room):
+                    address, data = first + number * LighthouseMemory.PAGE_SIZE, bytearray()
+                    given.get(number, none).add_mem_data(data)
+                    write_memory(link, memory, address, bytes(data), f"base station {number}")
+            self._store((1 << room) - 1)
+        except CrazyflieError as error:
+            raise type(error)(
+                f"{error}; the vehicle may have a part of the file's base stations: write it "
+                "again, or restart the vehicle, which then has those that it stored last"
+            ) from None
+        return len(numbers)
 
-    def _write_all(self, given: Mapping[int, Any], none: Any, first: int) -> int:
-        # Returns the mask of the stations that the vehicle has room for.
-        link = self._current_link()
-        memory = find_memory(link, MemoryElement.TYPE_LH, "base stations")
-        mask = 0
-        for number in range(STATIONS):
-            data = bytearray()
-            given.get(number, none).add_mem_data(data)
-            address = first + number * LighthouseMemory.PAGE_SIZE
-            try:
-                write_memory(link, memory.id, address, bytes(data), f"base station {number}")
-                mask |= 1 << number
-            except RefusedError:
-                if any(other >= number for other in given):
-                    raise
-                # The firmware is built for fewer.
-                break
-        return mask
-
-    def _store(self, geometries, calibrations):
+    def _store(self, mask):
         port, channel = CRTPPort.LOCALIZATION, CflibLocalization.GENERIC_CH
         what = "storing the base stations"
         request = Request(port, channel, _STORE, what, limit=_FLASH_LIMIT)
-        answer = self._current_link().request(
-            _STORE + struct.pack("<HH", geometries, calibrations), request
-        )
+        answer = self._current_link().request(_STORE + struct.pack("<HH", mask, mask), request)
         if len(answer) < 2 or not answer[1]:
             raise RefusedError(f"{what}: the vehicle refuses it")
+
+
+def _room(link, memory):
+    """Return the number of base stations for which the firmware is built; blocks."""
+    size = LighthouseMemory.PAGE_SIZE
+    for number in range(STATIONS):
+        if not has_memory(link, memory, number * size, f"base station {number}"):
+            return number
+    return STATIONS
 
 
 def _read_file(path):
@@ -264,6 +282,10 @@ def _read_file(path):
         # Texts, and too few numbers, are found before anything is written.
         for each in (*geometries.values(), *calibrations.values()):
             each.add_mem_data(bytearray())
+        for each in geometries.values():
+            check_finite("geometry", *each.origin, *itertools.chain(*each.rotation_matrix))
+        for sweep in itertools.chain(*(each.sweeps for each in calibrations.values())):
+            check_finite("calibration", *vars(sweep).values())
         unknown = [n for n in (*geometries, *calibrations) if n not in range(STATIONS)]
     except ParameterError as error:
         raise ValueRangeError(f"lighthouse file {error}") from None

@@ -20,7 +20,6 @@ from crazyflie_link.link import Link
 from crazyflie_link.subsystem import Subsystem, elements
 from crazyflie_link.transmission import Request
 
-
 #: Groups of parameters, parameters, and parts of names, that have the vehicle act when they are
 #: written: turn its motors, stop, arm, restart, forget.
 _TRIGGER_GROUPS = frozenset({"health", "motorPowerSet", "system"})
@@ -108,6 +107,11 @@ class FirmwareParameters(Subsystem):
         if answer != data:
             raise _refusal(request, answer)
         return self._keep(link, element, answer[2:])
+
+    def check_persistent(self, name: str) -> None:
+        """Raise `CrazyflieError` unless a parameter exists and can be stored on the vehicle."""
+        if not self._find(self._current_link(), name).is_persistent():
+            raise RefusedError(f"{name} is no persistent parameter")
 
     def store(self, name: str) -> None:
         """Store the present value of a persistent parameter, to survive a restart; blocks."""

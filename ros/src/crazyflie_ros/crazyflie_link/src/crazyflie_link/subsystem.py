@@ -6,7 +6,7 @@ import struct
 from collections.abc import Callable
 from typing import Self, TypeVar
 
-from cflib.crazyflie.mem import CHAN_WRITE, MemoryElement, _WriteRequest
+from cflib.crazyflie.mem import CHAN_READ, CHAN_WRITE, MemoryElement, _WriteRequest
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.errors import RefusedError, ValueRangeError
@@ -84,6 +84,14 @@ def find_memory(link: Link, kind: int, what: str) -> MemoryElement:
     if not memories:
         raise RefusedError(f"the vehicle has no memory for {what}: update its firmware")
     return memories[0]
+
+
+def has_memory(link: Link, number: int, address: int, what: str) -> bool:
+    """Return whether a memory has an address; blocks."""
+    where = struct.pack("<BI", number, address)
+    request = Request(CRTPPort.MEM, CHAN_READ, where, f"looking for {what}")
+    answer = link.request(where + b"\1", request)
+    return len(answer) > 5 and answer[5] == 0
 
 
 def write_memory(

@@ -23,8 +23,8 @@ _SAFELINK = 0x05  #: First byte of the request for numbered packets; the second 
 class RadioChip:
     """The radio chip of a vehicle, behind which its processor is a UDP port of this machine.
 
-    Source: the behaviour of crazyflie2-nrf-firmware. With safelink, on at request, a packet with the
-    number of the one before is acknowledged and dropped: it was sent again because the
+    Source: the behaviour of crazyflie2-nrf-firmware. With safelink, on at request, a packet with
+    the number of the one before is acknowledged and dropped: it was sent again because the
     acknowledgement was lost. So is the data that comes back sent again, until its arrival is
     confirmed.
     """

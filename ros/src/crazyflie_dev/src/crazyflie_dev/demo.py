@@ -154,8 +154,15 @@ def main() -> int:
     parser.add_argument(
         "--out", type=Path, default=Path("out"), help="folder for report, data, log"
     )
+    parser.add_argument(
+        "--journal", action="store_true", help="journals of all processes, for ./run replay"
+    )
     parser.add_argument("launch_arguments", nargs="*", help="such as composed:=true")
     options = parser.parse_args()
+    if options.journal:
+        journals = options.out / "journals"
+        options.launch_arguments.append(f"journal:={journals.absolute()}")
+        print(f"journals: {journals}", flush=True)
     if "sim_time:=true" not in options.launch_arguments:
         say_if_busy(os.getloadavg()[0], len(os.sched_getaffinity(0)))
     try:

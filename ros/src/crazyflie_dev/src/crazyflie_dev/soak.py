@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import time
 from collections import Counter
@@ -34,6 +35,8 @@ from crazyflie_dev.soak_faults import (
 from crazyflie_dev.soak_page import NAME, PageNode
 from crazyflie_dev.soak_watch import Watch
 from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_utils.journal.journal_file import SUFFIX, JournalWriter
+from crazyflie_utils.journal.recording import Recorder
 from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
@@ -55,11 +58,12 @@ _STRAY = 1.5
 class Soak:
     """Flights one after the other, with a fault in each.
 
-    ``seed`` decides the faults and everything else that is random; the other arguments are those of
+    ``seed`` decides the faults and everything else that is random; ``journals`` is the folder of a
+    journal of each process, if there are to be any; the other arguments are those of
     sw_hover.launch.
     """
 
-    def __init__(self, seed: int, **arguments: object):
+    def __init__(self, seed: int, journals: Path | None = None, **arguments: object):
         package = Path(rospkg.RosPack().get_path("crazyflie_examples"))
         given = {"composed": True, "rviz": False, "simulator_dt": 0.005, **arguments}
         _, parameters = expand(package / "launch/sw_hover.launch", **given)
@@ -69,7 +73,8 @@ class Soak:
             parameters |= {f"{mission}/{key}": name for key, name in MISSION_PARAMETERS.items()}
         self._classes = {f"/{name}": node for name, node in NODE_CLASSES(nodes).items()}
         # Far from the beginning of time: the wall clock is set back, too.
-        self.graph = FakeGraph({**parameters, "/simulator/seed": seed}, start=1e6)
+        self._journals, self._count = journals, 0
+        self.graph = FakeGraph({**parameters, "/simulator/seed": seed}, 1e6, self._recorder)
         self.random = Random(seed)
         self.watch = Watch(self.graph)
         self.faults: Counter[str] = Counter()  #: Fault -> how often.
@@ -85,6 +90,16 @@ class Soak:
             self.start(name)
         self.graph.start(NAME, self.page)
         self.graph.advance(2.0)
+
+    def _recorder(self, name, start):
+        # The page is made with the graph, not by a class alone.
+        if self._journals is None or name == NAME:
+            return None
+        self._count += 1
+        path = self._journals / f"{self._count:05d}_{name.strip('/')}{SUFFIX}"
+        began = time.monotonic_ns() // 1000
+        header = {"node": name, "program": "", "clock": "manual", "us": began, "start": start}
+        return Recorder(JournalWriter(path, header, math.inf, print))
 
     def start(self, name: str) -> None:
         """Start a node's process, unless it is alive."""
@@ -210,13 +225,19 @@ class Soak:
             self.graph.advance(min(_STEP, end - self.graph.time))
 
 
-def soak(duration: float, seed: int, progress: bool = False, **arguments: object) -> dict[str, Any]:
+def soak(
+    duration: float,
+    seed: int,
+    progress: bool = False,
+    journals: Path | None = None,
+    **arguments: object,
+) -> dict[str, Any]:
     """Fly for ``duration`` (s, simulated) and return what was seen, as JSON knows it.
 
     ``progress`` shows a bar on the terminal; see `Soak` for the other arguments.
     """
     began = time.monotonic()
-    run = Soak(seed, **arguments)
+    run = Soak(seed, journals, **arguments)
     start = run.graph.time
     faults: list[Fault] = []
     with tqdm(total=round(duration), unit="s", disable=not progress) as bar:
@@ -230,6 +251,7 @@ def soak(duration: float, seed: int, progress: bool = False, **arguments: object
             run.watch.violations[before:] = [f"{fault.name}: {each}" for each in new]
             bar.update(round(run.graph.time - start) - bar.n)
     flown = run.graph.time - start
+    run.graph.end_journals()
     return {
         "seed": seed,
         "arguments": {name: str(value) for name, value in arguments.items()},
@@ -253,8 +275,15 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--dynamics", default="near_hover", help="of sw_hover.launch")
     parser.add_argument("--output", type=Path, help="JSON file")
+    parser.add_argument("--journals", type=Path, help="folder of journals, for ./run replay")
     options = parser.parse_args()
-    result = soak(options.duration, options.seed, progress=True, dynamics=options.dynamics)
+    result = soak(
+        options.duration,
+        options.seed,
+        progress=True,
+        journals=options.journals,
+        dynamics=options.dynamics,
+    )
     text = json.dumps(result, indent=2)
     print(text)
     if options.output is not None:

@@ -36,8 +36,8 @@ from crazyflie_utils.topics import (
 
 _U64, _I64, _MOMENT = struct.Struct("<Q"), struct.Struct("<q"), struct.Struct("<d")
 SAME_COLLECTION = 0xFFFFFFFF  #: Value of `Kind.COLLECTED` for more messages of one collection.
-PLAIN = 0x80  #: Bit of the first byte of a message: it came decoded. The others: its caller, or 0.
-_MAX_CALLERS = 127
+ORIGIN = struct.Struct("<H")  #: Before a message: `PLAIN`, and the number of its connection, or 0.
+PLAIN = 0x8000  #: It came decoded.
 _LONGEST = 0xFFFFFFFF  #: Longest time between two inputs that is written (us).
 
 
@@ -134,10 +134,10 @@ class Recorder:
         self.clock: RecordedClock
         #: ``begin(moment)`` begins an input at a moment (ns), and returns the clock's wall offset.
         self.begin: Callable[[int], int]
-        self._last: int = writer.header["us"]
+        self._last = int(writer.header["us"])
         self._wall = 0
         self._digest = Digest()
-        self._callers: dict[str, int] = {"": 0}
+        self._callers: dict[tuple[str, str], int] = {("", ""): 0}
 
     def attach(self, transport: Transport, executor: Executor) -> "RecordingTransport":
         """Begin to record; return the transport that the process is to use."""
@@ -226,14 +226,14 @@ class Recorder:
     def data(self, message: Any, is_plain: bool) -> bytes:
         """Return a received message with its origin."""
         header = getattr(message, "_connection_header", None) or {}
-        name = header.get("callerid", "")
-        number = self._callers.get(name)
+        connection = header.get("callerid", ""), header.get("topic", "")
+        number = self._callers.get(connection)
         if number is None:
-            # Later ones are not told apart.
-            number = self._callers[name] = min(len(self._callers), _MAX_CALLERS)
-            self.name(Kind.CALLER, number, name, header.get("topic", ""))
-        first = bytes((number | PLAIN if is_plain else number,))
-        return first + (getattr(message, "raw", None) or serialized(message))
+            # Those beyond the limit are not told apart.
+            number = self._callers[connection] = min(len(self._callers), PLAIN - 1)
+            self.name(Kind.CALLER, number, *connection)
+        origin = ORIGIN.pack(number | PLAIN if is_plain else number)
+        return origin + (getattr(message, "raw", None) or serialized(message))
 
     def name(self, kind: Kind, number: int, *names: str) -> None:
         """Write the name of something that has a number."""

@@ -12,6 +12,7 @@ import genpy
 
 from crazyflie_utils.journal.journal_file import INPUTS, NAMES, Journal, JournalError, Kind, Row
 from crazyflie_utils.journal.recording import (
+    ORIGIN,
     PLAIN,
     SAME_COLLECTION,
     Digest,
@@ -49,6 +50,7 @@ class Rows:
         self._path, self._rows = journal.path, journal.rows()
         #: Numbers to names, by kind of `NAMES`.
         self.names: dict[Kind, dict[int, list[str]]] = {kind: {} for kind in NAMES}
+        self._headers: dict[int, dict[str, str]] = {}
         self.next: Row | None = None  #: The next row; None at the end.
         self.counts: collections.Counter[Kind] = collections.Counter()
         self._advance()
@@ -71,6 +73,13 @@ class Rows:
         self.counts[row.kind] += 1
         self._advance()
         return row
+
+    def connection(self, number: int) -> dict[str, str] | None:
+        """Return the header that all messages of a connection share, or None."""
+        if number not in self._headers and number in self.names[Kind.CALLER]:
+            names = self.names[Kind.CALLER][number]
+            self._headers[number] = dict(zip(("callerid", "topic"), names, strict=True))
+        return self._headers.get(number)
 
     def check_name(self, kind: Kind, number: int, *names: str) -> None:
         """Raise `DifferenceError` if something with a number had other names."""
@@ -155,11 +164,10 @@ class _Subscriber(ExternalSubscriber):
         self._empty = 0
 
     def message(self, data: bytes) -> Any:
+        (origin,) = ORIGIN.unpack_from(data)
         plain, keeping = self._types
-        message = (plain if data[0] & PLAIN else keeping)().deserialize(data[1:])
-        caller = self._rows.names[Kind.CALLER].get(data[0] & ~PLAIN)
-        if caller is not None:
-            message._connection_header = dict(zip(("callerid", "topic"), caller, strict=True))
+        message = (plain if origin & PLAIN else keeping)().deserialize(data[ORIGIN.size :])
+        message._connection_header = self._rows.connection(origin & ~PLAIN)
         return message
 
     def has_publishers(self) -> bool:

@@ -66,6 +66,12 @@ class FakeGraph:
         if process.recorder is not None:
             process.recorder.close()
 
+    def end_journals(self) -> None:
+        """Write what the journals of all processes still lack."""
+        for process in self._processes.values():
+            if process.recorder is not None:
+                process.recorder.close()
+
     def interrupt(self, name: str) -> None:
         """Ask a process to prepare its end, as SIGINT and ``rosnode kill`` do; it continues."""
         process = self._processes[name]

@@ -17,6 +17,7 @@ from crazyflie_utils import ParameterError
 from crazyflie_virtual.body import (
     FULL_VOLTAGE,
     LOW_CHARGE,
+    MAX_RAW,
     NOTHING,
     STEP,
     Battery,
@@ -263,8 +264,12 @@ def test_the_ground_is_beside_a_vehicle_that_is_tilted():
 
 
 def test_reach():
-    assert RangingSensors(At(3.99), True, True).distance("zrange") == 3990
-    assert RangingSensors(At(4.01), True, True).distance("zrange") == NOTHING
+    """The sensor down is not filtered: its readings end where the sensor does."""
+    for height, reading in ((3.99, 3990), (5.5, 5500), (9.0, MAX_RAW)):
+        assert RangingSensors(At(height), True, True).distance("zrange") == reading
+    above = (0.0, 1.0, 0.0, 0.0)
+    for height, reading in ((3.99, 3990), (4.01, NOTHING)):
+        assert RangingSensors(At(height, above), True, True).distance("up") == reading
 
 
 def test_without_decks():

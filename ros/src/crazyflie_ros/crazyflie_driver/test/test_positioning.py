@@ -7,7 +7,7 @@ import pytest
 import rospy
 from geometry_msgs.msg import PoseStamped
 
-from crazyflie_driver.positioning import OUT_OF_REACH, SYSTEMS, Positioning
+from crazyflie_driver.positioning import SYSTEMS, Positioning
 from crazyflie_driver.srv import TakeoffRequest, UpdateParamsRequest
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing.programs import wait_until
@@ -43,7 +43,8 @@ def test_nothing_is_wrong_with_a_good_state(source):
 @pytest.mark.parametrize(
     ("source", "variable", "value", "words"),
     [
-        ("flow", "range.zrange", float(OUT_OF_REACH), "no ground within its reach"),
+        ("flow", "range.zrange", 5000.0, "no ground within its reach (range.zrange is 5000 mm)"),
+        ("flow", "range.zrange", 8190.0, "no ground within its reach"),
         ("flow", "kalman.varPY", 0.04, "velocity with a deviation of 0.20 m/s, expected at most"),
         ("flow", "kalman.varPX", math.nan, "velocity with a deviation of nan"),
         ("lighthouse", "lighthouse.bsReceive", 0.0, "receives no base station"),
@@ -178,6 +179,19 @@ def test_an_estimate_that_has_begun_elsewhere_is_not_used_until_it_is_reset():
     positioning.update(10.3, GOOD["flow"])
     assert positioning.problem(10.3) == ""
     assert positioning.is_usable(10.3)
+
+
+def test_a_flow_deck_that_sees_no_ground_is_a_problem(server, monkeypatch):
+    """As above a hole, or a floor that swallows its light; the log has the raw reading."""
+    with virtual_vehicle(positioning="flow") as (virtual, uri):
+        add(server, uri, "flow")
+        texts = server.process.published("/cf1/positioning")
+        pass_time(server, lambda: texts and texts[-1].data == "")
+        ranging = virtual.vehicle.board.firmware.ranging
+        monkeypatch.setattr(ranging, "_distance", lambda direction: 6.0)
+        pass_time(server, lambda: "range.zrange is 6000 mm" in texts[-1].data)
+        with pytest.raises(ServiceError, match="no takeoff.*no ground within its reach"):
+            server.call("/cf1/takeoff", TAKEOFF)
 
 
 def pass_time(server, condition):

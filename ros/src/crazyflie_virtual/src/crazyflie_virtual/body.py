@@ -294,8 +294,12 @@ class Physics:
         self.specific_force = rotate_back(after[6:10], force)
 
 
-NOTHING = 32767  #: Reading of a sensor without an object in its range (mm).
-_REACH = 4.0  #: m.
+#: Reading of a sensor of the Multi-ranger without an object in its range (mm), and that range (m).
+NOTHING = 32767
+_REACH = 4.0
+#: Largest raw reading of the sensor down (mm), which the firmware passes on; its own estimator does
+#: not use 5,000 and more.
+MAX_RAW = 8190
 
 #: Log variable -> direction of its sensor, body frame.
 _DIRECTIONS: dict[str, Triple] = {
@@ -325,6 +329,8 @@ class RangingSensors:
             return 0
         direction = rotate(self._physics.quaternion, _DIRECTIONS[side])
         distance = self._distance(direction)
+        if side == "zrange":
+            return round(min(1000.0 * distance, MAX_RAW))
         return round(1000.0 * distance) if distance < _REACH else NOTHING
 
     def _distance(self, direction: Triple) -> float:

@@ -28,8 +28,9 @@ MIN_STREAM = 1.0
 #: velocity by optical flow (m/s). A converged filter has less than half of the least of them.
 MAX_DEVIATIONS = {LIGHTHOUSE: 0.05, LOCO: 0.15, FLOW: 0.1}
 
-#: Reading of the Flow deck's ranging sensor without an object in its range (mm).
-OUT_OF_REACH = 32000
+#: Reading of the Flow deck's ranging sensor from which on the firmware's filter does not use it
+#: (mm). The log has the raw readings, which end at 5,000 to 8,190: zranger2.c of the firmware.
+OUT_OF_REACH = 5000
 
 _POSITION = ("kalman.varX", "kalman.varY", "kalman.varZ")
 
@@ -116,7 +117,7 @@ def _place(position):
 def _flow(values: Values) -> str:
     height = values["range.zrange"]
     if height >= OUT_OF_REACH:
-        return "the Flow deck sees no ground within its reach (range.zrange)"
+        return f"the Flow deck sees no ground within its reach (range.zrange is {height:.0f} mm)"
     deviation = _deviation(values, "kalman.varPX", "kalman.varPY")
     return _excess(FLOW, "velocity", deviation, "m/s", "has the floor texture, and light?")
 

@@ -34,6 +34,15 @@ def write(tmp_path):
     return write_text
 
 
+def test_files_are_found_from_home(write, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "mine.txt").write_text(4 * f"{7 * '2 '}\n")
+    write(GOOD.replace("K_soft.txt", "~/mine.txt").replace("0.002", "2e-3"))
+    settings = read_settings("~/settings.yaml")
+    assert settings.K[0][0] == 2.0
+    assert settings.vehicle.attitude_noise == 0.002
+
+
 def complaint(path):
     """Return what is said about a file."""
     with pytest.raises(ParameterError) as error:

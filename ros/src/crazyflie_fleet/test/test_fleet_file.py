@@ -10,9 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_fleet import fleet_file
+from crazyflie_fleet.connect_node import lighthouse_file
 from crazyflie_fleet.fleet_config import LogTopicSettings
+from crazyflie_fleet.fleet_parameters import FleetParameters
+from crazyflie_fleet.launch_text import launch_text
 from crazyflie_fleet.vehicle_nodes import parameters
 from crazyflie_utils import ParameterError
+from crazyflie_utils.testing import FakeProcess
 
 EXAMPLE = Path(rospkg.RosPack().get_path("crazyflie_fleet")) / "config" / "example.yaml"
 
@@ -256,6 +260,21 @@ robot_types:
     assert fleet.names == ("cf1", "cf2")
     assert fleet["cf2"].position == (1.0, 0.0, 0.0)
     assert not any("defaults" in text for text in fleet.warnings)
+
+
+def test_files_are_found_from_home(tmp_path, monkeypatch):
+    """A fleet file, and those that it names."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "heavy.yaml").write_text("mass: 0.035\n")
+    (tmp_path / "stations.yaml").write_text("")
+    text = TWO.replace("uri", "model: ~/heavy.yaml\n    lighthouse: ~/stations.yaml\n    uri", 1)
+    (tmp_path / "fleet.yaml").write_text(text)
+    fleet = fleet_file.load("~/fleet.yaml")
+    assert fleet["cf1"].model == str(tmp_path / "heavy.yaml")
+    assert lighthouse_file("~/fleet.yaml", fleet["cf1"]) == str(tmp_path / "stations.yaml")
+    handle = FakeProcess({"/fleet": {"fleet": {"file": "~/fleet.yaml"}}}).handle("/fleet")
+    assert handle.load(FleetParameters).fleet().names == ("cf1", "cf2")
+    assert f'value="{tmp_path}/fleet.yaml"' in launch_text("~/fleet.yaml")
 
 
 def test_numbers_are_written_as_people_do(load):

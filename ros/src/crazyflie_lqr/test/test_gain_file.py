@@ -8,6 +8,7 @@ from hypothesis.extra.numpy import arrays
 
 from crazyflie_lqr.gain_file import (
     GainFileError,
+    MatrixFile,
     load_matrix,
     load_vector,
     save_matrix,
@@ -101,6 +102,14 @@ def test_a_bad_vector_is_told_by_file_line_and_shape(write, text, line, reason):
         load_vector(path, 4)
     for part in (path, line, reason, "expected 4 numbers in one row or one column"):
         assert part in str(caught.value)
+
+
+def test_files_are_found_from_home(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    save_matrix("~/K.txt", [[1.0, 2.0]])
+    assert MatrixFile(1, 2)("~/K.txt").tolist() == [[1.0, 2.0]]
+    with pytest.raises(GainFileError, match=f"{tmp_path}/none.txt: No such file"):
+        load_matrix("~/none.txt", 1, 2)
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path):

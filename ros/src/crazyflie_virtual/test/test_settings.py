@@ -41,9 +41,9 @@ def test_all_types():
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("--port", "70000"), "--port is 70000; expected an integer from 0 to 65535"),
+        (("--port", "70000"), "--port is '70000'; expected an integer from 0 to 65535"),
         (("--port", "many"), "--port is 'many'; expected an integer"),
-        (("--init-x", "nan"), "--init-x is nan; expected a finite number"),
+        (("--init-x", "nan"), "--init-x is 'nan'; expected a finite number"),
         (
             ("--positioning", "gps"),
             "--positioning is 'gps'; expected one of deck, flow, lighthouse, loco, none",

@@ -15,6 +15,7 @@ from crazyflie_utils.testing.random_input import (
 from crazyflie_world import world_file
 from crazyflie_world.shapes import Ball, Box, Circle, Cylinder, Waypoints
 from crazyflie_world.world import Floor
+from crazyflie_world.world_file import WORLD_FILE
 
 LAB = Path(rospkg.RosPack().get_path("crazyflie_world")) / "config" / "lab.yaml"
 
@@ -43,6 +44,18 @@ def write(tmp_path):
         return file
 
     return write
+
+
+def test_files_are_found_from_home(write, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "tag.png").write_bytes(b"")
+    write(
+        "floor: {size: [4, 3]}\nobjects:\n"
+        "  - {type: box, name: tag, centre: [0, 0, 1], size: [0.1, 1, 1], picture: ~/tag.png}\n"
+    )
+    assert WORLD_FILE("~/room.yaml")["tag"].picture == str(tmp_path / "tag.png")
+    with pytest.raises(ParameterError, match=f"looked for {tmp_path}/none.yaml"):
+        world_file.load("~/none.yaml")
 
 
 def test_objects_may_merge_others(write):

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
-from pathlib import Path
 
 from tqdm import tqdm
 
@@ -16,6 +15,7 @@ from crazyflie_batch.monte_carlo import Results, run
 from crazyflie_batch.report import findings, table, write_csv
 from crazyflie_batch.settings import read_settings
 from crazyflie_utils import ParameterError
+from crazyflie_utils.text_file import user_path
 
 SCHEDULER_LIMIT = 10.0  #: Longest time to connect to a scheduler, and to its workers, s.
 
@@ -34,7 +34,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         settings = read_settings(options.settings)
-        folder = Path(options.out or settings.name)
+        folder = user_path(options.out or settings.name)
         if options.restart:
             shutil.rmtree(folder / "chunks", ignore_errors=True)
             (folder / "settings.json").unlink(missing_ok=True)

@@ -19,6 +19,7 @@ from crazyflie_utils.parameters.types import DURATION, METRES, SHARE, TEXT, Inte
 from crazyflie_utils.parameters.types import FINITE as ANY
 from crazyflie_utils.parameters.yaml_file import Entry, load
 from crazyflie_utils.text import shortened
+from crazyflie_utils.text_file import user_path
 
 MODELS = ("near_hover", "coupled_7d", "quadrotor")
 ESTIMATORS = ("finite_difference", "kalman")
@@ -189,7 +190,7 @@ def read_settings(path: str | Path) -> Settings:
 
 
 def _gain_file(settings: Path, name: str) -> Path:
-    local = settings.parent / name
+    local = settings.parent / user_path(name)
     # Unlike pathlib's, this accepts a name that is too long for a file.
     if os.path.exists(local):
         return local

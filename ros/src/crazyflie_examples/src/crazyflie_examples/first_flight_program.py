@@ -46,7 +46,7 @@ from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamp
 from crazyflie_utils import Parameters, ServiceError, parameter
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.parameters.command_line import parse_arguments
-from crazyflie_utils.parameters.types import BOOLEAN, FINITE, FRAME, Text
+from crazyflie_utils.parameters.types import BOOLEAN, FILE, FINITE, FRAME, Text
 from crazyflie_utils.vectors import stamped
 
 PREFIX = "/crazyflie"  #: Namespace of the driver.
@@ -68,7 +68,7 @@ class FirstFlightParameters(Parameters):
     mocap_frame: str = parameter(
         FRAME, "frame of the vehicle in motion capture, which must be running", "HY5/base_link"
     )
-    out: str = parameter(Text(), "folder of the report and the recording", "out/first_flight")
+    out: str = parameter(FILE, "folder of the report and the recording", "out/first_flight")
     yes: bool = parameter(
         BOOLEAN, "answer every question with yes: for virtual vehicles only", False
     )

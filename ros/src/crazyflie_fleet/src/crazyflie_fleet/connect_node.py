@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from concurrent.futures import Future
 from functools import partial
-from pathlib import Path
 
 from std_msgs.msg import Float32
 from typing_extensions import override
@@ -29,6 +28,7 @@ from crazyflie_fleet.vehicle_nodes import PLACE
 from crazyflie_utils import Node, NodeHandle, ParameterError, ServiceError, parameter
 from crazyflie_utils.parameters.types import TEXT, ListOf
 from crazyflie_utils.steps import follow
+from crazyflie_utils.text_file import user_path
 
 _PERIOD = 30.0  #: Least time between two reports about one vehicle (s).
 
@@ -129,7 +129,7 @@ class FleetConnectNode(Node):
                 f"{parameters.file}: {', '.join(missing)} has no uri; expected one"
             )
         self._lighthouse_files = {
-            vehicle.name: _lighthouse_file(parameters.file, vehicle)
+            vehicle.name: lighthouse_file(parameters.file, vehicle)
             for vehicle in self._vehicles
             if vehicle.lighthouse
         }
@@ -230,8 +230,15 @@ class FleetConnectNode(Node):
         self._handle.end(1 if self._failed else 0)
 
 
-def _lighthouse_file(fleet_file: str, vehicle: VehicleConfig) -> str:
-    file = Path(fleet_file).resolve().parent / vehicle.lighthouse
+def lighthouse_file(fleet_file: str, vehicle: VehicleConfig) -> str:
+    """Return the file with the base stations of a vehicle of a fleet file.
+
+    Raises
+    ------
+    ParameterError
+        There is no such file.
+    """
+    file = user_path(fleet_file).resolve().parent / user_path(vehicle.lighthouse)
     if not file.is_file():
         raise ParameterError(
             f"{fleet_file}: lighthouse of {vehicle.name} is {vehicle.lighthouse!r}, and "

@@ -14,6 +14,7 @@ from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.declaration import Complaints
 from crazyflie_utils.parameters.types import Integer
 from crazyflie_utils.parameters.yaml_file import Entry
+from crazyflie_utils.text_file import user_path
 
 VEHICLES, TYPES = "crazyflies", "crazyflieTypes"  #: Keys at the top of the two files.
 
@@ -133,7 +134,7 @@ def load(path: str | Path) -> FleetConfig:
     ParameterError
         The text names all errors: file, line, and what was expected.
     """
-    types = Path(path).with_name(TYPES_FILE)
+    types = user_path(path).with_name(TYPES_FILE)
     return _fleet(yaml_file.load(path), types if types.exists() else None)
 
 

@@ -31,6 +31,7 @@ from crazyflie_utils.parameters.types import BOOLEAN, FIRMWARE_NUMBER, Parameter
 from crazyflie_utils.parameters.vehicle_model import load
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_utils.text import shortened, shown
+from crazyflie_utils.text_file import user_path
 
 #: Least similarity of an unknown key to a known one that is misspelt (0 to 1).
 _SIMILAR = 0.8
@@ -297,7 +298,7 @@ class FleetParser:
         """Return a model; the path of a model file is relative to this one."""
         if model in DYNAMICS or model in TYPES:
             return model
-        path = str((self._top.file.parent / model).resolve())
+        path = str((self._top.file.parent / user_path(model)).resolve())
         try:
             load(path)
         except ParameterError as error:

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import LOCAL
 from crazyflie_utils import ParameterError
+from crazyflie_utils.text_file import user_path
 
 
 def launch_text(path: str | Path) -> str:
@@ -19,7 +20,7 @@ def launch_text(path: str | Path) -> str:
     ParameterError
         The text names all errors of the file.
     """
-    path = Path(path).absolute()
+    path = user_path(path).absolute()
     fleet = fleet_file.load(path)
     used = dict.fromkeys(vehicle.machine for vehicle in fleet.vehicles)
     launch = ElementTree.Element("launch")

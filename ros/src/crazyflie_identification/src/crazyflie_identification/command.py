@@ -9,6 +9,7 @@ from crazyflie_identification.fit import NAMES, IdentificationError
 from crazyflie_model.quadrotor import TYPES
 from crazyflie_reports.bag_file import BagError
 from crazyflie_utils.parameters import model_file
+from crazyflie_utils.text_file import user_path
 
 _DESCRIPTION = """
 Find the model of a vehicle in the bag of a flight: mass, thrust curve, delay, lags of roll, pitch
@@ -46,7 +47,9 @@ def _identify(bag: Path, kind: str, vehicle: str, out: Path) -> None:
 
 def _parser():
     parser = argparse.ArgumentParser(prog="identify", description=_DESCRIPTION)
-    parser.add_argument("bag", type=Path, metavar="BAG", help="a bag, or the folder of a recording")
+    parser.add_argument(
+        "bag", type=user_path, metavar="BAG", help="a bag, or the folder of a recording"
+    )
     parser.add_argument(
         "--type",
         choices=sorted(TYPES),
@@ -55,6 +58,6 @@ def _parser():
     )
     parser.add_argument("--vehicle", default="", help="name of the vehicle, if the bag has several")
     parser.add_argument(
-        "--out", type=Path, default=Path("model.yaml"), help="model file (%(default)s)"
+        "--out", type=user_path, default=Path("model.yaml"), help="model file (%(default)s)"
     )
     return parser

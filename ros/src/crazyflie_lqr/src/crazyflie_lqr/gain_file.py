@@ -16,6 +16,7 @@ from typing_extensions import override
 
 from crazyflie_utils.parameters.types import TEXT, Converted, ParameterType
 from crazyflie_utils.text import number_from_text, shortened, shown
+from crazyflie_utils.text_file import user_path
 
 
 class GainFileError(ValueError):
@@ -53,7 +54,7 @@ def _load(path, shapes, expected, unit):
 
 def save_matrix(path: str, matrix: ArrayLike, comment: str = "") -> None:
     """Write a matrix, shape (rows, columns), with 12 digits, and a comment at the end."""
-    with open(path, "w", encoding="utf-8") as file:
+    with open(user_path(path), "w", encoding="utf-8") as file:
         # Adding 0 turns -0, whose sign would look meaningful, into 0.
         for row in np.asarray(matrix) + 0.0:
             file.write(" ".join(f"{value:.12g}" for value in row) + "\n")
@@ -88,12 +89,12 @@ CONTROL_FILE = Converted(
 def _rows(path, expected):
     """Yield line number and numbers of every line that has any."""
     try:
-        with open(path, encoding="utf-8", errors="replace") as file:
+        with open(user_path(path), encoding="utf-8", errors="replace") as file:
             lines = file.read().split("\n")
     except (OSError, ValueError) as error:
         # A path with a NUL character raises ValueError.
         reason = error.strerror if isinstance(error, OSError) else error
-        where = shortened(os.path.abspath(path))
+        where = shortened(os.path.abspath(user_path(path)))
         raise GainFileError(f"cannot read {where}: {reason}, {expected}") from None
     if lines[-1].endswith(".") and "#" not in lines[-1]:
         # With a line break behind it, the number would be valid.

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import rospkg
 
+from crazyflie_utils.text_file import user_path
+
 #: The package, with ``@name@`` for what is filled in.
 TEMPLATE = Path(rospkg.RosPack().get_path("crazyflie_package_generator")) / "template"
 
@@ -151,7 +153,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument(
         "--folder",
-        type=Path,
+        type=user_path,
         default=Path(),
         help="folder in which the package is made (default: the current one)",
     )

@@ -10,7 +10,7 @@ import termios
 import tty
 from collections.abc import Callable, Iterator, Sequence
 
-from crazyflie_demo.joystick import EVENT, Joystick
+from crazyflie_demo.joystick import EVENT, Joystick, open_joystick
 from crazyflie_py.swarm import TimeHelper
 
 _log = logging.getLogger(__name__)
@@ -32,7 +32,7 @@ class JoystickDevice:
 
     def __init__(self, path: str):
         self._path = path
-        self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        self._file = open_joystick(path)
         self._joystick = Joystick()
 
     def poll(self) -> Sequence[int]:

@@ -3,13 +3,13 @@
 import logging
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from crazyflie_py.simulated_vehicle import SimulatedVehicle
 from crazyflie_py.swarm import NullVisualizer
+from crazyflie_utils.text_file import user_path
 
 _log = logging.getLogger(__name__)
 
@@ -75,7 +75,7 @@ class MatplotlibVisualizer(NullVisualizer):
         from matplotlib.animation import FFMpegWriter, PillowWriter
         from matplotlib.figure import Figure
 
-        target = Path(path)
+        target = user_path(path)
         if not target.parent.is_dir():
             raise ValueError(f"--video: {path}: the folder {target.parent} does not exist")
         writer = FFMpegWriter

@@ -18,6 +18,7 @@ from crazyflie_reports.bag_flights import flights, vehicle_namespaces
 from crazyflie_reports.bag_topics import ROLES
 from crazyflie_reports.figures import Figure, figures
 from crazyflie_reports.usd_overlay import lay_over
+from crazyflie_utils.text_file import user_path
 
 PAGE, FIGURES, EVENTS, DATA = "report.html", "figures.csv", "events.csv", "report.json"
 MCAP = "mcap"  #: Folder of the recordings as MCAP.
@@ -155,13 +156,16 @@ def main() -> int:
     parser.add_argument(
         "bags",
         nargs="+",
-        type=Path,
+        type=user_path,
         metavar="BAG",
         help="bag of ROS 1 or ROS 2 (*.mcap, *.db3), or a folder of consecutive bags; or a log "
         "of a vehicle's micro SD card, which is added to the bag that it matches",
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("flight_report"), help="folder of the report (%(default)s)"
+        "--out",
+        type=user_path,
+        default=Path("flight_report"),
+        help="folder of the report (%(default)s)",
     )
     parser.add_argument(
         "--topic", action="append", default=[], metavar="ROLE=NAME",

@@ -80,6 +80,32 @@ def test_waits_for_the_joystick_and_says_so(tmp_path):
     process.node.shutdown()
 
 
+@pytest.mark.parametrize("kind", ["/dev/zero", "/dev/null", "/dev/urandom", "file", "folder"])
+def test_something_else_is_not_read_as_a_joystick(tmp_path, kind):
+    path = tmp_path / "js0"
+    if kind == "file":
+        path.write_bytes(axis(0, 32767))
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        path = kind
+    process = launch(path)
+    process.advance(0.5)
+    (warning,) = process.logged("warn")
+    assert warning.startswith(f"/crazyflie/joy: cannot open {path}: it is not a joystick")
+    assert process.logged("info") == process.logged("error") == states(process) == []
+    process.node.shutdown()
+
+
+def test_the_home_folder_is_found_and_the_path_is_absolute(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    for dev in ("~/js7", "js7"):
+        process = launch(dev)
+        assert f"cannot open {tmp_path}/js7: No such file" in process.logged("warn")[0]
+        process.node.shutdown()
+
+
 def test_an_unplugged_joystick_is_released_and_taken_up_again(fifo, monkeypatch):
     process = launch(fifo)
     with open(fifo, "wb", buffering=0) as stick:

@@ -9,6 +9,7 @@ from crazyflie_utils.parameters.declaration import Complaints
 from crazyflie_utils.parameters.types import Text, path_of
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_utils.text import shortened, shown
+from crazyflie_utils.text_file import user_path
 from crazyflie_world.shapes import Ball, Box, Circle, Cylinder, Path, Shape, Wall, Waypoints
 from crazyflie_world.world import FLOOR, World
 
@@ -63,7 +64,7 @@ def _with_picture(shape: Shape, entry: Entry) -> Shape:
     # The picture's name is relative to the world file.
     if not isinstance(shape, Box) or not shape.picture:
         return shape
-    picture = entry.file.parent / shape.picture
+    picture = (entry.file.parent / user_path(shape.picture)).absolute()
     # Unlike pathlib's, this accepts a name that is too long for a file.
     if not os.path.isfile(picture):
         raise entry["picture"].error(

@@ -6,10 +6,10 @@ import os
 from sensor_msgs.msg import Joy
 from typing_extensions import override
 
-from crazyflie_demo.joystick import EVENT, Joystick, JoystickState
+from crazyflie_demo.joystick import EVENT, Joystick, JoystickState, open_joystick
 from crazyflie_demo.node_parts import JOY_LIMIT, REPEATED
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import TEXT, Number
+from crazyflie_utils.parameters.types import FILE, Number
 from crazyflie_utils.vectors import stamped
 
 _POLL_PERIOD = 0.01  #: Time between two reads of the device, s.
@@ -18,6 +18,7 @@ _EVENTS = 512  #: Largest number of events that are read at once.
 
 _HINTS = {
     errno.ENOENT: "is it plugged in, and does the parameter dev name it?",
+    errno.ENOTTY: "does the parameter dev name it?",
     errno.EACCES: "may this user read it? Usually the user must be in the group input",
 }
 
@@ -25,7 +26,7 @@ _HINTS = {
 class JoyNodeParameters(Parameters):
     """Parameters of `JoyNode`."""
 
-    dev: str = parameter(TEXT, "the joystick's device", "/dev/input/js0")
+    dev: str = parameter(FILE, "the joystick's device", "/dev/input/js0")
     deadzone: float = parameter(
         Number(minimum=0.0, maximum=0.9),
         "fraction of an axis's range about the centre that is read as the centre",
@@ -70,7 +71,7 @@ class JoyNode(Node[JoyNodeParameters]):
         device = self._parameters.dev
         self._tried = self._handle.time()
         try:
-            self._file = os.open(device, os.O_RDONLY | os.O_NONBLOCK)
+            self._file = open_joystick(device)
         except OSError as error:
             hint = _HINTS.get(error.errno or 0, "")
             self._handle.warn(f"cannot open {device}: {error.strerror}; {hint}", throttle=10.0)

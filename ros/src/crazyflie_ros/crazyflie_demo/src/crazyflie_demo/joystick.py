@@ -1,5 +1,10 @@
 """A joystick: its events as Linux encodes them (linux/joystick.h), its axes and buttons."""
 
+import contextlib
+import errno
+import fcntl
+import os
+import stat
 import struct
 
 #: Axes, with the right stick for tilt: left, up and forward are positive.
@@ -14,6 +19,25 @@ BUTTON, AXIS = 0x01, 0x02  #: Types of events.
 INITIAL = 0x80  #: Flag in the type of events that report the state when the device is opened.
 _FULL = 32767  #: Value of an axis at its end.
 JoystickState = tuple[list[float], list[int]]  #: Axes and buttons.
+
+
+#: JSIOCGVERSION of linux/joystick.h: only the driver of joysticks answers it.
+_GET_VERSION = 0x80046A01
+
+
+def open_joystick(path: str) -> int:
+    """Return the file of a joystick's device, or of a FIFO in its place; reading does not block.
+
+    OSError: it cannot be opened, or is something else, such as /dev/input/event0.
+    """
+    file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    if stat.S_ISFIFO(os.fstat(file).st_mode):
+        return file
+    with contextlib.suppress(OSError):
+        fcntl.ioctl(file, _GET_VERSION, bytes(4))
+        return file
+    os.close(file)
+    raise OSError(errno.ENOTTY, "it is not a joystick, as /dev/input/js0 is")
 
 
 class Joystick:

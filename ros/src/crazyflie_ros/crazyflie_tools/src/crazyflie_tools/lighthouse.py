@@ -26,6 +26,7 @@ from cflib.localization.lighthouse_types import LhException
 import crazyflie_link
 from crazyflie_link.errors import NoAnswerError, NoReplyError, RefusedError, ValueRangeError
 from crazyflie_tools.program import make_parser, run
+from crazyflie_utils.text_file import user_path
 
 #: Largest distance between the rays of two base stations to one sensor (m): cflib's limit.
 MAX_RESIDUAL = 0.01
@@ -66,7 +67,7 @@ def lighthouse(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument(
         "--out",
-        type=Path,
+        type=user_path,
         default=Path("lighthouse.yaml"),
         metavar="FILE",
         help="file for the measured geometry, as cfclient writes it; by default %(default)s",

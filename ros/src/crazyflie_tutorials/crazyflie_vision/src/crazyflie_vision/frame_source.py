@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import cv2
 from numpy.typing import NDArray
 
+from crazyflie_utils.text_file import user_path
 from crazyflie_vision.renderer import load_picture
 
 SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")  #: Suffixes of pictures in a folder.
@@ -79,9 +80,9 @@ def open_source(device: str, width: int, height: int, rate: float) -> FrameSourc
     """Return a `webcam`, or the source of images at a path; OSError if it has no images."""
     if device.isdecimal() or device.startswith("/dev/"):
         return webcam(device, width, height, rate)
-    path = Path(device)
+    path = user_path(device).absolute()
     if path.is_dir() or path.suffix.lower() in SUFFIXES:
         return pictures(path)
     if path.is_file():
         return video(path)
-    raise OSError(f"{device!r} is not a camera, video, picture or folder")
+    raise OSError(f"{device!r} is not a camera, video, picture or folder; looked for {path}")

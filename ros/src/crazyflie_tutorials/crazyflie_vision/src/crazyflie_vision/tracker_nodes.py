@@ -9,7 +9,7 @@ from std_msgs.msg import Header
 from typing_extensions import TypeVar, override
 
 from crazyflie_utils import NodeHandle, ParameterError, Parameters, parameter, topic
-from crazyflie_utils.parameters.types import TEXT, Integer, Number
+from crazyflie_utils.parameters.types import FILE, Integer, Number
 from crazyflie_vision.images import ImageNode, to_message
 from crazyflie_vision.trackers import CASCADE, ColourBounds, FaceDetector, Target, draw, find
 
@@ -72,7 +72,7 @@ class ColourTrackerNode(TrackerNode[ColourTrackerParameters]):
 class FaceDetectorParameters(TrackerParameters):
     """Parameters of `FaceDetectorNode`."""
 
-    cascade: str = parameter(TEXT, "file of the cascade", CASCADE)
+    cascade: str = parameter(FILE, "file of the cascade", CASCADE)
     smallest: int = parameter(
         Integer(20, 1000, "pixels"), "width of the smallest face", 30, live=True
     )

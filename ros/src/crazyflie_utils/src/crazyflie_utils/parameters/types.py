@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import os
 import re
 import sys
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_utils.text import number_from_text, shown
+from crazyflie_utils.text_file import user_path
 
 
 class ParameterType:
@@ -227,6 +229,8 @@ TIME_STEP = Number(unit="s", minimum=1e-4)
 METRES = Number(unit="m")
 BOOLEAN = Converted(_boolean, "true or false", "bool")
 TEXT = Text()
+#: Path of a file or folder; its value is absolute, with the home folder in place of ~.
+FILE = Converted(lambda value: os.path.abspath(user_path(TEXT(value))), str(TEXT))
 TOPIC = SERVICE = Converted(_graph_name, "the name of a topic or service, such as /state")
 FRAME = Converted(_frame_name, "the name of a tf frame, such as world")
 POSITION = ListOf(METRES, 3)

@@ -19,7 +19,7 @@ from typing_extensions import override
 from crazyflie_utils.parameters.declaration import Complaints, ParameterError, Parameters
 from crazyflie_utils.parameters.types import ParameterType, checked
 from crazyflie_utils.text import DECIMAL, HEXADECIMAL, number_from_text, shortened, shown
-from crazyflie_utils.text_file import TextFileError, read_text
+from crazyflie_utils.text_file import TextFileError, read_text, user_path
 
 MAX_SIZE = 1_000_000  #: Largest file (bytes): three times that of a thousand vehicles.
 MAX_DEPTH = 50  #: Largest number of nested lists and mappings.
@@ -126,7 +126,7 @@ P = TypeVar("P", bound=Parameters)
 
 
 def load(path: str | Path) -> "Entry":
-    """Return the content of a file, which is a mapping.
+    """Return the content of a file, which is a mapping; see `user_path`.
 
     `ParameterError`: it cannot be read, is not a YAML mapping, has a key twice, exceeds the limits
     above, or has an alias within the node to which the alias refers.
@@ -135,7 +135,7 @@ def load(path: str | Path) -> "Entry":
         text = read_text(path, MAX_SIZE)
     except TextFileError as error:
         raise _error(path, error.line, error) from None
-    return parse(text, path)
+    return parse(text, user_path(path))
 
 
 def parse(text: str, name: str | Path) -> "Entry":

@@ -10,7 +10,7 @@ from crazyflie_link.errors import NoReplyError, RefusedError, ValueRangeError
 from crazyflie_link.log import LogBlock
 
 LIMIT = 60.0
-START, CREATE, APPEND = 3, 6, 7
+DELETE, START, CREATE, APPEND = 2, 3, 6, 7
 
 #: Ten variables with the 26 bytes of a packet: one packet creates the block with nine of them, a
 #: second one appends the last.
@@ -140,7 +140,10 @@ def test_a_block_of_which_a_part_is_refused_is_refused(
 
 @pytest.mark.parametrize("lost", [1, 2])
 def test_no_variables_are_mixed_up_when_an_answer_is_lost(make_vehicle, make_link, lost):
-    """A block of three packets: a second one that comes twice would displace the third."""
+    """A block of three packets: a second one that comes twice would displace the third.
+
+    It is not known whether it has come: the block is deleted and begun again.
+    """
     variables = {f"many.n{number:02}": ("B", number) for number in range(26)}
     vehicle = make_vehicle(log=variables)
     link = make_link(vehicle.uri)
@@ -155,9 +158,22 @@ def test_no_variables_are_mixed_up_when_an_answer_is_lost(make_vehicle, make_lin
 
     vehicle.lose = lose
     block = log_block("many", lambda *data: received.put(data), tuple(variables))
-    if lost == 1:
-        with pytest.raises(NoReplyError, match="'many': the vehicle has not replied"):
-            link.add_log_block(block)
+    link.add_log_block(block)
+    assert received.get(timeout=LIMIT)[1] == tuple(range(26))
+    assert [data[0] for data in vehicle.packets(5, 1)].count(DELETE) == (lost == 1)
+
+
+@pytest.mark.parametrize("is_lost", [True, False])
+def test_a_block_that_cannot_be_started_leaves_nothing_behind(make_vehicle, make_link, is_lost):
+    """Its second packet has no answer, however often it is tried; or it is refused."""
+    variables = {f"many.n{number:02}": ("B", number) for number in range(26)}
+    vehicle = make_vehicle(log=variables)
+    link = make_link(vehicle.uri)
+    link.connect()
+    if is_lost:
+        vehicle.lose = lambda _: vehicle.received[-1][2][:1] == bytes([APPEND])
     else:
-        link.add_log_block(block)
-        assert received.get(timeout=LIMIT)[1] == tuple(range(26))
+        vehicle.answers[5, 1, APPEND] = bytes([APPEND, 1, errno.ENOMEM])
+    with pytest.raises(NoReplyError if is_lost else RefusedError, match="'many'"):
+        link.add_log_block(log_block("many", variables=tuple(variables)))
+    assert vehicle._logs._blocks == {}

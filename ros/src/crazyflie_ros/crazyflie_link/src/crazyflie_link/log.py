@@ -1,10 +1,11 @@
 """Log blocks: variables that the vehicle sends periodically."""
 
+import contextlib
 import errno
 import struct
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 from cflib.crazyflie import log as cflib_log
@@ -12,16 +13,23 @@ from cflib.crazyflie.log import (
     CHAN_SETTINGS,
     CMD_APPEND_BLOCK_V2,
     CMD_CREATE_BLOCK_V2,
+    CMD_DELETE_BLOCK,
     LogConfig,
 )
 from cflib.crtp.crtpstack import CRTPPort
 from cflib.utils.encoding import decompress_quaternion
 
-from crazyflie_link.errors import RefusedError, ValueRangeError, unknown_name
+from crazyflie_link.errors import (
+    CrazyflieError,
+    NoReplyError,
+    RefusedError,
+    ValueRangeError,
+    unknown_name,
+)
 from crazyflie_link.limits import LONGEST_PERIOD_MS, PERIOD_STEP_MS, SHORTEST_PERIOD_MS
 from crazyflie_link.link import Link
 from crazyflie_link.subsystem import Subsystem, elements
-from crazyflie_link.transmission import Request
+from crazyflie_link.transmission import RESEND_PERIOD, Request
 
 _STAMP_END = 4  #: A log packet begins with the number of its block and three bytes of time.
 _TICKS = 1 << 24  #: The vehicle's time in ms has 24 bits.
@@ -29,6 +37,9 @@ _TICKS = 1 << 24  #: The vehicle's time in ms has 24 bits.
 #: (ms): this machine may have been busy.
 _REORDERED_MS = 100
 _LATEST_FIRST_MS = 60_000.0
+
+#: Largest number of attempts to start a block of three packets: a lost answer needs another one.
+_ATTEMPTS = 5
 
 #: Command -> error of a repetition whose first answer was lost: the block exists, or is full.
 _REPEATED = {CMD_CREATE_BLOCK_V2: errno.EEXIST, CMD_APPEND_BLOCK_V2: errno.E2BIG}
@@ -165,22 +176,49 @@ class Log(Subsystem):
             packets = _packets(link.cflib.log, config)
         except (AttributeError, KeyError) as error:
             raise RefusedError(f"{what}: {error}") from None
+        try:
+            for _ in range(_ATTEMPTS):
+                if self._send(link, packets, what):
+                    break
+                self._delete(link, packets, what)
+            else:
+                raise NoReplyError(
+                    f"{what}: a part of it was not confirmed in {_ATTEMPTS} attempts: the link is "
+                    "poor; come nearer, or make it several blocks of 9 variables"
+                )
+        except RefusedError:
+            # What was accepted would take room from other blocks.
+            with contextlib.suppress(CrazyflieError):
+                self._delete(link, packets, what)
+            raise
+        link.monitor.expect_log(block.period_ms / 1000.0, time.monotonic())
+
+    def _send(self, link, packets, what):
+        # Returns False if it is not known whether variables were appended: if they were, a
+        # repetition would displace those of the next packet.
         for data in packets:
-            # Variables that are appended twice would displace those of the next packet.
-            resend = data[0] != CMD_APPEND_BLOCK_V2 or data is packets[-2]
-            request = Request(
-                CRTPPort.LOGGING,
-                CHAN_SETTINGS,
-                data[:2],
-                what,
-                resend,
-                accepts=lambda answer: len(answer) > 2,
-            )
-            code = link.request(data, request)[2]
+            if data[0] != CMD_APPEND_BLOCK_V2 or data is packets[-2]:
+                code = link.request(data, _request(data, what))[2]
+            else:
+                try:
+                    once = replace(_request(data, what), resend=False, limit=RESEND_PERIOD)
+                    code = link.request(data, once)[2]
+                except NoReplyError:
+                    return False
             if code not in (0, _REPEATED.get(data[0])):
                 reason = cflib_log.Log._err_codes.get(code, f"error {code}")
                 raise RefusedError(f"{what}: the vehicle answers: {reason}")
-        link.monitor.expect_log(block.period_ms / 1000.0, time.monotonic())
+        return True
+
+    def _delete(self, link, packets, what):
+        # Its answer also shows that no earlier one is under way.
+        data = bytes([CMD_DELETE_BLOCK, packets[0][1]])
+        link.request(data, _request(data, f"{what}, deleting it"))
+
+
+def _request(data, what):
+    begin, accepts = data[:2], lambda answer: len(answer) > 2
+    return Request(CRTPPort.LOGGING, CHAN_SETTINGS, begin, what, accepts=accepts)
 
 
 def _packets(log: cflib_log.Log, config: LogConfig) -> list[bytes]:

@@ -240,6 +240,8 @@ class ProcessContext:
         self._steady = TimerQueue(self.executor, machine_clock, *tf)
         self._simulated = SimulatedTimers(self.executor, self.clock, *tf)
         self._clock_publisher: Publisher | None = None
+        #: Work and decoder of each input of `NodeHandle.input`, by its number - 1.
+        self.inputs: list[tuple[Callable[..., None], Callable[[Any], Any]]] = []
         self.flights = OwnFlights(self.topics)
         #: Exit status with which the process is to end; None while it is not to end.
         self.exit_status: int | None = None
@@ -252,6 +254,8 @@ class ProcessContext:
             # overtake earlier messages of the simulation.
             move = partial(self.executor.submit, self.clock.set)
             self.topics.subscribe("/clock", Clock, lambda message: move(message.clock.to_sec()))
+
+    is_replay = False  #: Whether a journal has all that comes from outside.
 
     def end(self, status: int) -> None:
         """Shut the process down; it exits with ``status``."""

@@ -311,6 +311,32 @@ class NodeHandle:
         else:
             process.recorder.submit(self.name, callback, guarded, arguments)
 
+    def input(
+        self, callback: Callable[..., None], decode: Callable[[Any], Any] = lambda plain: plain
+    ) -> Callable[..., None]:
+        """Return a function for threads of the node that queues ``callback(argument)``, as `submit`.
+
+        Unlike with `submit`, a journal has the argument, if there is one, as JSON, and
+        ``decode(plain)`` returns it again. Created in the same order each time.
+        """
+        process, guarded = self._process, self.guard(callback)
+        process.inputs.append((guarded, decode))
+        if process.recorder is None:
+            return partial(self._submit, guarded)
+        return partial(process.recorder.submit_input, len(process.inputs), guarded)
+
+    def start(self, begin: Callable[[], None]) -> None:
+        """Call ``begin()``, which starts a thread that uses functions of `input`.
+
+        It is not called in a replay: the journal has what the thread has passed on.
+        """
+        if not self._process.is_replay:
+            begin()
+
+    def random_seed(self) -> int:
+        """Return a random seed, 32 bits: callbacks draw no random numbers elsewhere."""
+        return self._process.transport.random_seed()
+
     def broadcast_poses(
         self, refresh: Callable[[], None] | None = None
     ) -> Callable[[list[StampedPose]], None]:

@@ -6,6 +6,7 @@ change it. Messages are sent to other processes only if these subscribe. A `Tran
 the same for both.
 """
 
+import secrets
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -129,6 +130,10 @@ class Transport(ABC):
     def living_node(self, name: str) -> str | None:
         """Return where a node of another process runs; None if it does not answer, by default."""
         return None
+
+    def random_seed(self) -> int:
+        """Return 32 random bits."""
+        return secrets.randbits(32)
 
     @abstractmethod
     def log(self, level: str, text: str) -> None:

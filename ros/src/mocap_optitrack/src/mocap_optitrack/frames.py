@@ -1,7 +1,7 @@
 """Frames of a motion capture system, whatever its make, and their axes: z up or y up."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from crazyflie_model.angles import Quaternion, Triple
 
@@ -29,6 +29,13 @@ class Frame(NamedTuple):
     waited: float = 0.0
     #: Markers that the system has not assigned to a body, m, in the server's coordinates.
     points: tuple[Triple, ...] = ()
+
+    @classmethod
+    def of(cls, plain: list[Any]) -> "Frame":
+        """Return a frame of the lists as which JSON has its tuples."""
+        exposure, sent, arrival, bodies, waited, points = plain
+        seen = tuple(SeenBody(a, b, tuple(p), tuple(q), tracked) for a, b, p, q, tracked in bodies)
+        return cls(exposure, sent, arrival, seen, waited, tuple(map(tuple, points)))
 
 
 UP_AXES = ("z", "y")  #: Axes that may point up in a stream.

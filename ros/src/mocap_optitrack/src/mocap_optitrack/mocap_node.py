@@ -78,8 +78,9 @@ class MocapNode(Node[MocapParameters]):
         handle.info(
             f"connecting to {parameters.backend}; axis {parameters.up_axis} of its stream points up"
         )
+        self._on_complaint = handle.input(lambda text: handle.warn(text, _REPEAT, "datagram"))
         self._receiver = self.make_receiver(handle)
-        self._receiver.start()
+        handle.start(self._receiver.start)
 
     def add_body(self, body: RigidBody) -> None:
         """Publish a body from now on that is not in the parameters."""
@@ -97,10 +98,10 @@ class MocapNode(Node[MocapParameters]):
         """Return the thread whose frames and events the executor passes to ``on_...``."""
         return Receiver(
             lambda: self._make_source(handle),
-            on_connected=partial(handle.submit, self.on_connected),
-            on_frame=partial(handle.submit, self.on_frame),
-            on_silence=partial(handle.submit, self.on_silence),
-            on_failure=partial(handle.submit, self.on_failure),
+            on_connected=handle.input(self.on_connected),
+            on_frame=handle.input(self.on_frame, Frame.of),
+            on_silence=handle.input(self.on_silence),
+            on_failure=handle.input(self.on_failure),
         )
 
     @override
@@ -204,7 +205,7 @@ class MocapNode(Node[MocapParameters]):
         return NatNetSource(
             parameters.natnet,
             handle.time,
-            lambda text: handle.submit(handle.warn, text, _REPEAT, "datagram"),
+            self._on_complaint,
         )
 
     def _report(self):

@@ -85,7 +85,7 @@ class Receiver:
         """End the thread; returns after half a second even if it is still busy."""
         self._stopping.set()
         # The thread itself may be running the callbacks that end the node.
-        if self._thread is not threading.current_thread():
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_STOP_LIMIT)
 
     def _run(self):

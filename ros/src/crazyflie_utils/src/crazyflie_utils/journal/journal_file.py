@@ -60,7 +60,7 @@ class Kind(enum.IntEnum):
     TIMER = 3  #: The next one of the timers that were due runs.
     CALL = 4  #: A call of a service. Service; the request.
     REPLY = 5  #: The answer to the process's own request. Request; a byte, 0 or 1, answer or error.
-    SUBMITTED = 6  #: A call by another thread. JSON: node, function and arguments.
+    SUBMITTED = 6  #: A call by a thread. Input of a node, JSON: argument; or 0, JSON: what it was.
     PREPARE_SHUTDOWN = 7  #: The process is to end.
     SHUTDOWN = 8  #: The process ends.
     CLOCK = 9  #: A clock of a `FakeProcess` is set. 0: its own, 1: the machine's; f64: s.

@@ -165,6 +165,15 @@ class Recorder:
             self._wall = offset
             self.row(Kind.WALL, 0, 0, _I64.pack(offset))
 
+    def submit_input(self, number: int, work: Callable[..., None], *arguments: Any) -> None:
+        """Run a function of `NodeHandle.input`, by its number, with at most one argument."""
+
+        def run():
+            self.input(Kind.SUBMITTED, number, json.dumps(arguments).encode())
+            work(*arguments)
+
+        self.executor.post(run)
+
     def submit(self, node: str, callback: Callable[..., Any], work: Any, arguments: Any) -> None:
         """Run a callback that another thread has submitted for a node."""
 
@@ -458,6 +467,10 @@ class RecordingTransport(Transport):
     def living_node(self, name: str) -> str | None:
         """Return where a node runs."""
         return self._recorder.value(f"node {name}", lambda: self._transport.living_node(name))
+
+    def random_seed(self) -> int:
+        """Return a random seed."""
+        return self._recorder.value("seed", self._transport.random_seed)
 
     def log(self, level: str, text: str) -> None:
         """Log."""

@@ -99,6 +99,8 @@ class _ReplayClock(SteadyClock):
 class _RosProcess(Process):
     """A process that was one with ROS."""
 
+    is_replay = True
+
     def __init__(self, transport: Transport, clock: str, executor: Executor, rows: Rows):
         self.machine = _ReplayClock(rows, executor)
         simulated = SimulatedClock() if clock == "simulated" else self.machine
@@ -121,6 +123,8 @@ class _RosProcess(Process):
 
 class _OfflineProcess(OfflineProcess):
     """A process that was one without ROS, too."""
+
+    is_replay = True
 
     def __init__(self, transport: Transport, start: float, executor: Executor):
         super().__init__(transport, start, executor=executor)
@@ -294,11 +298,16 @@ class Replay:
             self._executor.submit(future.set_result, response)
 
     def _submitted(self, row):
-        node, function, arguments = json.loads(row.data)
-        raise JournalError(
-            f"{self.journal.path}: a thread of {node} has called {function}{arguments}, "
-            "which cannot be repeated"
-        )
+        known = json.loads(row.data)
+        if row.number:
+            work, decode = self.process.inputs[row.number - 1]
+            self._executor.submit(work, *map(decode, known))
+        else:
+            node, function, arguments = known
+            raise JournalError(
+                f"{self.journal.path}: at {self.time:.3f} s, a thread of {node} has called "
+                f"{function}{arguments}, which cannot be repeated"
+            )
 
     def _prepare_shutdown(self, _):
         self.process.prepare_shutdown(self.nodes)

@@ -294,6 +294,10 @@ class ReplayTransport(Transport):
         """Return the process of then."""
         return self.value(f"node {name}", f"looks for the node {name}")
 
+    def random_seed(self) -> int:
+        """Return the seed of then."""
+        return self.value("seed", "draws a random seed")
+
     def log(self, level: str, text: str) -> None:
         """Pass a text on."""
         self.on_log(level, text)

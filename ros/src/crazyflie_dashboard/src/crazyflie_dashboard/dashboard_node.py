@@ -40,6 +40,8 @@ class DashboardParameters(Parameters):
 class DashboardNode(Node):
     """Show vehicles in a browser, and command them."""
 
+    sources = "browsers, files and the master"
+
     def __init__(self) -> None:
         # Closes what has been opened, also if the page cannot be opened.
         self._open = contextlib.ExitStack()

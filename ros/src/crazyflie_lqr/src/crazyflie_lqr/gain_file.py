@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 
+from crazyflie_utils import text_file
 from crazyflie_utils.parameters.types import TEXT, Converted, ParameterType
 from crazyflie_utils.text import number_from_text, shortened, shown
 from crazyflie_utils.text_file import user_path
@@ -89,13 +90,13 @@ CONTROL_FILE = Converted(
 def _rows(path, expected):
     """Yield line number and numbers of every line that has any."""
     try:
-        with open(user_path(path), encoding="utf-8", errors="replace") as file:
-            lines = file.read().split("\n")
+        content = text_file.content(user_path(path), text_file.MAX_SIZE)
     except (OSError, ValueError) as error:
         # A path with a NUL character raises ValueError.
         reason = error.strerror if isinstance(error, OSError) else error
         where = shortened(os.path.abspath(user_path(path)))
         raise GainFileError(f"cannot read {where}: {reason}, {expected}") from None
+    lines = content.decode(errors="replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if lines[-1].endswith(".") and "#" not in lines[-1]:
         # With a line break behind it, the number would be valid.
         raise GainFileError(

@@ -314,7 +314,7 @@ class NodeHandle:
     def input(
         self, callback: Callable[..., None], decode: Callable[[Any], Any] = lambda plain: plain
     ) -> Callable[..., None]:
-        """Return a function for threads of the node that queues ``callback(argument)``, as `submit`.
+        """Return a function for the node's threads that queues ``callback(argument)``.
 
         Unlike with `submit`, a journal has the argument, if there is one, as JSON, and
         ``decode(plain)`` returns it again. Created in the same order each time.

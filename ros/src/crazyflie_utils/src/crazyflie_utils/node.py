@@ -32,6 +32,9 @@ class Node(Generic[P]):
     needs no locks.
     """
 
+    #: What callbacks read that does not come through the handle, and is not in a journal (text).
+    sources: ClassVar[str] = ""
+
     #: Whether a process with this node continues after SIGINT until flights have ended.
     needed_in_flight: ClassVar[bool] = False
 

@@ -17,6 +17,8 @@ _POLL_PERIOD = 0.5  #: Period at which the switches are read (s).
 class ServerNode(Node):
     """Runs a server; switches are polled, so that ``rosparam set`` also works on them."""
 
+    sources = "sockets"
+
     needed_in_flight = True
 
     #: ``server_type(parameters, warn)`` listens, or raises `OSError`; ``warn(text)`` logs.

@@ -47,6 +47,8 @@ class JoyNode(Node[JoyNodeParameters]):
     buttons at zero.
     """
 
+    sources = "a joystick"
+
     def __init__(self) -> None:
         self._joystick = Joystick()
         self._file: int | None = None

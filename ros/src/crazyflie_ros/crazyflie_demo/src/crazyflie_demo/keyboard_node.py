@@ -38,6 +38,8 @@ class KeyboardParameters(Parameters):
 class KeyboardNode(Node[KeyboardParameters]):
     """Publish the keys of the terminal as the axes and buttons of a joystick."""
 
+    sources = "a keyboard"
+
     def __init__(self) -> None:
         self._presses: deque[int] = deque()
         self._settings: list[Any] | None = None

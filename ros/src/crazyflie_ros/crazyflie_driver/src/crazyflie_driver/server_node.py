@@ -124,6 +124,8 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
     that has not received the broadcast is sent its own command.
     """
 
+    sources = "its vehicles, by threads"
+
     needed_in_flight = True
 
     def __init__(self) -> None:

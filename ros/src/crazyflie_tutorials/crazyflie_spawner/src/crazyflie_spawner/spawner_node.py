@@ -113,6 +113,8 @@ class SpawnedVehicle:
 class SpawnerNode(Node[SpawnerParameters]):
     """Start and end simulated vehicles, each in a namespace of its own, by service."""
 
+    sources = "processes"
+
     #: ``start_process(arguments of roslaunch)`` returns a `VehicleProcess`.
     start_process: Callable[[list[str]], VehicleProcess] = VehicleProcess
 

@@ -369,7 +369,8 @@ class VelocityServerNode(Node[VelocityServerParameters]):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
-        self._random = random.Random(parameters.seed)
+        seed = handle.random_seed() if parameters.seed is None else parameters.seed
+        self._random = random.Random(seed)
         handle.advertise_service(parameters.random_service, Velocity, self._on_random)
         handle.advertise_service(parameters.oscillator_service, VelocityAt, self._on_oscillator)
 

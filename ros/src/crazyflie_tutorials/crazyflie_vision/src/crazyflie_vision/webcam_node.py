@@ -40,6 +40,8 @@ class WebcamParameters(Parameters):
 class WebcamNode(Node[WebcamParameters]):
     """Publish the images of a webcam; end when it is disconnected."""
 
+    sources = "a camera"
+
     needed_in_flight = True
 
     def __init__(self) -> None:

@@ -201,6 +201,11 @@ class Replay:
         make = self._load(header["program"])
         self.nodes = {handle.name: make()} if isinstance(make, type) else make(handle)
         for name, node in self.nodes.items():
+            if node.sources:
+                raise JournalError(
+                    f"{self.journal.path}: {name} reads {node.sources}: its journal can be read, "
+                    "but not run again"
+                )
             if not node.initialize(self.process.handle(name)):
                 return False
         if needed := [name for name, node in self.nodes.items() if node.needed_in_flight]:

@@ -90,7 +90,7 @@ CONTROL_FILE = Converted(
 def _rows(path, expected):
     """Yield line number and numbers of every line that has any."""
     try:
-        content = text_file.content(user_path(path), text_file.MAX_SIZE)
+        content = text_file.content(path, text_file.MAX_SIZE)
     except (OSError, ValueError) as error:
         # A path with a NUL character raises ValueError.
         reason = error.strerror if isinstance(error, OSError) else error

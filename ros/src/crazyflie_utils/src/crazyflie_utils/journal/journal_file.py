@@ -143,7 +143,8 @@ class JournalWriter:
     def __init__(
         self, path: Path, header: dict[str, Any], keep: float, report: Callable[[str], None]
     ):
-        self.path, self.header, self.is_open = path, {"format": FORMAT, "start": 0.0} | header, True
+        self.path, self.is_open = path, True
+        self.header: dict[str, Any] = {"format": FORMAT, "start": 0.0, **header}
         self._report, self._keep = report, keep
         self._count, self._starts, self._has_failed = 0, True, False
         self._start_end = 0

@@ -210,7 +210,8 @@ class Recorder:
         try:
             content = read(path, most)
         except (OSError, ValueError) as error:
-            known = [type(error).__name__, getattr(error, "errno", None), str(error)]
+            text = getattr(error, "strerror", None) or str(error)
+            known = [type(error).__name__, getattr(error, "errno", None), text]
             self.row(Kind.FILE, 0, 0, name + b"\n" + json.dumps(known).encode())
             raise
         self.row(Kind.FILE, 1, 0, name + b"\n" + content)

@@ -243,6 +243,18 @@ def test_bad_changes_are_refused(name, value):
     assert len(transforms(process)) == 10
 
 
+@pytest.mark.parametrize("start", [5000.0, 1795944674.8])
+def test_a_clock_that_begins_anywhere_is_no_jump(start):
+    process = FakeProcess(start=0.0)
+    process.launch(NearHoverSimulatorNode(), "/simulator", PARAMETERS)
+    process.set_clock(start)
+    process.advance(0.02)
+    assert process.logged("warn") == []
+    process.set_clock(start + 3600.0)
+    process.advance(0.02)
+    assert "time has jumped by 3599" in process.logged("warn")[0]
+
+
 def test_a_clock_that_jumps_forward_is_not_simulated_step_by_step(monkeypatch):
     process = launch()
     command(process, 9.81)

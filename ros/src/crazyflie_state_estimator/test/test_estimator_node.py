@@ -1,6 +1,7 @@
 """The estimator nodes on a fake process."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -52,6 +53,19 @@ def test_bad_parameters_are_named(name, value):
     assert not process.launch(node, "/state_estimator", parameters)
     assert f"/state_estimator/{name} is" in process.logged("error")[0]
     assert "expected" in process.logged("error")[0]
+
+
+@pytest.mark.parametrize("start", [5000.0, 1795944674.8])
+def test_silence_begins_with_simulated_time_wherever_that_begins(start):
+    """As a bag that is played, or a simulation that runs already."""
+    process = FakeProcess(start=0.0)
+    process.launch(PositionVelocityYawStateEstimatorNode(), "/state_estimator", PARAMETERS)
+    process.set_clock(start)
+    assert process.logged("warn") == []
+    process.advance(1.0)
+    assert process.logged("warn")
+    for text in process.logged("warn"):
+        assert re.search(r"no new transform world -> \w+ for (0\.[5-9]|1\.0) s", text)
 
 
 def test_publishes_the_state_with_the_transforms_stamp_and_frame():

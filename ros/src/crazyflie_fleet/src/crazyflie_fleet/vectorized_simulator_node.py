@@ -229,12 +229,15 @@ class VectorizedSimulatorNode(Node):
     def _fly_to(self, now):
         skipped = now - self._batch.time - max(MAX_CATCH_UP, self._parameters.time_step)
         if skipped > 0.0:
+            # Simulated time is 0 until the first message on /clock, which may begin anywhere.
+            if self._batch.time > 0.0:
+                self._handle.warn(
+                    f"time has moved by {skipped:.1f} s too much to simulate; the vehicles skip "
+                    "that",
+                    throttle=1.0,
+                    key="skipped time",
+                )
             self._batch.skip(skipped)
-            self._handle.warn(
-                f"time has moved by {skipped:.1f} s too much to simulate; the vehicles skip that",
-                throttle=1.0,
-                key="skipped time",
-            )
         self._batch.advance_to(now)
         time = self._batch.time
         if self._measured is not None and time == self._measured[0]:

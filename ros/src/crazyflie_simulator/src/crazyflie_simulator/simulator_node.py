@@ -254,13 +254,15 @@ class SimulatorNode(Node[SimulatorParameters]):
     def _advance_to(self, now):
         skipped = now - self._vehicle.time - max(MAX_CATCH_UP, self._parameters.time_step)
         if skipped > 0.0:
+            # Simulated time is 0 until the first message on /clock, which may begin anywhere.
+            if self._vehicle.time > 0.0:
+                self._handle.warn(
+                    f"time has jumped by {skipped:.1f} s more than can be simulated; the vehicle "
+                    "skips that time",
+                    throttle=1.0,
+                    key="skipped time",
+                )
             self._vehicle.skip(skipped)
-            self._handle.warn(
-                f"time has jumped by {skipped:.1f} s more than can be simulated; the vehicle "
-                "skips that time",
-                throttle=1.0,
-                key="skipped time",
-            )
         self._vehicle.advance_to(now)
         if self._vehicle.has_crashed and not self._crash_is_known:
             self._handle.warn(

@@ -137,7 +137,8 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
     def __init__(self) -> None:
         self._control = ControlInput()
         self._clock_steps = ClockStepMonitor()
-        self._last_success = 0.0
+        #: Time of the last state, or of the first attempt: simulated time may begin anywhere.
+        self._last_success: float | None = None
         self._stamp: int | None = None
         self._is_tilted: bool | None = None
         self._frozen_poses = 0
@@ -190,7 +191,6 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
             handle.subscribe(
                 parameters.control_topic, ControlStamped, self._on_control, finite="control"
             )
-        self._last_success = handle.time()
         if parameters.acts_on_arrival:
             handle.on_pose(parameters.robot_frame, parameters.time_step, self._estimate)
             handle.timer(max(parameters.time_step, SILENCE_PERIOD), self._watch)
@@ -203,12 +203,18 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
 
     def _watch(self):
         # Without arrivals `_estimate` would not run and report the silence.
-        if self._handle.time() - self._last_success >= HOLD_LIMIT:
+        if self._silence(self._handle.time()) >= HOLD_LIMIT:
             self._estimate()
+
+    def _silence(self, now):
+        """Return the time since the last state, or since the first call (s)."""
+        if self._last_success is None:
+            self._last_success = now
+        return now - self._last_success
 
     def _estimate(self):
         now = self._handle.time()
-        if now < self._last_success:
+        if self._silence(now) < 0.0:
             # The simulation was reset, and the estimate belongs to the previous run.
             self._estimator.reset()
             self._gate.reset()
@@ -287,7 +293,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         }
 
     def _report(self):
-        silence = self._handle.time() - self._last_success
+        silence = self._silence(self._handle.time())
         is_silent = silence > HOLD_LIMIT
         rejected = self._rejections()
         values = [KeyValue(f"rejected: {key}", str(count)) for key, count in rejected.items()]
@@ -303,7 +309,8 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
     def _report_no_state(self, now, reason, pose=None):
         # Shorter silences are ordinary: at the start, and when time_step is
         # shorter than the period of the transforms.
-        if now - self._last_success < HOLD_LIMIT:
+        silence = self._silence(now)
+        if silence < HOLD_LIMIT:
             return
         self._tell_tf_error(reason)
         if pose is not None:
@@ -313,7 +320,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
             )
         self._handle.warn(
             f"no state: no new transform {self._parameters.fixed_frame} -> "
-            f"{self._parameters.robot_frame} for {now - self._last_success:.1f} s ({reason})",
+            f"{self._parameters.robot_frame} for {silence:.1f} s ({reason})",
             throttle=1.0,
             key="no state",
         )

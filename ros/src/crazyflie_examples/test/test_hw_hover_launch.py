@@ -74,6 +74,12 @@ def test_what_dies_in_flight_is_started_again():
     assert {name for name, node in simulated.items() if not node.respawn} == {"/simulator"}
 
 
+def test_what_keeps_the_motors_running_is_started_again_at_once():
+    nodes, _ = launch_files.expand(LAUNCH / "hw_hover.launch", rviz="false")
+    for name in ("/takeoff_control_filter", "/cmd_vel_converter"):
+        assert (nodes[name].respawn, nodes[name].respawn_delay) == (True, 0.0)
+
+
 def test_the_frame_of_motion_capture_outlives_its_publisher():
     # Messages of tf2's publisher are latched and kept; tf's publisher would have to repeat them.
     nodes, _ = launch_files.expand(LAUNCH / "hw_hover.launch", rviz="false")

@@ -216,6 +216,20 @@ def remove_the_vehicle(flight):
     return {"answer": answer, "heights": flight.observer.range_since(begin)}
 
 
+def kill_filter_and_converter(flight):
+    """Kill both in flight: nothing is sent to the vehicle until they are started again."""
+    flight.observer.hover(2.0)
+    begin = flight.observer.now
+    for node in ("/takeoff_control_filter", "/cmd_vel_converter"):
+        os.kill(node_process(node), signal.SIGKILL)
+    flight.observer.hover(4.0)
+    return {
+        "heights": flight.observer.range_since(begin),
+        "locked": flight.vehicle.is_locked,
+        "height afterwards": flight.is_back_at(1.0),
+    }
+
+
 def end_node(flight, name):
     """End a node in flight, as with rosnode kill."""
     begin = flight.observer.now
@@ -293,6 +307,8 @@ def fly(core_command, arguments, folder):
             with running(*launch, stdout=output, stderr=output):
                 flight.wait_for_vehicle()
                 flight.lift_off()
+                if node == "crazyflie_server":
+                    seen["filter killed"] = kill_filter_and_converter(flight)
                 seen["removed"] = remove_the_vehicle(flight)
                 seen[f"{node} asked to end"] = end_node(flight, f"/{node}")
     return seen

@@ -99,6 +99,13 @@ def test_a_vehicle_in_flight_is_not_removed(seen):
     assert min(seen["removed"]["heights"]) > 0.4
 
 
+def test_flies_on_when_filter_and_converter_are_killed(seen):
+    assert not seen["filter killed"]["locked"]
+    assert min(seen["filter killed"]["heights"]) > 0.3
+    assert max(seen["filter killed"]["heights"]) < 1.3
+    assert seen["filter killed"]["height afterwards"] == pytest.approx(1.0, abs=0.05)
+
+
 @pytest.mark.parametrize("node", ["crazyflie_server", "mocap_node"])
 def test_the_end_of_driver_or_motion_capture_is_a_landing(seen, node):
     assert seen[f"{node} asked to end"]["fastest descent"] < 0.7

@@ -97,7 +97,9 @@ def on_thrust(server, vehicle):
 def test_a_flight_on_thrust_cannot_be_landed_by_the_vehicle(on_thrust):
     server, vehicle = on_thrust
     # The stream has ended.
-    server.process.advance(0.5)
+    server.process.advance(3.0)
+    vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 2)
+    vehicle.received.clear()
     server.remove(vehicle.uri)
     assert commands(vehicle) == UNLOCKED
 

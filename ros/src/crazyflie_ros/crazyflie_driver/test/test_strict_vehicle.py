@@ -4,6 +4,7 @@ import threading
 
 import pytest
 from genpy import Duration
+from geometry_msgs.msg import Twist, Vector3
 from std_msgs.msg import Empty
 
 from crazyflie_driver.msg import Position
@@ -11,6 +12,7 @@ from crazyflie_driver.srv import LandRequest, NotifySetpointsStopRequest, Takeof
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.log import LogBlock
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_model.units import GRAVITY, pwm_from_thrust
 from crazyflie_utils.testing.programs import LIMIT, wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
@@ -49,13 +51,29 @@ class Flight:
         end = self.time + duration
         wait_until(lambda: self.time >= end, f"{duration} s of the vehicle's time", period=0.002)
 
-    def run(self, duration, height=None, until=lambda: False):
-        """Advance the time, streaming positions if a height is given."""
+    def thrust(self, height):
+        """Send the level thrust of a controller of the height (m)."""
+        truth = self.virtual.observe()
+        thrust = GRAVITY + 6.0 * (height - truth.position[2]) - 5.0 * truth.velocity[2]
+        twist = Twist(linear=Vector3(z=pwm_from_thrust(min(max(thrust, 1.0), 13.0))))
+        self.server.process.publish("/cf1/cmd_vel", twist)
+
+    def hover_on_thrust(self, height, duration):
+        """Unlock the thrust and hover, at a height (m), for a time (s)."""
+        self.server.process.publish("/cf1/cmd_vel", Twist())
+        self.run(duration, height, send=self.thrust)
+
+    def position(self, height):
+        """Send a position at a height (m)."""
+        self.server.process.publish("/cf1/cmd_position", Position(z=height))
+
+    def run(self, duration, height=None, until=lambda: False, send=None):
+        """Advance the time, streaming setpoints, positions by default, if a height is given."""
         end, step = self.time + duration, PERIOD
         while (begin := self.time) < end and not until():
             self.server.process.advance(step)
             if height is not None:
-                self.server.process.publish("/cf1/cmd_position", Position(z=height))
+                (send or self.position)(height)
             self.wait(PERIOD)
             # On a busy machine the vehicle comes further, and the driver's clock goes with it.
             step = self.time - begin
@@ -117,6 +135,35 @@ def test_a_streamed_flight_survives_a_second_of_silence(flight):
     assert SupervisorState.LOCKED not in flight.state
     assert min(flight.heights[count:]) > 0.5 * HEIGHT
     assert flight.crazyflie.connection_count == 1
+
+
+@pytest.mark.parametrize("gap", [1.0, 2.4])
+def test_a_stream_of_thrust_that_pauses_flies_on(flight, gap):
+    """Such as while the filter or the converter is started again, on a busy machine."""
+    flight.hover_on_thrust(1.0, 4.0)
+    assert flight.virtual.observe().position[2] == pytest.approx(1.0, abs=0.1)
+    count = len(flight.heights)
+    flight.run(gap)
+    flight.run(2.0, 1.0, send=flight.thrust)
+    assert SupervisorState.LOCKED not in flight.state
+    assert min(flight.heights[count:]) > 0.2
+    assert flight.virtual.observe().position[2] == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_stream_of_thrust_that_ends_in_flight_lets_the_vehicle_sink(flight):
+    flight.hover_on_thrust(1.0, 4.0)
+    speeds = []
+
+    def is_down():
+        truth = flight.virtual.observe()
+        speeds.append(-truth.velocity[2])
+        return truth.position[2] < 0.02
+
+    flight.run(LIMIT, until=is_down)
+    # A fall from there would end with 4.4 m/s.
+    assert 0.5 < max(speeds) < 2.5
+    flight.wait(LOCK_TIME + 1.0)
+    assert not any(flight.virtual.vehicle.board.firmware.stabilizer.commands)
 
 
 def test_a_setpoint_that_comes_after_cmd_stop_locks_nothing(flight):

@@ -131,6 +131,12 @@ class SetpointGate:
         with self._lock:
             yield self.refusal(now, is_zero)
 
+    @contextlib.contextmanager
+    def repeating(self, now: float) -> Iterator[str]:
+        """Do the same for a setpoint of the driver's own: it is no part of a stream."""
+        with self._lock:
+            yield self._reason(now, False)
+
     def is_blocking(self, now: float) -> bool:
         """Return whether a stream is blocked because the link was lost."""
         is_streamed = self._latest is not None and now - self._latest <= STREAM_PAUSE
@@ -146,13 +152,16 @@ class SetpointGate:
             if is_zero or before is None or now - before > STREAM_PAUSE:
                 if not self._blocks & ~_ON_TRIAL:
                     self.handle(GateEvent.STREAM_BEGUN)
-            for block, reason in REASONS.items():
-                if block in self._blocks:
-                    return reason
-            for since, event in (
-                (self._high_level_since, "given a high-level command"),
-                (self._stopped_since, "stopped by cmd_stop"),
-            ):
-                if since is not None and now - since < OVERLAP and not is_zero:
-                    return f"the vehicle was just {event}"
-            return ""
+            return self._reason(now, is_zero)
+
+    def _reason(self, now, is_zero):
+        for block, reason in REASONS.items():
+            if block in self._blocks:
+                return reason
+        for since, event in (
+            (self._high_level_since, "given a high-level command"),
+            (self._stopped_since, "stopped by cmd_stop"),
+        ):
+            if since is not None and now - since < OVERLAP and not is_zero:
+                return f"the vehicle was just {event}"
+        return ""

@@ -16,6 +16,7 @@ from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import LIFT_LIMIT, MAX_TURN, LiftWatch
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
 from crazyflie_driver.setpoint_gate import GateEvent
+from crazyflie_driver.thrust_fade import FADE_TIME, ThrustFade
 from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
@@ -30,8 +31,8 @@ _RATE_WINDOW = 1.0
 #: Period of the warning of an estimator that ignores poses, s.
 _ESTIMATOR_PERIOD = 30.0
 
-#: Silence after zero thrust that ends a stream, s, and the period of the check, s.
-_REST, _REST_PERIOD = 0.5, 0.1
+#: Silence after zero thrust that ends a stream, s, and the period of the checks of silence, s.
+_REST, _SILENCE_PERIOD = 0.5, 0.1
 
 
 class Sender(NamedTuple):
@@ -106,6 +107,11 @@ def _xyzw(orientation: Quaternion) -> tuple[float, float, float, float]:
     return orientation.x, orientation.y, orientation.z, orientation.w
 
 
+def _thrust(message: Twist) -> float:
+    # This order keeps a NaN, which is refused.
+    return min(max(message.linear.z, 0.0), MAX_SETPOINT_PWM)
+
+
 def _yaw(orientation: Quaternion) -> float:
     # For quaternions of any norm.
     x, y, z, w = _xyzw(orientation)
@@ -125,9 +131,10 @@ class Control(enum.Enum):
 class SetpointTopics:
     """Subscribe to a vehicle's setpoints and pass them on, as long as that is allowed.
 
-    Nothing is repeated: when messages stop coming, the firmware's watchdogs act, after 0.5 s and
-    2 s. But if the last one stopped the motors, "setpoints stop" is sent: otherwise the vehicle
-    would be locked 2 s later.
+    When messages stop coming, the firmware's watchdogs act, after 0.5 s and 2 s. Before that, a
+    stream of thrust that has stopped in flight is followed by level setpoints whose thrust fades:
+    the sender may be started again. If the last message stopped the motors, "setpoints stop" is
+    sent: otherwise the vehicle would be locked 2 s later.
     """
 
     _vehicle: BaseVehicle
@@ -143,6 +150,8 @@ class SetpointTopics:
     _external_time: float = -math.inf
     _lift: LiftWatch = field(default_factory=LiftWatch)
     _commanded_yaw: float | None = None
+    _fade: ThrustFade = field(default_factory=ThrustFade)
+    _faded_time: float = -math.inf
 
     def subscribe(self) -> None:
         """Subscribe to all topics."""
@@ -156,7 +165,7 @@ class SetpointTopics:
             for name, sender in each.items():
                 receive = partial(callback, name, sender)
                 handle.subscribe(f"{prefix}/{name}", sender.message_type, receive)
-        handle.timer(_REST_PERIOD, self._end_stream_at_rest)
+        handle.timer(_SILENCE_PERIOD, self._follow_silence)
 
     @property
     def is_streaming(self) -> bool:
@@ -189,8 +198,8 @@ class SetpointTopics:
 
     @property
     def last_time(self) -> float:
-        """When the last setpoint was sent, s; -inf if none was."""
-        return self._times[-1] if self._times else -math.inf
+        """When the last setpoint was sent, also one of the fade, s; -inf if none was."""
+        return max(self._times[-1] if self._times else -math.inf, self._faded_time)
 
     def rate(self) -> float:
         """Return how many setpoints were sent in the last second."""
@@ -304,6 +313,8 @@ class SetpointTopics:
                 if name == CMD_STOP:
                     self._vehicle.gate.stop(now)
                 self._times.append(now)
+                if name == CMD_VEL:
+                    self._fade.command(now, _thrust(message))
                 moving = Control.THRUST if name == CMD_VEL else Control.REFERENCE
                 self.control, self._topic = Control.ZERO_THRUST if at_rest else moving, name
         if refusal:
@@ -334,20 +345,37 @@ class SetpointTopics:
             return False
         return True
 
-    def _end_stream_at_rest(self):
-        silence = self._vehicle.handle.time() - self.last_time
-        if self.control is Control.ZERO_THRUST and silence > _REST:
-            # Without a link, which its state shows; it is tried again.
-            with contextlib.suppress(CrazyflieError):
+    def _follow_silence(self):
+        now = self._vehicle.handle.time()
+        # Without a link, which its state shows; it is tried again.
+        with contextlib.suppress(CrazyflieError):
+            if self.control is Control.ZERO_THRUST and now - self.last_time > _REST:
                 self.notify_setpoints_stop()
+            elif self.control is Control.THRUST and self._log.is_flying:
+                self._send_fading(now)
+
+    def _send_fading(self, now):
+        thrust = self._fade.thrust(now)
+        if thrust is None:
+            return
+        with self._vehicle.gate.repeating(now) as refusal:
+            if refusal:
+                return
+            self._cmd_vel(Twist(linear=Vector3(z=thrust)))
+            self._faded_time = now
+        self._vehicle.warn(
+            f"{CMD_VEL} has stopped in flight: the vehicle is kept level with a thrust that fades "
+            f"for {FADE_TIME:g} s; {OFF_AGE:g} s later it stops its motors",
+            OFF_AGE,
+            "fade",
+        )
 
     def _warn(self, text, key):
         self._vehicle.warn(text, _THROTTLE, key)
 
     def _cmd_vel(self, message):
         # The link's pitch is the negative of cmd_vel's, and cflib negates it; tests compare bytes.
-        # This order keeps a NaN, which is refused.
-        thrust = min(max(message.linear.z, 0.0), MAX_SETPOINT_PWM)
+        thrust = _thrust(message)
         parameters, state = self._vehicle.parameters, self._log.supervisor
         if thrust > 0.0 and state is not None:
             if state & (SupervisorState.LOCKED | SupervisorState.CRASHED):

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.firmware.states import DISABLED, VELOCITY, Modes, Setpoint
 from crazyflie_virtual.firmware.supervisor import TRANSITIONS, State, Supervisor
 
@@ -29,6 +30,25 @@ class Hand:
             sensors = SimpleNamespace(acc_x=x, acc_y=y, acc_z=z)
             self.supervisor.update(self.time, sensors, self.setpoint_age, self.motors_run)
         return self.supervisor.state
+
+
+def test_a_fault_of_a_deck_ends_a_flight_and_the_next_does_not_begin(flying):
+    assert SupervisorState.DECK_FAULT not in flying.supervisor.flags
+    flying.supervisor.has_deck_fault = True
+    assert flying.run(0.1) is State.LOCKED
+    assert {SupervisorState.DECK_FAULT, SupervisorState.LOCKED} <= set(flying.supervisor.flags)
+
+
+@pytest.mark.parametrize("auto_arm", [True, False])
+def test_a_vehicle_with_a_fault_of_a_deck_is_not_armed(auto_arm):
+    hand = Hand(auto_arm)
+    hand.run(0.2)
+    hand.supervisor.has_deck_fault = True
+    assert hand.run(0.2) is State.PRE_FL_CHECKS_NOT_PASSED
+    assert not hand.supervisor.arm(True)
+    assert hand.run(0.2) is State.PRE_FL_CHECKS_NOT_PASSED
+    hand.supervisor.has_deck_fault = False
+    assert hand.run(0.2) is (State.READY_TO_FLY if auto_arm else State.PRE_FL_CHECKS_PASSED)
 
 
 @pytest.fixture

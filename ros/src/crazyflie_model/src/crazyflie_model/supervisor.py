@@ -6,7 +6,7 @@ import enum
 class SupervisorState(enum.IntFlag):
     """State of the vehicle; also the log variable supervisor.info.
 
-    The last three are the high-level commander's (supervisor.c of the firmware).
+    Three of the last four are the high-level commander's (supervisor.c of the firmware).
     """
 
     CAN_BE_ARMED = 1 << 0
@@ -20,6 +20,7 @@ class SupervisorState(enum.IntFlag):
     HIGH_LEVEL_ACTIVE = 1 << 8
     TRAJECTORY_FINISHED = 1 << 9
     HIGH_LEVEL_DISABLED = 1 << 10
+    DECK_FAULT = 1 << 11  #: A deck reports a fault of its hardware (firmware 2026.08).
 
     @classmethod
     def of(cls, **flags: bool) -> "SupervisorState":
@@ -40,7 +41,7 @@ class SupervisorState(enum.IntFlag):
     @property
     def faults(self) -> "SupervisorState":
         """Flags with which the vehicle cannot take off before it is put upright or restarted."""
-        return self & (self.TUMBLED | self.LOCKED | self.CRASHED)
+        return self & (self.TUMBLED | self.LOCKED | self.CRASHED | self.DECK_FAULT)
 
     def words(self) -> str:
         """Return the state in words, such as "armed, flying"."""

@@ -2,12 +2,14 @@
 
 import math
 
+import pytest
 from conftest import LOG
-from safety_helpers import FLYING, LOCKED, is_, position, said, wait_for_words
+from safety_helpers import FLYING, LOCKED, TAKEOFF, is_, position, said, wait_for_words
 from std_msgs.msg import Empty
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_msgs.msg import VehicleStatus
+from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.programs import wait_until
 
 
@@ -106,3 +108,12 @@ def test_a_vehicle_without_these_variables(server, vehicle):
     status = published(server)[-1]
     assert status.pm_state == VehicleStatus.PM_STATE_UNKNOWN
     assert (status.num_rx_broadcast, status.num_rx_unicast) == (0, 0)
+
+
+def test_the_fault_of_a_deck_is_named(server, vehicle):
+    """Of firmware 2026.08: such a vehicle disarms, and is not armed."""
+    is_(vehicle, 0x804)
+    wait_for_words(server, "cannot fly: deck fault")
+    with pytest.raises(ServiceError, match="the vehicle cannot fly, its state is: .*deck fault"):
+        server.call("/cf1/takeoff", TAKEOFF)
+    assert vehicle.packets(8, 0) == []

@@ -263,6 +263,7 @@ _GROUPS = {
         *_limited(FLOAT, 0.0, 10.0, delay="faults.delay"),
         *_limited(FLOAT, 0.0, 3600.0, silence="faults.silence"),
         *_limited(U8, 0, 1, lowBattery="faults.low_battery"),
+        *_limited(U8, 0, 1, deck="faults.deck"),
         *_limited(U8, 0, 4, motorFailure="faults.motor_failure"),
         *_limited(U8, 0, 3, occluded="faults.occluded"),
         *_limited(FLOAT, 0.0, 100.0, smooth="faults.smooth"),

@@ -135,6 +135,9 @@ class VehicleSettings(Parameters):
     motor_failure: int = parameter(
         Integer(0, 4), "the failed motor, 1 to 4; 0 for none", 0, "fault/motor_failure", live=True
     )
+    deck: bool = parameter(
+        BOOLEAN, "a deck reports a fault of its hardware: no flight", False, "fault/deck", live=True
+    )
     occluded: int = parameter(
         Integer(0, 3),
         "base stations that the Lighthouse deck does not see: 1 the first, 2 the second, 3 both",

@@ -378,7 +378,7 @@ class SetpointTopics:
         thrust = _thrust(message)
         parameters, state = self._vehicle.parameters, self._log.supervisor
         if thrust > 0.0 and state is not None:
-            if state & (SupervisorState.LOCKED | SupervisorState.CRASHED):
+            if state.faults & ~SupervisorState.TUMBLED:
                 self._warn(f"cannot fly ({state.words()}): restart the vehicle", key="locked")
             elif SupervisorState.ARMED not in state:
                 self._warn(f"not armed, call {parameters.prefix}/arm", key="armed")

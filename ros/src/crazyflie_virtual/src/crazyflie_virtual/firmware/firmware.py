@@ -161,6 +161,7 @@ class Firmware:
         idle = self.stabilizer.idle_thrust
         motors_run = max(self.stabilizer.commands) > idle
         age = self.time - self.commander.setpoint.time
+        self.supervisor.has_deck_fault = bool(self.faults.deck)
         self.supervisor.update(self.time, self.sensors, age, motors_run)
         if self.supervisor.can_fly:
             self._warned_state = None

@@ -7,7 +7,8 @@ with what came later: that disarming in the air is no emergency (pull request 14
 has a time limit (1441), and the state before `State.READY_TO_FLY` (1641). The recorded flights
 (release 2026.08) confirm each transition but these, of which there is no record: the one out of
 `State.READY_TO_FLY` by time, those out of `State.LANDED` by disarming and of
-`State.WARNING_LEVEL_OUT` by disarming and tumbling, and those of `State.CRASHED`.
+`State.WARNING_LEVEL_OUT` by disarming and tumbling, those of `State.CRASHED`, and those by the
+fault of a deck.
 """
 
 import math
@@ -51,6 +52,7 @@ class Condition(Flag):
     EMERGENCY_STOP = auto()
     CRASHED = auto()  #: The vehicle has not been recovered since the crash.
     PREFLIGHT_TIMEOUT = auto()  #: Armed for `Supervisor.preflight_timeout`.
+    DECK_FAULT = auto()  #: A deck has reported a fault of its hardware.
     LANDING_TIMEOUT = auto()  #: Landed for `Supervisor.landed_timeout`.
     ALWAYS = auto()
 
@@ -69,11 +71,12 @@ _S, _C = State, Condition
 TRANSITIONS: dict[State, tuple[Transition, ...]] = {
     _S.PRE_FL_CHECKS_NOT_PASSED: (
         Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP),
+        Transition(_S.PRE_FL_CHECKS_NOT_PASSED, when=_C.DECK_FAULT),
         Transition(_S.PRE_FL_CHECKS_PASSED, unless=_C.IS_TUMBLED),
     ),
     _S.PRE_FL_CHECKS_PASSED: (
         Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP),
-        Transition(_S.PRE_FL_CHECKS_NOT_PASSED, when=_C.IS_TUMBLED),
+        Transition(_S.PRE_FL_CHECKS_NOT_PASSED, when=_C.IS_TUMBLED | _C.DECK_FAULT),
         Transition(_S.ARMING, when=_C.ARMED),
     ),
     _S.ARMING: (
@@ -84,12 +87,16 @@ TRANSITIONS: dict[State, tuple[Transition, ...]] = {
     ),
     _S.READY_TO_FLY: (
         Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP),
-        Transition(_S.PRE_FL_CHECKS_NOT_PASSED, when=_C.IS_TUMBLED, unless=_C.ARMED),
+        Transition(
+            _S.PRE_FL_CHECKS_NOT_PASSED, when=_C.IS_TUMBLED | _C.DECK_FAULT, unless=_C.ARMED
+        ),
         Transition(_S.FLYING, when=_C.IS_FLYING),
         Transition(_S.PRE_FL_CHECKS_PASSED, when=_C.PREFLIGHT_TIMEOUT),
     ),
     _S.FLYING: (
-        Transition(_S.EXCEPT_FREE_FALL, when=_C.COMMANDER_WDT_TIMEOUT | _C.EMERGENCY_STOP),
+        Transition(
+            _S.EXCEPT_FREE_FALL, when=_C.COMMANDER_WDT_TIMEOUT | _C.EMERGENCY_STOP | _C.DECK_FAULT
+        ),
         Transition(_S.CRASHED, when=_C.IS_TUMBLED),
         Transition(_S.RESET, unless=_C.ARMED),
         Transition(_S.WARNING_LEVEL_OUT, when=_C.COMMANDER_WDT_WARNING),
@@ -103,7 +110,8 @@ TRANSITIONS: dict[State, tuple[Transition, ...]] = {
     # No transition to LANDED: without setpoints a vehicle is locked although its motors are off.
     _S.WARNING_LEVEL_OUT: (
         Transition(
-            _S.EXCEPT_FREE_FALL, when=_C.COMMANDER_WDT_TIMEOUT | _C.IS_TUMBLED | _C.EMERGENCY_STOP
+            _S.EXCEPT_FREE_FALL,
+            when=_C.COMMANDER_WDT_TIMEOUT | _C.IS_TUMBLED | _C.EMERGENCY_STOP | _C.DECK_FAULT,
         ),
         Transition(_S.RESET, unless=_C.ARMED),
         Transition(_S.FLYING, unless=_C.COMMANDER_WDT_WARNING),
@@ -152,6 +160,7 @@ class Supervisor:
         self.is_armed = self.is_tumbled = self.is_crashed = False
         self.emergency_stop = 0  #: Parameter stabilizer.stop: not 0 stops the motors.
         self.tumble_check = 1  #: 0 for none.
+        self.has_deck_fault = False  #: Whether a deck reports a fault of its hardware.
         #: preflight_timeout, landed_timeout: ms after which a vehicle is disarmed when it does not
         #: take off, and after landing. With automatic arming it cannot fly for four updates then.
         self.preflight_timeout, self.landed_timeout = 30000, 3000
@@ -187,6 +196,7 @@ class Supervisor:
             tumbled=self.is_tumbled,
             locked=self.state is State.LOCKED,
             crashed=self.is_crashed,
+            deck_fault=self.has_deck_fault,
         )
 
     def arm(self, do_arm: bool) -> bool:
@@ -250,6 +260,7 @@ class Supervisor:
             Condition.COMMANDER_WDT_TIMEOUT: setpoint_age > OFF_AGE,
             Condition.EMERGENCY_STOP: self._is_emergency(time),
             Condition.CRASHED: self.is_crashed,
+            Condition.DECK_FAULT: self.has_deck_fault,
             Condition.PREFLIGHT_TIMEOUT: self._waited(time, self.preflight_timeout),
             Condition.LANDING_TIMEOUT: self._waited(time, self.landed_timeout),
         }

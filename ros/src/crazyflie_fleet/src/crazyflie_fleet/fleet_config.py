@@ -36,6 +36,8 @@ VENDOR, SINGLE_MARKER = "vendor", "single_marker"
 #: Marker configurations with one marker.
 _SINGLE_MARKERS = ("default_single_marker", SINGLE_MARKER)
 LOCAL = "local"  #: Default machine of vehicles.
+#: Connection of a vehicle, and of a body that has none.
+CRAZYFLIE, NONE = "crazyflie", "none"
 
 #: Key in ``default_topics`` -> standard topic of the driver; empty if there is no such topic.
 DEFAULT_TOPICS = {
@@ -52,6 +54,20 @@ DEFAULT_TOPICS = {
 }
 
 
+#: Names below a vehicle's namespace that nodes of the workspace use: a topic of firmware variables
+#: would have two types. A test compares them with the topics and services of these nodes.
+RESERVED_NAMES = frozenset(
+    """
+    battery cmd_full_state cmd_hover cmd_position cmd_stop cmd_vel cmd_velocity_world connected
+    control driver emergency emergency_reset external_pose external_position go_to heading
+    high_level imu in_flight in_flight_controller in_flight_filter in_flight_filter_status
+    in_flight_flight_status in_flight_state in_flight_status land magnetic_field packets pose
+    positioning pressure ref ref_descent ref_descent_safe ref_safe rssi state state_missing
+    state_tilted status takeoff takeoff_inhibition temperature true_pose vehicle_status
+    """.split()
+)
+
+
 #: Name of a vehicle's namespace and frame; /all/takeoff is a service for all vehicles.
 VEHICLE_NAME = matching(
     "(?!all$)[A-Za-z][A-Za-z0-9_]*",
@@ -59,16 +75,16 @@ VEHICLE_NAME = matching(
 )
 
 
-def vehicle_key(uri: str) -> str:
-    """Return a key that is equal for all addresses of a vehicle; `ValueError` if malformed."""
+def address_of(uri: str) -> Address:
+    """Return a vehicle's address; `ValueError` if it is malformed."""
     try:
-        return Address.parse(uri.replace("radio://*/", "radio://0/")).key
+        return Address.parse(uri.replace("radio://*/", "radio://0/"))
     except AddressError:
         raise ValueError from None
 
 
 def _uri(value):
-    vehicle_key(TEXT(value))
+    address_of(TEXT(value))
     return value
 
 
@@ -196,7 +212,18 @@ class Settings(Parameters):
     big_quad: bool = parameter(BOOLEAN, WITHOUT_EFFECT, False)
     reference_frame: str = parameter(TEXT, WITHOUT_EFFECT, "world")
     enabled: bool = parameter(BOOLEAN, "whether the vehicle takes part", True)
+    connection: str = parameter(
+        Text((CRAZYFLIE, NONE)),
+        "`none`: not a vehicle, but a body that motion capture sees; it is never flown, and "
+        "vehicles keep apart from it",
+        CRAZYFLIE,
+    )
     uri: str | None = parameter(_URI, "address of the vehicle; not needed in simulation", None)
+    id: int | None = parameter(
+        Integer(0, 255),
+        "number of the vehicle in scripts, and the last byte of its radio address if it has one",
+        None,
+    )
     position: tuple[float, float, float] | None = parameter(
         _START_POSITION, "position of the vehicle before takeoff", None, "initial_position"
     )
@@ -297,6 +324,8 @@ class FleetConfig:
     broadcasts: Mapping[str, float] = dataclasses.field(default_factory=dict)
     # Pairs of names of vehicles whose start points are closer than their buffers.
     unplaced: tuple[tuple[str, str], ...] = ()
+    # Bodies that are seen, and never flown: the entries with the connection `NONE`.
+    obstacles: tuple[VehicleConfig, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -320,8 +349,8 @@ class FleetConfig:
         return dataclasses.replace(self, vehicles=vehicles)
 
     def __getitem__(self, name: str) -> VehicleConfig:
-        """Return a vehicle that takes part; raises KeyError."""
-        for vehicle in self.vehicles:
+        """Return a vehicle that takes part, or an obstacle; raises KeyError."""
+        for vehicle in (*self.vehicles, *self.obstacles):
             if vehicle.name == name:
                 return vehicle
         raise KeyError(name)

@@ -5,7 +5,7 @@ from std_msgs.msg import ColorRGBA, String
 from typing_extensions import override
 from visualization_msgs.msg import Marker, MarkerArray
 
-from crazyflie_fleet.fleet_config import DOWNWASH, VehicleConfig
+from crazyflie_fleet.fleet_config import DOWNWASH, NONE, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_utils import Node, NodeHandle, topic
 
@@ -16,6 +16,7 @@ HELD = ColorRGBA(0.85, 0.15, 0.10, 0.45)
 
 _ROTOR = 0.0325  #: Distance from the middle to a rotor, along x and along y (m).
 
+_OBSTACLE_SIZE = 0.1  #: Edge of the cube of a body that is not flown (m).
 _TEXT_SIZE = 0.12
 
 PERIOD = 1.0  #: Period of the messages (s): RViz drops a marker that comes before its frame.
@@ -51,7 +52,7 @@ class FleetMarkersNode(Node):
     def _publish(self):
         markers = [
             marker
-            for number, vehicle in enumerate(self._fleet.vehicles)
+            for number, vehicle in enumerate((*self._fleet.vehicles, *self._fleet.obstacles))
             for marker in _markers(number, vehicle, vehicle.name in self._held)
         ]
         self._publisher.publish(MarkerArray(markers))
@@ -59,10 +60,12 @@ class FleetMarkersNode(Node):
 
 def _markers(number: int, vehicle: VehicleConfig, is_held: bool) -> list[Marker]:
     radius = vehicle.buffer
-    body = _marker("bodies", number, vehicle, Marker.SPHERE_LIST, BODY, (0.05, 0.05, 0.05))
+    is_vehicle = vehicle.connection != NONE
+    kind, size = (Marker.SPHERE_LIST, 0.05) if is_vehicle else (Marker.CUBE, _OBSTACLE_SIZE)
+    body = _marker("bodies", number, vehicle, kind, BODY, (size, size, size))
     body.points = [Point(x, y, 0.0) for x in (-_ROTOR, _ROTOR) for y in (-_ROTOR, _ROTOR)]
-    size = (2.0 * radius, 2.0 * radius, 2.0 * radius * DOWNWASH)
-    buffer = _marker("buffers", number, vehicle, Marker.SPHERE, HELD if is_held else FREE, size)
+    space = (2.0 * radius, 2.0 * radius, 2.0 * radius * DOWNWASH)
+    buffer = _marker("buffers", number, vehicle, Marker.SPHERE, HELD if is_held else FREE, space)
     name = _marker("names", number, vehicle, Marker.TEXT_VIEW_FACING, NAME, (0.0, 0.0, _TEXT_SIZE))
     name.text = vehicle.name
     name.pose.position.z = 0.15

@@ -71,7 +71,7 @@ class FleetParameters(Parameters):
         fleet = fleet_file.load(self.file) if self.file else fleet_file.grid(self.n, self.spacing)
         if self.positioning:
             fleet = fleet.positioned_by(self.positioning)
-        for vehicle in fleet.vehicles:
+        for vehicle in (*fleet.vehicles, *fleet.obstacles):
             for what, frame in (("name", vehicle.name), ("frame", vehicle.mocap_frame)):
                 if frame == self.fixed_frame:
                     raise ParameterError(

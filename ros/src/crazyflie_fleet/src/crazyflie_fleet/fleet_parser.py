@@ -8,10 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from crazyflie_driver.positioning import MOCAP
 from crazyflie_fleet.fleet_config import (
     DEFAULT_TOPICS,
     DYNAMICS,
     LOCAL,
+    NONE,
+    RESERVED_NAMES,
     VEHICLE_NAME,
     WITHOUT_EFFECT,
     BroadcastSettings,
@@ -21,8 +24,8 @@ from crazyflie_fleet.fleet_config import (
     MachineSettings,
     Settings,
     VehicleConfig,
+    address_of,
     close_pairs,
-    vehicle_key,
 )
 from crazyflie_model.quadrotor import TYPES
 from crazyflie_utils import ParameterError
@@ -146,11 +149,21 @@ class FleetParser:
         self._check_apart(enabled, robots, own)
         self._errors.raise_any()
         disabled = [vehicle.name for vehicle in vehicles if not vehicle.enabled]
-        if not enabled:
-            raise self._parts["robots"].error("has no enabled vehicle; expected at least one")
+        flown = [vehicle for vehicle in enabled if vehicle.connection != NONE]
+        if not flown:
+            raise self._parts["robots"].error(
+                f"has no enabled vehicle with a connection other than {NONE}; expected at least one"
+            )
         unplaced = self._unplaced(enabled)
+        obstacles = tuple(vehicle for vehicle in enabled if vehicle.connection == NONE)
         return FleetConfig(
-            tuple(enabled), tuple(disabled), machines, self.remarks.texts(), broadcasts, unplaced
+            tuple(flown),
+            tuple(disabled),
+            machines,
+            self.remarks.texts(),
+            broadcasts,
+            unplaced,
+            obstacles,
         )
 
     # Errors.
@@ -187,21 +200,31 @@ class FleetParser:
             self._error(chosen, f"is {shown(chosen.value)}; expected {expected}")
 
     def _check_apart(self, vehicles, robots, own):
-        """Check that no two vehicles have one address, or one frame of motion capture."""
+        """Check that no two vehicles have one address, id, or frame of motion capture."""
 
         def given(name, key):
             return own[name].settings.get(key, robots[name])
 
         uris: dict[str, str] = {}
+        ids: dict[int, str] = {}
         # Two with one frame would both fly by the pose of one body.
         frames = {vehicle.name: vehicle.name for vehicle in vehicles}
         for vehicle in vehicles:
             name, frame = vehicle.name, vehicle.mocap_frame
-            if vehicle.uri and (other := uris.setdefault(vehicle_key(vehicle.uri), name)) != name:
+            if (
+                vehicle.uri
+                and (other := uris.setdefault(address_of(vehicle.uri).key, name)) != name
+            ):
                 self._error(
                     given(name, "uri"),
                     f"is {vehicle.uri}, which is also that of {other} in line "
                     f"{given(other, 'uri').line}; expected an address of its own",
+                )
+            if vehicle.id is not None and (other := ids.setdefault(vehicle.id, name)) != name:
+                self._error(
+                    given(name, "id"),
+                    f"is {vehicle.id}, which is also that of {other} in line "
+                    f"{given(other, 'id').line}; expected another",
                 )
             if (other := frames.setdefault(frame, name)) != name:
                 self._error(
@@ -213,6 +236,8 @@ class FleetParser:
     def _unplaced(self, vehicles):
         pairs = []
         for i, j, distance, limit in close_vehicles(vehicles):
+            if vehicles[i].connection == vehicles[j].connection == NONE:
+                continue
             first, second = vehicles[i].name, vehicles[j].name
             pairs.append((first, second))
             self.remarks.add(
@@ -270,6 +295,8 @@ class FleetParser:
                     self.remarks.idle(entry["frequency"], "frequency of a default topic")
         for name, entry in _entries(parts, "custom_topics").items():
             layer.log_topics[name] = self._read(entry, LogTopicSettings)
+            if name in RESERVED_NAMES:
+                self._error(entry, "is a name of the vehicle's own topics; expected another name")
             self._check_type(VEHICLE_NAME, name, entry)
 
     def _vehicle(self, name, robot, layers):
@@ -282,6 +309,9 @@ class FleetParser:
         with self._errors:
             vehicle = VehicleConfig.read(lambda key: settings[key].value, place)
             self._check_voltages(settings, vehicle)
+            self._check_id(settings, vehicle)
+            if vehicle.connection == NONE:
+                self._check_obstacle(settings, vehicle)
             if (enabled := settings.get("firmware_logging/enabled")) and not enabled.value:
                 standard_topics = log_topics = ChainMap()
             return dataclasses.replace(
@@ -304,6 +334,28 @@ class FleetParser:
         except ParameterError as error:
             self._errors += [str(settings["model"].error(each)) for each in error.complaints]
         return path
+
+    def _check_obstacle(self, settings, vehicle):
+        if vehicle.positioning != MOCAP:
+            self._error(
+                settings["positioning"],
+                f"is {vehicle.positioning} of a body without a connection; expected {MOCAP}",
+            )
+        elif vehicle.has_single_marker:
+            self._error(
+                settings["motion_capture/tracking"],
+                f"is {vehicle.mocap_tracking} with the marker {vehicle.mocap_marker}, of a body "
+                "without a connection; expected a rigid body, as one marker does not tell its yaw",
+            )
+
+    def _check_id(self, settings, vehicle):
+        found = None if vehicle.uri is None else address_of(vehicle.uri).vehicle_id
+        if vehicle.id is not None and found is not None and vehicle.id != found:
+            self._error(
+                settings["id"],
+                f"is {vehicle.id}, and its address {vehicle.uri} ends with {found:02X} ({found}); "
+                "expected the same number",
+            )
 
     def _check_voltages(self, settings, vehicle):
         # Only here is it known whether each comes from the robot, its type or ``all``.

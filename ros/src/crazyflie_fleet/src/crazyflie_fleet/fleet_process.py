@@ -61,7 +61,10 @@ class _NodeFactory:
         self._unplaced = {name for pair in fleet.unplaced for name in pair}
         for vehicle in vehicles:
             self._add_vehicle(vehicle)
-        references = ReferencesNode(fleet, own_names, config.fixed_frame, vectorized)
+        is_measured = not (config.is_simulated or config.virtual_port)
+        references = ReferencesNode(
+            fleet, own_names, config.fixed_frame, vectorized, has_motion_capture=is_measured
+        )
         # This node comes first, since the others answer the same references of the takeoff servers.
         self.nodes[f"{handle.name}/references"] = references
         for vehicle, tracked in zip(vehicles, references.vehicles, strict=True):

@@ -53,7 +53,7 @@ def bodies(
         ``dynamics_configurations`` and ``marker_configurations``.
     """
     result: dict[str, Any] = {}
-    for vehicle in fleet.vehicles:
+    for vehicle in (*fleet.vehicles, *fleet.obstacles):
         if vehicle.positioning != MOCAP:
             continue
         frames = {"parent_frame_id": fixed_frame, "child_frame_id": vehicle.mocap_frame}

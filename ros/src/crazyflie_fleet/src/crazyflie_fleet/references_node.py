@@ -1,5 +1,6 @@
 """The vehicles of a fleet: their states, and their references, which keep them apart."""
 
+import contextlib
 import math
 from collections import defaultdict
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -34,8 +35,9 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped as Reference
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
+from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter, topic
 from crazyflie_utils.parameters.types import TIME_STEP
+from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_utils.timers import Timer
 from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import is_finite, to_tuple
@@ -46,45 +48,76 @@ _IN_FLIGHT = (FlightStatus.TAKING_OFF, FlightStatus.FLYING, FlightStatus.DESCEND
 class VehicleStates:
     """The last states and flight states of vehicles, which have numbers in the order given.
 
-    ``vectorized`` are topics with the states of several of them in one message.
+    ``vectorized`` are topics with the states of several of them in one message. ``obstacles``
+    are not flown: their numbers follow, and `update_obstacles` takes their positions from tf.
     """
 
     def __init__(
         self,
         vehicles: Sequence[VehicleConfig],
         vectorized: Mapping[str, Sequence[VehicleConfig]],
+        obstacles: Sequence[VehicleConfig] = (),
     ):
-        self.names = [vehicle.name for vehicle in vehicles]
+        self._obstacles = obstacles
+        everyone = [*vehicles, *obstacles]
+        self.names = [vehicle.name for vehicle in everyone]
         #: Name to number.
         self.numbers = {name: number for number, name in enumerate(self.names)}
         #: Shape (n,); `FlightStatus.state` of each; UNKNOWN before the first.
-        self.flight_states = np.full(len(vehicles), FlightStatus.UNKNOWN)
+        self.flight_states = np.full(len(everyone), FlightStatus.UNKNOWN)
+        #: Shape (n,); which are obstacles.
+        self.are_obstacles = np.arange(len(everyone)) >= len(vehicles)
         #: Reason for which each vehicle would refuse a takeoff; empty if it would not.
         self.takeoff_refusals = [
             f"nothing has come on /{name}/{FLIGHT_STATUS}" for name in self.names
         ]
         self._vectorized = vectorized
-        self._states = np.full((len(vehicles), 7), np.nan)
-        self._times = np.full(len(vehicles), -np.inf)
+        self._lookups: dict[int, Callable[[], StampedPose]] = {}
+        self._states = np.full((len(everyone), 7), np.nan)
+        self._times = np.full(len(everyone), -np.inf)
         #: positions, velocities, headings: Shapes (n, 3), (n, 3) and (n,), m, m/s and rad, fixed
         #: frame; NaN before the first.
         self.positions: NDArray[np.float64] = self._states[:, :3]
         self.velocities: NDArray[np.float64] = self._states[:, 3:6]
         self.headings: NDArray[np.float64] = self._states[:, 6]
 
-    def subscribe(self, handle: NodeHandle) -> None:
-        """Subscribe to the topics of all vehicles through the handle of a node."""
+    def subscribe(self, handle: NodeHandle, frame: str) -> None:
+        """Subscribe to the topics of all vehicles; ``frame`` is the fixed frame, of obstacles."""
         self._handle = handle
-        for number, name in enumerate(self.names):
+        flown = np.flatnonzero(~self.are_obstacles).tolist()
+        scalar = {self.names[number]: number for number in flown}
+        for name, number in scalar.items():
             on_status = partial(self._on_flight_status, number)
             handle.subscribe(f"/{name}/{FLIGHT_STATUS}", FlightStatus, on_status)
-        scalar = dict(self.numbers)
+        if self._obstacles:
+            lookup = handle.listen_to_poses()
+            self._lookups = {
+                self.numbers[each.name]: partial(lookup, frame, each.mocap_frame)
+                for each in self._obstacles
+            }
         for name, vehicles in self._vectorized.items():
             numbers = np.array([scalar.pop(vehicle.name) for vehicle in vehicles])
             handle.subscribe(name, Float64MultiArray, partial(self._on_states, numbers))
         for name, number in scalar.items():
             on_state = partial(self._on_state, number)
             handle.subscribe(f"/{name}/{STATE}", PositionVelocityYawStateStamped, on_state)
+
+    def update_obstacles(self) -> None:
+        """Take the last poses of obstacles from tf; the velocity is that between two of them."""
+        now, clock = self._handle.time(), self._handle.nanoseconds()
+        for number, lookup in self._lookups.items():
+            # Before the first pose it is not known.
+            with contextlib.suppress(TransformError):
+                pose = lookup()
+                # A static pose, that of a body which nothing measures, has no stamp.
+                time = now - (clock - pose.stamp) * 1e-9 if pose.stamp else now
+                passed = time - self._times[number]
+                moved = np.array(pose.position) - self.positions[number]
+                # The clock may have been set back.
+                if passed != 0.0:
+                    self.velocities[number] = np.nan_to_num(moved / passed) * (passed > 0.0)
+                self.positions[number] = pose.position
+                self._times[number] = time
 
     def flight_state(self, name: str) -> int:
         """Return `FlightStatus.state` of a vehicle."""
@@ -317,7 +350,9 @@ class ReferencesNode(Node[ReferencesParameters]):
     References of descents are moved away from vehicles that are beneath. Vehicles with one start
     point in the fleet file must not take off until they have been measured apart, once, and take
     off from where they are seen. ``vectorized`` are topics with the states of several vehicles in
-    one message. The attribute ``states`` has those of all, the vehicles of this process first.
+    one message. Obstacles have their initial positions if nothing measures them
+    (``has_motion_capture``). The attribute ``states`` has the states of all, the vehicles of this
+    process first.
     """
 
     needed_in_flight = True
@@ -328,12 +363,15 @@ class ReferencesNode(Node[ReferencesParameters]):
         names: Collection[str],
         fixed_frame: str,
         vectorized: Mapping[str, tuple[VehicleConfig, ...]] | None = None,
+        has_motion_capture: bool = True,
     ):
+        self._has_motion_capture = has_motion_capture
         self._fixed_frame = fixed_frame
         self._configs = [each for each in fleet.vehicles if each.name in names]
         others = [each for each in fleet.vehicles if each.name not in names]
-        everyone = [*self._configs, *others]
-        self.states = VehicleStates(everyone, vectorized or {})
+        self._obstacles = fleet.obstacles
+        self.states = VehicleStates([*self._configs, *others], vectorized or {}, fleet.obstacles)
+        everyone = [*self._configs, *others, *fleet.obstacles]
         self._buffers = [each.buffer for each in everyone]
         self._separation = Separation(self._buffers)
         self._descents = SafeDescents(self._buffers)
@@ -364,7 +402,7 @@ class ReferencesNode(Node[ReferencesParameters]):
             on_descent = partial(self._on_descent, tracked)
             topic = f"/{tracked.name}/{DESCENT}"
             handle.subscribe(topic, PositionVelocityStateStamped, on_descent)
-        self.states.subscribe(handle)
+        self.states.subscribe(handle, self._fixed_frame)
         handle.subscribe(LANDING_TOPIC, String, self._on_landing)
         handle.timer(parameters.watch_period, self._on_watch_timer)
         if self._inhibitions:
@@ -376,9 +414,18 @@ class ReferencesNode(Node[ReferencesParameters]):
         identity = Transform(Vector3(), Quaternion(w=1.0))
         transforms = [
             TransformStamped(Header(0, handle.stamp(), vehicle.mocap_frame), vehicle.name, identity)
-            for vehicle in self._configs
+            for vehicle in (*self._configs, *self._obstacles)
             if vehicle.mocap_frame != vehicle.name
         ]
+        if not self._has_motion_capture:
+            transforms += [
+                TransformStamped(
+                    Header(0, handle.stamp(), self._fixed_frame),
+                    obstacle.mocap_frame,
+                    Transform(Vector3(*obstacle.position), Quaternion(w=1.0)),
+                )
+                for obstacle in self._obstacles
+            ]
         if transforms:
             handle.broadcast_static_transforms()(transforms)
 
@@ -395,7 +442,11 @@ class ReferencesNode(Node[ReferencesParameters]):
     # Distances.
 
     def _on_watch_timer(self):
+        self.states.update_obstacles()
         in_flight, fresh = self.states.are_in_flight(), self.states.are_fresh()
+        if in_flight.any():
+            # Vehicles keep apart from obstacles, wherever these are.
+            in_flight |= self.states.are_obstacles
         positions = np.where(in_flight[:, None], self.states.positions, np.nan)
         # An old velocity does not predict a vehicle's position.
         velocities = np.where(fresh[:, None], self.states.velocities, 0.0)
@@ -429,12 +480,13 @@ class ReferencesNode(Node[ReferencesParameters]):
 
     def _warn_of_silence(self, number):
         name, position = self.states.names[number], self.states.positions[number]
+        what = "is not flown" if self.states.are_obstacles[number] else "is in flight"
         consequence = "the others cannot keep apart from it"
         if np.isfinite(position).all():
             x, y, z = position.tolist()
             consequence = f"the others keep apart from its last place, ({x:.2f}, {y:.2f}, {z:.2f})"
         self._handle.warn(
-            f"{name} is in flight, and no state of it has come for {MAX_POSITION_AGE:g} s: its "
+            f"{name} {what}, and no state of it has come for {MAX_POSITION_AGE:g} s: its "
             f"position is not known; {consequence}",
             throttle=SILENCE_PERIOD,
             key=("silence", name),

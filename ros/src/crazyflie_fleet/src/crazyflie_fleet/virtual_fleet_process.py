@@ -1,5 +1,7 @@
 """A process with virtual vehicles and a motion capture system that measures them."""
 
+from dataclasses import replace
+
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_fleet.mocap_process import bodies
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
@@ -58,7 +60,8 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
         }
         handle.set_param(name, parameters)
         nodes[name] = VirtualCrazyflieNode()
-    if not (seen := bodies(fleet, config.fixed_frame)):
+    # Nothing measures obstacles: the fleet's process has them at their initial positions.
+    if not (seen := bodies(replace(fleet, obstacles=()), config.fixed_frame)):
         # All vehicles use their decks for positioning.
         return nodes
     ports = {"command_port": config.command_port, "data_port": config.data_port}

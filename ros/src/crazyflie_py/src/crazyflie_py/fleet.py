@@ -85,6 +85,8 @@ def chosen(names: Sequence[str]) -> list[str]:
 
 
 def _id(vehicle: VehicleConfig) -> int:
+    if vehicle.id is not None:
+        return vehicle.id
     # The end of the address, as in crazyswarm2; without an address, the number in the name.
     address = "" if vehicle.uri is None else vehicle.uri.split("?")[0]
     if found := re.search("[0-9A-Fa-f]{2}$", address):

@@ -10,60 +10,82 @@ import threading
 
 import pytest
 import rospy
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, Transform, TransformStamped, Vector3
+from tf2_msgs.msg import TFMessage
 
+from crazyflie_driver.positioning import COMPLEMENTARY, ESTIMATOR, KALMAN
+from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_utils.ros1.master_watch import living_node
 from crazyflie_utils.testing.programs import free_port, running, wait_until
 
-# The protocol with one flight only; `carry` launches the driver.
+# Some steps of the protocol; PLACE is a part of "poses by hand", and launches the driver.
+PLACE = "place"
 PROGRAM = """
 import sys
 from crazyflie_examples import first_flight, first_flight_program
 
-uri, out, step = sys.argv[1:]
-first_flight.STEPS = (
-    first_flight.Step("place", "put it there", lambda rig, _: rig.carry(0, 0, 0, 0) or ""),
-    *(each for each in first_flight.STEPS if each.name == step),
+arguments, names = sys.argv[1:6], sys.argv[6:]
+place = first_flight.Step("place", "put it there", lambda rig, _: rig.carry(0, 0, 0, 0) or "")
+first_flight.STEPS = tuple(
+    each for name in names for each in (place, *first_flight.STEPS) if each.name == name
 )
-sys.exit(first_flight_program.main([uri, "--positioning", "lighthouse", "--out", out]))
+sys.exit(first_flight_program.main(arguments))
 """
 OWN = ("/crazyflie_server", "/takeoff_server")
 
 
 class Terminal:
-    """A terminal in which a protocol of one flight runs, and its virtual vehicle."""
+    """A terminal in which steps of the protocol run, and their virtual vehicle."""
 
-    def __init__(self, stack, folder, step):
+    def __init__(self, stack, folder, steps, positioning="lighthouse"):
         name, port = f"virtual_{free_port()}", free_port()
-        parameters = (f"_port:={port}", "_positioning:=lighthouse", "_observer/port:=0")
+        deck = "none" if positioning == "mocap" else positioning
+        parameters = (f"_port:={port}", f"_positioning:={deck}", "_observer/port:=0")
         vehicle = ("rosrun", "crazyflie_virtual", "virtual_crazyflie", f"__name:={name}")
         stack.enter_context(running(*vehicle, *parameters))
-        self.height = 0.0
+        self.height = None
+        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
         rospy.Subscriber(f"/{name}/true_pose", PoseStamped, self._on_pose)
         self.output = ""
         self._keys, terminal = pty.openpty()
+        self._has_read_all = threading.Event()
         threading.Thread(target=self._read, daemon=True).start()
-        self._uri = f"udp://127.0.0.1:{port}"
-        command = (sys.executable, "-c", PROGRAM, self._uri, folder, step)
+        self.uri = f"udp://127.0.0.1:{port}"
+        wait_until(lambda: self.height is not None, "the virtual vehicle")
+        if positioning == "mocap":
+            # As a vehicle without decks begins.
+            with Crazyflie(self.uri) as bare:
+                bare.parameters.write(ESTIMATOR, COMPLEMENTARY)
+        options = ("--positioning", positioning, "--out", folder)
+        command = (sys.executable, "-c", PROGRAM, self.uri, *options, *steps)
         ends = {"stdin": terminal, "stdout": terminal, "stderr": terminal}
         self.program = stack.enter_context(running(*command, **ends))
         os.close(terminal)
-        for question in ("place", step):
-            self.wait_for(f"{question}: ")
+        for step in steps:
+            self.wait_for(f"{step}: ")
             self.type("\n")
 
     def _on_pose(self, message):
-        self.height = message.pose.position.z
+        place = message.pose.position
+        self.height = place.z
+        # Motion capture, with its frame's name by default.
+        transform = Transform(Vector3(place.x, place.y, place.z), message.pose.orientation)
+        pose = TransformStamped(message.header, "HY5/base_link", transform)
+        self._tf.publish(TFMessage([pose]))
 
     def _read(self):
         # EIO: the program has ended.
         with contextlib.suppress(OSError):
             while data := os.read(self._keys, 4096):
                 self.output += data.decode(errors="replace")
+        self._has_read_all.set()
 
     def wait_for(self, text):
         """Wait until the program has printed a text."""
-        wait_until(lambda: text in self.output, f"{text!r} in {self.output[-2000:]}")
+        ended = self.program.poll
+        wait_until(lambda: text in self.output or ended() is not None, repr(text))
+        wait_until(lambda: text in self.output or self._has_read_all.is_set(), repr(text))
+        assert text in self.output, self.output
 
     def type(self, text):
         """Type a text."""
@@ -78,18 +100,18 @@ class Terminal:
         assert self.program.wait(60.0) == 1, self.output
         wait_until(lambda: self.height < 0.05, "the end of the flight")
         wait_until(lambda: not any(living_node(name) for name in OWN), f"the end of {OWN}")
-        launches = ("pgrep", "-f", f"roslaunch.*{self._uri}")
+        launches = ("pgrep", "-f", f"roslaunch.*{self.uri}")
         assert subprocess.run(launches, capture_output=True, check=False).stdout == b""
 
 
 @pytest.fixture
 def terminal(tmp_path):
     with contextlib.ExitStack() as stack:
-        yield lambda step: Terminal(stack, tmp_path, step)
+        yield lambda *steps, **options: Terminal(stack, tmp_path, steps, **options)
 
 
 def test_a_driver_that_dies_in_its_hover_ends_the_flight(terminal):
-    flight = terminal("hover by the driver")
+    flight = terminal(PLACE, "hover by the driver")
     flight.hovers()
     driver = living_node("/crazyflie_server")
     os.kill(int(driver.split()[1]), signal.SIGKILL)
@@ -98,7 +120,7 @@ def test_a_driver_that_dies_in_its_hover_ends_the_flight(terminal):
 
 
 def test_a_second_signal_leaves_nothing_behind(terminal):
-    flight = terminal("hover by the driver")
+    flight = terminal(PLACE, "hover by the driver")
     flight.hovers()
     flight.program.send_signal(signal.SIGINT)
     wait_until(lambda: flight.height < 0.25, "the landing")
@@ -107,9 +129,17 @@ def test_a_second_signal_leaves_nothing_behind(terminal):
 
 
 def test_a_key_ends_a_takeoff(terminal):
-    flight = terminal("hover by the LQR")
+    flight = terminal(PLACE, "hover by the LQR")
     flight.wait_for("/takeoff_server: taking off")
     flight.type("x\n")
     flight.wait_for("FAILED  hover by the LQR: ended by the pilot")
     flight.ends()
     assert "/takeoff_server: flying" not in flight.output
+
+
+def test_a_vehicle_without_decks_flies_by_its_poses(terminal):
+    flight = terminal("doctor", PLACE, "hover by the driver", positioning="mocap")
+    flight.hovers()
+    assert rospy.get_param(f"/crazyflie/{ESTIMATOR.replace('.', '/')}") == KALMAN
+    flight.wait_for("passed  hover by the driver: ")
+    flight.ends()

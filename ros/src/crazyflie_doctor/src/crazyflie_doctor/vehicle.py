@@ -6,7 +6,7 @@ Normal ranges are those of a Crazyflie 2.1 with the stock battery; figures of a 
 import math
 import statistics
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -155,10 +155,16 @@ def _battery_test(facts: VehicleFacts) -> Iterator[Finding]:
         yield error("its voltage sags too far under load", "change the battery, clean its contacts")
 
 
-def examine(uri: str, duration: float = 10.0, motors: bool = False) -> VehicleFacts:
+def examine(
+    uri: str,
+    duration: float = 10.0,
+    motors: bool = False,
+    prepare: Callable[[Crazyflie], None] = lambda _: None,
+) -> VehicleFacts:
     """Connect to a vehicle and watch it for a duration (s); blocks.
 
-    With ``motors`` it does the self tests, in which the propellers turn.
+    With ``motors`` it does the self tests, in which the propellers turn. ``prepare(vehicle)`` is
+    called before.
     """
     versions: list[bytes] = []
 
@@ -168,6 +174,7 @@ def examine(uri: str, duration: float = 10.0, motors: bool = False) -> VehicleFa
 
     try:
         with Crazyflie(uri, on_packet=on_packet) as vehicle:
+            prepare(vehicle)
             return _watch(vehicle, versions, duration, motors)
     except CrazyflieError as failure:
         return VehicleFacts(failure=str(failure))

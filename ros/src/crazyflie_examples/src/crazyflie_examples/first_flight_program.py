@@ -1,5 +1,6 @@
 """The command `first_flight`: the protocol with a vehicle, by the driver and then by the LQR."""
 
+import contextlib
 import math
 import os
 import select
@@ -24,8 +25,9 @@ from std_srvs.srv import Empty, EmptyRequest
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_doctor.vehicle import VehicleFacts, examine
+from crazyflie_driver.monitors import VARIANCES, VARIANCES_PERIOD_MS, Variances
 from crazyflie_driver.msg import GenericLogData
-from crazyflie_driver.positioning import MOCAP, SOURCES
+from crazyflie_driver.positioning import ESTIMATOR, KALMAN, MOCAP, SOURCES
 from crazyflie_driver.srv import (
     GoTo,
     GoToRequest,
@@ -52,6 +54,7 @@ from crazyflie_utils.vectors import stamped
 PREFIX = "/crazyflie"  #: Namespace of the driver.
 _RELAYED = "first_flight"  #: Frame that the LQR uses: the relayed poses, until they are hidden.
 _LIMIT = 60.0  #: Timeout of starts, of services and of ends (s).
+_CONVERGENCE_LIMIT = 10.0  #: Timeout of the convergence of the vehicle's Kalman filter (s).
 _REACH_LIMIT = 5.0  #: Timeout of reaching a service, whose process may have died (s).
 _POLL = 0.1  #: Longest time until a key, a signal or a fault is noticed (s).
 _MAX_SILENCE = 1.0  #: Time without poses or log in flight after which the flight ends (s).
@@ -90,6 +93,7 @@ class LiveRig:
         # Stamp of the last pose; arrival of the last log and of the last pose (s).
         self._stamp = self._log_time = self._pose_time = -math.inf
         self._hides = self._is_connected = False
+        self._examined: Crazyflie | None = None  # While the doctor watches it.
         self._end_node: Callable[[], None] = lambda: None
         #: Lands the vehicle; None while it does not fly.
         self._landing: Callable[[], None] | None = None
@@ -137,6 +141,10 @@ class LiveRig:
             external = PoseStamped(header=pose.header)
             external.pose.position, external.pose.orientation = Point(place.x, place.y, place.z), q
             self._external.publish(external)
+            if (vehicle := self._examined) is not None:
+                # Its link may end at any time.
+                with contextlib.suppress(CrazyflieError):
+                    vehicle.localization.pose((place.x, place.y, place.z), (q.x, q.y, q.z, q.w))
 
     # What ends the protocol.
 
@@ -196,18 +204,43 @@ class LiveRig:
     # The rig.
 
     def examine(self) -> VehicleFacts:
-        """Return the facts of the doctor, without the self tests, which spin fast."""
+        """Return the facts of the doctor, without the self tests, which spin fast.
+
+        With motion capture the vehicle is sent its poses meanwhile, for its Kalman filter.
+        """
         examined: Future[VehicleFacts] = Future()
 
         def work():
+            is_mocap = self._options.positioning == MOCAP
+            prepare = self._begin_estimate if is_mocap else lambda _: None
             try:
-                examined.set_result(examine(self._uri))
+                examined.set_result(examine(self._uri, prepare=prepare))
             except Exception as error:
                 examined.set_exception(error)
+            finally:
+                self._examined = None
 
         threading.Thread(target=work, daemon=True).start()
         self._wait(examined.done, math.inf)
         return examined.result()
+
+    def _begin_estimate(self, vehicle):
+        """Let the vehicle's Kalman filter begin with the poses that come, and converge; blocks."""
+        variances = Variances()
+        variances.is_logged = {*VARIANCES} <= {*vehicle.log.variables()}
+        vehicle.parameters.write(ESTIMATOR, KALMAN)
+        self._examined = vehicle
+        vehicle.parameters.write("kalman.resetEstimation", 1)
+        if variances.is_logged:
+            vehicle.add_log_block(
+                LogBlock(
+                    "converging", VARIANCES_PERIOD_MS, VARIANCES, lambda _, v: variances.add(v)
+                )
+            )
+        end = time.monotonic() + _CONVERGENCE_LIMIT
+        # What has not converged then is named by the doctor.
+        while variances.problem() and time.monotonic() < end:
+            time.sleep(_POLL)
 
     def run(self, duration: float) -> None:
         """Wait for a duration (s)."""

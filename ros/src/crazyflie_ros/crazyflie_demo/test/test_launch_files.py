@@ -190,6 +190,26 @@ def test_high_level_flights(name):
     assert parameters["/crazyflie_server/emergency_watchdog"] is True
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "test_high_level",
+        "execute_trajectory",
+        "position",
+        "hover",
+        "external_pose_vicon",
+        "external_position_vicon",
+        "external_position_vrpn",
+        "swarm_external_position_vrpn",
+    ],
+)
+def test_launch_files_whose_vehicle_flies_by_its_own_position_set_the_filter(name):
+    nodes, parameters = expand(f"{name}.launch")
+    added = [each for each, node in nodes.items() if node.type == "crazyflie_add"]
+    assert added
+    assert {parameters[f"{each}/estimator"] for each in added} == {"kalman"}
+
+
 def tree(parameters, prefix):
     """Return the parameters below a name as the parameter server does."""
     root = {}

@@ -7,7 +7,12 @@ import pytest
 from roslaunch.config import load_config_default
 
 from crazyflie_driver.add_node import CrazyflieAddNode
-from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieResponse
+from crazyflie_driver.srv import (
+    AddCrazyflie,
+    AddCrazyflieResponse,
+    UpdateParams,
+    UpdateParamsResponse,
+)
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
@@ -51,6 +56,36 @@ def test_a_vehicle_may_have_no_prefix():
         launch = Launch(parameters)
         assert [request.tf_prefix for request in launch.requests] == [""]
         assert "/add: added usb://0 as /" in launch.process.logged("info")
+
+
+@pytest.mark.parametrize(
+    ("parameters", "refusal", "written", "status"),
+    [
+        ({"estimator": "kalman"}, "", [["stabilizer/estimator"]], 0),
+        ({"estimator": "kalman"}, "not written", [["stabilizer/estimator"]], 1),
+        ({}, "", [], 0),
+    ],
+)
+def test_the_estimator_is_set_once_the_vehicle_is_added(parameters, refusal, written, status):
+    launch = Launch({**PARAMETERS, **parameters}, answer=(added := Future()))
+    updates = []
+
+    def update(request):
+        updates.append(request.params)
+        if refusal:
+            raise ServiceError(refusal)
+        return UpdateParamsResponse()
+
+    server = launch.process.handle("/server")
+    server.advertise_service("/cf1/update_params", UpdateParams, update)
+    assert (updates, launch.process.exit_status) == ([], None)
+    added.set_result(AddCrazyflieResponse())
+    launch.process.advance(0.1)
+    value = 2 if written else None
+    assert launch.process.transport.parameters.get("/cf1/stabilizer/estimator") == value
+    assert (updates, launch.process.exit_status) == (written, status)
+    text = f"it is added, but stabilizer/estimator is not set: {refusal}"
+    assert [text in each for each in launch.process.logged("error")] == [True] * status
 
 
 def test_all_parameters_arrive():

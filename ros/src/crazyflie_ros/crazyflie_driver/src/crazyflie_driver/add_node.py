@@ -1,12 +1,20 @@
 """A node that makes the server add one vehicle, and ends."""
 
 from concurrent.futures import Future
+from functools import partial
 
 from typing_extensions import override
 
-from crazyflie_driver.parameters import ADD, POSITIONING_PARAMETER, CrazyflieAddParameters
-from crazyflie_driver.srv import AddCrazyflie
-from crazyflie_utils import Node, NodeHandle
+from crazyflie_driver.parameters import (
+    ADD,
+    KALMAN_FILTER,
+    POSITIONING_PARAMETER,
+    CrazyflieAddParameters,
+)
+from crazyflie_driver.positioning import ESTIMATOR, KALMAN
+from crazyflie_driver.srv import AddCrazyflie, UpdateParams, UpdateParamsRequest
+from crazyflie_utils import Node, NodeHandle, ServiceError
+from crazyflie_utils.steps import follow
 
 _LIMIT = 60.0  #: Time limit of the start of the server and of its connecting, s.
 
@@ -29,8 +37,22 @@ class CrazyflieAddNode(Node[CrazyflieAddParameters]):
         parameters = self._parameters
         handle.info(f"adding {parameters.uri} as {parameters.tf_prefix or '/'}")
         handle.set_param(f"{parameters.prefix}/{POSITIONING_PARAMETER}", parameters.positioning)
-        self._answer = handle.call_service(ADD, AddCrazyflie, parameters.request(), _LIMIT)
-        self._answer.add_done_callback(self._on_answer)
+        self._answer = follow(self._add(), handle.submit)
+        self._answer.add_done_callback(partial(handle.submit, self._on_answer))
+
+    def _add(self):
+        """Add the vehicle, in steps."""
+        handle, parameters = self._handle, self._parameters
+        yield handle.call_service(ADD, AddCrazyflie, parameters.request(), _LIMIT)
+        if parameters.estimator == KALMAN_FILTER:
+            name, service = ESTIMATOR.replace(".", "/"), f"{parameters.prefix}/update_params"
+            yield handle.set_param_later(f"{parameters.prefix}/{name}", KALMAN)
+            try:
+                yield handle.call_service(
+                    service, UpdateParams, UpdateParamsRequest([name]), _LIMIT
+                )
+            except ServiceError as error:
+                raise ServiceError(f"it is added, but {name} is not set: {error}") from None
 
     @override
     def shutdown(self) -> None:

@@ -8,7 +8,7 @@ import rosgraph.names
 from typing_extensions import override
 
 from crazyflie_driver.msg import LogBlock
-from crazyflie_driver.positioning import MOCAP, SOURCES
+from crazyflie_driver.positioning import ESTIMATOR, KALMAN, MOCAP, SOURCES
 from crazyflie_driver.srv import AddCrazyflieRequest
 from crazyflie_link.limits import (
     LONGEST_PERIOD_MS,
@@ -126,6 +126,9 @@ CONNECTED_TOPIC = "connected"  #: Topic with whether the driver is connected to 
 
 #: Parameter below a vehicle's namespace that the driver reads when the vehicle is added.
 POSITIONING_PARAMETER = "positioning"
+
+
+UNCHANGED, KALMAN_FILTER = "unchanged", "kalman"  #: Values of ``estimator``.
 
 
 def _namespace(value):
@@ -321,7 +324,17 @@ _OWN_TOPICS = (
 
 
 class CrazyflieAddParameters(VehicleParameters):
-    """The same on the parameter server, where the variables of each log block are a parameter."""
+    """The same on the parameter server, where the variables of each log block are a parameter.
+
+    What is not in an AddCrazyflieRequest is written to the vehicle after it has been added.
+    """
+
+    estimator: str = parameter(
+        Text((UNCHANGED, KALMAN_FILTER)),
+        f"`{KALMAN_FILTER}` sets the firmware's `{ESTIMATOR}` to {KALMAN}: for vehicles that fly "
+        "by their own position, from external poses or a deck. Without either its attitude drifts",
+        UNCHANGED,
+    )
 
     @classmethod
     @override

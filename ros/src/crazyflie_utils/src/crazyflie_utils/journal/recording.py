@@ -18,10 +18,12 @@ from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
+from weakref import WeakSet
 
 import genpy
 from typing_extensions import override
 
+from crazyflie_utils import text_file
 from crazyflie_utils.journal.journal_file import JournalWriter, Kind
 from crazyflie_utils.timers import Executor, SteadyClock
 from crazyflie_utils.topics import (
@@ -145,6 +147,7 @@ class Recorder:
         self.clock = RecordedClock(self, executor)
         self.begin = self.clock.begin
         executor.on_timers = self._on_timers
+        _recorders.add(self)
         return RecordingTransport(transport, self)
 
     def input(self, kind: Kind, number: int = 0, data: bytes | None = None) -> None:
@@ -204,8 +207,6 @@ class Recorder:
 
     def file(self, read: Callable[[str, int], bytes], path: str, most: int) -> bytes:
         """Return what ``read`` returns for a file, and write it."""
-        if not self.executor.is_in_turn:
-            return read(path, most)
         name = json.dumps(path).encode()
         try:
             content = read(path, most)
@@ -266,6 +267,21 @@ class Recorder:
 
     def _on_timers(self, is_first):
         self.input(Kind.TIMERS if is_first else Kind.TIMER)
+
+
+_recorders: WeakSet[Recorder] = WeakSet()
+_read_file = text_file.content
+
+
+def _content(path, most):
+    for recorder in _recorders:
+        if recorder.executor.is_in_turn:
+            return recorder.file(_read_file, path, most)
+    return _read_file(path, most)
+
+
+# The files of all processes with a journal that are in this process of the machine.
+text_file.content = _content
 
 
 class _Flag:

@@ -12,7 +12,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from crazyflie_utils import text_file
 from crazyflie_utils.journal.journal_file import SUFFIX, JournalError, JournalWriter
 from crazyflie_utils.journal.recording import Recorder
 
@@ -60,7 +59,4 @@ def begin_journal(
     except JournalError as error:
         warn(str(error))
         return None
-    recorder = Recorder(writer)
-    read = text_file.content
-    text_file.content = lambda path, most: recorder.file(read, path, most)
-    return recorder
+    return Recorder(writer)

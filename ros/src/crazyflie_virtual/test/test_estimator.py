@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 from scipy.spatial.transform import Rotation
+from virtual_bench import Bench
 
 from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.firmware.estimator import Estimator
@@ -28,6 +29,7 @@ def sensors(gyro=(0.0, 0.0, 0.0), force=(0.0, 0.0, 1.0)):
         acc_x=force[0],
         acc_y=force[1],
         acc_z=force[2],
+        asl=0.0,
     )
 
 
@@ -146,3 +148,21 @@ def test_years_without_a_measurement(estimator):
     e = estimate_of(estimator)
     assert e.x == pytest.approx(1.0, abs=1e-3)
     assert abs(e.vx) < 1.0
+
+
+def test_the_complementary_filter_knows_no_position():
+    bench = Bench(positioning="none", estimator=1)
+    localization = bench.firmware.localization
+    for _ in range(300):
+        localization.take_position(bench.firmware.time, (2.0, 1.0, 3.0))
+        bench.run(0.01)
+    e = bench.firmware.estimate
+    assert (e.x, e.y) == (0.0, 0.0)
+    # The barometer's, with its noise: the vehicle is on the ground.
+    assert abs(e.z) < 0.2
+    # With the Kalman filter they count.
+    bench.firmware.estimator.kind = 2
+    for _ in range(300):
+        localization.take_position(bench.firmware.time, (2.0, 1.0, 3.0))
+        bench.run(0.01)
+    assert (e.x, e.y, e.z) == pytest.approx((2.0, 1.0, 3.0), abs=0.01)

@@ -12,6 +12,7 @@ from operator import attrgetter
 from typing import NamedTuple
 
 from crazyflie_virtual.crtp import MAX_DATA
+from crazyflie_virtual.firmware.estimator import COMPLEMENTARY, KALMAN
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.firmware.stabilizer import DEFAULT, MELLINGER
 from crazyflie_virtual.toc import (
@@ -97,7 +98,7 @@ _MELLINGER = (
 #: firmware: its parameters are the fault switches.
 _GROUPS = {
     "stabilizer": [
-        *_rows(U8, estimator=2),
+        *_limited(U8, COMPLEMENTARY, KALMAN, estimator="estimator.kind"),
         # Those of the firmware's controllers that the virtual vehicle has.
         *_limited(U8, DEFAULT, MELLINGER, controller="stabilizer.controller"),
         *_rows(U8, stop="supervisor.emergency_stop"),

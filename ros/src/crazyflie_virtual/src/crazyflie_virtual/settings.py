@@ -40,6 +40,12 @@ class VehicleSettings(Parameters):
         "drifts, a Lighthouse or a Loco deck, or the inertial sensors only (`none`)",
         DECK,
     )
+    estimator: int = parameter(
+        Integer(1, 2),
+        "stabilizer.estimator at the start: 2 is the Kalman filter, 1 the complementary one, with "
+        "which a vehicle without decks begins and which ignores external poses",
+        2,
+    )
     smooth_x: float = parameter(METRES, "middle of the patch of `fault/smooth`", 0.0, "smooth/x")
     smooth_y: float = parameter(METRES, "the same", 0.0, "smooth/y")
     base_stations: int = parameter(Integer(1, 2), "of Lighthouse", 2)

@@ -24,6 +24,9 @@ from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.body import Sensors
 from crazyflie_virtual.firmware.states import Estimate
 
+COMPLEMENTARY, KALMAN = 1, 2  #: Numbers of the firmware's estimators.
+_BAROMETER_TIME = 1.0  #: Time constant of the height by the barometer, s: assumed.
+
 _ACCELERATION_NOISE = 3.7e-4  #: Process noise, m^2/s^3: 0.6 m/s^2, held for 1 ms each.
 _RATE_NOISE = 1e-5  #: Process noise, rad^2/s: 0.1 rad/s, held for 1 ms each.
 #: Limit for position and velocity (m^2, m^2/s^2): MAX_COVARIANCE of kalman_core.c.
@@ -38,9 +41,15 @@ _REVERSION_TIME = 10.0
 
 
 class Estimator:
-    """Estimate of position, velocity and attitude, updated in place."""
+    """Estimate of position, velocity and attitude, updated in place.
 
-    def __init__(self, estimate: Estimate):
+    The complementary filter has no position: x and y are 0, z is the barometer's, and external
+    measurements are ignored. A vehicle without decks begins with it.
+    """
+
+    def __init__(self, estimate: Estimate, kind: int = KALMAN):
+        self._kind = kind
+        self._pressure_height = 0.0
         #: The estimate; others read it.
         self.estimate = self._estimate = estimate
         #: Pose after `reset`, m and rad.
@@ -51,6 +60,8 @@ class Estimator:
         """Return to the initial pose, at rest, with the initial variances."""
         e = self._estimate
         e.x, e.y, e.z = self.initial_x, self.initial_y, self.initial_z
+        if self._kind == COMPLEMENTARY:
+            e.x, e.y, e.z = 0.0, 0.0, self._pressure_height
         e.vx = e.vy = e.vz = e.ax = e.ay = e.az = 0.0
         e.qx = e.qy = 0.0
         e.qz, e.qw = math.sin(self.initial_yaw / 2.0), math.cos(self.initial_yaw / 2.0)
@@ -58,6 +69,17 @@ class Estimator:
         self.variance_attitude = _FIRST_ATTITUDE_VARIANCE
         self._samples: list[tuple[float, ...]] = []
         self._update_angles()
+
+    @property
+    def kind(self) -> int:
+        """`COMPLEMENTARY` or `KALMAN`; another one begins anew."""
+        return self._kind
+
+    @kind.setter
+    def kind(self, kind: int) -> None:
+        if kind != self._kind:
+            self._kind = kind
+            self.reset()
 
     @property
     def variance_position(self) -> float:
@@ -72,6 +94,7 @@ class Estimator:
     def sample(self, sensors: Sensors) -> None:
         """Add a sample of the inertial sensors for the next `predict`."""
         s = sensors
+        self._pressure_height = s.asl
         self._samples.append((s.gyro_x, s.gyro_y, s.gyro_z, s.acc_x, s.acc_y, s.acc_z))
 
     def predict(self, dt: float) -> None:
@@ -83,6 +106,11 @@ class Estimator:
         e.qx, e.qy, e.qz, e.qw = turned(e.quaternion, rotation)
         e.ax, e.ay, up = rotate(e.quaternion, mean[3:])
         e.az = up - 1.0
+        if self._kind == COMPLEMENTARY:
+            e.vz = (self._pressure_height - e.z) / _BAROMETER_TIME
+            e.z += dt * e.vz
+            self._update_angles()
+            return
         dvx, dvy, dvz = GRAVITY * dt * e.ax, GRAVITY * dt * e.ay, GRAVITY * dt * e.az
         e.x += dt * (e.vx + 0.5 * dvx)
         e.y += dt * (e.vy + 0.5 * dvy)
@@ -109,6 +137,8 @@ class Estimator:
 
     def correct_position(self, x: float, y: float, z: float, deviation: float) -> None:
         """Correct with a measured position (m) of a standard deviation (m)."""
+        if self._kind == COMPLEMENTARY:
+            return
         e = self._estimate
         p, m, v = self._covariance
         total = p + max(deviation * deviation, _LEAST_VARIANCE)
@@ -124,6 +154,8 @@ class Estimator:
 
     def correct_attitude(self, x: float, y: float, z: float, w: float, deviation: float) -> None:
         """Correct with a measured attitude, a unit quaternion, of a deviation (rad)."""
+        if self._kind == COMPLEMENTARY:
+            return
         variance = max(deviation * deviation, _LEAST_VARIANCE)
         gain = self.variance_attitude / (self.variance_attitude + variance)
         self._blend(x, y, z, w, gain)

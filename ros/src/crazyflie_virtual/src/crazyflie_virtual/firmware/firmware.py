@@ -54,7 +54,7 @@ class Firmware:
         self.warn = self.console.warn
         self.estimate = Estimate()
         self.sensors = Sensors(settings.sensor_noise, settings.seed)
-        self.estimator = Estimator(self.estimate)
+        self.estimator = Estimator(self.estimate, settings.estimator)
         self.deck = PositioningDeck(settings, faults, self.estimator, physics)
         self.ranging = RangingSensors(physics, settings.multiranger, self.deck.has_flow)
         self.localization = Localization(self.estimator)

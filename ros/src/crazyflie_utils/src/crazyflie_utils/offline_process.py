@@ -10,6 +10,11 @@ from crazyflie_utils.timers import Executor, SimulatedClock, TimerQueue
 from crazyflie_utils.topics import Transport
 
 
+#: Period at which a timer of period 0 fires here (s); on a real machine it fires as often as
+#: possible.
+_SHORTEST_PERIOD = 1e-4
+
+
 class WallClock(SimulatedClock):
     """Simulated time whose stamps are those of a wall clock that can be set."""
 
@@ -65,6 +70,24 @@ class OfflineProcess(Process):
         self.executor.submit(run)
         return outcome[0]
 
+    def advance(self, duration: float) -> None:
+        """Advance both clocks (s), with a stop at every timer's deadline."""
+        pass_time(duration, self.clock.time, self.next_deadline, self.set_clocks)
+
+    def next_deadline(self) -> float:
+        """Return the time at which the next timer of either clock is due, in simulated time (s)."""
+        ahead = self.machine_clock.time() - self.clock.time()
+        return min(self._simulated.next_deadline(), self._machine_deadline() - ahead)
+
+    def set_clocks(self, moment: float) -> None:
+        """Move both clocks, at once, until simulated time is ``moment`` (s)."""
+        ahead = self.machine_clock.time() - self.clock.time()
+        self.set_clock(moment)
+        self.set_machine_clock(moment + ahead)
+
+    def _machine_deadline(self) -> float:
+        return self._steady.next_deadline()
+
     def _setter(self, number, clock):
         if self.recorder is None:
             return clock.set
@@ -74,3 +97,19 @@ class OfflineProcess(Process):
             clock.set(moment)
 
         return set_recorded
+
+
+def pass_time(
+    duration: float,
+    time: Callable[[], float],
+    next_deadline: Callable[[], float],
+    move_to: Callable[[float], None],
+) -> None:
+    """Advance ``time()`` by a duration (s), with a stop at each deadline."""
+    end = time() + duration
+    while time() < end:
+        deadline = next_deadline()
+        if deadline <= time():
+            deadline = time() + _SHORTEST_PERIOD
+        # A deadline may be past the end by a rounding error, which is not a step back.
+        move_to(deadline if deadline < end + 1e-9 else end)

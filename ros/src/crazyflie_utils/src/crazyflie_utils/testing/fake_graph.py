@@ -12,8 +12,10 @@ import genpy
 
 from crazyflie_utils.journal.recording import Recorder, copy_outcome
 from crazyflie_utils.node import Node
-from crazyflie_utils.testing.fake_process import FakeProcess, pass_time
-from crazyflie_utils.testing.fake_transport import FakeTransport, refuse
+from crazyflie_utils.offline_process import pass_time
+from crazyflie_utils.offline_transport import refuse
+from crazyflie_utils.testing.fake_process import FakeProcess
+from crazyflie_utils.testing.fake_transport import FakeTransport
 from crazyflie_utils.topics import Condition, ExternalPublisher, ExternalSubscriber, Receiver, never
 
 #: Largest number of messages that wait for a frozen process on one connection; of later ones only
@@ -91,7 +93,7 @@ class FakeGraph:
         """Resume a frozen process, with the messages and calls that have waited."""
         process = self._processes[name]
         process.is_frozen = False
-        process.move_to(self.time)
+        process.set_clocks(self.time)
         while process.waiting:
             deliver, message = process.waiting.pop(0)
             deliver(message)
@@ -163,7 +165,7 @@ class FakeGraph:
         self.time = time
         for process in list(self._processes.values()):
             if not process.is_frozen and process.name in self._processes:
-                process.move_to(time)
+                process.set_clocks(time)
 
     # Data of the transports.
 
@@ -226,7 +228,7 @@ class _GraphProcess(FakeProcess):
             return
         # The order of processes that wake up at one moment is random.
         if self.clock.time() != self.transport.graph.time:
-            self.move_to(self.transport.graph.time)
+            self.set_clocks(self.transport.graph.time)
         deliver(message)
 
 

@@ -75,8 +75,16 @@ class TopicError(Exception):
     """A topic that cannot be read; the text names it and what was expected."""
 
 
-class _BrokenOffError(Exception):
+class BrokenOffError(Exception):
     """The file ends, or is damaged, within a record."""
+
+
+def broken_off(path: Path, size: int, place: int, reason: object) -> str:
+    """Return the sentence that a file of a size is read up to a place (bytes), and why."""
+    return (
+        f"{path} breaks off at {place / 1e6:.2f} of {size / 1e6:.2f} MB ({reason}), as after a "
+        "crash: the rest is missing here"
+    )
 
 
 @dataclass(frozen=True)
@@ -135,12 +143,12 @@ class BagFile:
             file.seek(len(MAGIC))
             try:
                 yield from self._messages_in(file, self.size, is_wanted)
-            except _BrokenOffError as error:
-                self.interruption = self._broken_off(file.tell(), error)
+            except BrokenOffError as error:
+                self.interruption = broken_off(self._path, self.size, file.tell(), error)
             except ExpansionError as error:
                 self.interruption = f"{self._path} is read up to {self.done / 1e6:.2f} MB: {error}"
             except (struct.error, KeyError, ValueError, EOFError, RecursionError):
-                self.interruption = self._broken_off(file.tell(), "it is damaged")
+                self.interruption = broken_off(self._path, self.size, file.tell(), "it is damaged")
 
     def _messages_in(self, file, end, is_wanted):
         """Yield the messages in the records of a file, or of a chunk."""
@@ -155,7 +163,7 @@ class BagFile:
                 chunk = self._decompressed(content, fields[b"compression"])
                 yield from self._messages_in(BytesIO(chunk), len(chunk), is_wanted)
                 if len(content) != size:
-                    raise _BrokenOffError("its last chunk was not closed")
+                    raise BrokenOffError("its last chunk was not closed")
                 continue
             data = _sized(file, end)
             if op == _MESSAGE:
@@ -173,24 +181,18 @@ class BagFile:
                 f"{self._path} was not closed, as after a crash: the last second may be missing"
             )
         elif place > self.size:
-            self.interruption = self._broken_off(self.size, "its index is missing")
-
-    def _broken_off(self, place, reason):
-        return (
-            f"{self._path} breaks off at {place / 1e6:.2f} of {self.size / 1e6:.2f} MB ({reason}), "
-            "as after a crash: the rest is missing here"
-        )
+            self.interruption = broken_off(self._path, self.size, self.size, "its index is missing")
 
     def _decompressed(self, data, compression):
         if compression == b"none":
             return data
         if compression not in DECOMPRESSORS:
-            raise _BrokenOffError(f"its compression is {compression.decode(errors='replace')}")
+            raise BrokenOffError(f"its compression is {compression.decode(errors='replace')}")
         try:
             # A truncated chunk is read as far as possible.
             return b"".join(self._expansion.pieces(DECOMPRESSORS[compression](), data))
         except (OSError, RuntimeError) as error:
-            raise _BrokenOffError(str(error)) from None
+            raise BrokenOffError(str(error)) from None
 
     def _connect(self, fields, data, is_wanted):
         if (key := fields[b"conn"]) in self._by_id:
@@ -206,7 +208,7 @@ def _sized(file: BinaryIO, end: int) -> bytes:
     """Return the next part of a file that has so many bytes; its size is before it."""
     size = int.from_bytes(file.read(4), "little")
     if size > end - file.tell():
-        raise _BrokenOffError("it ends within a record")
+        raise BrokenOffError("it ends within a record")
     return file.read(size)
 
 

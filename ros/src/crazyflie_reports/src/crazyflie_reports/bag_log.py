@@ -23,6 +23,7 @@ from crazyflie_reports.bag_topics import (
     seconds,
     topic_of,
 )
+from crazyflie_reports.mcap_file import McapFile, profile_of
 from crazyflie_reports.usd_log import UsdConnection, UsdLogFile, is_usd_log
 
 POSE_PERIOD = 0.009  #: Period of the transforms that are kept; they may come at 1 kHz (s).
@@ -157,6 +158,8 @@ def read(path: Path, folder: Path, names: dict[str, str] | None = None) -> list[
 
 def _opened(path, folder):
     try:
+        if path.suffix == ".mcap" and profile_of(path) not in (None, "ros2"):
+            return McapFile(path)
         if path.name.endswith(SUFFIXES):
             return Ros2BagFile(path, folder)
         return UsdLogFile(path) if is_usd_log(path) else BagFile(path)

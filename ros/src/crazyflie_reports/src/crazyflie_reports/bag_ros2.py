@@ -59,7 +59,7 @@ FOREIGN = {
 
 # Largest length of a definition (characters): the parser's time grows with its square.
 _LARGEST_DEFINITION = 20_000
-_MCAP = b"\x89MCAP0\r\n"
+MCAP_MAGIC = b"\x89MCAP0\r\n"
 _CHUNK = 0x06  # The record of MCAP with compressed messages.
 _ZSTD = b"\x28\xb5\x2f\xfd"  # A message of CDR begins with 0.
 _RECORD = struct.Struct("<BQ")
@@ -231,7 +231,7 @@ class Ros2BagFile:
         """
         found = set()
         with self._source.open("rb") as file:
-            file.seek(len(_MCAP))
+            file.seek(len(MCAP_MAGIC))
             while len(head := file.read(_RECORD.size)) == _RECORD.size:
                 kind, size = _RECORD.unpack(head)
                 begin = file.tell()
@@ -239,13 +239,31 @@ class Ros2BagFile:
                     break  # rosbags reports that itself.
                 if kind == _CHUNK:
                     data = file.read(size)
-                    (length,) = struct.unpack_from("<I", data, 28)
-                    name, content = data[32 : 32 + length].decode(), data[40 + length :]
+                    name, content = _chunk(data)
                     found.add((begin - _RECORD.size, name, len(content)))
-                    while content and name in _DECOMPRESSORS:
-                        decompressor = _DECOMPRESSORS[name]()
-                        for _ in self._expansion.pieces(decompressor, content):
-                            pass
-                        content = decompressor.unused_data  # Size of the next frame.
+                    for _ in chunk_content(data, self._expansion):
+                        pass
                 file.seek(begin + size)
         return found
+
+
+def _chunk(data):
+    """Return compression and compressed records of a chunk's record."""
+    (length,) = struct.unpack_from("<I", data, 28)
+    return data[32 : 32 + length].decode(), data[40 + length :]
+
+
+def chunk_content(data: bytes, expansion: Expansion) -> Iterator[bytes]:
+    """Yield the records in a chunk's record of MCAP, in pieces.
+
+    `ExpansionError`: they exceed the limit. ValueError: the compression is not known.
+    """
+    name, content = _chunk(data)
+    if name and name not in _DECOMPRESSORS:
+        raise ValueError(f"the compression of a chunk is {name!r}")
+    while content and name:
+        decompressor = _DECOMPRESSORS[name]()
+        yield from expansion.pieces(decompressor, content)
+        content = decompressor.unused_data  # The next frame.
+    if not name:
+        yield content

@@ -35,7 +35,7 @@ class Setpoints(Subsystem):
     numbers that cannot be sent.
     """
 
-    def attitude(self, roll: float, pitch: float, yaw_rate: float, thrust: int) -> None:
+    def attitude(self, roll: float, pitch: float, yaw_rate: float, thrust: float) -> None:
         """Roll, pitch (degrees), yaw rate (degrees/s) and thrust (PWM, 0 to 65535).
 
         Positive pitch accelerates forward; over the link it is negated (by cflib).

@@ -60,7 +60,8 @@ def test_names_of_one_vehicle_reach_all_nodes(composed):
     assert parameters["/cmd_vel_converter/topics/cmd_vel"] == "/cf3/cmd_vel"
     assert parameters["/cmd_vel_converter/topics/control"] == "/control/cf3"
     assert parameters["/state_estimator/frames/robot"] == "cf3"
-    assert parameters["/takeoff_server/topics/connected"] == "/cf3/connected"
+    for node in ("takeoff_server", "takeoff_control_filter"):
+        assert parameters[f"/{node}/topics/connected"] == "/cf3/connected"
 
 
 def test_what_dies_in_flight_is_started_again():
@@ -86,8 +87,9 @@ def test_the_frame_of_motion_capture_outlives_its_publisher():
     assert nodes["/mocap_robot_publisher"].package == "tf2_ros"
 
 
-def test_takeoff_servers_ask_for_the_driver_where_one_flies():
-    of_driver = "takeoff_server/topics/connected"
+@pytest.mark.parametrize("node", ["takeoff_server", "takeoff_control_filter"])
+def test_takeoff_servers_and_filters_ask_for_the_driver_where_one_flies(node):
+    of_driver = f"{node}/topics/connected"
     _, simulated = launch_files.expand(LAUNCH / "sw_hover.launch", rviz="false")
     assert f"/{of_driver}" not in simulated
     _, swarm = launch_files.expand(LAUNCH / "virtual_hw_swarm.launch", rviz="false")

@@ -3,7 +3,6 @@
 import math
 
 import pytest
-from takeoff_helpers import BARE
 
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_takeoff.filter_machine import FilterMachine, LossTimeouts
@@ -11,14 +10,13 @@ from crazyflie_takeoff.limits import Box, Callers, Debounce, DescentWatch, Limit
 from crazyflie_takeoff.motion import Delay, Ground, MeasuredPosition, Measurement, Motion
 from crazyflie_takeoff.relay import Relay
 from crazyflie_takeoff.safe_control import SafeSetpoint
-from crazyflie_takeoff.server_table import DESCENT_MARGIN, NO_FILTER, Descent
+from crazyflie_takeoff.server_table import DESCENT_MARGIN, Descent
 from crazyflie_takeoff.takeoff_checks import (
     BatteryCheck,
     Charge,
-    TakeoffChecks,
-    TakeoffServerParameters,
 )
 from crazyflie_takeoff.transition_table import FlightState
+from crazyflie_takeoff.vehicle_facts import VehicleFacts
 
 
 def at(z, z_dot=0.0):
@@ -185,15 +183,13 @@ def test_what_has_flown_is_down_where_it_stays_without_enough_thrust():
 
 
 def test_what_a_driver_says_counts_for_three_seconds():
-    parameters = TakeoffServerParameters.from_mapping(
-        {**BARE, "topics/connected": "/cf1/connected"}
-    )
-    checks = TakeoffChecks(parameters, str)
-    assert checks.refusal(0.0, NO_FILTER)
-    checks.connection = 1.0, True
-    assert [bool(checks.refusal(now, NO_FILTER)) for now in (4.0, 4.1)] == [False, True]
-    checks.connection, checks.vehicle = (4.0, True), (1.0, SupervisorState.CRASHED, False)
-    assert [bool(checks.refusal(now, NO_FILTER)) for now in (4.0, 4.1)] == [True, False]
+    vehicle = VehicleFacts("/cf1/connected", str)
+    assert vehicle.takeoff_refusal(0.0)
+    vehicle.set_connected(1.0, True)
+    assert [bool(vehicle.takeoff_refusal(now)) for now in (4.0, 4.1)] == [False, True]
+    vehicle.set_connected(4.0, True)
+    vehicle.set_status(1.0, SupervisorState.CRASHED, True, False)
+    assert [bool(vehicle.takeoff_refusal(now)) for now in (4.0, 4.1)] == [True, False]
 
 
 # The walls.

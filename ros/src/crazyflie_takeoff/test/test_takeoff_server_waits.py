@@ -9,8 +9,8 @@ from std_srvs.srv import EmptyResponse
 from takeoff_helpers import SERVER, filter_status, state
 
 from crazyflie_msgs.msg import FilterStatus, VehicleStatus
-from crazyflie_takeoff.takeoff_checks import MAX_CONNECTION_AGE
 from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
+from crazyflie_takeoff.vehicle_facts import MAX_FACT_AGE
 from crazyflie_utils.refusal import ServiceError
 
 
@@ -226,7 +226,7 @@ def test_a_driver_that_has_died_is_not_connected():
     process = on_ground(DRIVEN)
     process.advance(START_LIMIT)
     process.publish("/cf1/connected", Bool(True))
-    process.advance(MAX_CONNECTION_AGE + 0.1)
+    process.advance(MAX_FACT_AGE + 0.1)
     process.publish("/state", state(0.0))
     with pytest.raises(ServiceError, match=NOT_CONNECTED.format("nothing")):
         call(process, "/takeoff")
@@ -238,6 +238,15 @@ def test_a_driver_that_has_died_is_not_connected():
         ({"supervisor": VehicleStatus.LOCKED}, "cannot fly, its state is: locked; restart it"),
         ({"supervisor": VehicleStatus.CRASHED}, "state is: crashed"),
         ({"is_emergency": True}, "stopped by emergency; remove it, restart it"),
+        ({"has_supervisor": True}, "/takeoff refused: the vehicle is not armed; call /cf1/arm"),
+        (
+            {"has_supervisor": True, "supervisor": VehicleStatus.ARMED},
+            "the vehicle cannot fly yet, its state is: armed",
+        ),
+        (
+            {"has_supervisor": True, "supervisor": VehicleStatus.AUTO_ARMED},
+            "the vehicle cannot fly yet, its state is: auto armed",
+        ),
     ],
 )
 def test_takeoff_of_a_vehicle_that_cannot_fly_is_refused_at_once(status, reason):
@@ -325,3 +334,17 @@ def test_a_landing_that_the_filter_finishes_has_succeeded_but_not_one_that_it_st
     process.publish("/in_flight_filter_status", report)
     with pytest.raises(ServiceError, match="the flight was ended by the filter: it was called"):
         land.result(0)
+
+
+def test_a_vehicle_that_arms_itself_again_may_take_off_meanwhile():
+    """It is not armed for 0.2 s after a landing, and every 30 s on the ground."""
+    process = on_ground(DRIVEN)
+    auto, ready = VehicleStatus.AUTO_ARMED, VehicleStatus.ARMED | VehicleStatus.CAN_FLY
+    for state_of_vehicle in (auto | ready, auto):
+        status = VehicleStatus(supervisor=state_of_vehicle, has_supervisor=True)
+        process.publish("/cf1/vehicle_status", status)
+    process.publish("/cf1/connected", Bool(True))
+    process.publish("/state", state(0.0))
+    call(process, "/takeoff")
+    process.advance(0.02)
+    assert states(process)[-1] == "taking_off"

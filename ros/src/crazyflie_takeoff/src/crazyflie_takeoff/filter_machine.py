@@ -54,6 +54,7 @@ class FilterEvent(enum.Enum):
     TICK = enum.auto()  # Time has passed.
     OBJECTION = enum.auto()  # Controls must not be passed on any more.
     CRASH = enum.auto()  # The vehicle is outside of its limits, or tilted over.
+    VEHICLE_LOST = enum.auto()  # The vehicle has not been able to fly for a while.
     STOP = enum.auto()  # /emergency was called.
     RESET = enum.auto()  # /emergency_reset was called.
 
@@ -447,7 +448,11 @@ class FilterMachine(Generic[Control]):
         elapsed = time - self._ticked
         return min(max(elapsed, 0.0), LONGEST_STEP) if math.isfinite(elapsed) else 0.0
 
-    # Emergencies.
+    # Ends of a flight.
+
+    def lose_vehicle(self, reason: str) -> None:
+        """Stop the motors of a vehicle that cannot fly, until the next takeoff."""
+        self.handle(FilterEvent.VEHICLE_LOST, reason)
 
     def stop(self, reason: str) -> None:
         """Stop the motors until `reset`, whatever controls come."""
@@ -471,7 +476,7 @@ class FilterMachine(Generic[Control]):
     def handle(self, event: FilterEvent, reason: str = "") -> bool:
         """Step the table; return whether the state has changed.
 
-        ``reason`` is that of an objection, a crash or a stop.
+        ``reason`` is that of an objection, a crash, a lost vehicle or a stop.
         """
         self._event_reason = reason
         before, self.state = self.state, step(self.TABLE, self.state, event, self)
@@ -577,6 +582,7 @@ class FilterMachine(Generic[Control]):
         Transition(_PASSING, FilterEvent.TICK, _control_is_lost, _HOLDING, _hold_place),
         Transition(_PASSING, FilterEvent.OBJECTION, _is_airborne, _SINKING, _take_over_and_land),
         Transition(_PASSING, FilterEvent.CRASH, _is_airborne, _EMERGENCY, _stop_at_once),
+        Transition(_PASSING, FilterEvent.VEHICLE_LOST, _is_airborne, _DOWN, _stop_at_once),
         Transition(_PASSING, FilterEvent.STOP, None, _EMERGENCY, _stop_at_once),
         Transition(_HOLDING, FilterEvent.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
         Transition(_HOLDING, FilterEvent.COMMANDED_CONTROL, None, _PASSING),
@@ -585,10 +591,12 @@ class FilterMachine(Generic[Control]):
         Transition(_HOLDING, FilterEvent.TICK, _control_stays_away, _SINKING, _give_up_waiting),
         Transition(_HOLDING, FilterEvent.OBJECTION, None, _SINKING, _land),
         Transition(_HOLDING, FilterEvent.CRASH, None, _EMERGENCY, _stop_at_once),
+        Transition(_HOLDING, FilterEvent.VEHICLE_LOST, None, _DOWN, _stop_at_once),
         Transition(_HOLDING, FilterEvent.STOP, None, _EMERGENCY, _stop_at_once),
         Transition(_SINKING, FilterEvent.TICK, _has_touched_down, _DOWN, _end_descent),
         Transition(_SINKING, FilterEvent.TICK, _descent_is_over, _DOWN, _end_long_descent),
         Transition(_SINKING, FilterEvent.CRASH, None, _EMERGENCY, _stop_at_once),
+        Transition(_SINKING, FilterEvent.VEHICLE_LOST, None, _DOWN, _stop_at_once),
         Transition(_SINKING, FilterEvent.STOP, None, _EMERGENCY, _stop_at_once),
         Transition(_DOWN, FilterEvent.TAKEOFF_CONTROL, _lifts_off, _PASSING, _end_flight),
         Transition(_DOWN, FilterEvent.STOP, None, _EMERGENCY, _stop_at_once),

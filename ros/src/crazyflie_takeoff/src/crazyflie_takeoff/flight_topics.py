@@ -1,4 +1,4 @@
-"""Parts of server and filter: parameters of topics and geofence, its box, and diagnostics."""
+"""Parts of server and filter: their parameters of topics, box, driver, and diagnostics."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -6,8 +6,12 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from dynamic_reconfigure.msg import Config
+from std_msgs.msg import Bool
 
+from crazyflie_model.supervisor import SupervisorState
+from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_takeoff.limits import NO_BOX, Box
+from crazyflie_takeoff.vehicle_facts import VehicleFacts
 from crazyflie_utils import NodeHandle, Parameters, parameter, topic
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import METRES
@@ -53,6 +57,17 @@ class FlightTopicParameters(Parameters):
     own_filter_status_topic: str | None = named_after("in_flight", "_filter_status")
     own_controller_topic: str | None = named_after("in_flight", "_controller")
 
+    connected_topic: str | None = topic(
+        "connected",
+        "whether the driver is connected; while it is not /takeoff is refused, and a flight ends",
+        None,
+    )
+    own_vehicle_status_topic: str | None = topic(
+        "vehicle_status",
+        "the vehicle's state; /takeoff is refused, and a flight ends, while it cannot fly. By "
+        "default `vehicle_status` next to topics/connected",
+        None,
+    )
     box_topic: str | None = topic(
         "box",
         "the geofence's live parameters, whose box replaces box/min and "
@@ -68,6 +83,17 @@ class FlightTopicParameters(Parameters):
         if self.box_topic is not None:
             return NO_BOX
         return Box(self.lower.vector(-math.inf), self.upper.vector(math.inf))
+
+    @property
+    def vehicle_status_topic(self) -> str | None:
+        """The driver's status of the vehicle; None without a driver."""
+        return self.own_vehicle_status_topic or self._of_driver("vehicle_status")
+
+    def _of_driver(self, name):
+        if self.connected_topic is None:
+            return None
+        namespace, slash, _ = self.connected_topic.rpartition("/")
+        return f"{namespace}{slash}{name}"
 
     filter_state_topic = derived_topic("filter_state", "in_flight", "_filter")
     flight_status_topic = derived_topic("flight_status", "in_flight", "_flight_status")
@@ -88,6 +114,24 @@ def follow_box(handle: NodeHandle, topic: str, callback: Callable[[Box], None]) 
         callback(Box(lower, upper))
 
     handle.subscribe(topic, Config, on_config)
+
+
+def follow_driver(
+    handle: NodeHandle, parameters: FlightTopicParameters, facts: VehicleFacts
+) -> None:
+    """Keep facts up to date with what the driver publishes."""
+
+    def on_connected(message: Bool) -> None:
+        facts.set_connected(handle.time(), message.data)
+
+    def on_status(message: VehicleStatus) -> None:
+        state = SupervisorState(message.supervisor)
+        facts.set_status(handle.time(), state, message.has_supervisor, message.is_emergency)
+
+    if parameters.connected_topic is not None:
+        handle.subscribe(parameters.connected_topic, Bool, on_connected)
+    if parameters.vehicle_status_topic is not None:
+        handle.subscribe(parameters.vehicle_status_topic, VehicleStatus, on_status)
 
 
 def report(

@@ -80,6 +80,7 @@ class ServerEvent(enum.Enum):
     FILTER_DOWN = enum.auto()  # It has brought the vehicle down; the motors are off.
     FILTER_EMERGENCY = enum.auto()  # It has stopped the motors at once.
     FILTER_REFUSES = enum.auto()  # It keeps the motors off and passes no takeoff on.
+    VEHICLE_LOST = enum.auto()  # The vehicle has not been able to fly for a while.
 
 
 #: Events after which the motors are off, and those after which the filter has the vehicle.
@@ -417,6 +418,6 @@ TABLE: Table[ServerState, FlightStateMachine] = (
     *(
         Transition(state, event, None, _S.ON_GROUND, _M._begin)
         for state in (*_TAKEOFF, *_AIRBORNE_OR_LANDING, _S.YIELDED)
-        for event in STOPS
+        for event in (*STOPS, _E.VEHICLE_LOST)
     ),
 )

@@ -7,11 +7,11 @@ from typing import Any
 
 from typing_extensions import override
 
-from crazyflie_model.supervisor import SupervisorState
 from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic, named_after
 from crazyflie_takeoff.limits import Box
 from crazyflie_takeoff.motion import MeasuredPosition
 from crazyflie_takeoff.server_table import FilterReport, ServerEvent, TakeoffPlan
+from crazyflie_takeoff.vehicle_facts import VehicleFacts
 from crazyflie_utils import parameter, topic
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, Number
 
@@ -58,17 +58,6 @@ class TakeoffServerParameters(FlightTopicParameters):
     )
     battery_topic: str | None = topic(
         "battery", "voltage of the battery; without it the battery is not monitored", None
-    )
-    connected_topic: str | None = topic(
-        "connected",
-        "whether the driver is connected; with it /takeoff is refused while it is not",
-        None,
-    )
-    own_vehicle_status_topic: str | None = topic(
-        "vehicle_status",
-        "the vehicle's state; /takeoff of one that is locked, crashed or overturned is refused. "
-        "By default `vehicle_status` next to topics/connected",
-        None,
     )
     inhibition_topic: str | None = topic(
         "inhibition", "why another node refuses takeoffs; empty text if it does not", None
@@ -121,20 +110,9 @@ class TakeoffServerParameters(FlightTopicParameters):
     status_topic = derived_topic("status", "in_flight", "_status")
 
     @property
-    def vehicle_status_topic(self) -> str | None:
-        """The driver's status of the vehicle; None without a driver."""
-        return self.own_vehicle_status_topic or self._of_driver("vehicle_status")
-
-    @property
     def positioning_topic(self) -> str | None:
         """Why the vehicle's own estimate cannot be flown by; None without a driver."""
         return self._of_driver("positioning")
-
-    def _of_driver(self, name):
-        if self.connected_topic is None:
-            return None
-        namespace, slash, _ = self.connected_topic.rpartition("/")
-        return f"{namespace}{slash}{name}"
 
     @override
     def complaints(self) -> Iterator[str]:
@@ -168,7 +146,6 @@ def hover_complaint(hover: tuple[float, float, float], box: Box) -> str:
 
 
 MAX_VOLTAGE_AGE = 5.0  #: Age at which a voltage is unknown (s); the driver sends one a second.
-MAX_CONNECTION_AGE = 3.0  #: Age at which a status of the driver is unknown (s); one comes a second.
 _LONGEST_STEP = 1.5  #: Longest time between two voltages that is added to a duration (s).
 _NOT_LOWER = -math.inf  # Duration below a level of a voltage that is not below it (s).
 _NO_CONTROLLER = "no commanded controls come; is the controller running?"
@@ -227,10 +204,8 @@ class TakeoffChecks:
         self.parameters = parameters
         self.box = parameters.box
         self.position = MeasuredPosition()
-        #: When the driver has published its last status (s), and whether it is connected.
-        self.connection = -math.inf, False
-        #: The same time of the vehicle's state, that state, and whether an emergency is latched.
-        self.vehicle = -math.inf, SupervisorState(0), False
+        #: What the driver publishes about the vehicle.
+        self.vehicle = VehicleFacts(parameters.connected_topic, resolve)
         self.battery = BatteryCheck(
             parameters.battery_low, parameters.battery_critical, parameters.battery_duration
         )
@@ -257,7 +232,7 @@ class TakeoffChecks:
         """Return whether something is missing at ``now`` (s) that has never been there."""
         lacks_state = self.parameters.state_topic is not None and not self.position.is_measured
         lacks_controller = not self.has_controller and not self._had_controller
-        return lacks_state or lacks_controller or bool(self._driver_refusal(now))
+        return lacks_state or lacks_controller or bool(self.vehicle.connection_refusal(now))
 
     def refusal(self, now: float, report: FilterReport) -> str:
         """Return why the vehicle must not take off at ``now`` (s); empty if it may."""
@@ -268,8 +243,7 @@ class TakeoffChecks:
         topic = self.parameters.state_topic
         return (
             hover_complaint(self.parameters.hover, self.box)
-            or self._driver_refusal(now)
-            or self._vehicle_refusal(now)
+            or self.vehicle.takeoff_refusal(now)
             or self.positioning
             or (topic and self.position.explanation(now, self._resolve(topic)))
             or ("" if self.has_controller else _NO_CONTROLLER)
@@ -281,28 +255,4 @@ class TakeoffChecks:
         """Return that the battery is low or critical; empty if it is not."""
         if self.battery.charge(now) in (Charge.LOW, Charge.CRITICAL):
             return f"the battery is low, {self.battery.voltage:.2f} V"
-        return ""
-
-    def _driver_refusal(self, now):
-        (time, is_connected), topic = self.connection, self.parameters.connected_topic
-        is_recent = now - time <= MAX_CONNECTION_AGE
-        if topic is None or (is_recent and is_connected):
-            return ""
-        topic = self._resolve(topic)
-        prefix = topic.rpartition("/")[0].strip("/")
-        text = "false" if is_recent else "nothing"
-        return (
-            f"the driver is not connected to the vehicle, {text} on {topic}; is the vehicle on? "
-            "It is added by: roslaunch crazyflie_driver crazyflie_add.launch uri:=ADDRESS "
-            f"tf_prefix:={prefix}"
-        )
-
-    def _vehicle_refusal(self, now):
-        time, state, is_emergency = self.vehicle
-        if now - time > MAX_CONNECTION_AGE:
-            return ""
-        if is_emergency:
-            return "the vehicle was stopped by emergency; remove it, restart it and add it again"
-        if state.faults:
-            return f"the vehicle cannot fly, its state is: {state.words()}; restart it"
         return ""

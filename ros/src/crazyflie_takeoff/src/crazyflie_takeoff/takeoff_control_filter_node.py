@@ -21,6 +21,7 @@ from crazyflie_takeoff.limits import Limits
 from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import SafeSetpoint
 from crazyflie_takeoff.transition_table import FlightState, flight_state
+from crazyflie_takeoff.vehicle_facts import VehicleFacts
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter, topic
 from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, Number
@@ -131,6 +132,8 @@ class TakeoffControlFilterNode(Node):
     def load_parameters(self, handle: NodeHandle) -> None:
         parameters = handle.load(TakeoffControlFilterParameters)
         self._parameters = parameters
+        self._vehicle = VehicleFacts(parameters.connected_topic, handle.resolve)
+        self._has_driver = parameters.vehicle_status_topic is not None
         self._filter: FilterMachine[ControlStamped] = FilterMachine(
             parameters.timeouts(), parameters.limits(), parameters.state_topic is not None
         )
@@ -167,6 +170,7 @@ class TakeoffControlFilterNode(Node):
             handle.subscribe(parameters.tilted_topic, Bool, self._on_tilted)
         if parameters.box_topic is not None:
             flight_topics.follow_box(handle, parameters.box_topic, self._filter.set_box)
+        flight_topics.follow_driver(handle, parameters, self._vehicle)
         self._takeoffs = handle.subscribe(
             parameters.takeoff_control_topic,
             ControlStamped,
@@ -283,6 +287,8 @@ class TakeoffControlFilterNode(Node):
     def _on_timer(self):
         time = self._handle.time()
         self._follow_clock(time)
+        if self._has_driver and (reason := self._vehicle.flight_end(time)):
+            self._filter.lose_vehicle(reason)
         if (control := self._filter.tick(time)) is not None:
             self._publish(control, self._handle.stamp())
         gap = self._filter.relay.gaps.longest

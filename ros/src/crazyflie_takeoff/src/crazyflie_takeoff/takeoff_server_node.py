@@ -7,7 +7,6 @@ from std_msgs.msg import Bool, Empty, Float32, String
 from std_srvs.srv import Empty as EmptyService
 from typing_extensions import override
 
-from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
@@ -16,7 +15,6 @@ from crazyflie_msgs.msg import (
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
-    VehicleStatus,
 )
 from crazyflie_takeoff import flight_topics
 from crazyflie_takeoff.server_table import (
@@ -126,10 +124,7 @@ class TakeoffServerNode(Node):
             flight_topics.follow_box(handle, parameters.box_topic, checks.set_box)
         if parameters.battery_topic is not None:
             handle.subscribe(parameters.battery_topic, Float32, self._on_battery)
-        if parameters.connected_topic is not None:
-            handle.subscribe(parameters.connected_topic, Bool, self._on_connected)
-        if (topic := parameters.vehicle_status_topic) is not None:
-            handle.subscribe(topic, VehicleStatus, self._on_vehicle_status)
+        flight_topics.follow_driver(handle, parameters, checks.vehicle)
         if (topic := parameters.positioning_topic) is not None:
             handle.subscribe(topic, String, self._on_positioning)
         if parameters.inhibition_topic is not None:
@@ -257,13 +252,6 @@ class TakeoffServerNode(Node):
         self._flight.set_filter(FilterReport(event, remembered, message.is_commanded, reason))
         self._set_pace()
 
-    def _on_connected(self, message):
-        self._checks.connection = self._handle.time(), message.data
-
-    def _on_vehicle_status(self, message):
-        state = SupervisorState(message.supervisor)
-        self._checks.vehicle = self._handle.time(), state, message.is_emergency
-
     def _on_inhibition(self, message):
         self._checks.inhibition = message.data
 
@@ -312,8 +300,10 @@ class TakeoffServerNode(Node):
         self._serve_waiting()
 
     def _watch(self):
-        """Land for a battery, or a positioning, by which the vehicle cannot fly on."""
+        """End a flight that is over; land for a battery or positioning by which it cannot go on."""
         checks, now = self._checks, self._handle.time()
+        if reason := checks.vehicle.flight_end(now):
+            self._end_flight(reason)
         if complaint := checks.battery_complaint(now):
             self._handle.warn(complaint, throttle=30.0, key="battery")
             if checks.battery.charge(now) is Charge.CRITICAL:
@@ -325,6 +315,12 @@ class TakeoffServerNode(Node):
         if self._flight.accepts(ServerEvent.LAND):
             self._answer(f"takeoff aborted: {failure or reason}")
             self._flight.handle(ServerEvent.LAND)
+            self._reason = reason
+
+    def _end_flight(self, reason):
+        if self._flight.accepts(ServerEvent.VEHICLE_LOST):
+            self._answer(f"the flight was ended: {reason}")
+            self._flight.handle(ServerEvent.VEHICLE_LOST)
             self._reason = reason
 
     def _tick(self, before):

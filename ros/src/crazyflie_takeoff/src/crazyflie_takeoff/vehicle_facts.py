@@ -1,0 +1,114 @@
+"""What the driver knows of the vehicle: whether it may take off, and whether it can still fly."""
+
+import math
+from collections.abc import Callable
+
+from crazyflie_model.supervisor import SupervisorState
+from crazyflie_takeoff.limits import Debounce
+
+MAX_FACT_AGE = 3.0  #: Age at which a status of the driver is unknown (s); it repeats each at 1 Hz.
+#: Time after which a flight is over if the vehicle cannot fly (s). The firmware stops the motors as
+#: long after the last setpoint.
+MAX_FAULT_TIME = 2.0
+#: Time in which a vehicle that arms itself has done so again (s): it disarms 3 s after a landing,
+#: and every 30 s on the ground, for 0.2 s.
+REARMING_TIME = 0.5
+_LONGEST_STEP = 0.1  # A process that was stopped has received no status meanwhile (s).
+
+_READY = SupervisorState.ARMED | SupervisorState.CAN_FLY
+
+
+class VehicleFacts:
+    """Facts of the driver about a vehicle, and decisions by them; times are s of one clock.
+
+    On ``topic`` the driver publishes whether it is connected (None: there is no driver);
+    ``resolve(topic)`` returns the absolute name. A fact that has never come, or that the driver does
+    not know, ends no flight.
+    """
+
+    def __init__(self, topic: str | None, resolve: Callable[[str], str]):
+        self._topic = topic
+        self._resolve = resolve
+        # Time, and whether the driver is connected.
+        self._connection = -math.inf, False
+        # Time, state, and whether an emergency is latched.
+        self._status = -math.inf, _READY, False
+        self._unready_since = -math.inf
+        self._time = -math.inf
+        self._debounce = Debounce(MAX_FAULT_TIME)
+
+    def set_connected(self, now: float, is_connected: bool) -> None:
+        """Record whether the driver is connected to the vehicle."""
+        self._connection = now, is_connected
+
+    def set_status(
+        self, now: float, state: SupervisorState, is_known: bool, is_emergency: bool
+    ) -> None:
+        """Record the vehicle's state, if it is known, and whether an emergency is latched."""
+        if not is_known:
+            state |= _READY
+        was_ready = _READY in self._status[1]
+        if was_ready and _READY not in state and math.isfinite(self._status[0]):
+            self._unready_since = now
+        self._status = now, state, is_emergency
+
+    def takeoff_refusal(self, now: float) -> str:
+        """Return why the vehicle must not take off; empty if it may."""
+        return self.connection_refusal(now) or self._fault(now) or self._unready(now)
+
+    def connection_refusal(self, now: float) -> str:
+        """Return that the driver is not connected, and what to do; empty if it is."""
+        if not (fault := self._connection_fault(now)):
+            return ""
+        return (
+            f"{fault}; is the vehicle on? It is added by: roslaunch crazyflie_driver "
+            f"crazyflie_add.launch uri:=ADDRESS tf_prefix:={self._prefix.strip('/')}"
+        )
+
+    def flight_end(self, now: float) -> str:
+        """Return why a flight is over; empty if it is not. To be called in each period.
+
+        The motors of a vehicle that could not fly for `MAX_FAULT_TIME` are off. When it can fly
+        again, somebody may have it in a hand.
+        """
+        step, self._time = min(max(now - self._time, 0.0), _LONGEST_STEP), now
+        was_connected = math.isfinite(self._connection[0])
+        fault = self._connection_fault(now) if was_connected else ""
+        fault = fault or self._fault(now)
+        if not fault and SupervisorState.ARMED not in self._state(now):
+            fault = "the vehicle is not armed"
+        return self._debounce.advance(step, fault)
+
+    @property
+    def _prefix(self):
+        return self._resolve(self._topic).rpartition("/")[0]
+
+    def _state(self, now):
+        time, state, _ = self._status
+        return state if now - time <= MAX_FACT_AGE else _READY
+
+    def _connection_fault(self, now):
+        time, is_connected = self._connection
+        is_recent = now - time <= MAX_FACT_AGE
+        if self._topic is None or (is_recent and is_connected):
+            return ""
+        text = "false" if is_recent else "nothing"
+        return f"the driver is not connected to the vehicle, {text} on {self._resolve(self._topic)}"
+
+    def _fault(self, now):
+        time, _, is_emergency = self._status
+        if is_emergency and now - time <= MAX_FACT_AGE:
+            return "the vehicle was stopped by emergency; remove it, restart it and add it again"
+        if faults := self._state(now).faults:
+            return f"the vehicle cannot fly, its state is: {faults.words()}; restart it"
+        return ""
+
+    def _unready(self, now):
+        state = self._state(now)
+        arms_itself = SupervisorState.AUTO_ARMED in state
+        if _READY in state or (arms_itself and now - self._unready_since < REARMING_TIME):
+            return ""
+        if SupervisorState.ARMED in state or arms_itself:
+            return f"the vehicle cannot fly yet, its state is: {state.words()}"
+        how = "" if self._topic is None else f"; call {self._prefix}/arm"
+        return f"the vehicle is not armed{how}"

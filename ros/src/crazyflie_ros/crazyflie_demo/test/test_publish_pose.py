@@ -98,14 +98,13 @@ def test_a_bad_parameter_is_named(node, changes):
     assert f"/pose/{next(iter(changes))}" in process.logged("error")[0]
 
 
-def test_a_constant_thrust_ends_with_none():
+def test_a_constant_thrust_begins_and_ends_with_none():
     process = FakeProcess()
     node = ConstThrustNode()
     assert process.launch(node, "/cf/const_thrust", {"thrust": 20000.0, "rate": 10.0})
     process.advance(1.0)
     setpoints = process.published("/cf/cmd_vel")
-    assert len(setpoints) == 10
-    assert {setpoint.linear.z for setpoint in setpoints} == {20000.0}
+    assert [setpoint.linear.z for setpoint in setpoints] == [0.0, *[20000.0] * 9]
     node.shutdown()
     assert setpoints[-1] == Twist()
 
@@ -133,5 +132,5 @@ def test_a_constant_thrust_may_be_changed():
     process.reconfigure("/cf/const_thrust", thrust=20000.0)
     with pytest.raises(ServiceError, match="/cf/const_thrust/thrust is 60001.0; expected"):
         process.reconfigure("/cf/const_thrust", thrust=60001.0)
-    process.advance(0.02)
+    process.advance(0.04)
     assert process.published("/cf/cmd_vel")[-1].linear.z == 20000.0

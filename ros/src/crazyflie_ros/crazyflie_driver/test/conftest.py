@@ -5,7 +5,9 @@ from safety_helpers import FLYING, is_, stream_position, wait_for_words
 
 from crazyflie_driver.msg import LogBlock
 from crazyflie_driver.server_node import CrazyflieServerNode
+from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.srv import AddCrazyflieRequest, RemoveCrazyflieRequest
+from crazyflie_link.address import Address
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.testing.fixtures import own_cache  # noqa: F401
 from crazyflie_virtual.testing import READ_ONLY, FakeVehicle
@@ -74,8 +76,10 @@ class Server:
         return self.process.call("/add_crazyflie", request)
 
     def add(self, uri, prefix="cf1", **changes):
-        """Add a vehicle, and wait until it is there."""
-        return result(self.begin_adding(uri, prefix, **changes))
+        """Add a vehicle, wait until it is there, and let setpoints pass as zero thrust does."""
+        answer = result(self.begin_adding(uri, prefix, **changes))
+        self.node._vehicles[Address.parse(uri).key].gate.handle(GateEvent.GROUND_COMMANDED)
+        return answer
 
     def remove(self, uri):
         return result(self.process.call("/remove_crazyflie", RemoveCrazyflieRequest(uri)))

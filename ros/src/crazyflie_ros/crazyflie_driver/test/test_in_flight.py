@@ -84,7 +84,7 @@ def stale(server, vehicle):
     ("service", "request_", "opens"),
     [
         ("arm", SetBoolRequest(False), False),
-        ("arm", SetBoolRequest(True), True),
+        ("arm", SetBoolRequest(True), False),
         ("land", LAND, False),
         ("stop", StopRequest(), False),
         ("notify_setpoints_stop", NotifySetpointsStopRequest(0, 0), False),

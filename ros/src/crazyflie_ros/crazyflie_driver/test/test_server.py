@@ -52,6 +52,8 @@ def test_many_vehicles_and_one_that_is_stuck(server):
         answer.result(timeout=LIMIT)
     assert not failing.done()
     for k, vehicle in enumerate(good):
+        server.process.publish(f"/cf{k}/cmd_vel", Twist())
+        vehicle.wait_for_packets(3, 0, 101)
         vehicle.received.clear()
         server.process.publish(f"/cf{k}/cmd_vel", Twist(Vector3(0, 0, 1000.0 + k), Vector3()))
         assert struct.unpack_from("<H", vehicle.wait_for_packets(3, 0)[0], 12) == (1000 + k,)

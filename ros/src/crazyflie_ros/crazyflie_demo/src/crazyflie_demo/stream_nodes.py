@@ -231,7 +231,11 @@ class ConstThrustParameters(SetpointParameters):
 
 
 class ConstThrustNode(Node[ConstThrustParameters]):
-    """Publish level setpoints with a constant thrust; zero thrust at the end."""
+    """Publish level setpoints with a constant thrust; zero thrust at the beginning and at the end."""
+
+    def __init__(self) -> None:
+        # The driver passes thrust on only after zero thrust: it may be from before.
+        self._has_begun = False
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -243,7 +247,9 @@ class ConstThrustNode(Node[ConstThrustParameters]):
         self._publisher.publish(Twist())
 
     def _on_timer(self):
-        self._publisher.publish(Twist(linear=Vector3(0.0, 0.0, self._parameters.thrust)))
+        thrust = self._parameters.thrust if self._has_begun else 0.0
+        self._has_begun = self._has_begun or self._publisher.has_subscribers()
+        self._publisher.publish(Twist(linear=Vector3(0.0, 0.0, thrust)))
 
 
 def execute_trajectory() -> None:

@@ -302,6 +302,7 @@ class FlightCommands:
                 "no takeoff: the vehicle flies on high-level commands already; use go_to"
             )
         if SupervisorState.ARMED not in state:
+            self._vehicle.refuse_to_arm_in_stream()
             supervisor.arm()
 
     def _state_once_armed(self, supervisor: Supervisor, job: Job) -> SupervisorState | None:

@@ -313,6 +313,7 @@ class VehicleServices:
         try:
             if request.data:
                 vehicle.refuse_after_emergency()
+                vehicle.refuse_to_arm_in_stream()
             vehicle.crazyflie.supervisor.arm(request.data)
             if request.data:
                 vehicle.gate.handle(GateEvent.FLIGHT_CALLED)

@@ -1,9 +1,12 @@
-"""Blocks of a stream of setpoints: after a lost link, without a liftoff, and others."""
+"""Blocks of a stream of setpoints: of a new vehicle, after a lost link, and others."""
 
 import contextlib
 import enum
+import math
 import threading
 from collections.abc import Iterator
+
+from crazyflie_model.limits import OFF_AGE
 
 #: Length of a pause (s) after which a stream was restarted on purpose.
 STREAM_PAUSE = 1.0
@@ -14,6 +17,15 @@ STREAM_PAUSE = 1.0
 OVERLAP = 0.5
 
 
+class Control(enum.Enum):
+    """Kind of a command."""
+
+    HIGH_LEVEL = enum.auto()  #: Or the notice that setpoints stop.
+    ZERO_THRUST = enum.auto()
+    THRUST = enum.auto()
+    REFERENCE = enum.auto()
+
+
 class Block(enum.Flag):
     """Reasons for which setpoints are not sent; several can hold, and the first one is named."""
 
@@ -21,6 +33,8 @@ class Block(enum.Flag):
     REMOVAL = enum.auto()
     BATTERY = enum.auto()
     LINK_LOST = enum.auto()
+    OLD_STREAM = enum.auto()
+    NEW = enum.auto()
     UNCONFIRMED = enum.auto()
     LANDED = enum.auto()
     NOT_LIFTED = enum.auto()
@@ -39,9 +53,11 @@ class GateEvent(enum.Enum):
     FLIGHT_CALLED = enum.auto()
     NOT_LIFTED = enum.auto()
     STREAM_BEGUN = enum.auto()
+    GROUND_COMMANDED = enum.auto()
 
 
 _NONE = Block(0)
+_ADDED = Block.OLD_STREAM | Block.NEW
 _ON_TRIAL = Block.UNCONFIRMED | Block.LANDED | Block.NOT_LIFTED
 
 #: Event -> (blocks that must hold, blocks that begin, blocks that end).
@@ -57,12 +73,14 @@ TRANSITIONS = {
     GateEvent.LINK_BACK: (Block.LINK_LOST, Block.UNCONFIRMED, Block.LINK_LOST),
     # The vehicle reports a flight, as it does with thrust on the ground, too.
     GateEvent.FLIGHT_REPORTED: (_NONE, _NONE, Block.UNCONFIRMED),
-    # A service call makes the vehicle fly.
-    GateEvent.FLIGHT_CALLED: (_NONE, _NONE, _ON_TRIAL),
+    # A service call makes the vehicle fly; it does not end a stream from before.
+    GateEvent.FLIGHT_CALLED: (_NONE, _NONE, _ON_TRIAL | Block.NEW),
     # Setpoints have commanded a flight, and the vehicle has not lifted off.
     GateEvent.NOT_LIFTED: (_NONE, Block.NOT_LIFTED, _NONE),
     # After a pause, or with zero thrust.
-    GateEvent.STREAM_BEGUN: (_NONE, _NONE, _ON_TRIAL),
+    GateEvent.STREAM_BEGUN: (_NONE, _NONE, _ON_TRIAL | Block.OLD_STREAM),
+    # By zero thrust, or a reference on the ground.
+    GateEvent.GROUND_COMMANDED: (_NONE, _NONE, _ADDED),
 }
 
 _ADVICE = f"pause the stream for {STREAM_PAUSE:g} s, send zero thrust or call a service"
@@ -73,6 +91,11 @@ REASONS = {
     Block.REMOVAL: "the vehicle is being removed",
     Block.BATTERY: "the battery is critical",
     Block.LINK_LOST: "the link is lost",
+    Block.OLD_STREAM: (
+        "it comes since before the vehicle was added: pause the stream for "
+        f"{STREAM_PAUSE:g} s, or send zero thrust"
+    ),
+    Block.NEW: "the vehicle has just been added: begin with zero thrust",
     Block.UNCONFIRMED: (
         f"the link was lost, and the vehicle does not fly: {_ADVICE} that has it fly"
     ),
@@ -84,14 +107,17 @@ REASONS = {
 class SetpointGate:
     """Decide about each setpoint; times are s of one clock.
 
-    Callbacks, the link's thread and those of the vehicle's jobs use it at the same time.
+    The gate of a new vehicle is closed: what comes may be a stream from before, for a vehicle that
+    flew then, and thrust that begins above zero makes a vehicle leap. Callbacks, the link's thread and those of the vehicle's jobs use it at the same time.
     """
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
-        self._blocks = _NONE
+        self._blocks = _ADDED
         self._commands = 0
-        self._latest: float | None = None
+        # When setpoints could come first, when the latest one came, and of which kind it was.
+        self._begin, self._latest = math.inf, -math.inf
+        self._control = Control.ZERO_THRUST
         self._high_level_since: float | None = None
         self._stopped_since: float | None = None
 
@@ -106,6 +132,10 @@ class SetpointGate:
         with self._lock:
             if needed in self._blocks:
                 self._blocks = self._blocks & ~ended | begun
+
+    def listen(self, now: float) -> None:
+        """Record that setpoints are subscribed to."""
+        self._begin = now
 
     def high_level(self, now: float) -> int:
         """Begin the overlap of a high-level command; return the number of the command."""
@@ -126,10 +156,10 @@ class SetpointGate:
             self._stopped_since = now
 
     @contextlib.contextmanager
-    def passing(self, now: float, is_zero: bool) -> Iterator[str]:
+    def passing(self, now: float, control: Control) -> Iterator[str]:
         """Yield the `refusal` of a setpoint sent within the block; nothing changes meanwhile."""
         with self._lock:
-            yield self.refusal(now, is_zero)
+            yield self.refusal(now, control)
 
     @contextlib.contextmanager
     def repeating(self, now: float) -> Iterator[str]:
@@ -138,20 +168,34 @@ class SetpointGate:
             yield self._reason(now, False)
 
     def is_blocking(self, now: float) -> bool:
-        """Return whether a stream is blocked because the link was lost."""
-        is_streamed = self._latest is not None and now - self._latest <= STREAM_PAUSE
-        return is_streamed and Block.UNCONFIRMED in self._blocks
+        """Return whether a stream from before a loss of the link, or an adding, is blocked."""
+        is_streamed = now - self._latest <= STREAM_PAUSE
+        return is_streamed and bool(self._blocks & (_ADDED | Block.UNCONFIRMED))
 
-    def refusal(self, now: float, is_zero: bool) -> str:
-        """Return why a setpoint must not be sent; empty if it may.
+    def arming_refusal(self, now: float) -> str:
+        """Return why arming would start the motors; empty if it would not.
 
-        A zero stops the motors.
+        The firmware obeys the latest setpoint for `OFF_AGE`. One that was blocked counts, too.
         """
         with self._lock:
-            before, self._latest = self._latest, now
-            if is_zero or before is None or now - before > STREAM_PAUSE:
-                if not self._blocks & ~_ON_TRIAL:
-                    self.handle(GateEvent.STREAM_BEGUN)
+            if self._control is Control.ZERO_THRUST or now - self._latest > OFF_AGE:
+                return ""
+        return (
+            "setpoints come that would start its motors at once: end them (call /land if a "
+            f"takeoff server sends them), and arm it after zero thrust, or {OFF_AGE:g} s later"
+        )
+
+    def refusal(self, now: float, control: Control) -> str:
+        """Return why a setpoint must not be sent; empty if it may."""
+        is_zero = control is Control.ZERO_THRUST
+        with self._lock:
+            has_paused = now - max(self._begin, self._latest) > STREAM_PAUSE
+            self._latest, self._control = now, control
+            # References do not make a vehicle leap.
+            if is_zero or (has_paused and control is Control.REFERENCE):
+                self.handle(GateEvent.GROUND_COMMANDED)
+            if (is_zero or has_paused) and not self._blocks & ~(_ON_TRIAL | _ADDED):
+                self.handle(GateEvent.STREAM_BEGUN)
             return self._reason(now, is_zero)
 
     def _reason(self, now, is_zero):

@@ -1,7 +1,6 @@
 """Topics with setpoints and external poses, sent over the link."""
 
 import contextlib
-import enum
 import math
 from collections import deque
 from collections.abc import Callable
@@ -13,9 +12,9 @@ from geometry_msgs.msg import Point, PointStamped, PoseStamped, Quaternion, Twis
 from std_msgs.msg import Empty
 
 from crazyflie_driver.log_topics import LogTopics
-from crazyflie_driver.monitors import LIFT_LIMIT, MAX_TURN, LiftWatch
+from crazyflie_driver.monitors import LIFT_LIMIT, MAX_TURN, MIN_CLIMB, LiftWatch
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
-from crazyflie_driver.setpoint_gate import GateEvent
+from crazyflie_driver.setpoint_gate import Control, GateEvent
 from crazyflie_driver.thrust_fade import FADE_TIME, ThrustFade
 from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.crazyflie import Crazyflie
@@ -118,15 +117,6 @@ def _yaw(orientation: Quaternion) -> float:
     return math.degrees(math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z))
 
 
-class Control(enum.Enum):
-    """Kind of the command that the vehicle was sent last."""
-
-    HIGH_LEVEL = enum.auto()  #: Or the notice that setpoints stop.
-    ZERO_THRUST = enum.auto()
-    THRUST = enum.auto()
-    REFERENCE = enum.auto()
-
-
 @dataclass(eq=False)
 class SetpointTopics:
     """Subscribe to a vehicle's setpoints and pass them on, as long as that is allowed.
@@ -165,6 +155,7 @@ class SetpointTopics:
             for name, sender in each.items():
                 receive = partial(callback, name, sender)
                 handle.subscribe(f"{prefix}/{name}", sender.message_type, receive)
+        self._vehicle.gate.listen(handle.time())
         handle.timer(_SILENCE_PERIOD, self._follow_silence)
 
     @property
@@ -303,26 +294,30 @@ class SetpointTopics:
                 self._vehicle.warn(f"{name}: {problem}", _ESTIMATOR_PERIOD, "estimator")
 
     def _on_setpoint(self, name, sender, message):
-        now = self._vehicle.handle.time()
+        now, gate = self._vehicle.handle.time(), self._vehicle.gate
         at_rest = name == CMD_STOP or (name == CMD_VEL and message.linear.z <= 0.0)
-        with self._vehicle.gate.passing(now, at_rest) as refusal:
+        moving = Control.THRUST if name == CMD_VEL else Control.REFERENCE
+        control = Control.ZERO_THRUST if at_rest else moving
+        height, yaw = sender.height_and_yaw(message)
+        if height is not None and height < MIN_CLIMB:
+            gate.handle(GateEvent.GROUND_COMMANDED)
+        with gate.passing(now, control) as refusal:
             key = "gate" if refusal else "estimate"
             refusal = refusal or self._wrong_estimate(name)
             is_sent = not refusal and self._send(name, sender, message)
             if is_sent:
                 if name == CMD_STOP:
-                    self._vehicle.gate.stop(now)
+                    gate.stop(now)
                 self._times.append(now)
                 if name == CMD_VEL:
                     self._fade.command(now, _thrust(message))
-                moving = Control.THRUST if name == CMD_VEL else Control.REFERENCE
-                self.control, self._topic = Control.ZERO_THRUST if at_rest else moving, name
+                self.control, self._topic = control, name
         if refusal:
             self._warn(f"ignoring {name}: {refusal}", key=key)
         if not is_sent:
             self.ignored += 1
             return
-        height, self._commanded_yaw = sender.height_and_yaw(message)
+        self._commanded_yaw = yaw
         if self._lift.command(now, height):
             self._check_heading()
         if now < self.high_level_end:

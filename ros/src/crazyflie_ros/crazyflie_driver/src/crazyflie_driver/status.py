@@ -30,7 +30,10 @@ _FEW_PACKETS = 10
 LINK_NAMES = {getattr(VehicleStatus, state.name): state.value for state in LinkState}
 
 _EMERGENCY = "emergency stop: remove, restart and add the vehicle"
-_BLOCKED = "setpoints are ignored since the link was lost: pause them, or call a service"
+_BLOCKED = (
+    "setpoints are ignored since the link was lost, or the vehicle was added: pause them, or send "
+    "zero thrust"
+)
 
 
 def findings(status: VehicleStatus, limits: LinkLimits) -> list[tuple[int, str]]:

@@ -298,3 +298,8 @@ class BaseVehicle:
                 f"emergency stop: remove {self.parameters.uri}, restart the vehicle and add it "
                 "again"
             )
+
+    def refuse_to_arm_in_stream(self) -> None:
+        """Raise `ServiceError` while setpoints come that would start the motors of an armed one."""
+        if reason := self.gate.arming_refusal(self.handle.time()):
+            raise ServiceError(f"{self.parameters.name} is not armed: {reason}")

@@ -22,13 +22,13 @@ class VehicleFacts:
     """Facts of the driver about a vehicle, and decisions by them; times are s of one clock.
 
     On ``topic`` the driver publishes whether it is connected (None: there is no driver);
-    ``resolve(topic)`` returns the absolute name. A fact that has never come, or that the driver does
-    not know, ends no flight.
+    ``resolve(topic)`` returns the absolute name. A fact that has never come, or that the driver
+    does not know, ends no flight.
     """
 
     def __init__(self, topic: str | None, resolve: Callable[[str], str]):
-        self._topic = topic
-        self._resolve = resolve
+        self._topic = "" if topic is None else resolve(topic)
+        self._prefix = self._topic.rpartition("/")[0]
         # Time, and whether the driver is connected.
         self._connection = -math.inf, False
         # Time, state, and whether an emergency is latched.
@@ -79,10 +79,6 @@ class VehicleFacts:
             fault = "the vehicle is not armed"
         return self._debounce.advance(step, fault)
 
-    @property
-    def _prefix(self):
-        return self._resolve(self._topic).rpartition("/")[0]
-
     def _state(self, now):
         time, state, _ = self._status
         return state if now - time <= MAX_FACT_AGE else _READY
@@ -90,10 +86,10 @@ class VehicleFacts:
     def _connection_fault(self, now):
         time, is_connected = self._connection
         is_recent = now - time <= MAX_FACT_AGE
-        if self._topic is None or (is_recent and is_connected):
+        if not self._topic or (is_recent and is_connected):
             return ""
         text = "false" if is_recent else "nothing"
-        return f"the driver is not connected to the vehicle, {text} on {self._resolve(self._topic)}"
+        return f"the driver is not connected to the vehicle, {text} on {self._topic}"
 
     def _fault(self, now):
         time, _, is_emergency = self._status
@@ -110,5 +106,5 @@ class VehicleFacts:
             return ""
         if SupervisorState.ARMED in state or arms_itself:
             return f"the vehicle cannot fly yet, its state is: {state.words()}"
-        how = "" if self._topic is None else f"; call {self._prefix}/arm"
+        how = f"; call {self._prefix}/arm" if self._topic else ""
         return f"the vehicle is not armed{how}"

@@ -231,7 +231,7 @@ class ConstThrustParameters(SetpointParameters):
 
 
 class ConstThrustNode(Node[ConstThrustParameters]):
-    """Publish level setpoints with a constant thrust; zero thrust at the beginning and at the end."""
+    """Publish level setpoints with a constant thrust; zero thrust before and after it."""
 
     def __init__(self) -> None:
         # The driver passes thrust on only after zero thrust: it may be from before.

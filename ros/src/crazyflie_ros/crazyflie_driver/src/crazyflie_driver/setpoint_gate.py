@@ -108,7 +108,9 @@ class SetpointGate:
     """Decide about each setpoint; times are s of one clock.
 
     The gate of a new vehicle is closed: what comes may be a stream from before, for a vehicle that
-    flew then, and thrust that begins above zero makes a vehicle leap. Callbacks, the link's thread and those of the vehicle's jobs use it at the same time.
+    flew then, and thrust that begins above zero makes a vehicle leap.
+
+    Callbacks, the link's thread and those of the vehicle's jobs use it at the same time.
     """
 
     def __init__(self) -> None:

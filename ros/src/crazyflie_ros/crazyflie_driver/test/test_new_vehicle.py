@@ -2,7 +2,7 @@
 
 import pytest
 from conftest import result
-from safety_helpers import READY, TAKEOFF, ZERO, is_, position, said, thrust
+from safety_helpers import READY, TAKEOFF, is_, position, said, thrust
 from std_srvs.srv import SetBoolRequest
 
 from crazyflie_driver.msg import Position
@@ -55,7 +55,8 @@ def flown(vehicle):
     """Return the setpoints with thrust, or with a reference, that have come so far."""
     # What was sent before is there when the next pings are answered.
     vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 2)
-    return [data for data in vehicle.packets(3, 0) if data != ZERO] + vehicle.packets(7, 0)
+    thrusts = [data for data in vehicle.packets(3, 0) if data[12:] != b"\0\0"]
+    return thrusts + vehicle.packets(7, 0)
 
 
 def arming(vehicle):

@@ -125,7 +125,9 @@ class DriverVehicle:
                 self.tell("flying: on high-level commands" if flies else "ready: armed")
             elif name == "go_to":
                 goal = request.goal
-                self.position = [goal.x, goal.y, goal.z]
+                begin = self.position if request.relative else (0.0, 0.0, 0.0)
+                goal = goal.x, goal.y, goal.z
+                self.position = [a + b for a, b in zip(begin, goal, strict=True)]
             elif name == "start_trajectory":
                 last = self.requests[-2][1].pieces[-1]
                 seconds = last.duration.to_sec()

@@ -5,6 +5,7 @@ import math
 import pytest
 from fake_fleet import fake_process
 from fake_vehicles import ControllerVehicle, DriverVehicle
+from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
 from crazyflie_driver.srv import StartTrajectory, StartTrajectoryResponse
@@ -59,6 +60,20 @@ def test_one_script_for_both(fleet, controlled, driven):
         "land",
         "stop",
     ]
+
+
+def test_a_trajectory_is_left_before_the_next_one_is_uploaded(fleet, driven):
+    """The firmware holds the end of a trajectory as long as it is in its memory."""
+    path = plan([(0, 0, 1), (0.2, 0, 1)])
+    with fleet:
+        fleet["cf2"].takeoff(1.0)
+        for _ in range(2):
+            fleet["cf2"].follow(path, relative=True)
+        second = ["upload_trajectory", "start_trajectory"]
+        assert driven.called()[-5:] == [*second, "go_to", *second]
+        hold = driven.requests[-3][1]
+        assert (hold.relative, hold.goal, hold.yaw) == (True, Point(), 0.0)
+        assert driven.position == pytest.approx([1.4, 0.0, 1.0])
 
 
 @pytest.mark.parametrize("frame", [None, "world"])

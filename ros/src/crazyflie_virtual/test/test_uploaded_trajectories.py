@@ -219,3 +219,23 @@ def test_compressed_trajectories_are_neither_flown_backwards_nor_scaled(bench, k
     assert command(bench, "start_trajectory", 1, **keywords) == errno.ENOEXEC
     bench.run(2.0)
     assert bench.physics.position == pytest.approx((0.0, 0.0, 1.0), abs=0.06)
+
+
+@pytest.mark.parametrize("moment", [1.0, 3.0])
+def test_an_upload_over_the_trajectory_that_is_flown_changes_it(bench, moment):
+    """The firmware does not copy it; at its end it holds the end of what is there."""
+    bench.take_off()
+    upload(bench, straight(0.2, 2.0))
+    assert command(bench, "define_trajectory", 1, 0, 1) == 0
+    assert command(bench, "start_trajectory", 1, relative_position=True) == 0
+    bench.run(moment)
+    share = min(moment, 2.0) / 2.0
+    assert bench.firmware.setpoint.x == pytest.approx(0.2 * share, abs=0.02)
+    upload(bench, straight(0.6, 2.0))
+    bench.run(0.02)
+    assert bench.firmware.setpoint.x == pytest.approx(0.6 * share, abs=0.03)
+    # Another plan is not in this memory.
+    assert command(bench, "go_to", 0.0, 0.0, 1.0, 0.0, 1.0) == 0
+    upload(bench, straight(-1.0, 2.0))
+    bench.run(1.5)
+    assert bench.firmware.setpoint.x == pytest.approx(0.0, abs=0.01)

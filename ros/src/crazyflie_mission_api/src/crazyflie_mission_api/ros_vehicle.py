@@ -49,7 +49,8 @@ ALL_OF_FLEET = f"/all/{HIGH_LEVEL}"  #: Namespace of a fleet's services for all.
 CALL_TIMEOUT = 60.0  #: Timeout of a service (s of the machine's clock).
 _SETTLING_TIME = 0.5  #: Time after the planned end of a landing until the vehicle is down (s).
 _HIGH_LEVEL = "commander/enHighLevel"  #: The firmware parameter that enables high-level commands.
-_HOLD_DURATION = 0.5  #: Duration of the go_to to the vehicle's place at the end of a stream (s).
+#: Duration of the go_to to the vehicle's place at the end of a stream, or of a trajectory (s).
+_HOLD_DURATION = 0.5
 #: Timeout of the answer to that go_to (s of the machine's clock); the driver's is 1 s.
 _HOLD_TIMEOUT = 3.0
 
@@ -288,6 +289,7 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
         self.start_skew = START_SKEW if access.uses_driver else 0.0
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
+        self._has_uploaded = False
         self._setpoints = SetpointPublishers(handle, access.top)
         if access.uses_driver:
             frame = "" if access.frames is None else access.frames[0]
@@ -345,7 +347,15 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
                     "what the vehicle's memory holds, or stream=True"
                 )
             )
-        return self.upload_trajectory(0, 0, pieces)
+        return follow(self._upload(pieces))
+
+    def _upload(self, pieces):
+        if self.uses_driver and self._has_uploaded and not self.has_landed():
+            # The vehicle may be at the end of the last one, which it holds as long as that is in
+            # the memory: it holds a goal instead.
+            yield self.go_to(Move((0.0, 0.0, 0.0), 0.0, _HOLD_DURATION, relative=True))
+        self._has_uploaded = True
+        return (yield self.upload_trajectory(0, 0, pieces))
 
     @override
     def start(self) -> "Future[Any]":

@@ -49,6 +49,7 @@ def test_an_upload_that_overlaps_keeps_the_other_from_flying(target, flying):
     flying.trajectories.upload_compressed(1, 0, START, [(1.0, (), (), (), ())])
     flying.trajectories.upload_compressed(2, 14, START, [(1.0, (), (), (), ())])
     flying.high_level.start_trajectory(1)
+    flying.high_level.go_to((0.0, 0.0, 1.0), 0.0, 1.0)
     flying.high_level.begin_upload(3, range(13, 14))
     with pytest.raises(RefusedError, match="upload of 3 has overwritten 1"):
         flying.high_level.start_trajectory(1)

@@ -9,7 +9,7 @@ from cflib.crazyflie.mem import Poly4D
 from wire_helpers import only_packet
 
 from crazyflie_link.errors import RefusedError, ValueRangeError
-from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.polynomials import PIECE_SIZE, PolynomialPiece
 
 NAN = float("nan")
 
@@ -252,10 +252,12 @@ def test_a_trajectory_whose_memory_is_overwritten_is_not_started(target, flying)
     upload(1, 0, [piece(0), piece(1)])
     upload(2, 2, [piece(2)])
     start(1)
+    flying.high_level.go_to((0.0, 0.0, 1.0), 0.0, 1.0)
     upload(3, 1, [piece(3)])
     with pytest.raises(RefusedError, match="upload of 3 has overwritten 1 .*upload 1 again"):
         start(1)
     start(2)
+    flying.high_level.go_to((0.0, 0.0, 1.0), 0.0, 1.0)
     upload(1, 0, [piece(0)])
     start(1)
 
@@ -266,6 +268,74 @@ def test_a_trajectory_whose_memory_is_overwritten_is_not_started(target, flying)
         upload(2, 2, [piece(4)], abort)
     with pytest.raises(RefusedError, match="upload of 2 has overwritten 2"):
         start(2)
+
+
+@pytest.fixture
+def on_trajectory(target, flying):
+    """Return a vehicle that flies the trajectory 1, of the second and third piece."""
+    flying.high_level.stop()
+    flying.trajectories.upload(1, 1, [piece(1), piece(2)])
+    flying.high_level.take_off(1.0, 1.0)
+    flying.high_level.start_trajectory(1)
+    yield flying
+    target.flight.restart()
+    flying.high_level.set_group_mask(0)
+    flying.high_level.stop()
+
+
+def compressed(trajectories, offset):
+    trajectories.upload_compressed(2, offset, (0, 0, 0, 0), [(1.0, [], [], [], [])])
+
+
+@pytest.mark.parametrize(
+    "upload",
+    [
+        lambda t: t.upload(1, 1, [piece(0)]),
+        lambda t: t.upload(2, 0, [piece(0), piece(0)]),
+        lambda t: t.upload(2, 2, [piece(0)]),
+        lambda t: compressed(t, 3 * PIECE_SIZE - 1),
+    ],
+)
+def test_the_memory_of_the_trajectory_that_is_flown_is_not_written(target, on_trajectory, upload):
+    """The firmware evaluates it straight from there."""
+    target.received.clear()
+    with pytest.raises(RefusedError, match="bytes .* overlap 132 to 396, of the trajectory that"):
+        upload(on_trajectory.trajectories)
+    assert target.packets(4, 2) == []
+    # What was not written can still be flown.
+    on_trajectory.high_level.start_trajectory(1)
+
+
+def test_memory_beside_the_trajectory_that_is_flown_is_written(target, on_trajectory):
+    on_trajectory.trajectories.upload(2, 0, [piece(0)])
+    on_trajectory.trajectories.upload(3, 3, [piece(0)])
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        lambda h: h.go_to((0.0, 0.0, 1.0), 0.0, 1.0),
+        lambda h: h.land(0.0, 2.0),
+        lambda h: h.stop(),
+        lambda h: h.spiral(1.0, (0.1, 0.1), 0.0, 1.0),
+    ],
+)
+def test_another_command_frees_the_memory(target, on_trajectory, command):
+    command(on_trajectory.high_level)
+    on_trajectory.trajectories.upload(1, 1, [piece(0)])
+
+
+def test_a_command_for_other_groups_frees_no_memory(target, on_trajectory):
+    on_trajectory.high_level.set_group_mask(1)
+    on_trajectory.high_level.go_to((0.0, 0.0, 1.0), 0.0, 1.0, group_mask=2)
+    with pytest.raises(RefusedError, match="overlap"):
+        on_trajectory.trajectories.upload(1, 1, [piece(0)])
+
+
+def test_a_vehicle_whose_planner_has_ended_takes_an_upload(target, on_trajectory):
+    # On the ground, or on setpoints.
+    target.flight.pin(0x20E)
+    on_trajectory.trajectories.upload(1, 1, [piece(0)])
 
 
 def test_a_trajectory_that_is_refused_is_not_defined(target, flying):

@@ -52,9 +52,11 @@ class _Knowledge:
     """Trajectories and groups (bits, None if unknown), which cannot be read.
 
     A trajectory has bytes of the memory, and another one whose upload has overwritten them, if any.
+    The planner may fly those that are in the bytes ``flown``, straight from there.
     """
 
     trajectories: dict[int, tuple[range, int | None]] = field(default_factory=dict)
+    flown: tuple[range, ...] = ()
     groups: int | None = None
 
 
@@ -75,6 +77,7 @@ class HighLevel(Subsystem):
     def forget_trajectories(self) -> None:
         """Forget trajectories and groups: a vehicle that has restarted has none."""
         self._knowledge.trajectories.clear()
+        self._knowledge.flown = ()
         self._knowledge.groups = 0
 
     def dry_run(self) -> Self:
@@ -113,8 +116,10 @@ class HighLevel(Subsystem):
     def take_off(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
         """Climb to a height (m) in a duration (s), keeping position and heading."""
         _check("takeoff", duration, group_mask, height)
-        self._command(
-            "the takeoff command", lambda c: c.takeoff(height, duration, group_mask, yaw=None)
+        self._fly(
+            "the takeoff command",
+            lambda c: c.takeoff(height, duration, group_mask, yaw=None),
+            group_mask,
         )
 
     def land(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
@@ -124,9 +129,10 @@ class HighLevel(Subsystem):
         refuses it: `AlreadyLandingError`.
         """
         _check("landing", duration, group_mask, height)
-        self._command(
+        self._fly(
             "the land command",
             lambda c: c.land(height, duration, group_mask, yaw=None),
+            group_mask,
             # After the touchdown a repetition would start the motors.
             resend=duration > REPLY_LIMIT,
         )
@@ -144,12 +150,12 @@ class HighLevel(Subsystem):
             commander.land(height, duration, ALL_GROUPS, yaw=None)
 
         # After the touchdown a repetition would start the motors.
-        self._command("the land command", send, resend=duration > REPLY_LIMIT)
+        self._fly("the land command", send, ALL_GROUPS, resend=duration > REPLY_LIMIT)
 
     def stop(self, group_mask: int = ALL_GROUPS) -> None:
         """Stop the motors, wherever the vehicle is."""
         check_byte("group mask", group_mask)
-        self._command("the stop command", lambda c: c.stop(group_mask))
+        self._fly("the stop command", lambda c: c.stop(group_mask), group_mask)
 
     def go_to(
         self,
@@ -168,11 +174,12 @@ class HighLevel(Subsystem):
         _check("go-to", duration, group_mask, x, y, z, yaw)
         if linear and self._current_link().protocol < _GO_TO_2_PROTOCOL:
             raise RefusedError("the go-to command: this firmware has no linear one; update it")
-        self._command(
+        self._fly(
             "the go-to command",
             lambda c: c.go_to(
                 x, y, z, yaw, duration, relative=relative, linear=linear, group_mask=group_mask
             ),
+            group_mask,
             resend=not relative,
         )
 
@@ -195,11 +202,12 @@ class HighLevel(Subsystem):
                 raise ValueRangeError(f"spiral: radius is {radius:g} m; expected at least 0")
         if self._current_link().protocol < _GO_TO_2_PROTOCOL:
             raise RefusedError("the spiral command: this firmware has none; update it")
-        self._command(
+        self._fly(
             "the spiral command",
             lambda c: c.spiral(
                 angle, *radii, ascent, duration, is_sideways, is_clockwise, group_mask
             ),
+            group_mask,
             resend=False,
         )
 
@@ -226,13 +234,13 @@ class HighLevel(Subsystem):
                 f"the start of the trajectory: {trajectory_id} has not been uploaded since the "
                 f"vehicle was connected or restarted; known: {known}"
             )
-        _, writer = trajectory
+        place, writer = trajectory
         if writer is not None:
             raise RefusedError(
                 f"the start of the trajectory: the upload of {writer} has overwritten "
                 f"{trajectory_id} in the vehicle's memory; upload {trajectory_id} again"
             )
-        self._command(
+        self._fly(
             "the start of the trajectory",
             lambda c: c.start_trajectory(
                 trajectory_id,
@@ -241,7 +249,9 @@ class HighLevel(Subsystem):
                 reversed=is_reversed,
                 group_mask=group_mask,
             ),
+            group_mask,
             resend=False,
+            place=place,
         )
 
     def define_trajectory(
@@ -260,11 +270,37 @@ class HighLevel(Subsystem):
         self._knowledge.trajectories[trajectory_id] = place, None
 
     def begin_upload(self, trajectory_id: int, place: range) -> None:
-        """Mark the trajectories in these bytes of the memory as overwritten by another one."""
+        """Mark the trajectories in these bytes of the memory as overwritten by another one; blocks.
+
+        Refused while the planner flies a trajectory that is there, or holds its end.
+        """
+        flown = [each for each in self._knowledge.flown if _overlap(each, place)]
+        if flown and _may_plan(self._current_link()):
+            raise RefusedError(
+                f"the upload of trajectory {trajectory_id}: bytes {place.start} to {place.stop} of "
+                f"the memory overlap {flown[0].start} to {flown[0].stop}, of the trajectory that "
+                "the vehicle flies, or at whose end it is: upload to another place, or command "
+                "go_to, land or stop before"
+            )
         known = self._knowledge.trajectories
         for other, (written, _) in known.items():
-            if written.start < place.stop and place.start < written.stop:
+            if _overlap(written, place):
                 known[other] = written, trajectory_id
+
+    def _fly(self, what, send, group_mask, resend=True, place=None):
+        # A command that replaces the plan; by a trajectory if that has a place in the memory.
+        knowledge, is_addressed = self._knowledge, self.is_addressed(group_mask)
+        before = knowledge.flown
+        if place is not None and is_addressed is not False:
+            # Also if the reply is lost.
+            knowledge.flown = (*before, place)
+        try:
+            self._command(what, send, resend)
+        except RefusedError:
+            knowledge.flown = before
+            raise
+        if is_addressed:
+            knowledge.flown = () if place is None else (place,)
 
     def _command(self, what, send, resend=True):
         link = self._current_link()
@@ -295,6 +331,18 @@ class HighLevel(Subsystem):
             is_landing = code == _BUSY and number == HighLevelCommander.COMMAND_LAND_2
             error = AlreadyLandingError if is_landing else RefusedError
             raise error(f"{what}: the vehicle refuses it ({os.strerror(code)}, {code})")
+
+
+def _overlap(one: range, other: range) -> bool:
+    return one.start < other.stop and other.start < one.stop
+
+
+def _may_plan(link: Link) -> bool:
+    # Whether the planner may fly the vehicle; where its state is not reported it may.
+    state = read_state(link)
+    if state is None or not state.reports_planner:
+        return True
+    return SupervisorState.HIGH_LEVEL_ACTIVE in state
 
 
 def _packets(link: Link, send: Callable[[HighLevelCommander], None]) -> list[CRTPPacket]:

@@ -8,12 +8,13 @@ import errno
 import math
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from enum import Enum
 from typing import Any
 
 from crazyflie_model.planner import smooth_piece, spiral_piece, straight_piece
 from crazyflie_model.polynomials import PIECE_SIZE, Goal, PolynomialPiece, at_rest, bezier
-from crazyflie_model.trajectory import Trajectory
+from crazyflie_model.trajectory import Trajectory, moved, turned
 from crazyflie_virtual.firmware.states import ABSOLUTE, MOTION, Estimate, Modes, Setpoint
 
 _START = struct.Struct("<4h")
@@ -59,6 +60,19 @@ def read_compressed(memory: bytes) -> tuple[PolynomialPiece, ...]:
     return tuple(pieces) or (PolynomialPiece(0.0, *((end,) for end in ends)),)
 
 
+def read_polynomials(memory: bytes) -> tuple[PolynomialPiece, ...]:
+    """Return the pieces of a trajectory that fills the memory; ValueError if one is impossible."""
+    begins = range(0, len(memory), PIECE_SIZE)
+    return tuple(PolynomialPiece.unpack(memory[begin:][:PIECE_SIZE]) for begin in begins)
+
+
+def _planned(pieces, time_scale, backwards):
+    if time_scale > 0.0:
+        return Trajectory(pieces, time_scale, backwards)
+    end = Trajectory(pieces, 1.0, backwards).evaluate(math.inf)
+    return Trajectory((PolynomialPiece(0.0, *((part,) for part in (*end.position, end.yaw))),))
+
+
 MEMORY_SIZE = 4096  #: Bytes of the trajectory memory.
 DEFINITIONS = 31  #: Trajectories that can be defined at one time.
 IN_MEMORY = 1  #: Location of trajectories: in the memory.
@@ -99,6 +113,9 @@ class Planner:
         self.groups = 0  #: Groups to which this vehicle belongs, a bit each.
         self._definitions: dict[int, tuple[int, int, int, int]] = {}
         self._trajectory: Trajectory | None = None
+        # Where in the memory the trajectory is that is flown, what was read there, and how it is
+        # planned; None for other plans.
+        self._flown: tuple[slice, bytes, Callable[[bytes], Trajectory]] | None = None
         self._begin = 0.0
         self._last = at_rest((0.0, 0.0, 0.0))
 
@@ -118,6 +135,7 @@ class Planner:
         if self._trajectory is None or self.state not in ACTIVE:
             self.tell_state(estimate)
             return Setpoint(time=time) if self.state is TrajectoryState.IDLE else None
+        self._follow_memory()
         goal = self._trajectory.evaluate(time - self._begin)
         if not all(map(math.isfinite, goal.position)):
             self.state = TrajectoryState.DISABLED
@@ -253,43 +271,65 @@ class Planner:
     ) -> int:
         """Fly a trajectory that was defined; ``relative`` to the present position (and yaw).
 
+        It is evaluated straight from the memory, also at its end: an upload there changes it.
         One that cannot be flown is ignored without an error. With a time scale that is not
         positive the trajectory ends at once.
         """
         try:
-            pieces, is_compressed = self._pieces(trajectory_id)
+            place, read = self._place(trajectory_id)
+            pieces = read(self.memory[place])
         except ValueError as error:
             self._write_line(f"HLC: no trajectory {trajectory_id}: {error}")
             return 0
         if not time_scale > 0.0:
             self._write_line(f"HLC: the trajectory ends at once: time scale {time_scale:g}")
+        is_compressed = read is read_compressed
         if is_compressed and (time_scale != 1.0 or backwards):
             return errno.ENOEXEC
-        if time_scale > 0.0:
-            trajectory = Trajectory(pieces, time_scale, backwards)
-        else:
-            end = Trajectory(pieces, 1.0, backwards).evaluate(math.inf)
-            still = PolynomialPiece(0.0, *((part,) for part in (*end.position, end.yaw)))
-            trajectory = Trajectory((still,))
+        start = _planned(pieces, time_scale, backwards).evaluate(0.0)
+        pivot, turn, offset = start.position, 0.0, (0.0, 0.0, 0.0)
         if relative:
-            yaw = self._last.yaw if relative_yaw and not is_compressed else None
-            trajectory = trajectory.moved_to(self._last.position, yaw)
-        self._begin_at(time, trajectory, TrajectoryState.FLYING)
+            if relative_yaw and not is_compressed:
+                turn = math.remainder(self._last.yaw - start.yaw, 2.0 * math.pi)
+            x, y, z = (a - b for a, b in zip(self._last.position, pivot, strict=True))
+            offset = (x, y, z)
+
+        def plan(data: bytes) -> Trajectory:
+            there = _planned(read(data), time_scale, backwards)
+            if not relative:
+                return there
+            return replace(there, pieces=moved(turned(there.pieces, pivot, turn), offset))
+
+        data = bytes(self.memory[place])
+        self._begin_at(time, plan(data), TrajectoryState.FLYING)
+        self._flown = place, data, plan
         return 0
 
-    def _pieces(self, trajectory_id):
+    def _follow_memory(self):
+        if self._flown is None:
+            return
+        place, before, plan = self._flown
+        data = bytes(self.memory[place])
+        if data != before:
+            try:
+                self._trajectory = plan(data)
+            except (ArithmeticError, ValueError):
+                self._trajectory = Trajectory((_NOT_A_NUMBER,))
+            self._flown = place, data, plan
+
+    def _place(self, trajectory_id):
+        # Where in the memory a trajectory is, and the function that reads its pieces there.
         if trajectory_id not in self._definitions:
             raise ValueError("it is not defined")
         location, kind, offset, count = self._definitions[trajectory_id]
         if location != IN_MEMORY or kind not in (POLYNOMIALS, COMPRESSED):
             raise ValueError(f"no trajectory has type {kind} and location {location}")
-        data = bytes(self.memory[offset:])
         if kind == COMPRESSED:
-            return read_compressed(data), True
-        if not 0 < count * PIECE_SIZE <= len(data):
+            return slice(offset, MEMORY_SIZE), read_compressed
+        end = offset + count * PIECE_SIZE
+        if not offset < end <= MEMORY_SIZE:
             raise ValueError(f"{count} pieces at byte {offset} are not in the memory")
-        chunks = (data[i * PIECE_SIZE :][:PIECE_SIZE] for i in range(count))
-        return tuple(map(PolynomialPiece.unpack, chunks)), False
+        return slice(offset, end), read_polynomials
 
     def _move_vertically(self, time, height, yaw, keep_yaw, duration, state):
         x, y, z = self._last.position
@@ -307,5 +347,6 @@ class Planner:
 
     def _begin_at(self, time, trajectory, state):
         self._trajectory = trajectory
+        self._flown = None
         self._begin = time
         self.state = state

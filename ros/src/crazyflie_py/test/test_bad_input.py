@@ -56,7 +56,7 @@ WRONG = [
     (lambda s, cf: cf.cmdFullState([0] * 3, [0] * 3, [0] * 2, 0, [0] * 3), "cmdFullState: acc is"),
     (lambda s, cf: cf.cmdVelocityWorld([0, 0, math.inf], 0), "cmdVelocityWorld: vel is .*inf"),
     (lambda s, cf: cf.cmdPosition([0, 0, 0], NAN), "cmdPosition: yaw is nan"),
-    (lambda s, cf: cf.cmdHover(0, 0, NAN, 1), "cmdHover: yawrate is nan"),
+    (lambda s, cf: cf.cmdHover(0, 0, NAN, 1), "cmdHover: yaw_rate is nan"),
     (lambda s, cf: cf.cmdVel(0, 0, 0, "full"), "cmdVel: thrust is 'full'"),
     (lambda s, cf: cf.getParam("ring"), "cf1.getParam: name is 'ring'; expected GROUP/NAME"),
     (lambda s, cf: cf.getParam("ring/effekt"), "name is ring.effekt; expected ring.effect, "),

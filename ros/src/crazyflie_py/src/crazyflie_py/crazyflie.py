@@ -1,11 +1,13 @@
 """The vehicles as Crazyswarm's scripts see them: each vehicle, and all of them.
 
-Names, arguments and defaults are Crazyswarm's. Angles are in rad unless a method says otherwise,
+Names, arguments and defaults are Crazyswarm's, and crazyswarm2's where only that has the method.
+Angles are in rad unless a method says otherwise,
 lengths in m, times in s.
 """
 
 import functools
 import logging
+import math
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -29,6 +31,7 @@ from crazyflie_mission_api.mission_vehicle import (
 )
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_model.collision_avoidance import AvoidanceSettings
+from crazyflie_model.limits import MAX_YAW_RATE
 from crazyflie_py import arguments as check
 from crazyflie_py.swarm import DEFAULT_COLOR, Order, Swarm, SwarmVehicle, TimeHelper
 
@@ -37,6 +40,9 @@ _log = logging.getLogger(__name__)
 __all__ = ["Crazyflie", "CrazyflieServer", "TimeHelper"]
 
 Array = NDArray[np.float64]
+
+#: Largest yaw rate of `Crazyflie.cmdHover` (rad/s). A larger one is taken for one in degrees/s.
+_MAX_YAW_RATE = 2.0 * MAX_YAW_RATE
 
 
 class ScriptCommands:
@@ -325,10 +331,14 @@ class Crazyflie(ScriptCommands):
         velocity = check.triple(where, "vel", vel)
         self._send(VelocityWorldSetpoint(velocity, check.number(where, "yawRate", yawRate)))
 
-    def cmdHover(self, vx: float, vy: float, yawrate: float, zDistance: float) -> None:
-        """Send a setpoint: velocity ahead and to the left, yaw rate (deg/s), height."""
-        arguments = {"vx": vx, "vy": vy, "yawrate": yawrate, "zDistance": zDistance}
-        self._send(HoverSetpoint(*self._numbers("cmdHover", arguments)))
+    def cmdHover(self, vx: float, vy: float, yaw_rate: float, z_distance: float) -> None:
+        """Send a setpoint: velocity ahead and to the left, yaw rate (rad/s), height."""
+        forward, left, height = self._numbers(
+            "cmdHover", {"vx": vx, "vy": vy, "z_distance": z_distance}
+        )
+        limits = -_MAX_YAW_RATE, _MAX_YAW_RATE
+        rate = check.number(self._where("cmdHover"), "yaw_rate", yaw_rate, *limits)
+        self._send(HoverSetpoint(forward, left, math.degrees(rate), height))
 
     def cmdVel(self, roll: float, pitch: float, yawrate: float, thrust: float) -> None:
         """Send a setpoint: roll, pitch (deg), yaw rate (deg/s), thrust (PWM, 0 to 65535)."""

@@ -37,7 +37,8 @@ def test_a_trajectory_is_streamed_as_it_is():
             setpoint.twist.angular,
         )
         sent = [[each.x, each.y, each.z] for each in (p, v, a, w)]
-        np.testing.assert_allclose(sent, goal[:4], atol=1e-6)
+        expected = goal.pos, goal.vel, goal.acc, goal.omega
+        np.testing.assert_allclose(sent, expected, atol=1e-6)
         assert setpoint.pose.orientation.w == 1.0
     assert setpoints[0].header.frame_id == "world"
 

@@ -1,5 +1,6 @@
 """Trajectories of users' scripts, against derivatives by differences."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from uav_trajectory import Polynomial, Polynomial4D, Trajectory, TrajectoryOutpu
 
 from crazyflie_demo.figure8 import figure8
 from crazyflie_demo.trajectory_file import TrajectoryError
+from crazyflie_model.units import GRAVITY
 
 FIGURE8 = Path(__file__).parents[1] / "data" / "figure8.csv"
 STEP = 1e-4
@@ -122,3 +124,18 @@ def test_a_stretched_trajectory_has_the_same_path():
         np.testing.assert_allclose(after.acc, before.acc / 4.0, atol=1e-9)
     with pytest.raises(ValueError, match="factor is 0.0; expected a number > 0"):
         stretched.stretchtime(0.0)
+
+
+def test_jerk_snap_and_attitude_are_those_of_the_polynomials():
+    # x = t^4 / 24, y = t^3 / 6: at t = 1 s, in m and s.
+    piece = Polynomial4D(2.0, [0, 0, 0, 0, 1 / 24], [0, 0, 0, 1 / 6], [1.0], [0.0])
+    output = piece.eval(1.0)
+    assert output.acc == pytest.approx([0.5, 1.0, 0.0])
+    assert output.jerk == pytest.approx([1.0, 1.0, 0.0])
+    assert output.snap == pytest.approx([1.0, 0.0, 0.0])
+    # A positive pitch accelerates ahead, a negative roll to the left.
+    thrust = np.array([0.5, 1.0, GRAVITY])
+    thrust /= np.linalg.norm(thrust)
+    sin_roll, cos_roll = math.sin(output.roll), math.cos(output.roll)
+    sin_pitch, cos_pitch = math.sin(output.pitch), math.cos(output.pitch)
+    assert thrust == pytest.approx([sin_pitch * cos_roll, -sin_roll, cos_pitch * cos_roll])

@@ -2,6 +2,7 @@
 
 import sys
 from concurrent.futures import Future
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -203,7 +204,7 @@ class TrajectoryStreamNode(StreamNode):
         goal = self._trajectory.eval(time)
         if time >= self.duration:
             # The command is repeated until the vehicle lands.
-            goal = goal._replace(vel=_REST, acc=_REST, omega=_REST)
+            goal = replace(goal, vel=_REST, acc=_REST, omega=_REST)
         return stamped(
             FullState,
             genpy.Time(),

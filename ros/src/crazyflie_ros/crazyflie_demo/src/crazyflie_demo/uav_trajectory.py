@@ -1,32 +1,40 @@
 """Polynomial trajectories and their body rates; users' scripts import it as uav_trajectory."""
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_demo.trajectory_file import load, save
+from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.polynomials import PolynomialPiece, evaluate
 from crazyflie_model.units import GRAVITY
 
 Array = NDArray[np.float64]
 
 
-class TrajectoryOutput(NamedTuple):
-    """A trajectory at a moment.
+@dataclass
+class TrajectoryOutput:
+    """A trajectory at a moment; a script may make one without arguments, and fill it.
 
-    Position (m), velocity (m/s) and acceleration (m/s^2) in the world frame, angular velocity in
-    the body frame (forward-left-up, rad/s), each of shape (3,); yaw (rad).
+    Position (m), velocity (m/s), acceleration (m/s^2), jerk (m/s^3) and snap (m/s^4) in the world
+    frame, angular velocity in the body frame (forward-left-up, rad/s), each of shape (3,); yaw,
+    roll and pitch (rad), of the attitude ``Rz(yaw) Ry(pitch) Rx(roll)`` with the thrust along z.
     """
 
-    pos: Array
-    vel: Array
-    acc: Array
-    omega: Array
-    yaw: float
+    pos: Any = None
+    vel: Any = None
+    acc: Any = None
+    omega: Any = None
+    yaw: Any = None
+    jerk: Any = None
+    snap: Any = None
+    roll: Any = None
+    pitch: Any = None
 
 
 class Polynomial:
@@ -78,11 +86,24 @@ class Polynomial4D:
 
     def eval(self, t: float) -> TrajectoryOutput:
         """Return the piece at a time ``t`` (s) from its beginning."""
-        axes = [evaluate(axis.p, t, 3) for axis in (self.px, self.py, self.pz)]
-        position, velocity, acceleration, jerk = np.array(axes).T
+        axes = [evaluate(axis.p, t, 4) for axis in (self.px, self.py, self.pz)]
+        position, velocity, acceleration, jerk, snap = np.array(axes).T
         yaw, yaw_rate = map(float, evaluate(self.pyaw.p, t, 1))
         omega = angular_velocity(acceleration, jerk, yaw, yaw_rate)
-        return TrajectoryOutput(position, velocity, acceleration, omega, yaw)
+        # Specific thrust ahead, to the left and up, for the heading.
+        ahead, left = rotate_by_yaw(*acceleration[:2].tolist(), -yaw)
+        up = float(acceleration[2]) + GRAVITY
+        return TrajectoryOutput(
+            position,
+            velocity,
+            acceleration,
+            omega,
+            yaw,
+            jerk,
+            snap,
+            roll=-math.atan2(left, math.hypot(ahead, up)),
+            pitch=math.atan2(ahead, up),
+        )
 
 
 class Trajectory:

@@ -49,7 +49,7 @@ def test_a_vehicle_that_is_closed_as_its_link_is_made_does_not_open_it(link_clas
     link = link_class.return_value
     link.cflib = MagicMock()
 
-    def make(*_):
+    def make(*_, **__):
         vehicle.close()
         return link
 

@@ -39,6 +39,8 @@ ROWS = [
     Row("hover separate", "memory_separate", "memory (PSS), five processes", "MiB", 190.0),
     Row("hover composed", "cpu_composed", "CPU, one process", "% of a core", 7.0),
     Row("hover composed", "memory_composed", "memory (PSS), one process", "MiB", 45.0),
+    Row("journal", "journal_cpu", "journals of five processes, CPU", "% more", 5.0),
+    Row("journal", "journal_size", "journals of five processes", "MiB/min", 1.0),
     Row("simulated", "simulated_time", "simulated time", "x real time", least=100.0),
     Row("simulated", "simulated_cpu", "the same per CPU time", "s/s", least=100.0),
     Row("start", "start", "from roslaunch to /takeoff, one process", "s", 1.5),

@@ -128,6 +128,31 @@ def hover(name: str) -> Figures:
         return {f"cpu_{name}": load, f"memory_{name}": memory(processes)}
 
 
+_TURNS = 3  #: Number of hovers with journals, and of those without.
+
+
+def journal() -> Figures:
+    """Measure what journals cost in the software example, with and without them in turns."""
+    nodes, _ = HOVERS["separate"]
+    loads: dict[bool, list[float]] = {False: [], True: []}
+    sizes = []
+    for turn in range(2 * _TURNS):
+        has_journal = turn % 2 == 1
+        with tempfile.TemporaryDirectory() as folder:
+            with launched("sw_hover.launch", *[f"journal:={folder}"] * has_journal):
+                began = time.monotonic()
+                call("/takeoff")
+                loads[has_journal].append(cpu_load([process_of(node) for node in nodes]))
+            if has_journal:
+                written = sum(path.stat().st_size for path in Path(folder).iterdir())
+                sizes.append(written / 2**20 / (time.monotonic() - began) * 60.0)
+    without, with_them = statistics.mean(loads[False]), statistics.mean(loads[True])
+    return {
+        "journal_cpu": 100.0 * (with_them / without - 1.0),
+        "journal_size": statistics.mean(sizes),
+    }
+
+
 #: Prints the stamp of a message on /clock and the time at which it came, ns.
 _CLOCK = """
 import time, rospy

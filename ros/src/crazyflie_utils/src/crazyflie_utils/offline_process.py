@@ -52,7 +52,8 @@ class OfflineProcess(Process):
         self._steady = TimerQueue(self.executor, self.machine_clock, *tf)
         self.machine_clock.on_change(lambda now, _: self._steady.run_due(now))
         if recorder is not None:
-            recorder.begin = lambda _: round(self.clock.wall_offset * 1e9)
+            recorder.wall = lambda: round(self.clock.wall_offset * 1e9)
+            recorder.look_period = 0
         self.set_clock: Callable[[float], None] = self._setter(0, self.clock)
         self.set_machine_clock: Callable[[float], None] = self._setter(1, self.machine_clock)
         self.executor.start()

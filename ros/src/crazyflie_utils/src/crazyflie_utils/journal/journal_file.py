@@ -35,6 +35,7 @@ SUFFIX = ".journal"  #: Of a journal's file.
 _CHUNK = struct.Struct("<4sIIII")  # Mark, number, bytes compressed and not, CRC of the compressed.
 _MARK = b"CFJc"
 _ROW = struct.Struct("<BHI")
+_ROW_SIZE, _pack_row = _ROW.size, _ROW.pack_into
 _SHORT, _LONG = struct.Struct("<H"), struct.Struct("<HI")
 _NUMBER = struct.Struct("<I")
 _IS_LONG = 0xFFFF
@@ -176,31 +177,30 @@ class JournalWriter:
         self._thread = threading.Thread(target=self._write_chunks, name="journal", daemon=True)
         self._thread.start()
 
-    def row(self, kind: Kind, number: int, value: int, data: bytes | None = None) -> None:
+    def row(self, kind: int, number: int, value: int, data: bytes | None = None) -> None:
         """Append a row, with the data of the kinds that have some."""
-        rows, at = self._rows, self._at
-        if not self.is_open:
-            return None
+        at = self._at
         if data is None:
-            if at + _ROW.size > _HALF:
-                return self._retry(kind, number, value, data)
-            _ROW.pack_into(rows, at, kind, number, value)
-            self._at = at + _ROW.size
+            self._at = end = at + _ROW_SIZE
+            if end > _HALF:
+                return self._retry(at, kind, number, value, data)
+            _pack_row(self._rows, at, kind, number, value)
             return None
         size = len(data)
-        start = at + _ROW.size + (_SHORT.size if size < _IS_LONG else _LONG.size)
-        if start + size > _HALF:
-            return self._retry(kind, number, value, data)
+        start = at + _ROW_SIZE + (_SHORT.size if size < _IS_LONG else _LONG.size)
+        self._at = end = start + size
+        if end > _HALF:
+            return self._retry(at, kind, number, value, data)
         if kind in _DIFFERENCES:
             data = self._differences.encode(number, data)
         # The kind is written last: a row counts once it is complete.
-        rows[start : start + size] = data
+        rows = self._rows
+        rows[start:end] = data
         if size < _IS_LONG:
-            _SHORT.pack_into(rows, at + _ROW.size, size)
+            _SHORT.pack_into(rows, at + _ROW_SIZE, size)
         else:
-            _LONG.pack_into(rows, at + _ROW.size, _IS_LONG, size)
-        _ROW.pack_into(rows, at, kind, number, value)
-        self._at = start + size
+            _LONG.pack_into(rows, at + _ROW_SIZE, _IS_LONG, size)
+        _pack_row(rows, at, kind, number, value)
         return None
 
     def pause(self, time: float) -> None:
@@ -244,8 +244,13 @@ class JournalWriter:
                 self.end(f"the disk is too slow: {_MAX_BACKLOG} chunks wait for it")
             self._begin()
 
-    def _retry(self, kind, number, value, data):
+    def _retry(self, at, kind, number, value, data):
         """Append a row that does not fit into the rest of the half; a longer one is a chunk."""
+        self._at = at
+        if not self.is_open:
+            # The rows of a journal that has ended are lost.
+            self._at = _NUMBER.size
+            return
         self._finish(self._chunk_begin)
         size = len(data or b"")
         if size + _NUMBER.size + _ROW.size + _LONG.size <= _HALF:

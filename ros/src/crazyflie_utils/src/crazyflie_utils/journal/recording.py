@@ -11,6 +11,7 @@ import builtins
 import io
 import json
 import struct
+import threading
 import time
 import zlib
 from collections.abc import Callable
@@ -41,6 +42,21 @@ SAME_COLLECTION = 0xFFFFFFFF  #: Value of `Kind.COLLECTED` for more messages of 
 ORIGIN = struct.Struct("<H")  #: Before a message: `PLAIN`, and the number of its connection, or 0.
 PLAIN = 0x8000  #: It came decoded.
 _LONGEST = 0xFFFFFFFF  #: Longest time between two inputs that is written (us).
+_LOOK_PERIOD = 10_000  #: Period at which an input looks at the wall clock, and at the file (us).
+
+# Plain numbers: those of an enumeration take longer to pack.
+_TIMERS, _TIMER, _MESSAGE, _COLLECTED, _PUBLISHED, _TIME, _WALL = map(
+    int,
+    (
+        Kind.TIMERS,
+        Kind.TIMER,
+        Kind.MESSAGE,
+        Kind.COLLECTED,
+        Kind.PUBLISHED,
+        Kind.TIME,
+        Kind.WALL,
+    ),
+)
 
 
 def keeps_data(message_type: Any) -> Any:
@@ -96,12 +112,11 @@ class RecordedClock(SteadyClock):
     def __init__(self, recorder: "Recorder", executor: Executor):
         super().__init__()
         self.now = 0  #: Moment of the present input, ns.
-        self.wall_offset = self._offset  #: Wall clock minus this clock then, ns.
+        self.wall_offset = self._offset  #: Wall clock minus this clock, ns.
         self._recorder, self._executor = recorder, executor
 
-    def begin(self, moment: int) -> int:
-        """Begin an input at a moment (ns of the machine); return wall clock minus this one."""
-        self.now = moment
+    def look_at_wall(self) -> int:
+        """Measure and return `wall_offset`."""
         self.wall_offset = self.measure_offset()
         return self.wall_offset
 
@@ -110,8 +125,8 @@ class RecordedClock(SteadyClock):
             return self.now
         moment = time.monotonic_ns()
         if self._executor.is_in_turn:
-            self._recorder.row(Kind.TIME, 0, 0, _U64.pack(moment))
-            self._recorder.note_wall(self.begin(moment))
+            self._recorder.row(_TIME, 0, 0, _U64.pack(moment))
+            self._recorder.look_at_wall()
         return moment
 
     @override
@@ -127,15 +142,21 @@ class RecordedClock(SteadyClock):
 
 
 class Recorder:
-    """Writes the rows of one process by a `JournalWriter`; an error of it ends the journal only."""
+    """Writes the rows of one process by a `JournalWriter`; an error of it ends the journal only.
+
+    What is called for each input or message has few calls of its own: a simulator has a thousand of
+    both in a second.
+    """
 
     def __init__(self, writer: JournalWriter):
         self._writer = writer
         self.row = writer.row
         self.executor: Executor
         self.clock: RecordedClock
-        #: ``begin(moment)`` begins an input at a moment (ns), and returns the clock's wall offset.
-        self.begin: Callable[[int], int]
+        #: Returns wall clock minus the process's clock (ns).
+        self.wall: Callable[[], int]
+        self.look_period = _LOOK_PERIOD  #: Time between two such looks (us).
+        self._next_look = 0
         self._last = int(writer.header["us"])
         self._wall = 0
         self._digest = Digest()
@@ -145,28 +166,33 @@ class Recorder:
         """Begin to record; return the transport that the process is to use."""
         self.executor = executor
         self.clock = RecordedClock(self, executor)
-        self.begin = self.clock.begin
+        self.wall = self.clock.look_at_wall
         executor.on_timers = self._on_timers
         _recorders.add(self)
         return RecordingTransport(transport, self)
 
-    def input(self, kind: Kind, number: int = 0, data: bytes | None = None) -> None:
-        """Begin an input, in its turn."""
-        now = time.monotonic_ns() // 1000
-        wall = self.begin(now * 1000)
+    def input(self, kind: int, number: int = 0, data: bytes | None = None) -> None:
+        """Begin an input of a `Kind`, in its turn."""
+        nanoseconds = time.monotonic_ns()
+        now = nanoseconds // 1000
+        self.clock.now = nanoseconds - nanoseconds % 1000
         try:
-            self._writer.pause(now * 1e-6)
-            self.note_wall(wall)
-            passed, self._last = now - self._last, now
-            self.row(kind, number, min(passed, _LONGEST), data)
+            if now >= self._next_look:
+                self._next_look = now + self.look_period
+                self._writer.pause(now * 1e-6)
+                self.look_at_wall()
+            passed = now - self._last
+            self._last = now
+            self.row(kind, number, passed if passed < _LONGEST else _LONGEST, data)
         except Exception as error:
             self._writer.end(repr(error))
 
-    def note_wall(self, offset: int) -> None:
-        """Write that the wall clock is another time (ns) ahead of the machine's."""
+    def look_at_wall(self) -> None:
+        """Write by how much the wall clock is ahead of the machine's, if that has changed."""
+        offset = self.wall()
         if offset != self._wall:
             self._wall = offset
-            self.row(Kind.WALL, 0, 0, _I64.pack(offset))
+            self.row(_WALL, 0, 0, _I64.pack(offset))
 
     def submit_input(self, number: int, work: Callable[..., None], *arguments: Any) -> None:
         """Run a function of `NodeHandle.input`, by its number, with at most one argument."""
@@ -220,9 +246,10 @@ class Recorder:
 
     def published(self, number: int, message: genpy.Message) -> None:
         """Write that a callback publishes a message."""
-        if self.executor.is_in_turn:
+        executor = self.executor
+        if executor._runner == threading.get_ident() or executor.is_in_turn:
             try:
-                self.row(Kind.PUBLISHED, number, self._digest.add(message))
+                self.row(_PUBLISHED, number, self._digest.add(message))
             except Exception as error:
                 self._writer.end(repr(error))
 
@@ -234,17 +261,16 @@ class Recorder:
         """End the journal."""
         self._writer.close()
 
-    def data(self, message: Any, is_plain: bool) -> bytes:
-        """Return a received message with its origin."""
-        header = getattr(message, "_connection_header", None) or {}
+    def origin(self, header: dict[str, str] | None) -> int:
+        """Return the number of a connection by its header."""
+        header = header or {}
         connection = header.get("callerid", ""), header.get("topic", "")
         number = self._callers.get(connection)
         if number is None:
             # Those beyond the limit are not told apart.
             number = self._callers[connection] = min(len(self._callers), PLAIN - 1)
             self.name(Kind.CALLER, number, *connection)
-        origin = ORIGIN.pack(number | PLAIN if is_plain else number)
-        return origin + (getattr(message, "raw", None) or serialized(message))
+        return number
 
     def name(self, kind: Kind, number: int, *names: str) -> None:
         """Write the name of something that has a number."""
@@ -266,7 +292,7 @@ class Recorder:
         return value
 
     def _on_timers(self, is_first):
-        self.input(Kind.TIMERS if is_first else Kind.TIMER)
+        self.input(_TIMERS if is_first else _TIMER)
 
 
 _recorders: WeakSet[Recorder] = WeakSet()
@@ -326,22 +352,36 @@ class _RecordedSubscriber(ExternalSubscriber):
         self._recorder, self._number = recorder, number
         self._plain_type, self._deliver = plain, deliver
         self._is_collecting, self._empty = False, 0
+        self._header: dict[str, str] | None = None
+        self._origin = ORIGIN.pack(0)
 
     def receive(self, message: Any) -> None:
         """Write a message and pass it on, in turn unless it was waiting."""
         recorder = self._recorder
         if self._is_collecting and recorder.executor.is_running_here:
-            data = recorder.data(message, type(message) is self._plain_type)
-            recorder.row(Kind.COLLECTED, self._number, self._empty, data)
+            recorder.row(_COLLECTED, self._number, self._empty, self._data(message))
             self._empty = SAME_COLLECTION
             self._deliver(message)
         else:
             recorder.executor.post(self._pass_on, message)
 
     def _pass_on(self, message):
-        data = self._recorder.data(message, type(message) is self._plain_type)
-        self._recorder.input(Kind.MESSAGE, self._number, data)
+        self._recorder.input(_MESSAGE, self._number, self._data(message))
         self._deliver(message)
+
+    def _data(self, message):
+        header = getattr(message, "_connection_header", None)
+        # Most messages come by the same connection, and share its header.
+        if header is not self._header:
+            self._header = header
+            self._origin = ORIGIN.pack(self._recorder.origin(header))
+        try:
+            data = message.raw
+        except AttributeError:
+            data = serialized(message)
+        if type(message) is self._plain_type:
+            return ORIGIN.pack(ORIGIN.unpack(self._origin)[0] | PLAIN) + data
+        return self._origin + data
 
     def has_publishers(self) -> bool:
         return self.flag()

@@ -256,6 +256,11 @@ class Timer:
         self._queue = queue
         self._work = work
 
+    @property
+    def name(self) -> str:
+        """Name of the callback."""
+        return getattr(self._work, "__qualname__", "")
+
     def stop(self) -> None:
         """Stop the timer, even if it is due already."""
         self.stopped = True

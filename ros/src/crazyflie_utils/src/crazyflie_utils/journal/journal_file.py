@@ -322,9 +322,9 @@ class Journal:
 
     def __init__(self, path: Path):
         self.path = path
-        self.damage = (
-            ""  #: Why the rows end early, once they have been read; or that some are gone.
-        )
+        #: Why the rows end early, once they have been read; or that some are gone.
+        self.damage = ""
+        self.position = 0  #: How far the file has been read (bytes).
         try:
             with open(path, "rb") as file:
                 line = file.readline(1 << 20)
@@ -352,8 +352,11 @@ class Journal:
         for number, data in self._chunks():
             if number != expected:
                 # What is left cannot follow from what was before.
-                self.damage = f"chunks {expected} to {number - 1} are not in it: older ones were "
-                self.damage += "dropped, or the file was changed"
+                self.damage = (
+                    f"chunks {expected} to {number - 1} are not in it: older ones were dropped "
+                    "(it keeps CRAZYFLIE_JOURNAL_MINUTES), or the file was changed; in which state "
+                    "the nodes were after them is not known"
+                )
                 return
             expected = number + 1
             yield from self._rows(data)
@@ -379,7 +382,7 @@ class Journal:
                 except zlib.error:
                     self.damage = f"chunk {number} is damaged or cut"
                     break
-                last = number
+                last, self.position = number, file.tell()
                 yield number, data
         # Of a process that has not ended by itself.
         with contextlib.suppress(OSError):

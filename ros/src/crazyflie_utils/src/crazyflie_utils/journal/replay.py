@@ -3,6 +3,7 @@
 import builtins
 import collections
 import json
+import math
 import struct
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
@@ -18,9 +19,8 @@ from crazyflie_utils.journal.replay_transport import (
     DifferenceError,
     ReplayTransport,
     Rows,
-    describe,
 )
-from crazyflie_utils.node import Node, Process
+from crazyflie_utils.node import Node, Process, initialization_failure
 from crazyflie_utils.offline_process import OfflineProcess
 from crazyflie_utils.program import load
 from crazyflie_utils.refusal import ServiceError
@@ -37,6 +37,7 @@ class _ReplayExecutor(Executor):
         super().__init__()
         self._due: collections.deque[Iterable[Callable[[], None]]] = collections.deque()
         self._timers: Iterator[Callable[[], None]] = iter(())
+        self.timer = ""  #: Name of the callback of the timer that runs, or did last.
 
     @override
     def submit_all(self, works: Iterable[Callable[[], None]]) -> None:
@@ -52,8 +53,10 @@ class _ReplayExecutor(Executor):
             # In its turn, since that reads the clock.
             self._timers = iter(list(self._due.popleft()) if self._due else [])
             first = next(self._timers, None)
-            if first is not None:
-                first()
+            if first is None:
+                self.timer = ""
+            else:
+                self._fire(first)
 
         self.submit(run)
 
@@ -64,9 +67,13 @@ class _ReplayExecutor(Executor):
             timer = next(self._timers, None)
             if timer is None:
                 raise DifferenceError("then a timer was due that is not due now")
-            timer()
+            self._fire(timer)
 
         self.submit(run)
+
+    def _fire(self, work):
+        self.timer = getattr(getattr(work, "__self__", None), "name", "")
+        work()
 
 
 class _ReplayClock(SteadyClock):
@@ -112,6 +119,12 @@ class _RosProcess(Process):
         """Set the machine's clock (ns)."""
         self.machine.now = moment
 
+    def ros_time(self) -> int:
+        """Return the ROS time of the present input (ns)."""
+        if self.clock is self.machine:
+            return self.machine.now + self.machine.wall_offset
+        return self.clock.nanoseconds()
+
     def set_wall(self, offset: int) -> None:
         """Set the wall clock minus the machine's (ns)."""
         self.machine.wall_offset = offset
@@ -131,6 +144,10 @@ class _OfflineProcess(OfflineProcess):
 
     def move_to(self, moment: int) -> None:
         """Do nothing: both clocks have rows of their own."""
+
+    def ros_time(self) -> int:
+        """Return the ROS time of the present input (ns)."""
+        return self.clock.nanoseconds()
 
     def set_wall(self, offset: int) -> None:
         """Set the wall clock minus the process's (ns)."""
@@ -154,6 +171,7 @@ class Replay:
         self.transport = ReplayTransport(self.rows)
         self.nodes: dict[str, Node] = {}
         self.input: Row | None = None  #: The input that is processed, or was last.
+        self.wall_offset = 0  #: Wall clock minus the machine's, or a manual one (ns).
         self._executor = _ReplayExecutor()
         header = journal.header
         self._us = self._begin = header["us"]
@@ -172,8 +190,34 @@ class Replay:
 
     @property
     def time(self) -> float:
-        """Time of the present input since the process was started, by its machine's clock (s)."""
-        return (self._us - self._begin) * 1e-6
+        """Time of the present input since the process was started (s).
+
+        It is that of the machine's clock, or of the manual one.
+        """
+        if isinstance(self.process, _OfflineProcess):
+            return self.process.clock.time() - float(self.journal.header["start"])
+        return float(self._us - self._begin) * 1e-6
+
+    @property
+    def next_time(self) -> float:
+        """`time` of the next input (s); infinity if there is none, or something else is next."""
+        row = self.rows.next
+        if row is None or row.kind not in INPUTS:
+            return math.inf
+        if row.kind is Kind.CLOCK and row.number == 0 and len(row.data) == _MOMENT.size:
+            return float(_MOMENT.unpack(row.data)[0]) - float(self.journal.header["start"])
+        is_offline = isinstance(self.process, _OfflineProcess)
+        return self.time + (0.0 if is_offline else row.value * 1e-6)
+
+    @property
+    def ros_time(self) -> int:
+        """ROS time of the present input (ns)."""
+        return self.process.ros_time()
+
+    @property
+    def wall_time(self) -> int:
+        """Wall time of the present input (ns)."""
+        return self._us * 1000 + self.wall_offset
 
     @property
     def input_name(self) -> str:
@@ -185,9 +229,9 @@ class Replay:
             return f"a message on {self.transport.subscribers[row.number].topic}"
         if row.kind is Kind.CALL:
             return f"a call of {self.transport.services[row.number][0]}"
+        if row.kind in (Kind.TIMERS, Kind.TIMER):
+            return f"the timer of {self._executor.timer}" if self._executor.timer else "a timer"
         return {
-            Kind.TIMERS: "a timer",
-            Kind.TIMER: "a timer",
             Kind.REPLY: "the answer of a service",
             Kind.CLOCK: "the clock",
         }.get(row.kind, row.kind.name.lower().replace("_", " "))
@@ -199,15 +243,22 @@ class Replay:
             return True
         handle = self.process.handle(header["node"])
         make = self._load(header["program"])
-        self.nodes = {handle.name: make()} if isinstance(make, type) else make(handle)
-        for name, node in self.nodes.items():
-            if node.sources:
-                raise JournalError(
-                    f"{self.journal.path}: {name} reads {node.sources}: its journal can be read, "
-                    "but not run again"
-                )
-            if not node.initialize(self.process.handle(name)):
-                return False
+        try:
+            self.nodes = {handle.name: make()} if isinstance(make, type) else make(handle)
+            for name, node in self.nodes.items():
+                if node.sources:
+                    raise JournalError(
+                        f"{self.journal.path}: {name} reads {node.sources}: its journal can be "
+                        "read, but not run again"
+                    )
+                if not node.initialize(self.process.handle(name)):
+                    return False
+        except JournalError:
+            raise
+        except Exception as error:
+            # As the main program.
+            handle.error(initialization_failure(error))
+            return False
         if needed := [name for name, node in self.nodes.items() if node.needed_in_flight]:
             Flights(self.process.topics, needed)
         self._executor.start()
@@ -219,10 +270,11 @@ class Replay:
         if row is None:
             return False
         if row.kind is Kind.WALL:
-            self.process.set_wall(*_I64.unpack(self.rows.take().data))
+            (self.wall_offset,) = _I64.unpack(self.rows.take().data)
+            self.process.set_wall(self.wall_offset)
             return True
         if row.kind not in INPUTS:
-            raise DifferenceError(f"now the callback has ended; then {describe(row)}")
+            raise DifferenceError(f"now the callback has ended; then {self.rows.describe(row)}")
         self.input = self.rows.take()
         self._us += row.value
         self.process.move_to(self._us * 1000)

@@ -35,8 +35,13 @@ from crazyflie_utils.topics import (
 class DifferenceError(BaseException):
     """The process did something else than what was recorded; the text says what.
 
-    Not an `Exception`: callbacks of nodes are guarded against those.
+    Not an `Exception`: callbacks of nodes are guarded against those. ``published`` is the topic and
+    the message, if it is its values that are others.
     """
+
+    def __init__(self, text: str, published: tuple[str, genpy.Message] | None = None):
+        super().__init__(text)
+        self.published = published
 
 
 class EndError(BaseException):
@@ -96,21 +101,30 @@ class Rows:
         """
         row = self.next
         if row is not None and (row.kind is not kind or row.number != number):
-            raise DifferenceError(f"now it {doing}; then {describe(row)}")
+            raise DifferenceError(f"now it {doing}; then {self.describe(row)}")
         return self.take()
 
-
-def describe(row: Row) -> str:
-    """Return what the process did when a row was written."""
-    if row.kind in INPUTS:
-        return "the callback ended there"
-    texts = {
-        Kind.PUBLISHED: f"it published by publisher {row.number}",
-        Kind.REQUESTED: "it called a service or set a parameter",
-        Kind.VALUE: f"it read the value {row.data[:200].decode(errors='replace')}",
-        Kind.FILE: f"it read the file {row.data[:200].decode(errors='replace')}",
-    }
-    return texts.get(row.kind, f"it read {row.kind.name} {row.number}")
+    def describe(self, row: Row) -> str:
+        """Return what the process did when a row was written."""
+        if row.kind in INPUTS:
+            return "the callback ended there"
+        number, text = row.number, row.data[:200].decode(errors="replace")
+        topic = "a topic that is not advertised now"
+        if row.kind is Kind.PUBLISHED:
+            topic = self.names[Kind.ADVERTISED].get(number, [topic])[0]
+        elif row.kind is Kind.COLLECTED:
+            topic = self.names[Kind.SUBSCRIBED].get(number, [topic])[0]
+        texts = {
+            Kind.PUBLISHED: f"it published on {topic}",
+            Kind.COLLECTED: f"it took a message that waited on {topic}",
+            Kind.REQUESTED: "it called a service or set a parameter",
+            Kind.VALUE: f"it read the value {text}",
+            Kind.FILE: f"it read the file {text.partition(chr(10))[0]}",
+            Kind.NAME: f"it looked for the remapped name {text}",
+            Kind.TIME: "it read the clock",
+            Kind.FLAG: "it saw a subscriber or a publisher come or go",
+        }
+        return texts.get(row.kind, f"there was a {row.kind.name} {number}")
 
 
 class _Flag:
@@ -144,7 +158,8 @@ class _Publisher(ExternalPublisher):
         rows, doing = transport.rows, f"publishes on {self._topic}"
         row = rows.expect(Kind.PUBLISHED, self._number, doing)
         if row.value != transport.digest.add(message):
-            raise DifferenceError(f"other values are published on {self._topic}")
+            text = f"other values are published on {self._topic}"
+            raise DifferenceError(text, (self._topic, message))
 
     def has_subscribers(self) -> bool:
         return self._flag()

@@ -116,6 +116,8 @@ class FleetConnectNode(Node):
     The driver itself writes the parameters again after a reconnection.
     """
 
+    needs_master = True
+
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         parameters = handle.load(FleetConnectParameters)

@@ -34,6 +34,7 @@ from crazyflie_utils import NodeHandle
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.node import Process
 from crazyflie_utils.parameters.types import Integer
+from crazyflie_utils.ros1.master_watch import master_answers
 
 _SEARCH_LIMIT = 5.0  #: Timeout of the search for vehicles (s of the machine's clock).
 _FIND_LIMIT = 10.0  #: Timeout of the search for the vehicles of a file (s, machine's clock).
@@ -246,7 +247,7 @@ def ids_of(names: list[str]) -> list[int]:
 
 
 def _begin(close):
-    if not rosgraph.is_master_online():
+    if not master_answers():
         sys.exit(
             f"no ROS master at {rosgraph.get_master_uri()}, so no vehicle is running; expected, "
             "for example, roslaunch crazyflie_examples sw_swarm.launch, or the option --sim"

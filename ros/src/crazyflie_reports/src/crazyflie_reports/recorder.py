@@ -17,6 +17,8 @@ import roslib.packages
 import rosparam
 import rospkg
 
+from crazyflie_utils.ros1.master_watch import master_answers
+
 #: Regular expression of the recorded topics: those that examples and drivers document, without
 #: images.
 TOPICS = (
@@ -65,7 +67,7 @@ def main() -> int:
     top = Path(options.folder or Path(rospkg.get_ros_home()) / "flights").expanduser()
     folder = top / f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
     topics = f"{TOPICS}|{options.topics}" if options.topics else TOPICS
-    if not rosgraph.is_master_online():
+    if not master_answers():
         print(f"nothing is recorded: no ROS master at {rosgraph.get_master_uri()}", file=sys.stderr)
         return 1
     try:

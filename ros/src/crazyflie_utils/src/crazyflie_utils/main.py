@@ -1,5 +1,6 @@
 """Main programs: one node in a process, or many; and how such a process ends."""
 
+import contextlib
 import gc
 import io
 import logging
@@ -22,7 +23,7 @@ from crazyflie_utils.node import Node, Process, initialization_failure
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, TOPIC, Converted
 from crazyflie_utils.program import load, missing_module
-from crazyflie_utils.ros1.master_watch import MasterWatch, namesake
+from crazyflie_utils.ros1.master_watch import MasterWatch, bounded_master, namesake
 from crazyflie_utils.ros1.transport import RosTransport
 
 JOURNAL_SWITCH = "CRAZYFLIE_JOURNAL"  #: Environment variable; see `crazyflie_utils.journal.start`.
@@ -31,6 +32,9 @@ _END_LIMIT = 5.0  #: Longest time that the shutdown waits for nodes without a fl
 #: take the processor from the nodes that fly.
 _REFUSED_TIME = 5.0
 _MASTER_LIMIT = 10.0  #: Longest time that a node waits for a ROS master (s).
+#: Time after which a master that accepts requests, and does not answer, is silent (s).
+SILENCE_LIMIT = 3.0
+_WATCH_PERIOD = 1.0  #: Period at which it is asked while nodes start (s).
 #: Time after which a computing thread yields to a waiting one (s): 5 ms by default.
 _SWITCH_INTERVAL = 0.0005
 
@@ -128,8 +132,8 @@ def begin(default_name: str, signals: list[int] | None = None, program: str = ""
     """Make this process a ROS node; return the `Process`, not yet started.
 
     With ``program``, "package.module:name" of what makes the nodes, it may have a journal. Exits
-    with status 1 without a ROS master, if another node of this name is alive (which the master
-    would shut down), and at ``signals``, see `catch_signals`.
+    with status 1 without a ROS master that answers, if another node of this name is alive (which
+    the master would shut down), and at ``signals``, see `catch_signals`.
     """
     # rospy's log is not flushed: the last texts of a node that dies would be lost in a pipe.
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -137,13 +141,14 @@ def begin(default_name: str, signals: list[int] | None = None, program: str = ""
     _wait_for_master(signals)
     mappings = rospy.names.get_mappings()
     own_name = mappings.get("__name", default_name)
-    refusal = namesake({rosgraph.names.resolve_name(own_name, rospy.get_name())})
-    if refusal:
-        print(refusal, file=sys.stderr, flush=True)
-        _pause_refused(signals)
-        sys.exit(1)
-    rospy.init_node(default_name, disable_signals=signals is not None)
-    return ros_process(program)
+    with _watched_master():
+        refusal = namesake({rosgraph.names.resolve_name(own_name, rospy.get_name())})
+        if refusal:
+            print(refusal, file=sys.stderr, flush=True)
+            _pause_refused(signals)
+            sys.exit(1)
+        rospy.init_node(default_name, disable_signals=signals is not None)
+        return ros_process(program)
 
 
 def _pause_refused(signals):
@@ -166,8 +171,10 @@ def begin_script(
     is_own = not rospy.core.is_initialized()
     if is_own:
         _wait_for_master()
-        rospy.init_node(default_name, anonymous=True, disable_signals=True)
-    process = ros_process()
+    with _watched_master():
+        if is_own:
+            rospy.init_node(default_name, anonymous=True, disable_signals=True)
+        process = ros_process()
 
     def shut_down() -> None:
         process.end(0)
@@ -209,10 +216,54 @@ def _recorder(program, use_sim_time):
     return begin_journal(rospy.get_name(), program, clock, folder, rospy.logwarn)
 
 
+def _answers(limit=SILENCE_LIMIT):
+    """Return whether the master answers; exit with status 1 if it only accepts the request.
+
+    A process that is stopped still accepts connections, and rospy waits for answers without a
+    limit.
+    """
+    try:
+        bounded_master("/start", limit).getPid()
+    except TimeoutError:
+        sys.exit(
+            f"the ROS master at {rosgraph.get_master_uri()} has not answered within {limit:g} s; "
+            "is it stopped, or the address wrong?"
+        )
+    # There is no master, or something else.
+    except Exception:
+        return False
+    return True
+
+
+@contextlib.contextmanager
+def _watched_master(needs_master=lambda: False):
+    """Exit with status 1 if the master falls silent within the block.
+
+    Also after it, if ``needs_master()`` is true at its end.
+    """
+    has_ended = threading.Event()
+
+    def watch():
+        while not has_ended.wait(_WATCH_PERIOD):
+            try:
+                _answers()
+            except SystemExit as error:
+                if not has_ended.is_set():
+                    print(error, file=sys.stderr, flush=True)
+                    exit_at_once(1)
+
+    threading.Thread(target=watch, name="master at start", daemon=True).start()
+    try:
+        yield
+    finally:
+        if not needs_master():
+            has_ended.set()
+
+
 def _wait_for_master(signals=None):
     uri, end = rosgraph.get_master_uri(), time.monotonic() + _MASTER_LIMIT
     is_told = False
-    while not rosgraph.is_master_online():
+    while not _answers():
         if not is_told:
             print(f"waiting for a ROS master at {uri}", file=sys.stderr)
         is_told = True
@@ -228,8 +279,13 @@ def _wait_for_master(signals=None):
 
 def _run(process, make_nodes, signals):
     handle = process.handle(rospy.get_name())
+    nodes: dict[str, Node] = {}
+
+    def needs_master():
+        return any(node.needs_master for node in nodes.values())
+
     try:
-        with process.transport.starting():
+        with _watched_master(needs_master), process.transport.starting():
             make = load(make_nodes) if isinstance(make_nodes, str) else make_nodes
             nodes = make(handle)
             refusal = namesake(set(nodes) - {handle.name})

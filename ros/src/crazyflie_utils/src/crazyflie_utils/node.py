@@ -38,6 +38,10 @@ class Node(Generic[P]):
     #: Whether a process with this node continues after SIGINT until flights have ended.
     needed_in_flight: ClassVar[bool] = False
 
+    #: Whether a process with this node, which does its work and ends, ends with status 1 if the
+    #: master is silent; others need it at the start only.
+    needs_master: ClassVar[bool] = False
+
     parameters_type: type[Any]  #: Declaration of the parameters: ``P`` of ``Node[P]``.
 
     _handle: NodeHandle

@@ -9,7 +9,6 @@ from crazyflie_utils.node import Node, Process
 from crazyflie_utils.timers import Executor, SimulatedClock, TimerQueue
 from crazyflie_utils.topics import Transport
 
-
 #: Period at which a timer of period 0 fires here (s); on a real machine it fires as often as
 #: possible.
 _SHORTEST_PERIOD = 1e-4

@@ -93,6 +93,15 @@ def bounded_master(caller: str, limit: float) -> rosgraph.Master:
     return master
 
 
+def master_answers(limit: float = _ANSWER_LIMIT) -> bool:
+    """Return whether the master answers within ``limit`` (s); one that is stopped does not."""
+    try:
+        bounded_master("/master_answers", limit).getPid()
+    except (*_NO_ANSWER, ValueError):
+        return False
+    return True
+
+
 def living_node(name: str) -> str | None:
     """Return the place of a node, such as "process 12 on HOST", if it is registered and answers."""
     caller = rospy.get_name()

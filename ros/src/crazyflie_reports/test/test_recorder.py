@@ -31,7 +31,7 @@ def run(tmp_path, monkeypatch, capsys):
         path.write_text(f"#!/bin/sh\n{program}\n")
         path.chmod(0o755)
         monkeypatch.setattr(recorder.roslib.packages, "find_node", lambda *names: [str(path)])
-        monkeypatch.setattr(recorder.rosgraph, "is_master_online", lambda: True)
+        monkeypatch.setattr(recorder, "master_answers", lambda: True)
         monkeypatch.setattr(rosparam, "dump_params", lambda path, name: open(path, "w").close())
         arguments = ["record_flight", f"--folder={tmp_path / folder}", "--topics=/x", "__name:=a"]
         monkeypatch.setattr("sys.argv", arguments)

@@ -216,11 +216,11 @@ class Streams:
     """A broadcaster that keeps what it is to send."""
 
     def __init__(self):
-        self.frames = []
+        self.frames = {}
 
     def put_latest(self, stream, frame):
         """Keep what makes the packets."""
-        self.frames.append(frame)
+        self.frames[stream] = frame
 
 
 def test_the_poses_of_a_frame_are_sent_once():
@@ -230,10 +230,25 @@ def test_the_poses_of_a_frame_are_sent_once():
     for _ in range(2):
         for vehicle_id in (1, 2):
             poses.put(vehicle_id, ((0.0, 0.0, 0.0), None))
-        (frame,) = broadcaster.frames
+        (frame,) = broadcaster.frames.values()
         (sent,) = frame()
         assert [sent.data[0], sent.data[7]] == [1, 2]
+        # That of a pose that came while the frame was made.
+        assert frame() == []
         broadcaster.frames.clear()
+
+
+def test_poses_go_on_after_a_frame_that_an_urgent_command_has_discarded():
+    broadcaster = Streams()
+    poses = PackedPoses(broadcaster)
+    poses.vehicles = 2
+    poses.put(1, ((0.0, 0.0, 0.0), None))
+    # As `Transmission.put` does with an emergency stop of all vehicles.
+    broadcaster.frames.clear()
+    poses.put(2, ((0.0, 0.0, 0.0), None))
+    (frame,) = broadcaster.frames.values()
+    (sent,) = frame()
+    assert [sent.data[0], sent.data[7]] == [1, 2]
 
 
 @pytest.mark.parametrize(("x", "is_packed"), [(32.767, True), (-32.767, True), (-32.768, False)])

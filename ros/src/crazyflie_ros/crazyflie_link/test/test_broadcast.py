@@ -15,7 +15,7 @@ from crazyflie_link.cflib_internals import packet
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.localization import PackedPoses, pack
 from crazyflie_link.supervisor import BROADCAST_STOP
-from crazyflie_utils.testing.programs import wait_until
+from crazyflie_utils.testing.programs import LIMIT, wait_until
 from crazyflie_virtual.testing import FakeVehicle
 
 # The thread of cflib that ends with the dongle.
@@ -221,6 +221,32 @@ def test_poses_of_a_frame_go_out_together(by_radio, broadcaster):
     # One that does not fit in 16 bits of mm goes alone.
     links[0].localization.position(40.0, 0.0, 0.0)
     assert vehicles[0].wait_for_packets(6, 0) == [struct.pack("<fff", 40.0, 0.0, 0.0)]
+
+
+def test_an_emergency_right_behind_a_pose_stops_no_later_poses(by_radio, broadcaster):
+    vehicles, links = by_radio
+    poses = PackedPoses(broadcaster)
+    poses.vehicles = 2
+    for link in links:
+        link.localization.broadcast_by(poses, link.address.vehicle_id)
+    may_go_on = threading.Event()
+    is_held = threading.Event()
+
+    def hold():
+        is_held.set()
+        may_go_on.wait(LIMIT)
+        return []
+
+    # Something else is being sent while pose and emergency come.
+    broadcaster.put_latest("test", hold)
+    assert is_held.wait(LIMIT)
+    links[0].localization.position(1.0, 2.0, 3.0)
+    broadcaster.send(BROADCAST_STOP, urgent=True)
+    may_go_on.set()
+    for link in links:
+        link.localization.position(1.0, 2.0, 3.0)
+    for vehicle in vehicles:
+        vehicle.wait_for_packets(6, 2)
 
 
 @pytest.mark.parametrize(

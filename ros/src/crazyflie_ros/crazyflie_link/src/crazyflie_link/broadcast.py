@@ -61,8 +61,13 @@ class Broadcaster:
         self._queue.put(partial(self._repeat, packets, end), urgent)
 
     def put_latest(self, stream: str, make: Callable[[], Sequence[CRTPPacket]]) -> None:
-        """Queue the packets that ``make()`` will return; see `Transmission.put_latest`."""
-        self._queue.put_latest(stream, lambda: self._transmit(make()))
+        """Queue the packets, if any, that ``make()`` will return; see `Transmission.put_latest`."""
+
+        def send() -> None:
+            if packets := make():
+                self._transmit(packets)
+
+        self._queue.put_latest(stream, send)
 
     def close(self) -> None:
         """Stop sending."""

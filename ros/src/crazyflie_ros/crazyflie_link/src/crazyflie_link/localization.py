@@ -94,19 +94,19 @@ class PackedPoses:
     def put(self, vehicle_id: int, pose: Pose) -> None:
         """Queue a pose; it replaces an earlier one of the vehicle. Does not block."""
         with self._changed:
-            is_first = not self._waiting
             self._waiting[vehicle_id] = pose
             if self._is_complete():
                 self._changed.notify()
-        if is_first:
-            self._broadcaster.put_latest(_STREAM, self._frame)
+        # With each pose: an urgent command discards the frame that is queued.
+        self._broadcaster.put_latest(_STREAM, self._frame)
 
     def _is_complete(self):
         return len(self._waiting) >= self.vehicles
 
     def _frame(self):
         with self._changed:
-            self._changed.wait_for(self._is_complete, FRAME_WINDOW)
+            if self._waiting:
+                self._changed.wait_for(self._is_complete, FRAME_WINDOW)
             waiting, self._waiting = self._waiting, {}
         return pack(waiting)
 

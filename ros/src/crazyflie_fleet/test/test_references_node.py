@@ -93,6 +93,12 @@ def test_references_pass_as_they_are(flight):
     assert math.isnan(flight.followed("cf1")[-1].state.x)
 
 
+def test_the_first_value_is_published_as_others_may_have_an_old_one(flight):
+    """The process before this one, which was killed, held a vehicle."""
+    flight.process.advance(0.1)
+    assert [each.data for each in flight.process.published("/fleet/waiting")] == [""]
+
+
 def test_who_would_come_too_close_waits_where_it_is(flight):
     flight.want("cf1", 0.9)
     flight.see("cf1", 0.8)

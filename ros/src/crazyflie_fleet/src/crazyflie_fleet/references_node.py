@@ -430,7 +430,8 @@ class ReferencesNode(Node[ReferencesParameters]):
             handle.broadcast_static_transforms()(transforms)
 
     def _publish(self, publisher, text):
-        if self._published.get(publisher, "") != text:
+        # The first is always published: others may still have that of a process before this one.
+        if self._published.get(publisher) != text:
             self._published[publisher] = text
             publisher.publish(String(text))
 

@@ -142,7 +142,9 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         self._stamp: int | None = None
         self._is_tilted: bool | None = None
         self._frozen_poses = 0
-        self._tf_error = ""
+        #: Text that was published last; None at the start, as others may still have one of a
+        #: process before this one.
+        self._tf_error: str | None = None
         self._inner_type = type(self.state_type().state)
 
     def state(self, motion: EstimatedMotion) -> list[float]:

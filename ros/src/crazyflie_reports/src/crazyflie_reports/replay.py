@@ -43,11 +43,15 @@ class Status(enum.IntEnum):
 
 @dataclass
 class Outcome:
-    """What came of the replay of a journal, for people, and how long the process had run (s)."""
+    """What came of the replay of a journal, for people; and what the process did.
+
+    That is how long it ran (s), and the checksum of all that it published.
+    """
 
     status: Status
     text: str
     time: float = 0.0
+    digest: int = 0
 
 
 #: ``report(time, position, inputs)``: time since the start (s), how much of the file is read
@@ -170,7 +174,8 @@ class _Run:
             f"{messages:,} messages; {passed:.1f} s in {took:.1f} s, "
             f"{passed / took:.0f} times real time"
         )
-        return Outcome(status, "\n  ".join([first, *self._notes]), passed)
+        text = "\n  ".join([first, *self._notes])
+        return Outcome(status, text, passed, self._replay.transport.digest.value)
 
     def _different(self, error: DifferenceError) -> Outcome:
         replay = self._replay

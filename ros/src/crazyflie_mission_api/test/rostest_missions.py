@@ -114,7 +114,8 @@ with Fleet(["cf1", "cf2"]) as fleet:
 """
 NODE = "/flier"
 
-SECOND_NODE = "import rospy; rospy.init_node('flier')"
+# It does not read /clock: a publisher keeps only the latest connection of each name.
+SECOND_NODE = "import rospy; rospy.init_node('flier', disable_rostime=True)"
 
 
 def ctrl_c(process):
@@ -186,9 +187,13 @@ def test_a_second_mission_for_a_vehicle_is_refused_until_the_first_has_ended(tmp
     first = written(tmp_path, ONE.format(names=["cf1", "cf2"], seconds=1e6))
     second = tmp_path / "second.py"
     second.write_text(ONE.format(names=["cf2"], seconds=0.0))
-    with recorded(["cf1", "cf2"]) as tracks, script(first) as process:
+    with recorded(["cf1", "cf2"]) as tracks, script(first, "__name:=flier") as process:
         try:
             peer.wait_until(lambda: all(t[-1][2] > 0.7 for t in tracks.values()), "takeoff", LIMIT)
+            # Of its name, it would make the master shut the first one down.
+            status, errors = run(second, "__name:=flier")
+            assert status == 1
+            assert "/flier" in errors
             status, errors = run(second)
             assert status == 1
             assert re.search(r"cf2: in use by the running mission mission_\w+", errors), errors

@@ -5,8 +5,9 @@ import math
 import pytest
 from fake_fleet import fake_process
 from fake_vehicles import ControllerVehicle, DriverVehicle
-from geometry_msgs.msg import Point
-from std_msgs.msg import String
+from geometry_msgs.msg import Point, Quaternion, Transform, TransformStamped, Vector3
+from std_msgs.msg import Header, String
+from tf2_msgs.msg import TFMessage
 
 from crazyflie_driver.srv import StartTrajectory, StartTrajectoryResponse
 from crazyflie_mission_api import Bounds, Fleet, MissionError, plan
@@ -394,6 +395,22 @@ def test_a_mission_whose_vehicles_another_one_has_leaves_them(fleet, process, co
         fleet.go_to((0.0, 0.5, 0.0), relative=True)
     assert "land" not in driven.called()
     assert controlled.position[2] == 0.0
+
+
+def test_bodies_that_nobody_flies_are_obstacles(process, controlled, driven):
+    process.transport.parameters["/fleet/obstacles"] = {
+        "turtlebot1": {"frame": "turtle", "buffer": 0.3}
+    }
+    fleet = Fleet(NAMES, process=process, startup_timeout=0.5)
+    header = Header(0, process.clock.stamp(), "world")
+    transform = Transform(Vector3(-1.0, 0.0, 0.8), Quaternion(w=1.0))
+    with fleet:
+        # It has not been seen yet.
+        fleet.takeoff(0.8)
+        process.publish("/tf", TFMessage([TransformStamped(header, "turtle", transform)]))
+        with pytest.raises(MissionError, match="turtlebot1 and cf1 would be .* m apart"):
+            fleet["cf1"].go_to((-1.5, 0.0, 0.8))
+        fleet["cf1"].go_to((0.0, 0.8, 0.8))
 
 
 def test_vehicles_of_other_missions_are_obstacles(fleet, process, controlled, driven):

@@ -18,6 +18,7 @@ from crazyflie_fleet.vectorized_simulator_node import (
 )
 from crazyflie_fleet.vehicle_nodes import (
     INHIBITION,
+    OBSTACLES,
     PLACE,
     WITHOUT_YAW,
     Tree,
@@ -53,6 +54,11 @@ class _NodeFactory:
         fleet = config.fleet()
         self._places = {name: place for place, name in enumerate(fleet.names)}
         own_names = config.own_names(fleet)
+        obstacles = {
+            each.name: {"frame": each.mocap_frame, "buffer": each.buffer}
+            for each in fleet.obstacles
+        }
+        handle.set_param(OBSTACLES, obstacles)
         vehicles = tuple(fleet[name] for name in own_names)
         for model in MODELS if config.is_simulated and config.is_vectorized else ():
             of_model = tuple(each for each in vehicles if each.dynamics == model)

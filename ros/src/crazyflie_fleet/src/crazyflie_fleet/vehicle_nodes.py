@@ -27,6 +27,8 @@ IN_FLIGHT = "in_flight"
 FLIGHT_STATUS = f"{IN_FLIGHT}_flight_status"  #: Topics and services of a vehicle, below its name.
 #: Topic below a vehicle's name: the reason for refusing takeoffs; empty if they are allowed.
 INHIBITION = "takeoff_inhibition"
+#: Parameter: the obstacles of the fleet, by name their tf frame, and their buffer (m).
+OBSTACLES = "/fleet/obstacles"
 #: Parameter below a vehicle's name: its index in the fleet file, from 0.
 PLACE = "place_in_fleet"
 

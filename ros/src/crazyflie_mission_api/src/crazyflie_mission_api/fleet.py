@@ -1,5 +1,6 @@
 """Groups of simulated, virtual and real vehicles, by ROS."""
 
+import contextlib
 import math
 import re
 import signal
@@ -8,6 +9,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +19,11 @@ from typing_extensions import override
 
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import BUFFER
+from crazyflie_fleet.fleet_parameters import NODE_PARAMETERS
 from crazyflie_fleet.high_level_node import HighLevelNode
 from crazyflie_fleet.high_level_services import HIGH_LEVEL, START_TOPIC
 from crazyflie_fleet.mission_watch import MISSION_PERIOD, MISSION_TOPIC, Claim, MissionWatch
+from crazyflie_fleet.vehicle_nodes import OBSTACLES
 from crazyflie_mission_api import observer
 from crazyflie_mission_api.dry_run import dry_run
 from crazyflie_mission_api.group_state import Obstacle, Rules
@@ -37,7 +41,7 @@ from crazyflie_mission_api.ros_vehicle import (
 )
 from crazyflie_mission_api.script_end import ScriptEnd
 from crazyflie_mission_api.vehicle_group import VehicleGroup
-from crazyflie_utils import NodeHandle, ParameterError
+from crazyflie_utils import NodeHandle, ParameterError, TransformError
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.node import Process
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, Number
@@ -162,6 +166,7 @@ class Fleet(VehicleGroup):
             self.observer = observer.of_process
             self.obstacles = self._find_obstacles
             self._buffers = buffers
+            self._bodies = self._find_bodies()
             process.start()
             self._claim_vehicles()
             self._await_positions(startup_timeout)
@@ -284,8 +289,22 @@ class Fleet(VehicleGroup):
             self._heartbeat = None
             self._claim.publish(String(self._mission))
 
+    def _find_bodies(self):
+        """Return the lookups of the bodies that nobody flies and vehicles keep apart from."""
+        lookups = {}
+        fixed = self._handle.get_param("/fleet/frames/fixed", FRAME, "world")
+        for name, body in self._handle.get_param(OBSTACLES, NODE_PARAMETERS, {}).items():
+            lookups[name] = partial(self._handle.listen_to_poses(), fixed, body["frame"])
+            self._buffers[name] = float(body["buffer"])
+        return lookups
+
     def _find_obstacles(self):
-        return {
+        bodies = {}
+        for name, lookup in self._bodies.items():
+            # It has not been seen yet; the fleet warns.
+            with contextlib.suppress(TransformError):
+                bodies[name] = Obstacle(lookup().position, False)
+        return bodies | {
             name: Obstacle(self._place_of_other(name), name in claim.flying)
             for claim in [*self._missions.claims.values()]
             for name in claim.vehicles

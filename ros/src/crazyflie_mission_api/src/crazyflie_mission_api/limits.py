@@ -125,6 +125,9 @@ def number(value: float, what: str, minimum: float = -math.inf, above: float = -
     """
     kind = Number(above=above, minimum=minimum)
     try:
+        # A text may be a number in a file, and not here.
+        if isinstance(value, str):
+            raise ValueError
         return kind(value.item() if isinstance(value, np.generic) else value)
     except ValueError:
         raise MissionError(f"{what} is {value!r}; expected {kind}") from None

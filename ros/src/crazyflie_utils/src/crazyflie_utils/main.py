@@ -173,6 +173,11 @@ def begin_script(
         _wait_for_master()
     with _watched_master():
         if is_own:
+            # Without a given name it has one of its own.
+            if given := rospy.names.get_mappings().get("__name"):
+                name = rosgraph.names.resolve_name(given, rospy.get_name())
+                if refusal := namesake({name}):
+                    sys.exit(refusal)
             rospy.init_node(default_name, anonymous=True, disable_signals=True)
         process = ros_process()
 

@@ -91,8 +91,9 @@ class Polynomial4D:
         yaw, yaw_rate = map(float, evaluate(self.pyaw.p, t, 1))
         omega = angular_velocity(acceleration, jerk, yaw, yaw_rate)
         # Specific thrust ahead, to the left and up, for the heading.
-        ahead, left = rotate_by_yaw(*acceleration[:2].tolist(), -yaw)
-        up = float(acceleration[2]) + GRAVITY
+        x, y, z = acceleration.tolist()
+        ahead, left = rotate_by_yaw(x, y, -yaw)
+        up = z + GRAVITY
         return TrajectoryOutput(
             position,
             velocity,

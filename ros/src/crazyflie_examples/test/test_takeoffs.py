@@ -25,7 +25,7 @@ HARDWARE = ("references/K_manual.txt", (-0.05, 0.05, -0.5), (1.0, 1.0, 6.0), "ka
 SOFTWARE = ("config/K_quadrotor.txt", (-0.15, 0.15, -10.0), (0.2, 0.2, 0.25), "finite_difference")
 
 
-def launch(example, mass_error, thrust_error):
+def launch(example, mass_error, thrust_error, height=HEIGHT):
     """Return a process with vehicle, estimator, controller, server and filter."""
     gains_file, gains, limits, rate_filter = example
     process = FakeProcess()
@@ -50,7 +50,7 @@ def launch(example, mass_error, thrust_error):
     server = {
         **{"topics/reference": "/ref", "topics/control": "/control/takeoff"},
         **{"topics/in_flight": "/in_flight", "topics/state": "/state"},
-        **{"hover/x": 0.0, "hover/y": 0.0, "hover/z": HEIGHT, "landing/descent_speed": 0.2},
+        **{"hover/x": 0.0, "hover/y": 0.0, "hover/z": height, "landing/descent_speed": 0.2},
     }
     control_filter = {
         **{"topics/takeoff_control": "/control/takeoff", "topics/in_flight": "/in_flight"},
@@ -94,3 +94,18 @@ def test_no_takeoff_overshoots_also_not_after_30_s_on_the_ground(example, mass_e
         land = process.call("/land", EmptyRequest())
         assert heights(process, 12.0)[-1] < 0.01
         assert land.exception(timeout=0) is None
+
+
+@pytest.mark.parametrize("height", [0.3, 1.0])
+@pytest.mark.parametrize("hover", [0.65, 30000 / 42000, 36000 / 42000, 1.3])
+def test_no_takeoff_passes_its_hover_point_whatever_thrust_the_vehicle_needs(hover, height):
+    """It hovers at this fraction of the assumed thrust: 36,000 PWM in place of 42,000 are usual."""
+    strength = min(1.0 / hover, 1.5)
+    process = launch(HARDWARE, strength * hover - 1.0, strength - 1.0, height)
+    takeoff = process.call("/takeoff", EmptyRequest())
+    course = heights(process, 12.0)
+    assert takeoff.exception(timeout=0) is None
+    assert max(course) < height + 0.15
+    assert course[-1] == pytest.approx(height, abs=0.05)
+    # It does not fall back to the ground.
+    assert min(course[course.index(max(course)) :]) > 0.6 * height

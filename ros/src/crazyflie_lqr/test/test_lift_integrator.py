@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from lift_controller import answer, launch, lifting, publish_flight_state, refer
-from std_msgs.msg import String
+from std_msgs.msg import Float64, String
 
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import ServiceError
@@ -108,3 +108,28 @@ def test_bad_gains_are_refused_and_the_old_ones_stay(process, tmp_path):
         process.reconfigure("/lqr_controller", K_file=str(gains))
     [after] = answer(process, z=0.5)
     np.testing.assert_array_equal(after, before)
+
+
+def test_a_takeoff_begins_with_the_thrust_of_hover_that_was_measured_and_it_is_forgotten():
+    process = lifting()
+    publish_flight_state(process, "taking_off")
+    process.publish("/in_flight_hover_thrust", Float64(8.0))
+    refer(process, z=1.0)
+    assert thrusts(process, 0.1) == pytest.approx([8.0])
+    publish_flight_state(process, "flying")
+    # No thrust of hover is like that.
+    process.publish("/in_flight_hover_thrust", Float64(99.0))
+    assert thrusts(process, 0.1, z=1.0)[0] < 9.0
+    publish_flight_state(process, "on_ground")
+    assert thrusts(process, 0.1) == pytest.approx([9.81 + 1.5])
+
+
+def test_gains_that_are_changed_in_flight_keep_the_thrust_of_hover():
+    process = lifting()
+    publish_flight_state(process, "flying")
+    process.publish("/in_flight_hover_thrust", Float64(8.0))
+    refer(process, z=1.0)
+    before = thrusts(process, 3.0, z=1.0)[-1]
+    process.reconfigure("/lqr_controller", **{"integrator/k/x": -0.01})
+    assert thrusts(process, 0.1, z=1.0) == pytest.approx([before], abs=0.1)
+    assert before == pytest.approx(8.0, abs=0.5)

@@ -98,6 +98,7 @@ def parameters(
                 "state": STATE,
                 "control": LQR_CONTROL,
                 "flight_status": FLIGHT_STATUS,
+                "hover_thrust": f"{IN_FLIGHT}_hover_thrust",
             },
         },
         "takeoff_server": {

@@ -219,6 +219,7 @@ class LinearFeedback:
     """
 
     def __init__(self, K: Iterable[Iterable[float]], u_ref: Iterable[float], yaw_index: int):
+        self._hover_thrust: float | None = None
         self.K = K
         self.u_ref = u_ref
         self.yaw_index = yaw_index
@@ -240,6 +241,19 @@ class LinearFeedback:
     @u_ref.setter
     def u_ref(self, u_ref: Iterable[float]) -> None:
         self._u_ref = _floats(u_ref)
+        self.hover_thrust = self._hover_thrust
+
+    @property
+    def hover_thrust(self) -> float | None:
+        """Thrust of hover measured at the takeoff, m/s^2, in place of that in `u_ref`; or None."""
+        return self._hover_thrust
+
+    @hover_thrust.setter
+    def hover_thrust(self, thrust: float | None) -> None:
+        self._hover_thrust = thrust
+        self._u_hover = [*self._u_ref]
+        if thrust is not None:
+            self._u_hover[THRUST] = thrust
 
     def control(
         self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
@@ -253,10 +267,11 @@ class LinearFeedback:
     def law(self, x: Components, x_ref: Components, time: float) -> list[float]:
         """Return the same as `control`, from floats and in floats."""
         error = heading_error(x, x_ref, self.yaw_index)
-        return linear_control(self._rows, self._u_ref, error)
+        return linear_control(self._rows, self._u_hover, error)
 
     def take_over(self, previous: Self) -> None:
         """Continue in flight where a controller with other parameters ends."""
+        self.hover_thrust = previous.hover_thrust
 
     def reset_integrator(self) -> None:
         """Stop the integration: the control is not flown, for example on the ground."""
@@ -317,7 +332,7 @@ class IntegralStateFeedback(LinearFeedback):
         self.enable_integrator()
         limit = self._climb_limit()
         self._climb = Climb(limit) if limit > 0.0 or self.height_overshoots else None
-        self._thrust = self._u_ref[THRUST]
+        self._thrust = self._u_hover[THRUST]
 
     @override
     def law(self, x: Components, x_ref: Components, time: float) -> list[float]:
@@ -325,7 +340,7 @@ class IntegralStateFeedback(LinearFeedback):
         dt = self._time_since_last(time)
         reference, climb_thrust = self._follow_climb(x, x_ref, dt)
         error = heading_error(x, reference, self.yaw_index)
-        u = linear_control(self._rows, self._u_ref, error)
+        u = linear_control(self._rows, self._u_hover, error)
         if self._integrates:
             self._integrate(error[:3], dt, u)
         u = with_integrals(u, self._integral, self._integrator_k)
@@ -337,6 +352,7 @@ class IntegralStateFeedback(LinearFeedback):
     @override
     def take_over(self, previous: Self) -> None:
         """Take over the integral such that ``k I`` does not jump, as far as the limits allow."""
+        super().take_over(previous)
         for axis, (before, now) in enumerate(
             zip(previous._integrator_k, self._integrator_k, strict=True)
         ):
@@ -373,7 +389,7 @@ class IntegralStateFeedback(LinearFeedback):
         climb = self._climb
         if climb is None:
             return x_ref, 0.0
-        climb.advance(dt, x[2], x[5], x_ref[2], self._thrust - self._u_ref[THRUST])
+        climb.advance(dt, x[2], x[5], x_ref[2], self._thrust - self._u_hover[THRUST])
         k, limit = self._integrator_k[2], self._integrator_limit[2]
         if climb.disturbance != 0.0 and k != 0.0:
             self._integral[2] = clip(-climb.disturbance / k, -limit, limit)

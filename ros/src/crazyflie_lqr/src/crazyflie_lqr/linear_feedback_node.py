@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from std_msgs.msg import Float64
 from typing_extensions import override
 
 from crazyflie_lqr.gain_file import CONTROL_FILE, MatrixFile
 from crazyflie_lqr.linear_feedback import GroundGuess, LinearFeedback, at_rest
 from crazyflie_lqr.reference import GuardedReference, StateAge
-from crazyflie_model.limits import HOLD_LIMIT, MAX_SPEED
+from crazyflie_model.limits import HOLD_LIMIT, MAX_SPEED, MAX_THRUST, MIN_THRUST
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter, topic
 from crazyflie_utils.flight_status import FlightTopics
@@ -70,6 +71,11 @@ class LinearFeedbackParameters(Parameters):
         None,
     )
     flight: FlightTopics = group(FlightTopics, "topics")
+    hover_thrust_topic: str = topic(
+        "hover_thrust",
+        "thrust of hover that the takeoff server has measured",
+        "in_flight_hover_thrust",
+    )
     max_jump: float = parameter(
         Number("m", above=0.0),
         "largest distance of a new reference from the vehicle; a further one is moved nearer",
@@ -158,6 +164,7 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             parameters.descent_topic, self.reference_type, self._on_descent, finite="state"
         )
         parameters.flight.subscribe(handle, self._on_flight_status)
+        handle.subscribe(parameters.hover_thrust_topic, Float64, self._on_hover_thrust)
         handle.subscribe(parameters.state_topic, self.state_type, self._on_state, finite="state")
 
     def _reconfigure(self, parameters):
@@ -206,6 +213,13 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
         else:
             self._is_flown = False
             self._controller.reset_integrator()
+            if status.state == FlightStatus.ON_GROUND:
+                # The battery, or the load, may be changed.
+                self._controller.hover_thrust = None
+
+    def _on_hover_thrust(self, message):
+        if MIN_THRUST <= message.data <= MAX_THRUST:
+            self._controller.hover_thrust = message.data
 
     def _take_off(self):
         if not self._is_flown:

@@ -79,9 +79,9 @@ class MeasuredPosition:
             self._gap, self._gap_end = gap, time
         self._position, self._received, self._age = position, time, age
 
-    def value(self, time: float) -> Position | None:
-        """Return the position, m; None when it is older than `MAX_POSITION_AGE` at ``time``."""
-        is_known = self._silence(time) + self._age < MAX_POSITION_AGE
+    def value(self, time: float, max_age: float = MAX_POSITION_AGE) -> Position | None:
+        """Return the position, m; None when it is older than ``max_age`` (s) at ``time``."""
+        is_known = self._silence(time) + self._age < max_age
         return self._position if is_known else None
 
     def explanation(self, time: float, topic: str) -> str:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from crazyflie_model.units import GRAVITY
+from crazyflie_takeoff.lift_off import LiftOff, has_lifted_off
 from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Position
 from crazyflie_takeoff.transition_table import FlightState, Table, Transition, find, step
 from crazyflie_utils.refusal import RefusalError
 
-LIFT_OFF_THRUST = GRAVITY + 0.2  #: Thrust of the open-loop part of a takeoff (m/s^2).
 #: Time after which a vehicle that is still on the ground is unable to fly (s).
 LIFT_OFF_TIME = 3.0
 RAMP_DURATION = 1.0  #: Duration of the thrust ramp of a landing; zero thrust follows (s).
@@ -55,6 +55,7 @@ class ServerState(enum.Enum):
     RECOVERING = 1, None  # Sends nothing until it knows the state of the flight.
     ON_GROUND = 2, FlightState.ON_GROUND  # Repeats zero thrust.
     LIFTING_OFF = 3, FlightState.TAKING_OFF  # Sends the open-loop thrust.
+    LIFTED = 10, FlightState.TAKING_OFF  # Climbs slowly, and measures the thrust of hover.
     CLIMBING = 4, FlightState.TAKING_OFF  # The controller flies to the hover point.
     FLYING = 5, FlightState.FLYING
     DESCENDING = 6, FlightState.DESCENDING  # Sends references that sink.
@@ -154,6 +155,7 @@ class Output:
 
     thrust: float | None = None  # Takeoff control with level attitude (m/s^2).
     reference: tuple[float, ...] | None = None  # x, y, z (m) and x_dot, y_dot, z_dot (m/s).
+    hover_thrust: float | None = None  # The thrust of hover that was measured (m/s^2).
     toggle: bool = False  # Whether in_flight changes.
 
 
@@ -168,6 +170,7 @@ class FlightStateMachine:
         self.ground_is_known = True  # False where the vehicle has sunk further.
         self.time = -math.inf  # Time of the last tick (s).
         self.measured: Position | None = None  # Present position (m); None if it is not known.
+        self.z_dot: float | None = None  # Present vertical speed (m/s); None if it is not known.
         self.reference: tuple[float, ...] | None = None  # See `Output`.
         # The last known position, in a descent also by dead reckoning.
         self._position: Position | None = None
@@ -181,6 +184,8 @@ class FlightStateMachine:
         self.descent_end = math.inf  # Latest end of a descent, s after it began.
         self.ramp_height: float | None = None  # First height measured in the ramp of a landing (m).
         self.zero_sent = -math.inf  # When zero thrust was sent last (s).
+        self.lift_off = LiftOff()
+        self.hover_thrust: float | None = None  # See `Output`.
 
     @property
     def flight_state(self) -> FlightState | None:
@@ -229,23 +234,32 @@ class FlightStateMachine:
             self.descent_end = self.elapsed + duration
             self.descent = None
 
-    def tick(self, time: float, position: Position | None = None) -> Output:
-        """Advance to ``time`` (s); ``position`` is the measured one, None if unknown."""
+    def tick(
+        self, time: float, position: Position | None = None, z_dot: float | None = None
+    ) -> Output:
+        """Advance to ``time`` (s); position and vertical speed (m/s) are measured, or None."""
+        step = max(time - self.time, 0.0) if self.begun is not None else 0.0
         self._follow_clock(time)
         is_seen_again = position is not None and self.measured is None
-        self.measured, self.reference = position, None
+        self.measured, self.z_dot, self.reference = position, z_dot, None
+        self.hover_thrust = None
+        if self.state in (ServerState.LIFTING_OFF, ServerState.LIFTED):
+            self.lift_off.measure(step, self.z_dot)
         if position is not None:
             self._measure(position)
         if self.state is ServerState.DESCENDING:
             self._plan_descent(is_seen_again)
         while self.accepts(ServerEvent.TICK):
             self.handle(ServerEvent.TICK)
+        if self.state is ServerState.LIFTED:
+            self.lift_off.climb(self._distance() or 0.0, self.z_dot)
         if self.descent is not None:
             self.reference = self.descent.reference(self.elapsed)
             if position is None:
                 self._position = self.reference[:3]
         was_in_flight, self._in_flight = self._in_flight, self._is_in_flight()
-        return Output(self._thrust(), self.reference, self._in_flight != was_in_flight)
+        toggle = self._in_flight != was_in_flight
+        return Output(self._thrust(), self.reference, self.hover_thrust, toggle)
 
     def _is_in_flight(self):
         return self.flight_state is not None and self.flight_state.in_flight
@@ -258,6 +272,10 @@ class FlightStateMachine:
             self.ramp_height = position[2]
         elif self.descent is not None:
             self.descent.measure(self.elapsed, position[2])
+
+    def _distance(self):
+        """Return the height of the hover point above the vehicle, m, or None."""
+        return None if self.measured is None else self.plan.hover[2] - self.measured[2]
 
     def _plan_descent(self, is_seen_again):
         position, elapsed = self._position, self.elapsed
@@ -272,8 +290,11 @@ class FlightStateMachine:
         self.descent = Descent(elapsed, position, self.ground, speed)
 
     def _thrust(self):
-        if self.state is ServerState.LIFTING_OFF:
-            return LIFT_OFF_THRUST
+        if self.state in (ServerState.LIFTING_OFF, ServerState.LIFTED):
+            return self.lift_off.thrust
+        if self.hover_thrust is not None:
+            # The filter repeats it until the controller has the vehicle.
+            return self.hover_thrust
         if self.state is ServerState.RAMPING_DOWN and self.begun is not None:
             return GRAVITY - RAMP_RATE * self.elapsed
         if self.state not in (ServerState.ON_GROUND, ServerState.TOUCHING_DOWN):
@@ -305,6 +326,10 @@ class FlightStateMachine:
     def _send_hover_point(self):
         self.reference = (*self.plan.hover, 0.0, 0.0, 0.0)
 
+    def _send_hover_point_and_thrust(self):
+        self._send_hover_point()
+        self.hover_thrust = self.lift_off.hover
+
     # Guards.
 
     def _filter_sinks(self):
@@ -332,6 +357,10 @@ class FlightStateMachine:
 
     def _landings_have_a_descent(self):
         return self.plan.descent_speed > 0.0
+
+    def _lifted_off(self):
+        distance, z_dot = self._distance(), self.z_dot
+        return distance is not None and z_dot is not None and has_lifted_off(distance, z_dot)
 
     def _open_loop_over(self):
         return self.elapsed + ROUNDING >= self.plan.open_loop
@@ -365,7 +394,7 @@ class FlightStateMachine:
 
 
 _S, _E, _M = ServerState, ServerEvent, FlightStateMachine
-_TAKEOFF = (_S.LIFTING_OFF, _S.CLIMBING)
+_TAKEOFF = (_S.LIFTING_OFF, _S.LIFTED, _S.CLIMBING)
 _AIRBORNE_OR_LANDING = (_S.FLYING, _S.DESCENDING, _S.RAMPING_DOWN, _S.TOUCHING_DOWN)
 
 TABLE: Table[ServerState, FlightStateMachine] = (
@@ -383,6 +412,10 @@ TABLE: Table[ServerState, FlightStateMachine] = (
     Transition(_S.RECOVERING, _E.RECOVER, None, _S.FLYING),
     Transition(_S.ON_GROUND, _E.TAKEOFF, None, _S.LIFTING_OFF, _M._begin),
     Transition(_S.LIFTING_OFF, _E.TICK, _M._open_loop_over, _S.CLIMBING, _M._send_hover_point),
+    Transition(_S.LIFTING_OFF, _E.TICK, _M._lifted_off, _S.LIFTED),
+    Transition(
+        _S.LIFTED, _E.TICK, _M._open_loop_over, _S.CLIMBING, _M._send_hover_point_and_thrust
+    ),
     Transition(_S.CLIMBING, _E.TICK, _M._takeoff_over_but_still_down, _S.RAMPING_DOWN, _M._begin),
     Transition(_S.CLIMBING, _E.TICK, _M._takeoff_over, _S.FLYING),
     *(

@@ -52,6 +52,7 @@ class TakeoffServerParameters(FlightTopicParameters):
         None,
     )
     own_flight_state_topic: str | None = named_after("in_flight", "_state", "flight_state")
+    own_hover_thrust_topic: str | None = named_after("in_flight", "_hover_thrust")
     own_status_topic: str | None = named_after("in_flight", "_status")
     state_topic: str | None = topic(
         "state", "states of the vehicle; without them its position is unknown", None
@@ -106,6 +107,7 @@ class TakeoffServerParameters(FlightTopicParameters):
     )
 
     descent_topic = derived_topic("descent", "reference", "_descent")
+    hover_thrust_topic = derived_topic("hover_thrust", "in_flight", "_hover_thrust")
     flight_state_topic = derived_topic("flight_state", "in_flight", "_state")
     status_topic = derived_topic("status", "in_flight", "_status")
 

@@ -3,7 +3,7 @@
 from concurrent.futures import Future
 
 from diagnostic_msgs.msg import DiagnosticArray
-from std_msgs.msg import Bool, Empty, Float32, String
+from std_msgs.msg import Bool, Empty, Float32, Float64, String
 from std_srvs.srv import Empty as EmptyService
 from typing_extensions import override
 
@@ -17,6 +17,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_takeoff import flight_topics
+from crazyflie_takeoff.motion import MAX_FEEDBACK_AGE
 from crazyflie_takeoff.server_table import (
     NO_FILTER,
     REFUSALS,
@@ -87,6 +88,7 @@ class TakeoffServerNode(Node):
         self._published_text = ""
         self._logged_word = self._logged_reason = ""
         self._positioning_since = 0.0
+        self._z_dot = 0.0  # Vertical speed of the last state (m/s).
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -108,6 +110,7 @@ class TakeoffServerNode(Node):
             parameters.reference_topic, PositionVelocityStateStamped, latch=True
         )
         self._descent = handle.publisher(parameters.descent_topic, PositionVelocityStateStamped)
+        self._hover_thrust = handle.publisher(parameters.hover_thrust_topic, Float64, latch=True)
         self._in_flight = handle.publisher(parameters.in_flight_topic, Empty)
         self._state_topic = handle.publisher(parameters.flight_state_topic, String, latch=True)
         self._status = handle.publisher(parameters.flight_status_topic, FlightStatus, latch=True)
@@ -268,6 +271,7 @@ class TakeoffServerNode(Node):
         state = message.state
         age = self._handle.age(message.header.stamp)
         self._checks.position.measure(self._handle.time(), (state.x, state.y, state.z), age)
+        self._z_dot = state.z_dot
 
     def _on_missing_state(self, message):
         self._checks.position.missing_reason = message.data
@@ -324,7 +328,9 @@ class TakeoffServerNode(Node):
             self._reason = reason
 
     def _tick(self, before):
-        output = self._flight.tick(self._handle.time(), self._measured_position())
+        now, position = self._handle.time(), self._checks.position
+        is_fresh = position.value(now, MAX_FEEDBACK_AGE) is not None
+        output = self._flight.tick(now, position.value(now), self._z_dot if is_fresh else None)
         state = self._flight.flight_state
         if before is FlightState.TAKING_OFF and state is FlightState.LANDING:
             self._reason = "the vehicle has not lifted off"
@@ -333,6 +339,8 @@ class TakeoffServerNode(Node):
             self._publish_state(state)
         if output.toggle:
             self._in_flight.publish(Empty())
+        if output.hover_thrust is not None:
+            self._hover_thrust.publish(Float64(output.hover_thrust))
         if output.reference is not None:
             reference = from_vector(PositionVelocityState, output.reference)
             message = stamped(PositionVelocityStateStamped, self._handle.stamp(), state=reference)

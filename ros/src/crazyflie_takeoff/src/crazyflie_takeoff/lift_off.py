@@ -1,0 +1,63 @@
+"""The liftoff of a vehicle whose thrust of hover is not known.
+
+Speeds are in m/s, z up; thrusts in m/s^2, mass-normalised for a vehicle that hovers at g.
+"""
+
+from crazyflie_model.units import GRAVITY
+from crazyflie_takeoff.safe_control import MAX_BRAKING, MAX_CORRECTION, SETTLING, limited
+
+LIFT_OFF_THRUST = GRAVITY + 0.2  #: Thrust of the open-loop part of a takeoff (m/s^2).
+#: Speed of a vehicle that has lifted off (m/s). One that hovers at g reaches it after 1 s of
+#: `LIFT_OFF_THRUST`; one that hovers at 0.65 g, after 0.04 s.
+LIFT_OFF_SPEED = 0.2
+CLIMB_SPEED = 0.1  #: Largest speed of the climb that follows (m/s).
+CLIMB_GAIN = 2.0  #: That speed over the distance from the hover point (1/s).
+AVERAGING = 0.2  #: Time constant of the means of thrust and speed (s).
+LAG = 0.1  #: Time by which motors and estimator make a speed later than its thrust (s).
+HOVER_RANGE = 0.4  #: Largest deviation of the thrust of hover from g, as a fraction.
+
+
+class LiftOff:
+    """Thrust of a takeoff until the controller has the vehicle, and the thrust of hover.
+
+    A vehicle that hovers at the thrust h accelerates with (thrust / h - 1) g. So h is g times the
+    mean thrust over g plus the mean acceleration, both filtered with the same time constant.
+    """
+
+    def __init__(self) -> None:
+        self.thrust = LIFT_OFF_THRUST  #: The thrust to send, m/s^2.
+        self._delayed = self._mean = LIFT_OFF_THRUST
+        self._speed: float | None = None
+        self._acceleration = 0.0
+
+    @property
+    def hover(self) -> float:
+        """The thrust of hover, m/s^2, within `HOVER_RANGE` of g."""
+        weight = max(GRAVITY + self._acceleration, 0.5 * GRAVITY)
+        return limited(GRAVITY * self._mean / weight, HOVER_RANGE * GRAVITY, GRAVITY)
+
+    def measure(self, step: float, z_dot: float | None) -> None:
+        """Process the vertical speed after ``step`` s with `thrust`; None if it is not known."""
+        self._delayed += step / (LAG + step) * (self.thrust - self._delayed)
+        share = step / (AVERAGING + step)
+        self._mean += share * (self._delayed - self._mean)
+        if z_dot is None:
+            self._speed, self._acceleration = None, 0.0
+            return
+        speed = z_dot if self._speed is None else self._speed + share * (z_dot - self._speed)
+        self._speed, self._acceleration = speed, (z_dot - speed) / AVERAGING
+
+    def climb(self, distance: float, z_dot: float | None) -> None:
+        """Choose the thrust of a vehicle below the hover point (``distance``, m).
+
+        While its speed is not known, that is the thrust of hover.
+        """
+        self.thrust = self.hover
+        if z_dot is not None:
+            correction = (limited(CLIMB_GAIN * distance, CLIMB_SPEED) - z_dot) / SETTLING
+            self.thrust += min(max(correction, -MAX_BRAKING), MAX_CORRECTION)
+
+
+def has_lifted_off(distance: float, z_dot: float) -> bool:
+    """Whether a vehicle has lifted off, or must brake for the hover point (``distance``, m)."""
+    return z_dot > LIFT_OFF_SPEED or distance < 0.5 * max(z_dot, 0.0) ** 2 / MAX_BRAKING

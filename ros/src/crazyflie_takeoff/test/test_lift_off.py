@@ -1,0 +1,89 @@
+"""A takeoff of vehicles that hover at less, or more, thrust than assumed."""
+
+import pytest
+from flight_words import states, thrusts
+from takeoff_helpers import GRAVITY, SERVER, HoverNetwork
+
+from crazyflie_takeoff.lift_off import CLIMB_SPEED, HOVER_RANGE, LIFT_OFF_THRUST, LiftOff
+
+
+def scaled(hover, server=SERVER):
+    """Return a network with a vehicle that hovers at a fraction of the assumed thrust."""
+    network = HoverNetwork(server)
+    command = network.vehicle.command
+    network.vehicle.command = lambda thrust: command(thrust / hover)
+    network.advance(0.5)
+    return network
+
+
+def take_off(network, duration):
+    """Take off; return the greatest height and speed until then (m, m/s)."""
+    network.call("/takeoff")
+    highest = fastest = 0.0
+    for _ in range(round(duration / 0.01)):
+        network.advance(0.01)
+        highest = max(highest, network.vehicle.z)
+        fastest = max(fastest, network.vehicle.z_dot)
+    return highest, fastest
+
+
+def measured(network):
+    return [message.data for _, message in network.on("/in_flight_hover_thrust")]
+
+
+@pytest.mark.parametrize("hover", [0.65, 0.75, 0.86, 0.95])
+def test_the_open_loop_ends_when_the_vehicle_has_lifted_off(hover):
+    network = scaled(hover, {**SERVER, "hover/z": 0.3})
+    highest, fastest = take_off(network, 1.5)
+    assert highest < 0.45
+    assert fastest < 0.7
+    assert states(network)[-1] == "taking_off"
+    assert network.on("/ref")[0][0] == pytest.approx(network.time - 0.5, abs=0.03)
+    assert measured(network) == [pytest.approx(hover * GRAVITY, rel=0.06)]
+    # Until the controller is selected, it is repeated.
+    begin = network.on("/ref")[0][0]
+    repeated = thrusts(network, begin + 0.02)
+    assert len(repeated) > 40
+    assert repeated == pytest.approx([measured(network)[0]] * len(repeated), abs=0.01)
+
+
+@pytest.mark.parametrize("hover", [1.0, 1.1, 1.3])
+def test_an_open_loop_without_a_liftoff_is_as_long_as_it_is_said_to_be(hover):
+    network = scaled(hover)
+    begin = network.time
+    take_off(network, 1.3)
+    sent = [m.control.thrust for t, m in network.on("/control/takeoff", begin) if t < begin + 0.98]
+    assert set(sent[1:]) == {LIFT_OFF_THRUST}
+    assert measured(network) == []
+
+
+def test_a_hover_point_that_is_near_ends_the_open_loop():
+    network = scaled(0.97, {**SERVER, "hover/z": 0.05})
+    assert take_off(network, 1.5)[0] < 0.15
+
+
+def test_a_vehicle_that_is_not_seen_any_more_is_kept_at_the_thrust_of_hover():
+    network = scaled(0.8)
+    take_off(network, 0.5)
+    network.vehicle_node.sees = False
+    network.advance(0.45)
+    thrust = network.last_of("server", "/control/takeoff").control.thrust
+    assert thrust == pytest.approx(0.8 * GRAVITY, rel=0.15)
+
+
+@pytest.mark.parametrize("hover", [0.65, 1.0, 1.3])
+def test_the_thrust_of_hover_is_that_with_which_the_vehicle_does_not_accelerate(hover):
+    lift, speed = LiftOff(), 0.2
+    for _ in range(300):
+        lift.climb(1.0, speed)
+        speed += 0.01 * (lift.thrust / hover - GRAVITY)
+        lift.measure(0.01, speed)
+    assert lift.hover == pytest.approx(hover * GRAVITY, rel=0.01)
+    assert speed == pytest.approx(CLIMB_SPEED, abs=0.02)
+
+
+def test_no_measurement_leads_beyond_the_range():
+    lift = LiftOff()
+    for speed in (0.2, 5.0, 50.0, -50.0, None, 3.0):
+        lift.measure(0.01, speed)
+        assert abs(lift.hover / GRAVITY - 1.0) < HOVER_RANGE + 1e-9

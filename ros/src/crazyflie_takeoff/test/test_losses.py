@@ -221,3 +221,19 @@ def test_who_was_stopped_has_not_waited():
     flight.run(1.0)
     assert flight.filter.state is FilterState.PASSING
     assert max(flight.flown) < G + 0.1
+
+
+@pytest.mark.parametrize(("seen", "share"), [(0.5, 0.1), (0.5, 0.15), (1.0, 0.15), (1.0, 0.2)])
+def test_a_blind_hold_uses_the_last_motion_where_the_thrust_of_hover_is_not_learned_yet(
+    seen, share
+):
+    """It has dropped a load; before the mean of the last seconds is right, poses are lost."""
+    flight = Flight(1.0).run(8.0)
+    flight.hover *= 1.0 - share
+    flight.run(seen).lose()
+    top = 0.0
+    while flight.filter.state is not FilterState.DOWN:
+        flight.run(0.01)
+        top = max(top, flight.vehicle.z)
+    assert top < 1.35
+    assert flight.vehicle.z == 0.0

@@ -487,7 +487,9 @@ class FilterMachine(Generic[Control]):
         if before is FilterState.PASSING:
             # States stop before controls do, so the last state is used.
             relay, motion = self.relay, self._measured.within(LAST_STATE)
-            self._safe = SafeControl(relay.hover, motion, self._measured.age, relay.passed)
+            self._safe = SafeControl(
+                relay.hover, motion, self._measured.age, relay.passed, relay.blind_hover
+            )
             self._ground.begin_descent()
         return True
 

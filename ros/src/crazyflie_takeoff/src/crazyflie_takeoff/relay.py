@@ -14,7 +14,13 @@ from crazyflie_takeoff.limits import (
     Walls,
 )
 from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Ground, Measurement, Motion
-from crazyflie_takeoff.safe_control import MOTORS_OFF, HoverThrust, SafeSetpoint
+from crazyflie_takeoff.safe_control import (
+    LAST_AVERAGING,
+    LAST_DIFFERENCE,
+    MOTORS_OFF,
+    HoverThrust,
+    SafeSetpoint,
+)
 
 LEARNING_STEP = 0.2  #: Longest time between controls from which hover is learned (s).
 HANDOVER = 3  #: Most changes between publishers in a handover from one controller to another.
@@ -41,7 +47,7 @@ class Relay:
         self.commanded_callers = Callers("commanded controls", HANDOVER)
         self._limits = limits
         self._hold = hold
-        self._hover = HoverThrust()
+        self._hover, self._last_hover = HoverThrust(), HoverThrust(LAST_AVERAGING)
         self._climb = ClimbLimit(limits.climb)
         self._descent = DescentWatch()
         self._position_complaint = ""
@@ -59,6 +65,12 @@ class Relay:
     def hover(self) -> float:
         """Thrust of hover that was learned in flight, m/s^2."""
         return self._hover.value
+
+    @property
+    def blind_hover(self) -> float:
+        """The same for a vehicle without a state: by its last motion, if that is less, m/s^2."""
+        hover, last = self.hover, self._last_hover.value
+        return last if last < (1.0 - LAST_DIFFERENCE) * hover else hover
 
     @property
     def passed(self) -> SafeSetpoint:
@@ -208,10 +220,11 @@ class Relay:
     def _learn(self, step, lift):
         motion = self.measured.fresh
         speed = None if motion is None else motion.velocity[2]
-        if 0.0 < step < LEARNING_STEP:
-            self._hover.update(step, lift, speed)
-        elif step >= LEARNING_STEP:
-            self._hover.skip(speed)
+        for hover in (self._hover, self._last_hover):
+            if 0.0 < step < LEARNING_STEP:
+                hover.update(step, lift, speed)
+            elif step >= LEARNING_STEP:
+                hover.skip(speed)
 
     def _allowed(self, setpoint, lowest, lands, is_ramp=False):
         motion, hover = self.measured.fresh, self.hover

@@ -21,6 +21,11 @@ LONGEST_STEP = 0.05
 
 HOVER_RANGE = 0.25  #: Largest deviation of the thrust of hover from g, as a fraction.
 AVERAGING = 2.0  #: Time constant of the mean of the commanded thrust (s).
+#: The same for the thrust of hover while no state comes: a load may just have been dropped (s).
+LAST_AVERAGING = 0.2
+#: The latter counts if it is smaller by more than this fraction, three times its noise with a
+#: speed that is known to within 0.02 m/s.
+LAST_DIFFERENCE = 0.03
 
 #: Decrease of the target of z_dot in a descent, and from the start while no state comes (m/s^2).
 #: Without a state, the thrust is this much below hover, which may have been learned 2 % too high;
@@ -70,11 +75,12 @@ class HoverThrust:
     """The thrust at which a vehicle hovers: a running mean of the thrust commanded in flight.
 
     Both the vertical part of the thrust and the vertical speed v are filtered with the time
-    constant T (`AVERAGING`). As (v - mean v) / T is the filtered acceleration, subtracting it
+    constant T (``averaging``, s). As (v - mean v) / T is the filtered acceleration, subtracting it
     leaves the thrust that carries the weight, also while the vehicle climbs or has just stopped.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, averaging: float = AVERAGING) -> None:
+        self._averaging = averaging
         self._thrust = GRAVITY
         self._speed: float | None = None
         self._acceleration = 0.0
@@ -89,13 +95,13 @@ class HoverThrust:
 
         ``speed`` is the measured z_dot, m/s, or None.
         """
-        share = step / (AVERAGING + step)
+        share = step / (self._averaging + step)
         self._thrust += share * (lift - self._thrust)
         if speed is None:
             self._speed, self._acceleration = None, 0.0
             return
         mean = speed if self._speed is None else self._speed + share * (speed - self._speed)
-        self._speed, self._acceleration = mean, (speed - mean) / AVERAGING
+        self._speed, self._acceleration = mean, (speed - mean) / self._averaging
 
     def skip(self, speed: float | None) -> None:
         """Skip a time in which it is not known which thrust has flown the vehicle.
@@ -103,14 +109,14 @@ class HoverThrust:
         ``speed`` is the z_dot measured after it, m/s, or None.
         """
         # What has changed the speed meanwhile is not in the mean of the thrust.
-        self._speed = None if speed is None else speed - AVERAGING * self._acceleration
+        self._speed = None if speed is None else speed - self._averaging * self._acceleration
 
 
 class SafeControl:
     """Hover at a position, and descent, without a controller.
 
-    ``hover`` is the thrust of hover, m/s^2; ``motion``, if it is known, was measured ``age`` s ago,
-    and ``control`` has been flown since.
+    ``hover`` is the thrust of hover, m/s^2, and ``blind_hover`` that while no state comes;
+    ``motion``, if it is known, was measured ``age`` s ago, and ``control`` has been flown since.
     """
 
     def __init__(
@@ -119,8 +125,9 @@ class SafeControl:
         motion: Motion | None,
         age: float = 0.0,
         control: SafeSetpoint = MOTORS_OFF,
+        blind_hover: float | None = None,
     ):
-        self._hover = hover
+        self._hover, self._blind_hover = hover, hover if blind_hover is None else blind_hover
         self._control = control
         self._velocity = (0.0, 0.0, 0.0) if motion is None else motion.velocity
         self._yaw = 0.0 if motion is None else motion.yaw
@@ -143,6 +150,8 @@ class SafeControl:
         whether the vehicle is to come down.
         """
         self._reckon(step)
+        if measured is None:
+            self._hover = self._blind_hover
         offset = self._offset(measured)
         if sinks or measured is None:
             lowest = -math.inf if measured is None else -SINK_SPEED

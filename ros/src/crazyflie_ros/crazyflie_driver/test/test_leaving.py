@@ -164,13 +164,14 @@ def test_a_link_that_is_lost_during_a_removal_is_a_removal_without_one(server, v
 
 
 def test_a_stream_that_ends_at_rest_is_handed_over(server, vehicle):
-    for pwm, ends in ((1000.0, 0), (0.0, 1)):
+    """Over UDP the notice is repeated until the vehicle would be locked."""
+    for pwm, ends in ((1000.0, 0), (0.0, 3)):
         vehicle.received.clear()
         thrust(server, pwm)
         vehicle.wait_for_packets(3, 0)
         server.process.advance(0.4)
         assert vehicle.packets(7, 1) == []
-        server.process.advance(1.0)
+        server.process.advance(3.0)
         vehicle.wait_for_packets(15, 0, 2)
         assert len(vehicle.packets(7, 1)) == ends
 

@@ -137,6 +137,25 @@ def test_a_streamed_flight_survives_a_second_of_silence(flight):
     assert flight.crazyflie.connection_count == 1
 
 
+def test_a_notice_after_zero_thrust_that_is_lost_locks_nothing(flight, monkeypatch):
+    flight.hover_on_thrust(0.3, 1.5)
+    setpoints = flight.crazyflie.setpoints
+    send, lost = setpoints.notify_setpoints_stop, []
+
+    def lose_first(*arguments):
+        # UDP does not acknowledge it.
+        if lost:
+            send(*arguments)
+        else:
+            lost.append(arguments)
+
+    monkeypatch.setattr(setpoints, "notify_setpoints_stop", lose_first)
+    flight.server.process.publish("/cf1/cmd_vel", Twist())
+    flight.run(LOCK_TIME)
+    assert len(lost) == 1
+    assert SupervisorState.LOCKED not in flight.seen_by_another()
+
+
 @pytest.mark.parametrize("gap", [1.0, 2.4])
 def test_a_stream_of_thrust_that_pauses_flies_on(flight, gap):
     """Such as while the filter or the converter is started again, on a busy machine."""

@@ -21,6 +21,7 @@ class Control(enum.Enum):
     """Kind of a command."""
 
     HIGH_LEVEL = enum.auto()  #: Or the notice that setpoints stop.
+    ENDED = enum.auto()  #: The same notice, after zero thrust.
     ZERO_THRUST = enum.auto()
     THRUST = enum.auto()
     REFERENCE = enum.auto()

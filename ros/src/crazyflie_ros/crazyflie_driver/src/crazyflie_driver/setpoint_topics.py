@@ -142,6 +142,7 @@ class SetpointTopics:
     _commanded_yaw: float | None = None
     _fade: ThrustFade = field(default_factory=ThrustFade)
     _faded_time: float = -math.inf
+    _end_time: float = -math.inf  # Of the latest notice after zero thrust, s.
 
     def subscribe(self) -> None:
         """Subscribe to all topics."""
@@ -161,7 +162,7 @@ class SetpointTopics:
     @property
     def is_streaming(self) -> bool:
         """Whether setpoints were sent since the last notice that they stop."""
-        return self.control is not Control.HIGH_LEVEL
+        return self.control not in (Control.HIGH_LEVEL, Control.ENDED)
 
     @property
     def may_have_priority(self) -> bool:
@@ -170,9 +171,12 @@ class SetpointTopics:
         UDP alone does not acknowledge the notice that they stop, which may have been lost; the
         vehicle locks itself once the last setpoint is as old as that.
         """
+        return self.is_streaming or self._may_have_lost_notice
+
+    @property
+    def _may_have_lost_notice(self):
         may_lose = self._vehicle.crazyflie.address.scheme == "udp"
-        is_recent = self._vehicle.handle.time() - self.last_time < OFF_AGE
-        return self.is_streaming or (may_lose and is_recent)
+        return may_lose and self._vehicle.handle.time() - self.last_time < OFF_AGE
 
     @property
     def runs_motors(self) -> bool:
@@ -346,8 +350,18 @@ class SetpointTopics:
         with contextlib.suppress(CrazyflieError):
             if self.control is Control.ZERO_THRUST and now - self.last_time > _REST:
                 self.notify_setpoints_stop()
+                self.control, self._end_time = Control.ENDED, now
+            elif self.control is Control.ENDED and self._may_have_lost_notice:
+                self._repeat_notice(now)
             elif self.control is Control.THRUST and self._log.is_flying:
                 self._send_fading(now)
+
+    def _repeat_notice(self, now):
+        # A vehicle that has lost it would be locked.
+        with self._vehicle.gate.repeating(now) as refusal:
+            if not refusal and now - self._end_time >= _REST:
+                self._vehicle.crazyflie.setpoints.notify_setpoints_stop()
+                self._end_time = now
 
     def _send_fading(self, now):
         thrust = self._fade.thrust(now)

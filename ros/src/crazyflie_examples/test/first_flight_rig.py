@@ -4,6 +4,7 @@ import math
 import struct
 from collections import deque
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import rospkg
 from geometry_msgs.msg import Quaternion as QuaternionMessage
@@ -15,8 +16,11 @@ from tf2_msgs.msg import TFMessage
 from crazyflie_doctor.vehicle import ALL_MOTORS, VehicleFacts
 from crazyflie_examples.first_flight import HEIGHT, Sample, Stop
 from crazyflie_model.angles import zyx_from_quaternion
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.main import NODE_CLASSES
+from crazyflie_utils.parameters import vehicle_model
+from crazyflie_utils.parameters.model_file import save_with_hover
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
 from crazyflie_virtual.crtp import Packet, Port
@@ -32,11 +36,16 @@ class FastRig:
     ``weak`` is the motor, 1 to 4, whose thrust is 30 % less; further ones are `VehicleSettings`.
     """
 
-    def __init__(self, measure=None, delay=0.0, weak=0, **settings):
+    def __init__(self, measure=None, delay=0.0, weak=0, taken_for=None, **settings):
         self.samples = []
         self._measure = measure or (lambda position, yaw: (position, yaw))
         self._delay = delay
-        self.vehicle = VirtualVehicle(VehicleSettings(positioning="none", **settings))
+        own = VehicleSettings(positioning="none", **settings)
+        self.vehicle = VirtualVehicle(own)
+        self._type = taken_for or own.model
+        self.model = vehicle_model.load(self._type)
+        self._folder = TemporaryDirectory()
+        self.model_file = None
         self._graph = None
         self._twist = None
         self._poses = deque()
@@ -95,7 +104,15 @@ class FastRig:
         else:
             yaw = angles[2]
         self.samples.append(
-            Sample(self.vehicle.time, *position, yaw, rate, firmware.power.voltage, motors)
+            Sample(
+                self.vehicle.time,
+                *position,
+                yaw,
+                rate,
+                firmware.power.voltage,
+                motors,
+                firmware.stabilizer.thrust,
+            )
         )
         if self._is_hidden:
             return
@@ -124,12 +141,14 @@ class FastRig:
         )
 
     def spin(self, motor, pwm):
-        override = self._firmware.stabilizer.override
+        override, supervisor = self._firmware.stabilizer.override, self._firmware.supervisor
+        self._arm()
         setattr(override, f"m{motor}", pwm)
         override.enable = 1
         self.run(1.0)
         override.enable = 0
         setattr(override, f"m{motor}", 0)
+        supervisor.arm(supervisor.auto_arm)
 
     def carry(self, x, y, z, yaw):
         hand = self.vehicle.physics.hand
@@ -141,9 +160,22 @@ class FastRig:
         assert answer[-1] == 0
 
     def driver_takeoff(self, height):
+        self._arm()
         z = self.vehicle.physics.position[2] + height
         self._command(7, "Bff?f", 0, z, 0.0, True, 2.0)
         self.run(2.0)
+
+    def _arm(self):
+        supervisor = self._firmware.supervisor
+        if supervisor.auto_arm:
+            return
+        supervisor.arm(False)
+        for _ in range(500):
+            self._tick()
+            if supervisor.flags & SupervisorState.CAN_BE_ARMED:
+                break
+        assert supervisor.arm(True)
+        self.run(0.1)
 
     def driver_turn(self, yaw):
         self._command(12, "B??5f", 0, True, False, 0.0, 0.0, 0.0, math.radians(yaw), 2.0)
@@ -155,9 +187,15 @@ class FastRig:
 
     # The hover stack.
 
+    def note_hover(self, pwm):
+        self.model_file = Path(self._folder.name) / "model.yaml"
+        save_with_hover(self.model_file, self._type, pwm)
+        return str(self.model_file)
+
     def _launch(self):
         launch = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch/hw_hover.launch"
-        _, parameters = expand(launch, composed=True, rviz=False, takeoff_hover_z=HEIGHT)
+        hover = {"takeoff_hover_z": HEIGHT, "model": self.model_file}
+        _, parameters = expand(launch, composed=True, rviz=False, **hover)
         self._graph = FakeGraph(parameters, start=1000.0)
         self._graph.listen("/crazyflie/cmd_vel", self._on_twist)
         for name, node in NODE_CLASSES(composed_nodes(parameters)).items():
@@ -176,8 +214,10 @@ class FastRig:
             raise Stop(str(error))
 
     def take_off(self):
+        self.lqr_begin = len(self.samples)
         self._launch()
         self.run(2.0)
+        self._arm()
         self._call("/takeoff")
 
     def refer(self, x, y, z):

@@ -20,8 +20,10 @@ from std_srvs.srv import Empty, EmptyRequest
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_driver.msg import GenericLogData
-from crazyflie_examples.first_flight import STEPS, Stop, fly, report
+from crazyflie_examples.first_flight import HEIGHT, STEP, STEPS, Stop, fly, report
 from crazyflie_examples.first_flight_program import FirstFlightParameters, LiveRig, main
+from crazyflie_model.units import GRAVITY
+from crazyflie_utils.parameters.vehicle_model import load
 from crazyflie_utils.testing.launch_files import expand
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch"
@@ -49,11 +51,25 @@ def flown(ask=yes, **faults):
     return list(fly(FastRig(**faults), ask))
 
 
-def test_a_good_vehicle_passes():
-    verdicts = flown()
+@pytest.mark.parametrize(
+    ("settings", "hover_pwm"),
+    [
+        ({}, 42000.0),
+        # An ordinary vehicle hovers at the firmware's base, 36,000.
+        ({"thrust_error": 42.0 / 36.0 - 1.0}, 36000.0),
+        ({"model": "brushless", "auto_arm": False}, 31600.0),
+    ],
+)
+def test_a_good_vehicle_passes(settings, hover_pwm):
+    rig = FastRig(**settings)
+    verdicts = list(fly(rig, yes))
     assert [(each.step, each.passed) for each in verdicts] == [(name, True) for name in NAMES], (
         verdicts[-1]
     )
+    # What the driver's hover took is what the converter sends for g.
+    assert load(str(rig.model_file)).pwm(GRAVITY) == pytest.approx(hover_pwm, rel=0.03)
+    assert str(rig.model_file) in verdicts[NAMES.index("hover by the driver")].text
+    assert max(sample.z for sample in rig.samples[rig.lqr_begin :]) < HEIGHT + STEP + 0.15
 
 
 @pytest.mark.parametrize(
@@ -67,6 +83,7 @@ def test_a_good_vehicle_passes():
         ({"delay": 0.12}, "poses by hand", "poses are delayed: 1[12]"),
         ({"weak": 2}, "hover by the driver", "motor 2 is commanded"),
         ({"mass_error": 45.0 / 33.0 - 1.0}, "hover by the driver", "the mass is off"),
+        ({"model": "brushless", "taken_for": "cf21"}, "hover by the driver", "choose its --model"),
         ({"battery": 0.0385}, "doctor", "V without load; normal is 3.7"),
     ],
 )

@@ -87,3 +87,13 @@ def test_what_is_saved_is_what_is_read(tmp_path):
     loaded = vehicle_model.load(str(path))
     assert (loaded.yaw_lag, loaded.roll_trim, loaded.mass) == (0.09, 0.01, 0.03)
     assert math.isclose(loaded.pwm(9.81), model.pwm(9.81))
+
+
+def test_a_hover_that_was_measured_is_that_of_the_file(tmp_path):
+    own = written(tmp_path, "type: cf21_markers\nmass: 0.035\ninertia_x: 1.5e-5\n")
+    path = tmp_path / "measured.yaml"
+    for model, pwm in ((own, 39000.0), ("brushless", 31000.0)):
+        model_file.save_with_hover(path, model, pwm)
+        measured, before = vehicle_model.load(str(path)), vehicle_model.load(model)
+        assert measured.thrust(pwm) == pytest.approx(9.81)
+        assert (measured.mass, measured.inertia_x) == (before.mass, before.inertia_x)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from crazyflie_doctor.finding import ERROR, lines
 from crazyflie_doctor.vehicle import checks
 from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
-from crazyflie_model.units import HOVER_PWM
+from crazyflie_model.units import GRAVITY
 
 Array = NDArray[np.float64]
 Rig = Any  #: A `first_flight_program.LiveRig`, or one with the same methods.
@@ -35,7 +35,8 @@ MAX_ERROR = 0.1  #: Largest distance of a hover from its mean position (m).
 MAX_OFFSET = 0.15  #: Largest distance of a hover's mean position from its goal (m).
 #: Largest relative difference of one motor's command from the mean of the four.
 MAX_IMBALANCE = 0.15
-#: Mean motor command over `HOVER_PWM`: 33 g, with a battery from full to half empty.
+#: Mean thrust command over that of the model's hover: its mass, with a battery from full to half
+#: empty.
 HOVER_RANGE = (0.8, 1.2)
 MIN_VOLTAGE = 3.2  #: Lowest voltage in flight (V).
 FULL_PWM = 65000  #: Command from which a motor is saturated (PWM).
@@ -63,6 +64,7 @@ class Sample(NamedTuple):
     gyro: float  # Yaw rate, rad/s.
     voltage: float  # V.
     motors: tuple[float, float, float, float]  # PWM.
+    thrust: float = 0.0  # Commanded for all of them (PWM).
 
 
 class Stop(Exception):  # noqa: N818
@@ -116,8 +118,12 @@ def _motors(rig, ask):
     for motor, (place, direction) in MOTORS.items():
         begin = len(rig.samples)
         rig.spin(motor, LOWEST_PWM)
+        # All brushless motors of an armed vehicle turn, with a smaller command.
         turned = {
-            i + 1 for sample in rig.samples[begin:] for i, pwm in enumerate(sample.motors) if pwm
+            i + 1
+            for sample in rig.samples[begin:]
+            for i, pwm in enumerate(sample.motors)
+            if pwm >= LOWEST_PWM
         }
         if turned != {motor}:
             raise Stop(
@@ -220,7 +226,11 @@ def pose_delay(samples: Sequence[Sample]) -> float:
     return float(shifts[np.argmin([difference(shift) for shift in shifts])])
 
 
-def _in_flight(samples, goal):
+def _hover_pwm(samples):
+    return float(np.mean([sample.thrust for sample in samples]))
+
+
+def _in_flight(samples, goal, model):
     """Check a hover; return its figures in words."""
     _, places = _columns(samples)
     motors = np.array([sample.motors for sample in samples])
@@ -233,12 +243,12 @@ def _in_flight(samples, goal):
             f"expected within {100 * MAX_IMBALANCE:.0f} %: the motor is weak, or the centre of "
             "mass is off; change its propeller, then the motor"
         )
-    load = means.mean() / HOVER_PWM
+    load = _hover_pwm(samples) / model.pwm(GRAVITY)
     if not HOVER_RANGE[0] <= load <= HOVER_RANGE[1]:
         raise Stop(
             f"the mass is off: hover takes {100 * load:.0f} % of the model's thrust, expected "
             f"{100 * HOVER_RANGE[0]:.0f} to {100 * HOVER_RANGE[1]:.0f} %: weigh the vehicle, and "
-            "choose or identify its model"
+            "choose its --model, or identify it"
         )
     voltage = min(sample.voltage for sample in samples)
     if voltage < MIN_VOLTAGE:
@@ -264,8 +274,10 @@ def _driver_hover(rig, _):
     place, _ = _rest(rig)
     rig.driver_takeoff(HEIGHT)
     rig.run(2.0)
+    samples = _since(rig, 5.0)
     # By its own estimate, the vehicle hovers near its start.
-    return _in_flight(_since(rig, 5.0), place + (0.0, 0.0, HEIGHT))
+    text = _in_flight(samples, place + (0.0, 0.0, HEIGHT), rig.model)
+    return f"{text}; {rig.note_hover(_hover_pwm(samples))}"
 
 
 def _yaw(rig, _):
@@ -277,7 +289,7 @@ def _yaw(rig, _):
         raise Stop(f"the vehicle has turned by {angle:.0f} degrees, expected {TURN:g}")
     rig.driver_turn(-TURN)
     rig.run(3.0)
-    text = _in_flight(_since(rig, 2.0), before[1:4])
+    text = _in_flight(_since(rig, 2.0), before[1:4], rig.model)
     rig.driver_land()
     return f"turns by {angle:.0f} degrees and back; {text}"
 
@@ -285,7 +297,7 @@ def _yaw(rig, _):
 def _lqr_hover(rig, _):
     rig.take_off()
     rig.run(3.0)
-    return _in_flight(_since(rig, 5.0), (0.0, 0.0, HEIGHT))
+    return _in_flight(_since(rig, 5.0), (0.0, 0.0, HEIGHT), rig.model)
 
 
 def _steps(rig, _):
@@ -294,7 +306,7 @@ def _steps(rig, _):
         for point in (goal, (0.0, 0.0, HEIGHT)):
             rig.refer(*point)
             rig.run(5.0)
-            texts.append(_in_flight(_since(rig, 1.0), point))
+            texts.append(_in_flight(_since(rig, 1.0), point, rig.model))
     return f"along all axes and back; {texts[-1]}"
 
 
@@ -309,7 +321,8 @@ def _loss(rig, _):
             f"the vehicle moves by {moved:.2f} m without poses, expected at most {MAX_LOSS_WAY:g} m"
         )
     rig.run(3.0)
-    return f"moves by {100 * moved:.0f} cm; {_in_flight(_since(rig, 1.0), (0.0, 0.0, HEIGHT))}"
+    text = _in_flight(_since(rig, 1.0), (0.0, 0.0, HEIGHT), rig.model)
+    return f"moves by {100 * moved:.0f} cm; {text}"
 
 
 def _land(rig, _):

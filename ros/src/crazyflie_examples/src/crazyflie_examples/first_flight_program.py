@@ -20,8 +20,8 @@ import genpy
 import rosgraph
 import rospkg
 from geometry_msgs.msg import Point, PoseStamped, TransformStamped
-from std_msgs.msg import Bool
-from std_srvs.srv import Empty, EmptyRequest
+from std_msgs.msg import Bool, Float32
+from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_doctor.vehicle import VehicleFacts, examine
@@ -44,11 +44,14 @@ from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.log import LogBlock
 from crazyflie_model.angles import zyx_from_quaternion
-from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_model.supervisor import SupervisorState
+from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped, VehicleStatus
 from crazyflie_utils import Parameters, ServiceError, parameter
 from crazyflie_utils.main import begin_script
+from crazyflie_utils.parameters import model_file, vehicle_model
 from crazyflie_utils.parameters.command_line import parse_arguments
 from crazyflie_utils.parameters.types import BOOLEAN, FILE, FINITE, FRAME, Text
+from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 from crazyflie_utils.vectors import stamped
 
 PREFIX = "/crazyflie"  #: Namespace of the driver.
@@ -71,6 +74,7 @@ class FirstFlightParameters(Parameters):
     mocap_frame: str = parameter(
         FRAME, "frame of the vehicle in motion capture, which must be running", "HY5/base_link"
     )
+    model: str = parameter(VEHICLE_MODEL, "type of the vehicle, or model file", "cf21")
     out: str = parameter(FILE, "folder of the report and the recording", "out/first_flight")
     yes: bool = parameter(
         BOOLEAN, "answer every question with yes: for virtual vehicles only", False
@@ -89,7 +93,11 @@ class LiveRig:
         self._uri, self._options, self._folder = uri, options, folder
         self._launched: list[subprocess.Popen[bytes]] = []
         self._signals: list[int] = []
+        self.model = vehicle_model.load(options.model)
+        self._model_file = options.model  # With the measured thrust of hover, once there is one.
         self._log: tuple[float, ...] = (0.0,) * 6
+        self._voltage = math.nan
+        self._supervisor: SupervisorState | None = None
         # Stamp of the last pose; arrival of the last log and of the last pose (s).
         self._stamp = self._log_time = self._pose_time = -math.inf
         self._hides = self._is_connected = False
@@ -110,12 +118,21 @@ class LiveRig:
         self._external = handle.publisher(f"{PREFIX}/external_pose", PoseStamped)
         self._reference = handle.publisher("/ref", PositionVelocityStateStamped)
         handle.subscribe(f"{PREFIX}/first_flight", GenericLogData, self._on_log)
+        handle.subscribe(f"{PREFIX}/battery", Float32, self._on_battery)
+        handle.subscribe(f"{PREFIX}/vehicle_status", VehicleStatus, self._on_status)
         handle.subscribe(f"{PREFIX}/connected", Bool, self._on_connected)
         handle.subscribe("/tf", TFMessage, self._on_tf)
         process.start()
 
     def _on_log(self, message):
         self._log, self._log_time = message.values, self._handle.time()
+
+    def _on_battery(self, message):
+        self._voltage = message.data
+
+    def _on_status(self, message):
+        is_known = message.has_supervisor
+        self._supervisor = SupervisorState(message.supervisor) if is_known else None
 
     def _on_connected(self, message):
         self._is_connected = message.data
@@ -128,13 +145,23 @@ class LiveRig:
     def _on_pose(self, pose):
         place, q = pose.transform.translation, pose.transform.rotation
         yaw = zyx_from_quaternion((q.x, q.y, q.z, q.w))[2]
-        m1, m2, m3, m4, gyro, voltage = self._log
+        m1, m2, m3, m4, gyro, thrust = self._log
         stamp, motors = pose.header.stamp.to_sec(), (m1, m2, m3, m4)
         # On a busy computer poses arrive together, and speeds by their arrival would be wrong.
         if stamp > self._stamp:
             self._stamp, self._pose_time = stamp, self._handle.time()
             self.samples.append(
-                Sample(stamp, place.x, place.y, place.z, yaw, math.radians(gyro), voltage, motors)
+                Sample(
+                    stamp,
+                    place.x,
+                    place.y,
+                    place.z,
+                    yaw,
+                    math.radians(gyro),
+                    self._voltage,
+                    motors,
+                    thrust,
+                )
             )
         self._tf.publish(TFMessage([TransformStamped(pose.header, _RELAYED, pose.transform)]))
         if self._options.positioning == MOCAP:
@@ -258,6 +285,7 @@ class LiveRig:
             with Crazyflie(self._uri) as vehicle:
                 write = vehicle.parameters.write
                 vehicle.add_log_block(LogBlock("motors", 100, tuple(names), note))
+                is_armed_here = self._arm(vehicle.supervisor.read, vehicle.supervisor.arm)
                 try:
                     write(f"motorPowerSet.m{motor}", pwm)
                     write("motorPowerSet.enable", 1)
@@ -265,6 +293,8 @@ class LiveRig:
                 finally:
                     write("motorPowerSet.enable", 0)
                     write(f"motorPowerSet.m{motor}", 0)
+                    if is_armed_here:
+                        vehicle.supervisor.arm(False)
         except CrazyflieError as error:
             raise Stop(str(error)) from None
 
@@ -308,6 +338,29 @@ class LiveRig:
         self._call("land", Land, request, ends_at_key=False)
         self._wait(lambda: False, 5.0, ends_at_key=False)
 
+    def note_hover(self, pwm: float) -> str:
+        """Write a model that hovers at a command (PWM), with which the LQR flies; return words."""
+        path = self._folder.resolve() / "model.yaml"
+        model_file.save_with_hover(path, self._options.model, pwm)
+        self._model_file = str(path)
+        return f"hw_hover.launch with model:={path} hovers so"
+
+    def _arm(self, read, arm):
+        """Arm a vehicle that does not arm itself, as one with brushless motors; return whether.
+
+        ``read()`` returns its `SupervisorState`; None from firmware that does not report it.
+        """
+        state = read()
+        if state is None or SupervisorState.AUTO_ARMED in state:
+            return False
+        # One that is armed since its last flight soon disarms itself.
+        arm(False)
+        known = SupervisorState.ARMED | SupervisorState.CAN_BE_ARMED
+        if not self._wait(lambda: read() & known == SupervisorState.CAN_BE_ARMED, _LIMIT):
+            raise Stop(f"the vehicle cannot be armed; it reports: {read().words()}")
+        arm(True)
+        return True
+
     def take_off(self) -> None:
         """Launch the hover stack and take off."""
         self._launch(
@@ -316,12 +369,17 @@ class LiveRig:
             f"positioning:={self._options.positioning}",
             f"pose_frame:={_RELAYED}",
             f"takeoff_hover_z:={HEIGHT}",
+            f"model:={self._model_file}",
             "rviz:=false",
             "record:=true",
             f"record_folder:={self._folder.resolve()}",
         )
         if not self._wait(lambda: "/takeoff" in self._handle.service_nodes(), _LIMIT):
             raise Stop(f"there is no service /takeoff {_LIMIT:g} s after the launch")
+        self._arm(
+            lambda: self._supervisor,
+            lambda do_arm: self._call("arm", SetBool, SetBoolRequest(do_arm)),
+        )
         self._landing = self.land
         self._call("/takeoff", Empty, EmptyRequest())
 

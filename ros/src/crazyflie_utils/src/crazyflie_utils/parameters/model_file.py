@@ -13,6 +13,7 @@ from crazyflie_model.units import GRAVITY
 from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import ListOf, Number, Text
+from crazyflie_utils.text_file import read_text
 
 #: Key of a model file below which `identify` stores the origin of its figures.
 RESULT = "identified"
@@ -117,3 +118,17 @@ def save(path: Path, type: str, model: QuadrotorParameters, result: dict[str, An
     tree[RESULT] = result
     text = yaml.safe_dump(tree, sort_keys=False)
     path.write_text(f"# Model of one vehicle, SI units.\n{text}", encoding="utf-8")
+
+
+def save_with_hover(path: Path, model: str, pwm: float) -> None:
+    """Write a type or a model file with its thrust curve scaled: it hovers at a command (PWM).
+
+    OSError: it cannot be written.
+    """
+    is_type = model in TYPES
+    figures = TYPES[model] if is_type else load(model)
+    tree: dict[str, Any] = {"type": model} if is_type else yaml.safe_load(read_text(model))
+    scale = GRAVITY / figures.thrust(pwm)
+    tree["thrust_curve"] = [scale * figures.thrust_linear, scale * figures.thrust_quadratic]
+    tree[RESULT] = {"hover_pwm": pwm}
+    path.write_text(yaml.safe_dump(tree, sort_keys=False), encoding="utf-8")

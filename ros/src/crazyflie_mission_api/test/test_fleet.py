@@ -161,6 +161,20 @@ def test_who_does_not_arrive_is_named(process, controlled, driven):
         fleet.arrive()
 
 
+@pytest.mark.parametrize("frame", [None, "world"])
+def test_a_position_outlasts_simulated_time_that_runs_ahead_of_it(process, controlled, frame):
+    driven = DriverVehicle(process, "cf2", (1.0, 0.0, 0.0), frame)
+    with Fleet(NAMES, process=process, startup_timeout=0.5) as fleet:
+        process.advance(1.0)
+        # /clock has come, and what belongs to it is on its way: at 10 times real time within 0.2 s.
+        driven.is_tracked = False
+        process.set_clock(process.clock.time() + 2.0)
+        assert fleet.position("cf2") == pytest.approx((1.0, 0.0, 0.0))
+        process.advance_machine(0.6)
+        with pytest.raises(MissionError, match="^cf2: its position is not known"):
+            fleet.position("cf2")
+
+
 @pytest.mark.parametrize(("frame", "step"), [(None, 0.0), ("world", 0.0), ("world", -3600.0)])
 def test_who_is_not_tracked_any_more_does_not_arrive(process, controlled, frame, step):
     process.clock.wall_offset = 1.7e9

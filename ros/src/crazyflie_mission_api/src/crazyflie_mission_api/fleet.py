@@ -32,6 +32,7 @@ from crazyflie_mission_api.mission_vehicle import Clock, Playback, done
 from crazyflie_mission_api.ros_vehicle import (
     ALL_OF_FLEET,
     Access,
+    PoseAgeLimit,
     RosVehicle,
     RosVehicleState,
     ServiceCommands,
@@ -148,8 +149,11 @@ class Fleet(VehicleGroup):
         self._mission = f"{_program()}_{uuid.uuid4().hex[:8]}"
         self._missions = MissionWatch(self._handle, own=self._mission)
         self._others: dict[str, RosVehicleState] = {}
+        self._max_age = PoseAgeLimit(self._handle)
         try:
-            vehicles, common = _connect(process, self._handle, chosen, startup_timeout)
+            vehicles, common = _connect(
+                process, self._handle, self._max_age, chosen, startup_timeout
+            )
             # Commands to all vehicles of a driver, if they are exactly these.
             self._driver: ServiceCommands | None = None
             if common not in (None, ALL_OF_FLEET):
@@ -314,7 +318,7 @@ class Fleet(VehicleGroup):
     def _place_of_other(self, name):
         if name not in self._others:
             access = _access(self._handle, name, flown_vehicles(self._handle.service_nodes()))
-            self._others[name] = RosVehicleState(name, self._handle, access)
+            self._others[name] = RosVehicleState(name, self._handle, access, self._max_age)
             if buffer := _buffer(self._handle, name):
                 self._buffers[name] = buffer
         vehicle = self._others[name]
@@ -362,7 +366,7 @@ def _buffer(handle, name):
     return handle.get_param(f"{prefix(name)}/{BUFFER}", Number("m", above=0.0), None)
 
 
-def _connect(process, handle, names, timeout):
+def _connect(process, handle, max_age, names, timeout):
     """Return the vehicles, and the namespace of services for all of them, if there is one."""
     end = time.monotonic() + timeout
     found: dict[str, RosVehicle] = {}
@@ -382,7 +386,7 @@ def _connect(process, handle, names, timeout):
                     raise MissionError(
                         f"{access.top} could not be started; its reason is in the log"
                     )
-            found[name] = RosVehicle(name, handle, access)
+            found[name] = RosVehicle(name, handle, access, max_age)
         missing = [prefix(name) for name in names if name not in found]
         if not missing:
             return [found[name] for name in names], common_services(services, names)

@@ -1,6 +1,7 @@
 """Vehicles of a mission by ROS services and topics."""
 
 import math
+from collections import deque
 from collections.abc import Collection, Mapping
 from concurrent.futures import Future
 from functools import partial
@@ -41,6 +42,7 @@ from crazyflie_utils.parameters.types import FINITE
 from crazyflie_utils.steps import follow
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
 
+_AGE_PERIOD = 0.1  #: Period at which the two clocks are compared (s of the machine's clock).
 _LANDED_HEIGHT = 0.1  #: Largest height above the start of a vehicle that has landed (m).
 #: States of the takeoff server after the flight.
 _ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
@@ -85,6 +87,28 @@ class Access(NamedTuple):
     has_yaw: bool  #: Whether it can have another heading than 0.
 
 
+class PoseAgeLimit:
+    """Age up to which a pose is that of its vehicle: 0.5 s of the vehicles' or the machine's clock.
+
+    Simulated time may run faster than a message arrives: /clock comes by another connection.
+    """
+
+    def __init__(self, handle: NodeHandle):
+        self._handle = handle
+        # Simulated time at the last ticks of the machine's clock, s.
+        self._times: deque[float] = deque(maxlen=round(MAX_POSITION_AGE / _AGE_PERIOD))
+        if handle.uses_sim_time:
+            handle.timer(_AGE_PERIOD, self._tick, steady=True)
+
+    def __call__(self) -> float:
+        """Return the limit, s of the vehicles' clock."""
+        moved = self._handle.time() - self._times[0] if self._times else 0.0
+        return max(MAX_POSITION_AGE, moved)
+
+    def _tick(self):
+        self._times.append(self._handle.time())
+
+
 class RosVehicleState:
     """Pose of a vehicle, whether it can fly on, and whether it has landed.
 
@@ -92,7 +116,8 @@ class RosVehicleState:
     estimator its state.
     """
 
-    def __init__(self, name: str, handle: NodeHandle, access: Access):
+    def __init__(self, name: str, handle: NodeHandle, access: Access, max_age: PoseAgeLimit):
+        self._max_age = max_age
         _, uses_driver, frames, has_yaw = access
         self.name = name
         self._handle = handle
@@ -130,7 +155,8 @@ class RosVehicleState:
 
     def pose(self) -> TimedPose | None:
         """Return the pose of the vehicle; None if it is not known."""
-        if self._handle.time() - self._seen_at < MAX_POSITION_AGE:
+        max_age = self._max_age()
+        if self._handle.time() - self._seen_at < max_age:
             return self._pose
         if self._lookup is None:
             return None
@@ -141,7 +167,7 @@ class RosVehicleState:
         # tf keeps the last pose of a vehicle that is not tracked any more.
         age = (self._handle.nanoseconds() - pose.stamp) * 1e-9
         # A pose far ahead of now is from before the clock was set back.
-        if not -MAX_FUTURE_STAMP_SIMULATED <= age < MAX_POSITION_AGE:
+        if not -MAX_FUTURE_STAMP_SIMULATED <= age < max_age:
             return None
         return TimedPose(pose.position, pose.rotation, pose.stamp * 1e-9)
 
@@ -282,8 +308,8 @@ class ServiceCommands(Commands):
 class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
     """A vehicle by the services of the driver, or by those of `HighLevelNode`, below ``top``."""
 
-    def __init__(self, name: str, handle: NodeHandle, access: Access):
-        RosVehicleState.__init__(self, name, handle, access)
+    def __init__(self, name: str, handle: NodeHandle, access: Access, max_age: PoseAgeLimit):
+        RosVehicleState.__init__(self, name, handle, access, max_age)
         ServiceCommands.__init__(self, handle, access.top)
         self.bounds = fence(handle, prefix(name))
         self.start_skew = START_SKEW if access.uses_driver else 0.0

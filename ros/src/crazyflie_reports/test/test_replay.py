@@ -8,6 +8,8 @@ import sys
 
 import pytest
 from geometry_msgs.msg import PointStamped
+from hypothesis import given
+from hypothesis import strategies as st
 from std_msgs.msg import Float64, String
 
 from crazyflie_reports import replay_program
@@ -15,7 +17,7 @@ from crazyflie_reports.replay import Status, replay
 from crazyflie_reports.replay_program import main
 from crazyflie_utils import Node
 from crazyflie_utils.journal import journal_file
-from crazyflie_utils.journal.journal_file import Journal, JournalWriter, Kind
+from crazyflie_utils.journal.journal_file import WITH_DATA, Journal, JournalWriter, Kind
 from crazyflie_utils.journal.recording import Recorder
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import Number
@@ -88,6 +90,12 @@ class DyingNode(Node):
         raise RuntimeError("as asked")
 
 
+class SocketNode(DyingNode):
+    """Reads more than its handle gives."""
+
+    sources = "sockets"
+
+
 @pytest.fixture
 def folder(tmp_path):
     """Return the folder of the journals of a flight of both nodes."""
@@ -123,7 +131,7 @@ def test_journals_of_a_folder_are_run_side_by_side(folder, capsys):
     assert first.startswith("/listen: identical: ")
     assert second.startswith("/scale: identical: ")
     assert "20 messages" in second
-    assert last.startswith("2 journals: 2 identical, 0 different, 0 not run")
+    assert last.startswith("2 journals: 2 identical, 0 different, 0 not run to their ends, 0 not r")
 
 
 def test_each_replay_prints_the_same_numbers(folder, capsys):
@@ -304,6 +312,18 @@ def test_a_class_that_is_gone_is_named_and_the_others_are_run(folder, monkeypatc
     assert "/listen: identical" in text
 
 
+def test_a_node_that_reads_sockets_is_named_and_does_not_count(folder, capsys):
+    """As the driver in the journals of a flight of a real vehicle."""
+    header = {"clock": "steady", "program": "test_replay:SocketNode"}
+    recorder(folder, "/socket", 0.0, **header).close()
+    status, text = run_program(capsys, folder)
+    assert status == 0
+    assert "/socket reads sockets" in text
+    assert "2 identical, 0 different, 0 not run to their ends, 1 not repeatable" in text
+    status, _ = run_program(capsys, folder / "socket.journal")
+    assert status == 2
+
+
 def test_a_cut_journal_is_compared_up_to_the_cut(folder, capsys):
     path = folder / "scale.journal"
     content = path.read_bytes()
@@ -312,6 +332,40 @@ def test_a_cut_journal_is_compared_up_to_the_cut(folder, capsys):
     assert status == 2
     assert "identical so far, and then not known" in text
     assert "is damaged or cut" in text
+
+
+_DATA = st.one_of(
+    st.binary(max_size=20),
+    st.sampled_from([b"5", b"[]", b"null", b'[[["a"], 1], 2]', b"[" * 100_000]),
+    st.lists(st.sampled_from(["/scale", "/point", "std_msgs/Float64", True, 3, None])).map(
+        lambda each: json.dumps(each).encode()
+    ),
+)
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from(Kind), st.integers(0, 3), st.integers(0, 3), _DATA)),
+    st.integers(0, 30),
+)
+def test_a_journal_into_which_anything_was_written_ends_with_an_outcome(
+    tmp_path_factory, rows, begin
+):
+    path = tmp_path_factory.mktemp("hostile") / "scale.journal"
+    process = FakeProcess(recorder=recorder(path.parent, "/scale", 100.0))
+    assert process.launch(ScaleNode(), "/scale")
+    for k in range(20):
+        process.publish("/number", Float64(k))
+    process.recorder.close()
+    journal = Journal(path)
+    good = list(journal.rows())
+    writer = JournalWriter(path, journal.header, 1e9, pytest.fail)
+    for row in [*good[:begin], *rows, *good[begin:]]:
+        kind, number, value, data = row
+        writer.row(kind, number, value, data if kind in WITH_DATA else None)
+    writer.close()
+    outcome = replay(path)
+    assert outcome.text.startswith(("/scale: ", str(path)))
+    assert rows or outcome.status is Status.IDENTICAL
 
 
 def test_rows_that_do_not_fit_are_named(tmp_path, capsys):

@@ -180,6 +180,23 @@ def test_a_process_that_was_killed_is_run_up_to_its_last_callback(path):
     assert again == process.published("/out")
 
 
+@pytest.mark.parametrize("is_before", [True, False])
+def test_a_journal_of_a_process_that_runs_lacks_nothing(path, monkeypatch, is_before):
+    process = fly(path)
+    read_bytes = type(path).read_bytes
+
+    def read_tail(self):
+        # Rows are moved from the tail to the file.
+        if is_before:
+            process.recorder.close()
+        content = read_bytes(self)
+        process.recorder.close()
+        return content
+
+    monkeypatch.setattr(type(path), "read_bytes", read_tail)
+    assert run_again(path).nodes["/mean"].count == 20
+
+
 def test_a_fault_happens_again(recorded):
     (fault,) = run_again(recorded).errors
     assert "RuntimeError: as asked" in fault

@@ -22,7 +22,7 @@ import genpy
 
 from crazyflie_reports.received import first_difference, received_value
 from crazyflie_utils import handle
-from crazyflie_utils.journal.journal_file import INPUTS, Journal, JournalError, Kind
+from crazyflie_utils.journal.journal_file import INPUTS, Journal, JournalError, Kind, SourcesError
 from crazyflie_utils.journal.replay import Replay
 from crazyflie_utils.journal.replay_transport import DifferenceError, EndError
 
@@ -34,8 +34,10 @@ _UTILS = str(Path(handle.__file__).parent)
 
 
 class Status(enum.IntEnum):
-    """Outcome of a replay. Of several, the worst one is the exit status of the program."""
+    """Outcome of a replay; the greatest one of several is the exit status of the program."""
 
+    #: Its nodes read more than their handles gave, such as sockets.
+    NOT_REPEATABLE = -1
     IDENTICAL = 0
     DIFFERENT = 1
     NOT_RUN = 2
@@ -76,6 +78,10 @@ def replay(
         run = _Run(Journal(path), others, report)
     except JournalError as error:
         return Outcome(Status.NOT_RUN, str(error))
+    except DifferenceError as error:
+        return Outcome(Status.DIFFERENT, f"{path}: different before its nodes are made: {error}")
+    except EndError:
+        return Outcome(Status.NOT_RUN, f"{path}: it ends before its nodes are made")
     # What the program has imported is no garbage of the nodes.
     gc.collect()
     gc.freeze()
@@ -129,6 +135,8 @@ class _Run:
             self._note(f"the journal ends {self._place(error)}")
         except _QuitError:
             return self._outcome(Status.IDENTICAL, "identical until the debugger was left")
+        except SourcesError as error:
+            return Outcome(Status.NOT_REPEATABLE, f"{journal.header['node']}: not run: {error}")
         except JournalError as error:
             return self._outcome(Status.NOT_RUN, f"identical so far, and cannot go on: {error}")
         if journal.damage:

@@ -22,7 +22,8 @@ from crazyflie_utils.journal.journal_file import INPUTS, SUFFIX, Journal
 _DESCRIPTION = """
 Run the nodes of journals again, with the same input and without ROS, and compare all that they do
 with what they did. Exit status: 0 identical, 1 a difference, 2 a journal cannot be run, or not to
-its end.
+its end. Journals of nodes that read more than their handle gives, such as sockets, do not count,
+beside others.
 """
 #: Longest time that a callback may take (s): less than somebody waits.
 _LIMIT = 60.0
@@ -55,22 +56,25 @@ class _Worker:
             self._seen, self._seen_at = self.progress.inputs, time.monotonic()
         return time.monotonic() - self._seen_at > _LIMIT
 
-    def outcome(self, reason: str = "") -> Outcome:
-        """Return what the worker has sent, or why it has not; a ``reason`` ends it."""
+    def outcome(self) -> Outcome:
+        """Return what the worker has sent, or how it died."""
         try:
-            if not reason:
-                outcome: Outcome = self.connection.recv()
-                return outcome
+            outcome: Outcome = self.connection.recv()
+            return outcome
         except EOFError:
-            pass
-        finally:
-            if reason:
-                self._process.kill()
             self._process.join()
-            self.connection.close()
-        return self._dead(reason or _describe_end(self._process.exitcode))
+            return self.died(_describe_end(self._process.exitcode))
+        finally:
+            self.end()
 
-    def _dead(self, reason):
+    def end(self) -> None:
+        """End the worker."""
+        self._process.kill()
+        self._process.join()
+        self.connection.close()
+
+    def died(self, reason: str) -> Outcome:
+        """Return the outcome of a worker that ended before its journal did."""
         journal = Journal(self.path)
         inputs = sum(row.kind in INPUTS for row in journal.rows())
         done, moment = self.progress.inputs, self.progress.time
@@ -121,14 +125,15 @@ def replay_all(
                             outcomes[number] = working.pop(number).outcome()
                         elif worker.has_stopped():
                             reason = f"did not return from a callback within {_LIMIT:g} s"
-                            outcomes[number] = working.pop(number).outcome(reason)
+                            worker.end()
+                            outcomes[number] = working.pop(number).died(reason)
                     done = sum(sizes[each] for each in outcomes)
                     bar.n = done + sum(each.progress.position for each in working.values())
                     bar.refresh()
                 yield outcomes[k]
         finally:
             for worker in working.values():
-                worker.outcome("was ended")
+                worker.end()
 
 
 def journals_of(paths: Sequence[Path]) -> list[Path]:
@@ -170,11 +175,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         longest, took = max(each.time for each in outcomes), time.monotonic() - began
         counts = [sum(each.status is status for each in outcomes) for status in Status]
         print(
-            "{} journals: {} identical, {} different, {} not run; ".format(len(paths), *counts)
+            "{0} journals: {2} identical, {3} different, {4} not run to their ends, "
+            "{1} not repeatable; ".format(len(paths), *counts)
             + f"{longest:.1f} s in {took:.1f} s, {longest / took:.0f} times real time"
         )
     sys.stdout.flush()
-    return max(each.status for each in outcomes)
+    worst = max(each.status for each in outcomes)
+    return Status.NOT_RUN if worst is Status.NOT_REPEATABLE else worst
 
 
 def _parser():

@@ -110,6 +110,10 @@ class JournalError(Exception):
     """A journal cannot be written or read; the text names the file and the reason."""
 
 
+class SourcesError(JournalError):
+    """The nodes of a journal read more than their handles gave, so that they cannot run again."""
+
+
 class _Differences:
     """Subtracts the data of a subscription from those before; the same way back."""
 
@@ -365,6 +369,10 @@ class Journal:
 
     def _chunks(self):
         last = 0
+        # Before the file: what a process that runs moves into it meanwhile is seen in one of them.
+        tail = b""
+        with contextlib.suppress(OSError):
+            tail = self.path.with_name(self.path.name + ".tail").read_bytes()
         with open(self.path, "rb") as file:
             file.seek(self._begin)
             while head := file.read(_CHUNK.size):
@@ -385,13 +393,13 @@ class Journal:
                 last, self.position = number, file.tell()
                 yield number, data
         # Of a process that has not ended by itself.
-        with contextlib.suppress(OSError):
-            tail = self.path.with_name(self.path.name + ".tail").read_bytes()
-            halves = (tail[:_HALF], tail[_HALF : 2 * _HALF])
-            found = sorted((_NUMBER.unpack_from(half)[0], half) for half in halves if half)
-            for number, half in found:
-                if number > last:
-                    yield number, half[_NUMBER.size :]
+        halves = (tail[:_HALF], tail[_HALF : 2 * _HALF])
+        found = (
+            (_NUMBER.unpack_from(half)[0], half) for half in halves if len(half) >= _NUMBER.size
+        )
+        for number, half in sorted(found):
+            if number > last:
+                yield number, half[_NUMBER.size :]
 
     def _rows(self, data):
         differences, at, end = _Differences(), 0, len(data)

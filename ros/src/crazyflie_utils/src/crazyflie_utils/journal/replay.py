@@ -8,13 +8,19 @@ import struct
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-import genpy
 from typing_extensions import override
 
 from crazyflie_utils import text_file
 from crazyflie_utils.context import Flights
 from crazyflie_utils.handle import NodeHandle
-from crazyflie_utils.journal.journal_file import INPUTS, Journal, JournalError, Kind, Row
+from crazyflie_utils.journal.journal_file import (
+    INPUTS,
+    Journal,
+    JournalError,
+    Kind,
+    Row,
+    SourcesError,
+)
 from crazyflie_utils.journal.replay_transport import (
     DifferenceError,
     ReplayTransport,
@@ -247,7 +253,7 @@ class Replay:
             self.nodes = {handle.name: make()} if isinstance(make, type) else make(handle)
             for name, node in self.nodes.items():
                 if node.sources:
-                    raise JournalError(
+                    raise SourcesError(
                         f"{self.journal.path}: {name} reads {node.sources}: its journal can be "
                         "read, but not run again"
                     )
@@ -280,8 +286,10 @@ class Replay:
         self.process.move_to(self._us * 1000)
         try:
             self._handlers[row.kind](self, row)
-        except (LookupError, ValueError, struct.error, genpy.DeserializationError) as error:
-            # Exceptions of nodes do not come here.
+        except JournalError:
+            raise
+        except Exception as error:
+            # Those of nodes do not come here.
             raise JournalError(
                 f"{self.journal.path}: at {self.time:.3f} s, {row.kind.name} {row.number} does "
                 f"not fit these nodes: {error!r}"

@@ -64,9 +64,12 @@ class Rows:
         row = next(self._rows, None)
         while row is not None and row.kind in NAMES:
             try:
-                self.names[row.kind][row.number] = json.loads(row.data)
-            except ValueError:
-                raise JournalError(f"{self._path}: a {row.kind.name} is not JSON") from None
+                names = json.loads(row.data)
+            except (ValueError, RecursionError):
+                names = None
+            if not (isinstance(names, list) and list(map(type, names)) == [str, str]):
+                raise JournalError(f"{self._path}: a {row.kind.name} is not two names in JSON")
+            self.names[row.kind][row.number] = names
             row = next(self._rows, None)
         self.next = row
 

@@ -125,7 +125,9 @@ def test_unknown_names_in_a_mapping_are_reported_with_the_rest():
     with pytest.raises(ParameterError) as error:
         FlightParameters.from_mapping({"hight": 1.0, "PIDs/X/kp": 2.0}, "bodies/7/")
     first, second = str(error.value).splitlines()
-    assert first.startswith("bodies/7/hight is no parameter; expected one of PIDs/X/ki, PIDs/X/kp")
+    assert first.startswith(
+        "bodies/7/hight is not a parameter; expected one of PIDs/X/ki, PIDs/X/kp"
+    )
     assert second == "parameter bodies/7/hover/z is not set; expected a finite number (m)"
 
 
@@ -139,7 +141,7 @@ def test_a_field_that_is_not_declared_is_no_parameter():
     assert [each.name for each in NamedAxis.declarations()] == ["kp", "ki"]
     axis = dataclasses.replace(NamedAxis.from_mapping({"kp": 2.0}), name="x")
     assert (axis.name, axis.kp) == ("x", 2.0)
-    with pytest.raises(ParameterError, match="name is no parameter"):
+    with pytest.raises(ParameterError, match="name is not a parameter"):
         NamedAxis.from_mapping({"kp": 2.0, "name": "x"})
 
 

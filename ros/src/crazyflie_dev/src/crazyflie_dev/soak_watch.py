@@ -148,7 +148,7 @@ class Watch:
         self.check(blind <= limit, f"in the air without a pose: for {blind:.1f} s")
 
     def _on_reference(self, message):
-        """Add the way that the present speed is worth to that to a reference which has jumped."""
+        """Allow for the braking distance after a jump of the reference."""
         goal = (message.state.x, message.state.y, message.state.z)
         if self._last is not None and not math.dist(goal, self._goal) < _JUMP:
             offset = [b - a for a, b in zip(self._last[1], goal, strict=True)]

@@ -1,4 +1,4 @@
-"""Landings of a fleet by ROS, in rounds."""
+"""Lands a fleet in stages over ROS."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future

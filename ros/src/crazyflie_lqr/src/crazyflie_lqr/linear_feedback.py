@@ -274,13 +274,13 @@ class LinearFeedback:
         self.hover_thrust = previous.hover_thrust
 
     def reset_integrator(self) -> None:
-        """Stop the integration: the control is not flown, for example on the ground."""
+        """Disable and clear the integrator."""
 
     def enable_integrator(self) -> None:
-        """Integrate from now on: the control is flown."""
+        """Enable the integrator: the vehicle flies."""
 
     def take_off(self) -> None:
-        """Begin to fly the control, from the ground or an unknown state."""
+        """Enable the integrator, and begin the limited climb of a takeoff."""
 
 
 class IntegralStateFeedback(LinearFeedback):

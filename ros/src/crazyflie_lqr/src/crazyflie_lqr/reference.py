@@ -1,4 +1,4 @@
-"""The reference that a controller follows, also when its sources fail, and the age of states."""
+"""Guards the reference and measures the age of states."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -68,7 +68,7 @@ DESCENT_LIMIT = 0.3  #: Time for which a descent's reference overrides all other
 
 
 class GuardedReference:
-    """The last valid reference; or, some time after invalid ones came, a hold point.
+    """Last valid reference; after invalid ones, the place where the vehicle is.
 
     `crazyflie_model.limits.HOLD_LIMIT` after the first invalid reference the vehicle stops
     where it is, until a valid one comes. A reference that is older than the present one is ignored.

@@ -1,4 +1,4 @@
-"""Groups of simulated, virtual and real vehicles, by ROS."""
+"""Groups of simulated, virtual and real vehicles, over ROS."""
 
 import contextlib
 import math

@@ -1,4 +1,4 @@
-"""Vehicles of a mission by ROS services and topics."""
+"""Vehicles of a mission, reached over ROS."""
 
 import math
 from collections import deque

@@ -1,4 +1,4 @@
-"""The swarm of running vehicles: simulated, virtual or real ones, by ROS."""
+"""The swarm of running vehicles: simulated, virtual or real ones, over ROS."""
 
 import argparse
 import math

@@ -116,7 +116,7 @@ class Connection:
 
 
 class BagFile:
-    """A bag file that is read once, from its beginning; `BagError`: it has not the format 2.0."""
+    """A bag file that is read once, from its beginning; `BagError`: not a bag of version 2.0."""
 
     def __init__(self, path: Path):
         self._path = path

@@ -93,7 +93,7 @@ def test_a_link_that_is_set_up_again_sends_an_old_vehicle_in_the_air_nothing(ser
     vehicle.is_frozen = True
     crazyflie = server.node._vehicles[vehicle.uri].crazyflie
     wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
-    # Another node has it fly.
+    # Another node makes it fly.
     is_(vehicle, FLYING)
     vehicle.received.clear()
     vehicle.is_frozen = False

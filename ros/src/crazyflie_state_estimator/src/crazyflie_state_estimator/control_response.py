@@ -294,11 +294,11 @@ def _mean(vectors: Sequence[Vector]) -> list[float]:
 #: on the ground repeat, too.
 CLEAR = 0.01
 
-#: Largest acceleration above nominal that a vehicle may need to leave the ground (m/s^2), and the
-#: speed from the acceleration beyond that with which every vehicle has left it (m/s).
+#: Most excess acceleration any vehicle needs to lift off (m/s^2), and the speed beyond it that
+#: proves that it has (m/s).
 HEAVY, LIFTING = 3.0, 0.3
 
-#: Last motion of a vehicle that has come to rest gradually (m): a smaller one.
+#: Steps smaller than this (m) count as rest.
 _ROUNDING = 1e-6
 LIFTED = 0.04  #: Height of a flying vehicle above the place where its motors were off last (m).
 _LEFT = 0.03  #: Least distance of the poses that show that the camera runs again (m).
@@ -318,7 +318,7 @@ class FrozenPoseMonitor:
         self.reset()
 
     def reset(self) -> None:
-        """Restart: the next pose is the vehicle's."""
+        """Reset; trust the next pose."""
         self._ground: float | None = None
         self._is_flying = False
         self.restart()
@@ -332,15 +332,14 @@ class FrozenPoseMonitor:
         self._time = 0.0
         self._place: Vector | None = None
         self._outside = 0
-        #: Where the vehicle is instead of the last pose, if that is the first one that does not
-        #: respond to the control.
+        #: Predicted state when a pose first contradicts the control.
         self.departure: Departure | None = None
         self._response.reset()
 
     def update(
         self, time: float, position: Vector, rotation: Vector, acceleration: Vector | None
     ) -> bool:
-        """Process a pose; return whether it is not the vehicle's.
+        """Process a pose; return True if the pose is frozen.
 
         Its stamp ``time`` (s) is later than the one before; position (m, fixed frame) and rotation
         (quaternion). ``acceleration`` is the control's, m/s^2, fixed frame; None while it is

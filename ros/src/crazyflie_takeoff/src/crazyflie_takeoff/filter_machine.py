@@ -132,8 +132,8 @@ class FilterMachine(Generic[Control]):
         self._takeoff_control: Control | None = None
         self._kept_thrust = 0.0
         self._takeoff_time = math.inf
-        # Whether a filter that has started in flight passes nothing on until it sees the vehicle:
-        # if that is on the ground, there was no filter for too long.
+        # Pass nothing on until the first state is seen: a vehicle on the ground had no filter for
+        # too long.
         self._ground_check_pending = sees
         self._ticked = math.nan
         self._safe = SafeControl(self.relay.hover, None)
@@ -258,7 +258,7 @@ class FilterMachine(Generic[Control]):
         self.passes_unchanged = False
 
     def miss_controller(self) -> None:
-        """Record that no node publishes commanded controls: the next controller is a new one."""
+        """No node publishes controls; treat the next one as new."""
         self.lacks_controller = False
 
     def miss_server(self) -> None:

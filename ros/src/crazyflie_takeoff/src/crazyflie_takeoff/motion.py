@@ -98,7 +98,7 @@ class MeasuredPosition:
                 )
             return (
                 f"states on {topic} are {self._age:.1f} s old when they come; do the clocks of all "
-                "computers agree, and are they quick enough?"
+                "computers agree, and are they fast enough?"
             )
         why = self.missing_reason or "are the estimator and the source of /tf running?"
         return f"no state has come on {topic} for {MAX_POSITION_AGE:g} s; {why}"

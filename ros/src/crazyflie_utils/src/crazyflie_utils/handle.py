@@ -102,7 +102,7 @@ class NodeHandle:
     def get_param(self, name: str, type: ParameterType, default: Any = REQUIRED) -> Any:  # noqa: A002
         """Return a parameter that cannot be declared: another node's, or with a varying name.
 
-        Waits for the master: not to be used in callbacks. Raises `ParameterError`, see `load`.
+        Blocks on the master; do not call it in a callback. Raises `ParameterError`, see `load`.
         """
         declaration = Declaration(self.resolve(name), type, "", default, live=False)
         return read_parameter(declaration, self._process.transport.get_param)

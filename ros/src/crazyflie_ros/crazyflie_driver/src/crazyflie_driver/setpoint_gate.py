@@ -98,9 +98,9 @@ REASONS = {
     ),
     Block.NEW: "the vehicle has just been added: begin with zero thrust",
     Block.UNCONFIRMED: (
-        f"the link was lost, and the vehicle does not fly: {_ADVICE} that has it fly"
+        f"the link was lost, and the vehicle does not fly: {_ADVICE} that makes it fly"
     ),
-    Block.LANDED: f"the vehicle was landed for its battery: {_ADVICE} that has it fly",
+    Block.LANDED: f"the vehicle was landed for its battery: {_ADVICE} that makes it fly",
     Block.NOT_LIFTED: f"the vehicle was commanded to fly and did not lift off: {_ADVICE}",
 }
 

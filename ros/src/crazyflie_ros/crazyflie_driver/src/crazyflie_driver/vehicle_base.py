@@ -115,7 +115,7 @@ class Jobs:
                 self._on_error(f"{what} failed: {text}")
                 raise ServiceError(text) from None
             except Exception as error:
-                # Nobody may look at the future.
+                # The caller may never read the future's result.
                 self._on_error(f"{what} failed: {error!r}")
                 raise
 

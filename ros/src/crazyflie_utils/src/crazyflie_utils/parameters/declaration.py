@@ -92,7 +92,7 @@ class Parameters:
     """Base class of declarations; an object of a subclass has checked values.
 
     A subclass is a frozen dataclass whose arguments are given by name. A field that is not declared
-    is no parameter: it has a default, and is set by `dataclasses.replace`.
+    is not a parameter: it has a default, and is set by `dataclasses.replace`.
     """
 
     def __init_subclass__(cls) -> None:
@@ -137,7 +137,7 @@ class Parameters:
         """
         known = {declaration.name for declaration in cls.declarations()}
         complaints = Complaints(
-            f"{prefix}{name} is no parameter; expected one of {', '.join(sorted(known))}"
+            f"{prefix}{name} is not a parameter; expected one of {', '.join(sorted(known))}"
             for name in values
             if name not in known
         )

@@ -373,7 +373,7 @@ class FrameTree:
             return self._reject(pose, "has no unit quaternion")
         names = self._names
         if len(names) >= _MAX_FRAMES and not (pose.parent in names and pose.child in names):
-            return self._reject(pose, "is one frame too many")
+            return self._reject(pose, "is of more frames than the limit")
         return True
 
     def _is_timely(self, pose, now):

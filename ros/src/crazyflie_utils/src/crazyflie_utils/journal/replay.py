@@ -239,6 +239,7 @@ class Replay:
             return f"the timer of {self._executor.timer}" if self._executor.timer else "a timer"
         return {
             Kind.REPLY: "the answer of a service",
+            Kind.SUBMITTED: "a call by a thread",
             Kind.CLOCK: "the clock",
         }.get(row.kind, row.kind.name.lower().replace("_", " "))
 

@@ -13,6 +13,8 @@ from crazyflie_dev.soak_faults import FAULTS, LIVE_VALUES, NODES, SoakFlight, li
 from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus, PositionVelocityStateStamped
+from crazyflie_reports.replay import Status
+from crazyflie_reports.replay_program import journals_of, replay_all
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.tf.frame_tree import StampedPose, encode_poses
 
@@ -48,6 +50,25 @@ def test_flights_by_the_page_of_a_dashboard_that_lags_and_reloads(monkeypatch):
     result = soak(60.0, seed=9, simulator_dt=POSE_PERIOD)
     assert result["flights by the page"] > 0
     assert result["violations"] == []
+
+
+@pytest.mark.parametrize(
+    ("dynamics", "duration"),
+    [
+        ("near_hover", 30.0),
+        # The same for longer, with every fault and by each model.
+        *(
+            pytest.param(dynamics, 600.0, marks=pytest.mark.long)
+            for dynamics in ("near_hover", "coupled_7d", "quadrotor")
+        ),
+    ],
+)
+def test_journals_of_what_was_killed_and_frozen_replay_to_the_bit(tmp_path, dynamics, duration):
+    soak(duration, 5, journals=tmp_path, dynamics=dynamics, simulator_dt=POSE_PERIOD)
+    paths = journals_of([tmp_path])
+    assert len(paths) > len(NODES)
+    different = [each.text for each in replay_all(paths) if each.status is not Status.IDENTICAL]
+    assert different == []
 
 
 def test_every_live_parameter_is_changed():

@@ -18,8 +18,11 @@ _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 
 
 def lines_of(text: str) -> list[str]:
-    """Return the lines of a text as one sees them: no colours, no empty lines."""
-    lines = [line.rstrip() for line in _COLOURS.sub("", text).replace("\r", "").split("\n")]
+    """Return the lines of a text as one sees them: no colours, no empty lines.
+
+    A progress bar is overwritten by what follows it in its line.
+    """
+    lines = [line.rstrip().rpartition("\r")[2] for line in _COLOURS.sub("", text).split("\n")]
     return [line for line in lines if line]
 
 

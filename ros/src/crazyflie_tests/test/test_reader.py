@@ -33,6 +33,12 @@ def test_what_is_not_printed(excerpt):
     assert not is_printed(excerpt, OUTPUT)
 
 
+def test_a_progress_bar_is_overwritten():
+    output = "  3% of it\r 90% of it\r           \rdone\r\n100%\r\r\nend\r\n"
+    assert is_printed("done\n100%\nend", output)
+    assert not is_printed("90% of it\n...", output)
+
+
 PAGE = """
 <!-- run -->
 ```sh

@@ -52,7 +52,8 @@ class Replay {
   // Show a flight of the recording, with others of the same time around it.
   choose(flight) {
     this.flight = flight;
-    this.others = this.recording.flights.filter((each) => each !== flight && each.path
+    const flights = [...this.recording.flights, ...(this.recording.others ?? [])];
+    this.others = flights.filter((each) => each !== flight && each.path
       && each.vehicle !== flight.vehicle && each.start < flight.start + flight.duration
       && each.start + each.duration > flight.start);
     const rows = [flight, ...this.others].flatMap((each) => each.path ? each.path.rows.filter(Boolean) : []);

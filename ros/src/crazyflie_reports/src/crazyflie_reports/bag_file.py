@@ -8,7 +8,7 @@ Format: https://wiki.ros.org/Bags/Format/2.0.
 import bz2
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -95,9 +95,11 @@ class Connection:
     topic: str
     datatype: str
     md5sum: str
+    #: Name of the publishing node; empty if the bag does not have it.
+    caller: str = field(default="", kw_only=True)
 
-    def deserializer(self) -> Callable[[bytes], Any]:
-        """Return a function from data to message, which is valid until the next call.
+    def message_type(self) -> Any:
+        """Return the class of the messages.
 
         `TopicError`: the type is not defined here, or is defined differently.
         """
@@ -111,8 +113,15 @@ class Connection:
                 f"{self.topic} is omitted: its {self.datatype} has the md5 sum "
                 f"{self.md5sum}, expected {message_type._md5sum}"
             )
+        return message_type
+
+    def deserializer(self) -> Callable[[bytes], Any]:
+        """Return a function from data to message, which is valid until the next call.
+
+        For `TopicError` see `message_type`.
+        """
         # A new message each time would take three times as long.
-        return message_type().deserialize
+        return self.message_type()().deserialize
 
 
 class BagFile:
@@ -199,7 +208,8 @@ class BagFile:
             return
         texts = {name: value.decode(errors="replace") for name, value in _fields(data).items()}
         topic = fields[b"topic"].decode(errors="replace")
-        connection = Connection(topic, texts[b"type"], texts[b"md5sum"])
+        caller = texts.get(b"callerid", "")
+        connection = Connection(topic, texts[b"type"], texts[b"md5sum"], caller=caller)
         self.connections.append(connection)
         self._by_id[key] = connection if is_wanted(connection) else None
 

@@ -90,7 +90,7 @@ def vehicles(log: BagLog) -> Iterator[Vehicle]:
     for namespace in namespaces:
         driver = _driver(log, namespace)
         sources = [each for each in log.sources.values() if each.namespace in (namespace, driver)]
-        frame = _frame_of(namespace, len(namespaces) == 1, log.frames)
+        frame = frame_of(namespace, len(namespaces) == 1, log.frames)
         yield _vehicle(namespace, driver, sources, frame, log)
     if not namespaces:
         for name in sorted(each for each in log.frames if _moves(log.frames[each])):
@@ -107,7 +107,8 @@ def _driver(log, namespace):
     return drivers.pop() if not namespace and len(drivers) == 1 else namespace
 
 
-def _frame_of(namespace, is_alone, frames):
+def frame_of(namespace: str, is_alone: bool, frames: dict[str, Spool]) -> str | None:
+    """Return the frame on /tf of a vehicle, which may be the only one; None if it is not known."""
     name = namespace.rpartition("/")[2]
     named = [each for each in frames if name and name in each.split("/")]
     candidates = [each for each in named or (frames if is_alone else ()) if _moves(frames[each])]

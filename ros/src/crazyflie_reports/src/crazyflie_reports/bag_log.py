@@ -96,7 +96,7 @@ def name_of(path: Path) -> str:
     return os.path.basename(os.path.abspath(path))
 
 
-def _files_of(path: Path) -> list[Path]:
+def files_of(path: Path) -> list[Path]:
     """Return the files of a recording: those of a folder in their order, or the file itself.
 
     `BagError`: the path does not exist, or the folder has no bags.
@@ -128,7 +128,7 @@ def read(path: Path, folder: Path, names: dict[str, str] | None = None) -> list[
     """
     name = name_of(path)
     reader = _Reader(name, folder, names or {})
-    files = [_opened(each, folder) for each in _files_of(path)]
+    files = [_opened(each, folder) for each in files_of(path)]
     size = sum(file.size for file in files)
     with tqdm(total=size, unit="B", unit_scale=True, desc=name, disable=None) as bar:
         for file in files:

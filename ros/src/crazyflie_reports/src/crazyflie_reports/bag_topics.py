@@ -147,16 +147,31 @@ def topic_of(connection: Connection, names: dict[str, str]) -> Topic | None:
 
     For ``names`` see `bag_log.read`. `TopicError`: its type is not defined here, or differently.
     """
-    for role in ROLES:
-        namespace = _namespace(connection.topic, names.get(role.name, role.topics))
-        if namespace is not None and connection.datatype in role.rows:
-            row = role.rows[connection.datatype]
-            return Topic(namespace, role, _decoder(connection, row))
+    if (found := role_of(connection.topic, connection.datatype, names)) is not None:
+        namespace, role = found
+        return Topic(namespace, role, _decoder(connection, role.rows[connection.datatype]))
     if connection.datatype in EVENT_TYPES:
         namespace = _namespace(connection.topic, EVENT_TYPES[connection.datatype])
         if namespace is not None:
             return Topic(namespace, None, _decoder(connection, lambda message: message))
     return None
+
+
+def role_of(topic: str, datatype: str, names: dict[str, str]) -> tuple[str, Role] | None:
+    """Return the namespace and the series of a topic of a type; None if it has no role."""
+    for role in ROLES:
+        namespace = _namespace(topic, names.get(role.name, role.topics))
+        if namespace is not None and datatype in role.rows:
+            return namespace, role
+    return None
+
+
+def row_of(topic: str, message: Any) -> Row:
+    """Return the row of a message on a topic that has a role."""
+    found = role_of(topic, message._type, {})
+    if found is None:
+        raise ValueError(f"{topic} ({message._type}) has no role")
+    return found[1].rows[message._type](message)
 
 
 def expected() -> str:

@@ -101,6 +101,11 @@ def figures(flight: Flight) -> list[Figure]:
     ]
 
 
+def figures_of_motion(flight: Flight) -> list[Figure]:
+    """Return those of the `figures` that follow from states, references and controls."""
+    return [*_hover(flight), *_tracking(flight), *_motion(flight), *_controls(flight)]
+
+
 def _hover(flight: Flight) -> Iterator[Figure]:
     record, point = flight.record, hover_point(flight)
     tolerance = HARDWARE_TOLERANCE if flight.vehicle.is_driven else HOVER_TOLERANCE

@@ -94,14 +94,14 @@ def _plots(flight, points):
 
     def curves(series, names, scale=1.0, suffix=""):
         return [
-            _curve(name + suffix, series.times, scale * series.column(name), start, points)
+            curve(name + suffix, series.times, scale * series.column(name), start, points)
             for name in names
         ]
 
     def angles(name, times, values):
         known = np.isfinite(values)
         turns = np.degrees(np.unwrap(values[known]))
-        return _curve(name, times[known], turns, start, points)
+        return curve(name, times[known], turns, start, points)
 
     xyz = ("x", "y", "z")
     measured = flight.during(flight.vehicle.attitude, MARGIN)
@@ -114,9 +114,9 @@ def _plots(flight, points):
     attitude += curves(control, ["roll", "pitch"], math.degrees(1.0), " commanded")
     attitude.append(angles("yaw reference", reference.times, reference.column("yaw")))
     times, distances = record.tracking_errors()
-    error = _curve("distance", times, distances, start, points)
+    error = curve("distance", times, distances, start, points)
     volts = flight.during(flight.vehicle.battery, MARGIN)
-    battery = _curve("voltage", volts[:, 0], volts[:, 1], start, points)
+    battery = curve("voltage", volts[:, 0], volts[:, 1], start, points)
     plots = [
         ("position", "m", curves(state, xyz) + curves(reference, xyz, 1.0, " reference")),
         ("distance from the reference", "m", [error]),
@@ -132,7 +132,8 @@ def _plots(flight, points):
     ]
 
 
-def _curve(name, times, values, start, points):
+def curve(name: str, times: Array, values: Array, start: float, points: int) -> dict[str, Any]:
+    """Return a curve of a plot, with times from ``start`` (s) on, reduced to about ``points``."""
     known = np.isfinite(values)
     times, values = times[known], values[known]
     # A reference is valid until the next one.

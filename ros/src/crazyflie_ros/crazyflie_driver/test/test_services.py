@@ -1,6 +1,7 @@
 """Services of a vehicle, down to the bytes on the link."""
 
 import struct
+from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
 
 import pytest
@@ -87,10 +88,29 @@ def test_a_takeoff_arms_a_vehicle_that_is_not(flying):
     # No setpoint of another test counts any more.
     server.process.advance(OFF_AGE + 0.1)
     vehicle.answers[9, 0, 0x0C] = b"\x8c\x01\x00"
-    server.call("/cf1/takeoff", TAKEOFF)
-    ports = [port for port, _, _ in vehicle.received if port in (8, 9)]
-    assert ports == [9, 9, 8]
+
+    def spin_up():
+        vehicle.wait_for_packets(9, 1)
+        assert vehicle.packets(8, 0) == []
+        vehicle.answers[9, 0, 0x0C] = b"\x8c\x0a\x00"
+
+    with ThreadPoolExecutor() as pool:
+        spun_up = pool.submit(spin_up)
+        server.call("/cf1/takeoff", TAKEOFF)
+        spun_up.result(LIMIT)
     assert vehicle.packets(9, 1) == [b"\x01\x01"]
+    assert len(vehicle.packets(8, 0)) == 1
+
+
+def test_a_vehicle_that_does_not_spin_up_does_not_take_off(flying):
+    server, vehicle = flying
+    server.process.advance(OFF_AGE + 0.1)
+    vehicle.answers[9, 0, 0x0C] = b"\x8c\x01\x00"
+    with pytest.raises(
+        ServiceError, match="is armed, and cannot fly within 2 s; its state is: can"
+    ):
+        server.call("/cf1/takeoff", TAKEOFF)
+    assert vehicle.packets(8, 0) == []
 
 
 def test_a_vehicle_that_cannot_fly_does_not_take_off(flying):

@@ -253,3 +253,11 @@ def test_the_emergency_watchdog_ends_a_flight_without_a_pc(make_server):
         flight.run(2.5)
         assert virtual.observe().position[2] < 0.05
         assert SupervisorState.LOCKED in flight.seen_by_another()
+
+
+def test_a_vehicle_that_does_not_arm_itself_takes_off(make_server):
+    with virtual_vehicle(positioning="deck", auto_arm=False) as (virtual, uri):
+        flight = Flight(make_server(), virtual, uri)
+        flight.server.call("/cf1/takeoff", TakeoffRequest(0, HEIGHT, Duration(1)))
+        flight.run(LIMIT, until=lambda: flight.heights[-1] > 0.8 * HEIGHT)
+        assert flight.heights[-1] > 0.8 * HEIGHT

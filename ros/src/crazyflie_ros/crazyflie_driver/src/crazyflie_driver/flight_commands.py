@@ -35,6 +35,9 @@ _WATCHDOG_PERIOD = 0.2
 #: Time in which a vehicle arms itself, s. Firmware 2026.08 disarms and arms itself 3 s after a
 #: landing (0.16 s) and every 30 s on the ground (0.08 s).
 _REARMING = 0.5
+#: Time in which a vehicle that was armed can fly, s: two updates of its supervisor, or the spin-up
+#: of brushless motors, whose speeds firmware 2026.08 watches for 0.2 s.
+_SPIN_UP_LIMIT = 2.0
 
 #: Time limit and period of the checks of a vehicle that has not answered a command (s). It is heard
 #: again within 1 s, or gets a new link.
@@ -304,6 +307,19 @@ class FlightCommands:
         if SupervisorState.ARMED not in state:
             self._vehicle.refuse_to_arm_in_stream()
             supervisor.arm()
+            self._wait_for_spin_up(supervisor, job)
+
+    def _wait_for_spin_up(self, supervisor: Supervisor, job: Job) -> None:
+        # Until it can fly, the firmware refuses a takeoff.
+        end = time.monotonic() + _SPIN_UP_LIMIT
+        while (state := supervisor.read()) is not None and SupervisorState.CAN_FLY not in state:
+            job.check()
+            if state.faults or time.monotonic() > end:
+                raise ServiceError(
+                    f"the vehicle is armed, and cannot fly within {_SPIN_UP_LIMIT:g} s; its state "
+                    f"is: {state.words()}"
+                )
+            time.sleep(_REARMING / 10)
 
     def _state_once_armed(self, supervisor: Supervisor, job: Job) -> SupervisorState | None:
         end = time.monotonic() + _REARMING

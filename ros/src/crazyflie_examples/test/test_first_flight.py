@@ -15,8 +15,8 @@ import rospkg
 from first_flight_rig import FastRig
 from genpy import Time
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped
-from std_msgs.msg import Header
-from std_srvs.srv import Empty, EmptyRequest
+from std_msgs.msg import Bool, Header
+from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest, SetBoolResponse
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_driver.msg import GenericLogData
@@ -164,6 +164,28 @@ def test_a_key_ends_a_call(live):
     live.type(b"x\n")
     with pytest.raises(Stop, match="ended by the pilot"):
         live.rig._call("/takeoff", Empty, EmptyRequest())
+
+
+def test_an_answer_that_refuses_ends_it(live):
+    refused = Future()
+    refused.set_result(SetBoolResponse(False, "cf1 is not armed: setpoints come"))
+    live.rig._handle.call_service = lambda *_: refused
+    with pytest.raises(Stop, match="/crazyflie/arm: cf1 is not armed: setpoints come"):
+        live.rig._call("arm", SetBool, SetBoolRequest(True))
+
+
+def test_a_takeoff_waits_for_the_controller(live, monkeypatch):
+    called = []
+
+    def check():
+        called.append("check")
+        live.rig._on_controller(Bool(True))
+
+    monkeypatch.setattr(live.rig, "_launch", lambda *_: called.append("launch"))
+    monkeypatch.setattr(live.rig, "_call", lambda name, *_: called.append(name))
+    monkeypatch.setattr(live.rig, "_check", check)
+    live.rig.take_off()
+    assert called == ["launch", "check", "/takeoff"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -100,7 +100,7 @@ class LiveRig:
         self._supervisor: SupervisorState | None = None
         # Stamp of the last pose; arrival of the last log and of the last pose (s).
         self._stamp = self._log_time = self._pose_time = -math.inf
-        self._hides = self._is_connected = False
+        self._hides = self._is_connected = self._has_controller = False
         self._examined: Crazyflie | None = None  # While the doctor watches it.
         self._end_node: Callable[[], None] = lambda: None
         #: Lands the vehicle; None while it does not fly.
@@ -121,6 +121,7 @@ class LiveRig:
         handle.subscribe(f"{PREFIX}/battery", Float32, self._on_battery)
         handle.subscribe(f"{PREFIX}/vehicle_status", VehicleStatus, self._on_status)
         handle.subscribe(f"{PREFIX}/connected", Bool, self._on_connected)
+        handle.subscribe("/in_flight_controller", Bool, self._on_controller)
         handle.subscribe("/tf", TFMessage, self._on_tf)
         process.start()
 
@@ -136,6 +137,9 @@ class LiveRig:
 
     def _on_connected(self, message):
         self._is_connected = message.data
+
+    def _on_controller(self, message):
+        self._has_controller = message.data
 
     def _on_tf(self, message):
         for each in message.transforms:
@@ -374,8 +378,9 @@ class LiveRig:
             "record:=true",
             f"record_folder:={self._folder.resolve()}",
         )
-        if not self._wait(lambda: "/takeoff" in self._handle.service_nodes(), _LIMIT):
-            raise Stop(f"there is no service /takeoff {_LIMIT:g} s after the launch")
+        # Its gains may take seconds to design; the server does not know yet that there is none.
+        if not self._wait(lambda: self._has_controller, _LIMIT):
+            raise Stop(f"no controller publishes {_LIMIT:g} s after the launch; see its log above")
         self._arm(
             lambda: self._supervisor,
             lambda do_arm: self._call("arm", SetBool, SetBoolRequest(do_arm)),
@@ -442,9 +447,11 @@ class LiveRig:
         reply = self._handle.call_service(full, service, request, _LIMIT, _REACH_LIMIT)
         self._wait(reply.done, math.inf, ends_at_key)
         try:
-            reply.result()
+            answer = reply.result()
         except ServiceError as error:
             raise Stop(f"{full}: {error}") from None
+        if not getattr(answer, "success", True):
+            raise Stop(f"{full}: {answer.message}")
 
 
 def _line(limit: float) -> bytes | None:

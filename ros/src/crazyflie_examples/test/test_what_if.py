@@ -13,6 +13,7 @@ import rospkg
 from figure_eight_flight import BAG, FOLDER, HOVER, fly, reference
 from std_srvs.srv import EmptyRequest
 
+from crazyflie_control_merger.cmd_vel_converter_node import CmdVelConverterNode
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityStateStamped
 from crazyflie_reports.what_if import FAILED, WORSE, Options, compare, main
 from crazyflie_utils import launch_file
@@ -81,6 +82,29 @@ def test_a_quadrotor_is_predicted_within_10_percent(tmp_path, weather):
     flown = rms_of(really, tmp_path / "flown")
     assert predicted == pytest.approx(flown, rel=0.1)
     assert abs(flown - before) > 0.2 * before
+
+
+def test_a_driven_vehicle_flies_by_the_commands_of_the_converter(tmp_path):
+    def drive(process):
+        topics = {"topics/control": "/control/final", "topics/cmd_vel": "/crazyflie/cmd_vel"}
+        assert process.launch(CmdVelConverterNode(), "/cmd_vel_converter", topics)
+
+    recorded = fly(tmp_path / "driven.bag", prepare=drive)
+    asked = Options(recorded, is_closed=True, model="cf21")
+    result = compare(asked, tmp_path / "out")
+    # Nodes and parameters are those of hw_hover.launch, whose gains are others.
+    remarks = result.report.recordings[1]["remarks"]
+    assert "cmd_vel_converter" in remarks[0]
+    assert any("/crazyflie/connected was not recorded" in each for each in remarks)
+    [(_, changes)] = result.changes
+    [(before, after)] = [(c.before.value, c.after.value) for c in changes if c.before.name == RMS]
+    assert before < after < 200.0
+
+
+def test_nodes_that_do_not_fly_say_why(tmp_path, capsys):
+    far = ["--set", "state_estimator/frames/fixed=moon"]
+    assert main([str(BAG), *far, "--out", str(tmp_path)]) == FAILED
+    assert "has published no state" in capsys.readouterr().err
 
 
 def test_a_figure_that_gets_worse_than_normal_is_the_exit_status(tmp_path, capsys):

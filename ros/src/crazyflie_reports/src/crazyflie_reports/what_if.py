@@ -148,6 +148,7 @@ def _compare(options, out, place):
         names = {name for each in interfaces.values() for name in each.topics}
         names |= {_inner(topic, namespace) for topic in log.sources} | {TF}
         flight_input.read_bag(options.recording, namespace, names.__contains__, given)
+    _leave_out(given, options)
     _check_topics(given, interfaces, log, frame, options.recording)
     rerun = Rerun(given, interfaces)
     first, last = given.messages[0].time, given.messages[-1].time
@@ -172,6 +173,8 @@ def _compare(options, out, place):
     for each in (log, other):
         report.add(each)
     pairs = _pairs(own, [each for each in flights(other) if each.vehicle.namespace == namespace])
+    if own and not pairs:
+        raise InputError(f"the nodes do not fly: {[*sent.refusals, rerun.last_warning()][0]}")
     for topic in sorted(_controls_of(interfaces)):
         add_controls(report, topic, _rows(given, sent, topic))
     lay_over(report)
@@ -249,6 +252,16 @@ def _interfaces(given: FlightInput, options: Options) -> dict[str, Interface]:
     return found
 
 
+def _leave_out(given, options):
+    """Remove names of topics without which a takeoff would be refused, if they are not recorded."""
+    recorded = {each.topic for each in given.messages}
+    for name, value in list(given.parameters.items()):
+        is_optional = name.endswith(("/topics/connected", "/topics/battery"))
+        if is_optional and value not in recorded and name[1:] not in options.values:
+            del given.parameters[name]
+            given.remarks.append(f"{name} is not set, as {value} was not recorded")
+
+
 def _check_topics(given, interfaces, log, frame, path):
     """Raise `InputError` if a topic is missing without which a node does nothing."""
     recorded = {each.topic for each in given.messages}
@@ -317,7 +330,7 @@ def _model(
     elif identified := _identify(options, flight.vehicle.name, out / "model.yaml", given):
         candidates = [identified]
     else:
-        names = ["cf21"] if is_driven else list(IDEAL)
+        names = ["cf21", *(() if is_driven else IDEAL)]
         candidates = [VehicleModel.of(name, is_driven) for name in names]
     begin, end = flight.start - MARGIN, flight.end + MARGIN
     found = [(each, explain(each, flight.vehicle, begin, end)) for each in candidates]

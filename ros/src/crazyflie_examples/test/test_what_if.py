@@ -101,10 +101,16 @@ def test_a_driven_vehicle_flies_by_the_commands_of_the_converter(tmp_path):
     assert before < after < 200.0
 
 
-def test_nodes_that_do_not_fly_say_why(tmp_path, capsys):
-    far = ["--set", "state_estimator/frames/fixed=moon"]
-    assert main([str(BAG), *far, "--out", str(tmp_path)]) == FAILED
-    assert "has published no state" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ("state_estimator/frames/fixed=moon", "/state_estimator has published no state: "),
+        ("takeoff_server/topics/connected=/connected", "the nodes do not fly: /takeoff: "),
+    ],
+)
+def test_nodes_that_do_not_fly_say_why(change, text, tmp_path, capsys):
+    assert main([str(BAG), "--set", change, "--out", str(tmp_path)]) == FAILED
+    assert text in capsys.readouterr().err
 
 
 def test_a_figure_that_gets_worse_than_normal_is_the_exit_status(tmp_path, capsys):
@@ -227,6 +233,13 @@ def test_a_process_is_run_again_in_the_recorded_order(tmp_path):
                     m.state if topic == "/state" else m.control for m in (again[stamp], then[stamp])
                 )
                 assert to_tuple(next(values)) == pytest.approx(to_tuple(next(values)), abs=1e-6)
+
+
+def test_a_model_flies_in_journals(journals, tmp_path):
+    gains = {"lqr_controller/K_file": str(SOFT)}
+    asked = Options(journals[0], gains, is_closed=True, model="near_hover")
+    before, after = figures(asked, tmp_path)[RMS]
+    assert 1.3 * before < after < 3.0 * before
 
 
 def test_other_gains_in_journals_are_laid_over(journals, tmp_path):

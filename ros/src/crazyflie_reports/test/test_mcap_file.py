@@ -131,6 +131,24 @@ def test_ros_2_without_its_profile_is_read(tmp_path, load):
     assert [flight.vehicle.name for flight in flights(log)] == ["cf1"]
 
 
+def test_a_file_that_is_compressed_as_a_whole_is_read(tmp_path, bag, load):
+    data = convert(bag, tmp_path / "a.mcap").read_bytes()
+    whole = load(tmp_path / "a.mcap").sources["/cf1/state"].rows().tolist()
+    file = tmp_path / "a.mcap.zstd"
+    file.write_bytes(zstd.compress(data))
+    log = load(file)
+    assert log.remarks == []
+    assert log.sources["/cf1/state"].rows().tolist() == whole
+    file.write_bytes(zstd.compress(data)[:-1000])
+    log = load(file)
+    assert any("a.mcap.zstd breaks off at" in text for text in log.remarks)
+    some = log.sources["/cf1/state"].rows().tolist()
+    assert 0 < len(some) < len(whole)
+    file.write_bytes(b"no zstd at all")
+    with pytest.raises(BagError, match="a.mcap.zstd cannot be read: "):
+        load(file)
+
+
 @pytest.mark.parametrize("compression", COMPRESS)
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
 def test_a_file_that_is_cut_is_read_as_far_as_it_goes(tmp_path, bag, load, compression, share):

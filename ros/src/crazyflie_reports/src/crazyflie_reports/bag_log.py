@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from crazyflie_reports.bag_events import EventLog
 from crazyflie_reports.bag_file import BagError, BagFile, Connection, TopicError
-from crazyflie_reports.bag_ros2 import SUFFIXES, Ros2BagFile
+from crazyflie_reports.bag_ros2 import SUFFIXES, Ros2BagFile, expanded
 from crazyflie_reports.bag_topics import (
     POSE_FIELDS,
     Topic,
@@ -158,10 +158,11 @@ def read(path: Path, folder: Path, names: dict[str, str] | None = None) -> list[
 
 def _opened(path, folder):
     try:
-        if path.suffix == ".mcap" and profile_of(path) not in (None, "ros2"):
-            return McapFile(path)
+        source = expanded(path, folder)
+        if source.suffix == ".mcap" and profile_of(source) not in (None, "ros2"):
+            return McapFile(path, source)
         if path.name.endswith(SUFFIXES):
-            return Ros2BagFile(path, folder)
+            return Ros2BagFile(path, source)
         return UsdLogFile(path) if is_usd_log(path) else BagFile(path)
     except OSError as error:
         raise BagError(f"{path}: {error.strerror}") from None

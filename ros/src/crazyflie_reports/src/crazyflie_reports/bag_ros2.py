@@ -156,24 +156,39 @@ def _fields(definition):
     return ", ".join(f"{kind[1]} {name}" for name, kind in definition[1]) or "none"
 
 
+def expanded(path: Path, folder: Path) -> Path:
+    """Return a file that is compressed as a whole, such as x.mcap.zstd, decompressed in ``folder``.
+
+    Another file is returned as it is. `BagError`: it is damaged, or too large.
+    """
+    if path.suffix != ".zstd":
+        return path
+    target = Path(tempfile.mkdtemp(dir=folder)) / path.stem
+    decompressor, expansion = zstd.ZstdDecompressor(), Expansion(path.stat().st_size)
+    try:
+        with path.open("rb") as source, target.open("wb") as file:
+            while (data := source.read(1 << 20)) and not decompressor.eof:
+                file.writelines(expansion.pieces(decompressor, data))
+    except (ExpansionError, zstd.ZstdError) as error:
+        raise BagError(f"{path} cannot be read: {error}") from None
+    return target
+
+
 class Ros2BagFile:
     """A file of a ROS 2 bag, as `bag_file.BagFile` is one of ROS 1.
 
-    A file that is compressed as a whole is decompressed into ``folder``. `BagError`: it cannot be
-    read.
+    ``source`` is the file itself, or what `expanded` has made of it. `BagError`: it cannot be read.
     """
 
-    def __init__(self, path: Path, folder: Path):
+    def __init__(self, path: Path, source: Path):
         self._path = path
         self.connections: list[Connection] = []
         self.interruption = ""  #: Reason why reading has ended early; empty if it has not.
         self.size = path.stat().st_size
         self.done = 0.0  #: Number of bytes that have been read, estimated by that of messages.
         self._expansion = Expansion(self.size)
-        self._source = path
+        self._source = source
         try:
-            if path.suffix == ".zstd":
-                self._source = self._expanded(folder)
             checked = self._checked_chunks() if self._source.suffix == ".mcap" else set()
             self._reader = Reader(self._source)
             self._reader.open()
@@ -213,15 +228,6 @@ class Ros2BagFile:
             self.interruption = f"{self._path} is damaged, and is read in part: {error}"
         finally:
             self._reader.close()
-
-    def _expanded(self, folder):
-        """Return the decompressed file, in a folder of its own."""
-        target = Path(tempfile.mkdtemp(dir=folder)) / self._path.stem
-        decompressor = zstd.ZstdDecompressor()
-        with self._path.open("rb") as source, target.open("wb") as file:
-            while (data := source.read(1 << 20)) and not decompressor.eof:
-                file.writelines(self._expansion.pieces(decompressor, data))
-        return target
 
     def _checked_chunks(self) -> set[tuple[int, str, int]]:
         """Return place, compression and size of each chunk, all within the limits.

@@ -79,13 +79,16 @@ def _fields(definition):
 
 
 class McapFile:
-    """An MCAP file that is read once, from its beginning, as `bag_file.BagFile`."""
+    """An MCAP file that is read once, from its beginning, as `bag_file.BagFile`.
 
-    def __init__(self, path: Path):
-        self._path = path
+    ``source`` is the file itself, or what `bag_ros2.expanded` has made of it.
+    """
+
+    def __init__(self, path: Path, source: Path):
+        self._path, self._source = path, source
         self.connections: list[Connection] = []  #: Connections that have been read so far.
         self.interruption = ""  #: Reason why reading has ended early; empty if it has not.
-        self.size = path.stat().st_size
+        self.size = source.stat().st_size
         self.done = 0  #: Number of bytes that have been read.
         self._expansion = Expansion(self.size)
         self._schemas: dict[int, tuple[str, str]] = {}  # Name and definition.
@@ -95,7 +98,7 @@ class McapFile:
         self, is_wanted: Callable[[Connection], bool]
     ) -> Iterator[tuple[Connection, float, bytes]]:
         """Yield connection, time of recording (s) and serialized message."""
-        with self._path.open("rb") as file:
+        with self._source.open("rb") as file:
             file.seek(len(MCAP_MAGIC))
             try:
                 yield from self._messages_in(file, self.size, is_wanted)

@@ -188,6 +188,15 @@ def test_simulated_vehicles_need_no_address(load):
             ":8: all/firmware_params/a/b is 'much'; expected a finite number",
         ),
         (
+            TWO + "all: {firmware_params: {health: {startPropTest: 1}}}\n",
+            ":8: all/firmware_params/health/startPropTest turns motors, arms, stops or restarts "
+            "the vehicle, and is no setting; expected none",
+        ),
+        (
+            TWO + "    firmware_params: {motorPowerSet: {enable: 1}}\n",
+            ":8: robots/cf2/firmware_params/motorPowerSet/enable turns motors, arms, stops or ",
+        ),
+        (
             TWO + "all: {firmware_params: {a: 3}}\n",
             ":8: all/firmware_params/a is 3; expected a mapping",
         ),

@@ -25,6 +25,35 @@ def test_a_simulated_fleet_needs_no_cflib():
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
 
 
+NO_MOCAP = """
+robots:
+  cf1:
+    initial_position: [0, 0, 0]
+    motion_capture: {enabled: false}
+"""
+
+
+@pytest.mark.parametrize("name", ["vehicle", "body"])
+def test_without_motion_capture_a_vehicle_needs_another_positioning(tmp_path, name):
+    file = tmp_path / "fleet.yaml"
+    body = (
+        "  body: {initial_position: [1, 0, 0], connection: none, motion_capture: {enabled: false}}"
+    )
+    decked = NO_MOCAP + "    positioning: flow\n"
+    file.write_text(NO_MOCAP if name == "vehicle" else decked + body)
+    with pytest.raises(ParameterError) as caught:
+        Swarm(simulated=False, fleet={"file": str(file)})
+    assert str(caught.value).startswith(f"{file}: {'cf1' if name == 'vehicle' else 'body'} has")
+    assert "motion_capture/enabled: false; expected true, or positioning: " in str(caught.value)
+    # Simulated poses come from no motion capture.
+    Swarm(fleet={"file": str(file)})
+    file.write_text(decked)
+    Swarm(simulated=False, fleet={"file": str(file)})
+    if name == "vehicle":
+        file.write_text(NO_MOCAP)
+        Swarm(simulated=False, fleet={"file": str(file), "positioning": "lighthouse"})
+
+
 class Waver(Node):
     """A node in addition to those that fly a vehicle."""
 

@@ -27,6 +27,7 @@ from crazyflie_fleet.fleet_config import (
     address_of,
     close_pairs,
 )
+from crazyflie_link.triggers import acts
 from crazyflie_model.quadrotor import TYPES
 from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters.declaration import Complaints
@@ -273,6 +274,10 @@ class FleetParser:
         with self._errors:
             for group, inner in _entries(layer.settings, "firmware_params").items():
                 for key, value in inner.entries().items():
+                    if acts(f"{group}.{key}"):
+                        # Values are written whenever the vehicle is added, also in a hand.
+                        text = "turns motors, arms, stops or restarts the vehicle, and is no "
+                        self._error(value, text + "setting; expected none")
                     number = self._check_type(FIRMWARE_NUMBER, value.value, value)
                     layer.firmware_params[f"{group}.{key}"] = number
             self._read_logging(_entries(layer.settings, "firmware_logging"), layer)

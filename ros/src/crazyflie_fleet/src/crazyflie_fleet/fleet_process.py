@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
+from crazyflie_driver.positioning import MOCAP, SOURCES
 from crazyflie_fleet.connect_node import BatteryReportNode
-from crazyflie_fleet.fleet_config import BUFFER, VehicleConfig
+from crazyflie_fleet.fleet_config import BUFFER, FleetConfig, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FlyParameters
 from crazyflie_fleet.fleet_services_node import FleetServicesNode
 from crazyflie_fleet.high_level_node import HighLevelNode
@@ -54,6 +55,8 @@ class _NodeFactory:
         fleet = config.fleet()
         self._places = {name: place for place, name in enumerate(fleet.names)}
         own_names = config.own_names(fleet)
+        if not config.is_simulated:
+            _check_positioning(config.file, fleet)
         obstacles = {
             each.name: {"frame": each.mocap_frame, "buffer": each.buffer}
             for each in fleet.obstacles
@@ -138,6 +141,17 @@ class _NodeFactory:
             has_yaw = not self._config.is_simulated or vehicle.dynamics not in WITHOUT_YAW
             known: Tree = {"frames": frames, "reference": {"yaw": has_yaw}}
             self._add(name, HighLevelNode(tracked), merged(own, known))
+
+
+def _check_positioning(file: str, fleet: FleetConfig) -> None:
+    errors = [
+        f"{file}: {each.name} has motion_capture/enabled: false; expected true, or positioning: "
+        f"{', '.join(source for source in SOURCES if source != MOCAP)}"
+        for each in (*fleet.vehicles, *fleet.obstacles)
+        if each.positioning == MOCAP and not each.mocap_enabled
+    ]
+    if errors:
+        raise ParameterError(*errors)
 
 
 def _paths(tree: Mapping[str, Any], prefix: str = "") -> list[str]:

@@ -22,6 +22,7 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_link.testing import write_lighthouse_file
 from crazyflie_utils import ServiceError
+from crazyflie_virtual.firmware.planner import read_compressed
 from crazyflie_virtual.testing import virtual_vehicle
 
 SPIRAL = SpiralRequest(0, 1.5, 0.5, 1.0, 0.25, Duration(3), True, False)
@@ -145,8 +146,9 @@ def test_a_compressed_trajectory(virtual):
     server.call("/cf9/upload_compressed_trajectory", request)
     planner = vehicle.board.firmware.planner
     assert struct.unpack_from("<4h", planner.memory, 100) == (0, 250, 1000, 286)
-    pieces, is_compressed = planner._pieces(3)
-    assert is_compressed
+    where, read = planner._place(3)
+    pieces = read(bytes(planner.memory[where]))
+    assert read is read_compressed
     assert [piece.duration for piece in pieces][:2] == [1.0, 2.0]
 
 

@@ -119,6 +119,17 @@ def test_a_number_that_is_not_finite_changes_nothing(path, old, new):
     assert vehicle.pages == {}
 
 
+@pytest.mark.parametrize("given", ["7", "0", "two", "[2]"])
+def test_an_unknown_type_of_base_stations_changes_nothing(path, given):
+    text = Path(write_lighthouse_file(path, 0)).read_text()
+    path.write_text(text.replace(f"systemType: {SYSTEM_TYPE}", f"systemType: {given}"))
+    vehicle = Vehicle()
+    with pytest.raises(ValueRangeError, match="systemType is .*; expected 1 or 2"):
+        Lighthouse(lambda: vehicle).write_file(str(path), vehicle)
+    assert vehicle.pages == {}
+    assert vehicle.parameters == {"lighthouse.systemType": 1}
+
+
 @pytest.mark.parametrize("answer", [b"\x0b", b"\x0b\x00"])
 def test_stations_that_are_not_stored_are_refused(path, answer):
     vehicle = Vehicle()

@@ -18,7 +18,7 @@ from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.vehicle_base import BaseVehicle, Job
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError, LinkLostError
-from crazyflie_link.parameters import is_trigger
+from crazyflie_link.triggers import is_trigger
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError

@@ -303,4 +303,10 @@ def _read_file(path):
         raise ValueRangeError(
             f"lighthouse file {path}: base station {unknown[0]!r}; expected 0 to {STATIONS - 1}"
         )
-    return geometries, calibrations, content.get(layout.SYSTEM_TYPE_ID, layout.SYSTEM_TYPE_V2)
+    system_type = content.get(layout.SYSTEM_TYPE_ID, layout.SYSTEM_TYPE_V2)
+    if system_type not in (layout.SYSTEM_TYPE_V1, layout.SYSTEM_TYPE_V2):
+        raise ValueRangeError(
+            f"lighthouse file {path}: {layout.SYSTEM_TYPE_ID} is {system_type!r}; expected "
+            f"{layout.SYSTEM_TYPE_V1} or {layout.SYSTEM_TYPE_V2}"
+        )
+    return geometries, calibrations, system_type

@@ -20,22 +20,6 @@ from crazyflie_link.link import Link
 from crazyflie_link.subsystem import Subsystem, elements
 from crazyflie_link.transmission import Request
 
-#: Groups of parameters, parameters, and parts of names, that have the vehicle act when they are
-#: written: turn its motors, stop, arm, restart, forget.
-_TRIGGER_GROUPS = frozenset({"health", "motorPowerSet", "system"})
-_TRIGGERS = frozenset({"stabilizer.stop", "supervisor.infdmp", "flightmode.yawRst"})
-_TRIGGER_WORD = "reset"
-
-
-def is_trigger(name: str) -> bool:
-    """Return whether a parameter, such as "health.startPropTest", triggers an action.
-
-    It is no state that a vehicle has lost when it was off: it must not be written again.
-    """
-    group, _, parameter = name.partition(".")
-    is_reset = _TRIGGER_WORD in parameter.lower()
-    return is_reset or group in _TRIGGER_GROUPS or name in _TRIGGERS
-
 
 class FirmwareParameters(Subsystem):
     """The parameters of a vehicle; all were read when the link was set up."""

@@ -74,7 +74,8 @@ def of_firmware(vehicle: str, tree: Mapping[str, Any]) -> Iterator[ParameterInfo
         except ValueError:
             continue
         for name, value in sorted(numbers.items()):
-            kind = "float" if isinstance(value, float) else "int"
+            # A text, as of 2e0, does not tell which one it is.
+            kind = "int" if isinstance(parameters[name], int) else "float"
             yield ParameterInfo(vehicle, f"{group}.{name}", kind, value, is_firmware=True)
 
 

@@ -216,7 +216,7 @@ class SimulatorNode(Node[SimulatorParameters]):
             self._catch_up(self._handle.time())
 
     def _catch_up(self, now):
-        """Advance to the clock, which is at ``now`` (s); broadcast the poses that are listened to."""
+        """Advance to the clock, which is at ``now`` (s); broadcast poses with listeners."""
         if self._publishes_clock:
             if self._ticks != self._broadcast_ticks:
                 self._broadcast_ticks = self._ticks

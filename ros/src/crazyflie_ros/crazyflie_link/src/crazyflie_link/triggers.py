@@ -1,6 +1,6 @@
 """Parameters of the firmware that trigger an action when they are written. Needs no cflib."""
 
-#: Groups of parameters, and parameters, that have the vehicle turn its motors, stop, arm or restart.
+#: Groups of parameters, and parameters, that make the vehicle turn its motors, stop, arm, restart.
 _ACTING_GROUPS = frozenset({"health", "motorPowerSet", "system"})
 _ACTING = frozenset({"stabilizer.stop", "supervisor.infdmp"})
 #: A parameter, and a part of names, that have it forget.

@@ -271,6 +271,11 @@ robot_types:
     assert not any("defaults" in text for text in fleet.warnings)
 
 
+def test_an_empty_path_is_no_file():
+    with pytest.raises(ParameterError, match="cannot be read: Is a directory"):
+        fleet_file.load("")
+
+
 def test_files_are_found_from_home(tmp_path, monkeypatch):
     """A fleet file, and those that it names."""
     monkeypatch.setenv("HOME", str(tmp_path))

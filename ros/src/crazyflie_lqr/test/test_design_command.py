@@ -207,6 +207,12 @@ def test_plot_is_a_picture(times, tmp_path):
     assert plot.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_picture_in_the_home_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert main(arguments(plot="~/design.png")) == 0
+    assert (tmp_path / "design.png").exists()
+
+
 def test_a_plot_of_no_format_is_refused(tmp_path, capsys):
     assert main(arguments(plot=tmp_path / "design.sheet")) == 1
     assert "sheet" in capsys.readouterr().err

@@ -120,8 +120,9 @@ def test_why_a_flight_fails(run):
     assert run("fly", "raise KeyboardInterrupt")[::2] == (130, "interrupted\n")
 
 
-def test_a_trajectory(vehicle, tmp_path, capsys):
-    path = str(tmp_path / "eight.csv")
+def test_a_trajectory(vehicle, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    path = "~/eight.csv"
     trajectory_file.save(path, figure8())
     assert main(["dry_run", path, "cf1"]) == 0
     assert result(capsys.readouterr().out)["duration"] == pytest.approx(20.0, abs=5.0)
@@ -133,11 +134,15 @@ def test_a_trajectory(vehicle, tmp_path, capsys):
     ("arguments", "text"),
     [
         (["flight", "one.py"], "invalid choice: 'flight'"),
-        (["fly", "none.py"], "the file none.py does not exist; expected a script, or a trajectory"),
+        (
+            ["fly", "none.py"],
+            "the file /none.py does not exist; expected a script, or a trajectory",
+        ),
         ([], "the following arguments are required: word, file"),
     ],
 )
-def test_bad_arguments(arguments, text, capsys):
+def test_bad_arguments(arguments, text, capsys, monkeypatch):
+    monkeypatch.chdir("/")
     with pytest.raises(SystemExit):
         main(arguments)
     assert text in capsys.readouterr().err

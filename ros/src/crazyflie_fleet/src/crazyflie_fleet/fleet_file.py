@@ -134,7 +134,7 @@ def load(path: str | Path) -> FleetConfig:
     ParameterError
         The text names all errors: file, line, and what was expected.
     """
-    types = user_path(path).with_name(TYPES_FILE)
+    types = user_path(path).parent / TYPES_FILE
     return _fleet(yaml_file.load(path), types if types.exists() else None)
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from crazyflie_lqr.design import Design
 from crazyflie_lqr.margins import loop_response
 from crazyflie_lqr.models import CONTROLS, LinearModel
+from crazyflie_utils.text_file import user_path
 
 #: State in which a reference may step, and the control that responds.
 _OUTPUTS = {"x": "pitch", "y": "roll", "z": "thrust", "yaw": "yaw_dot"}
@@ -54,7 +55,7 @@ def save_plot(path: str, model: LinearModel, design: Design) -> None:
     _draw_steps(position, effort, time, states, controls, design.sample_time > 0.0)
     _draw_bode(magnitude, phase, design)
     figure.suptitle(f"{model.name}: closed loop, and loops broken at the plant's input")
-    figure.savefig(path, dpi=120)
+    figure.savefig(user_path(path), dpi=120)
 
 
 def _draw_steps(position, effort, time, states, controls, is_sampled):

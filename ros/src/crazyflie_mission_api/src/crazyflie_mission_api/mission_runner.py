@@ -22,6 +22,7 @@ from crazyflie_demo import trajectory_file
 from crazyflie_mission_api import Fleet, Limits, MissionError, observer
 from crazyflie_mission_api.observer import NO_DRY_RUN, MissionObserver
 from crazyflie_utils import ParameterError
+from crazyflie_utils.text_file import user_path
 
 _HEIGHT = 1.0  #: Height of the takeoff before a trajectory (m).
 #: Limits of trajectories in files, which are flown unchanged or refused.
@@ -82,9 +83,11 @@ def main(arguments: list[str]) -> int:
         "others", nargs=argparse.REMAINDER, help="arguments of the script, or names of vehicles"
     )
     options = parser.parse_args(arguments)
-    path, others, is_dry = options.file, options.others, options.word == "dry_run"
+    path, others = str(user_path(options.file)), options.others
+    is_dry = options.word == "dry_run"
     if not os.path.isfile(path):
-        parser.error(f"the file {path} does not exist; expected a script, or a trajectory (CSV)")
+        place = os.path.abspath(path)
+        parser.error(f"the file {place} does not exist; expected a script, or a trajectory (CSV)")
     observer.of_process = _DryRunReport() if is_dry else _Printer()
     # sys.argv and the path are as if the script were started directly.
     sys.argv, sys.path[0] = [path, *others], os.path.dirname(os.path.abspath(path))

@@ -38,6 +38,12 @@ def test_reads_what_it_writes(path):
     np.testing.assert_allclose(piece.axes, coefficients, rtol=1e-8)
 
 
+def test_a_file_in_the_home_folder_is_written(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    save("~/flight.csv", [PolynomialPiece(2.5, *np.zeros((4, 8)))])
+    assert load(tmp_path / "flight.csv")[0].duration == 2.5
+
+
 def test_a_heading_empty_lines_and_a_last_comma_do_not_matter(path):
     write(path, ["Duration", "x^0"], [], [*LINE, ""], ["  "], [" 2.0 ", *LINE[1:]])
     assert [piece.duration for piece in load(path)] == [1.5, 2.0]

@@ -11,7 +11,7 @@ import numpy as np
 from crazyflie_model.elementwise import join
 from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
 from crazyflie_utils.text import number_from_text, shortened, shown
-from crazyflie_utils.text_file import TextFileError, read_text
+from crazyflie_utils.text_file import TextFileError, read_text, user_path
 
 #: Numbers in a line of a file: duration, then the coefficients of x, y, z and yaw.
 COLUMNS = 1 + 4 * COEFFICIENTS
@@ -94,7 +94,7 @@ def save(path: str | Path, pieces: list[PolynomialPiece]) -> None:
     for piece in pieces:
         numbers = [piece.duration, *(c for axis in piece.padded_axes for c in axis)]
         lines.append(",".join(f"{number:.9g}" for number in numbers))
-    Path(path).write_text("\n".join(lines) + "\n")
+    user_path(path).write_text("\n".join(lines) + "\n")
 
 
 class Summary(NamedTuple):

@@ -69,7 +69,12 @@ def test_a_stale_stream_does_not_start_a_vehicle_that_was_restarted(server, vehi
     vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 2)
     assert count() == 0
     assert "setpoints are ignored since the link was lost" in said(server)
+    # A new stream, whose thrust begins at zero.
     server.process.advance(1.5)
+    if send is thrust:
+        thrust(server, 0.0)
+        vehicle.wait_for_packets(3, 0)
+        vehicle.received.clear()
     send(server)
     wait_until(lambda: count() == 1, "the new stream")
 

@@ -55,10 +55,18 @@ def test_what_was_streamed_before_a_loss_stays_blocked(lost):
     assert not lost.is_blocking(62.0)
 
 
-@pytest.mark.parametrize("event", [GateEvent.FLIGHT_REPORTED, GateEvent.FLIGHT_CALLED])
-def test_a_flight_that_goes_on_and_a_call_open_it(lost, event):
-    lost.handle(event)
+def test_a_flight_that_goes_on_opens_it(lost):
+    lost.handle(GateEvent.FLIGHT_REPORTED)
     assert stream(lost, 2.0, 3.0) == (0, "")
+
+
+def test_a_call_for_a_flight_opens_it_for_another_stream_only(lost):
+    lost.handle(GateEvent.FLIGHT_CALLED)
+    lost.handle(GateEvent.FLIGHT_REPORTED)
+    count, why = stream(lost, 2.0, 60.0)
+    assert count == 2900
+    assert why.startswith("it comes since before the vehicle was added, or was called to fly")
+    assert stream(lost, 60.0 + STREAM_PAUSE + 0.1, 62.0) == (0, "")
 
 
 @pytest.fixture
@@ -78,27 +86,30 @@ def test_what_was_streamed_while_a_vehicle_did_not_lift_off_stays_blocked(standi
     assert why.startswith("the vehicle was commanded to fly and did not lift off")
 
 
-def test_a_new_stream_zero_thrust_and_a_call_are_new_attempts(standing):
+def test_a_new_stream_and_zero_thrust_are_new_attempts_and_a_call_is_none(standing):
     assert stream(standing, 2.0 + STREAM_PAUSE + 0.1, 4.0) == (0, "")
     standing.handle(GateEvent.NOT_LIFTED)
     assert standing.refusal(4.0, ZERO) == ""
     assert stream(standing, 4.02, 5.0) == (0, "")
     standing.handle(GateEvent.NOT_LIFTED)
     standing.handle(GateEvent.FLIGHT_CALLED)
-    assert stream(standing, 5.0, 6.0) == (0, "")
+    assert stream(standing, 5.0, 6.0)[0] == 50
 
 
-def test_a_pause_opens_it(lost):
+@pytest.mark.parametrize(("control", "refused"), [(REFERENCE, 0), (THRUST, 40)])
+def test_after_a_pause_references_open_it_and_thrust_begins_at_zero(lost, control, refused):
+    """A node that is started again pauses, too, and its first thrust is that of a flight."""
     assert stream(lost, 2.0, 2.2)[0] == 10
-    assert stream(lost, 2.2 + STREAM_PAUSE + 0.1, 4.0) == (0, "")
+    assert stream(lost, 2.2 + STREAM_PAUSE, 4.0, control=control)[0] == refused
 
 
-def test_a_pause_during_the_loss_opens_it():
+@pytest.mark.parametrize(("control", "refused"), [(REFERENCE, 0), (THRUST, 50)])
+def test_so_it_is_with_a_pause_during_the_loss(control, refused):
     gate = opened()
     stream(gate, 0.0, 1.0)
     gate.handle(GateEvent.LINK_LOST)
     gate.handle(GateEvent.LINK_BACK)
-    assert stream(gate, 3.0, 4.0) == (0, "")
+    assert stream(gate, 3.0, 4.0, control=control)[0] == refused
 
 
 def test_zero_thrust_opens_it(lost):
@@ -191,7 +202,7 @@ def test_a_command_that_fails_lets_setpoints_pass_but_not_after_another_one():
 
 
 def test_every_event_has_a_transition_and_every_block_a_reason():
-    assert set(TRANSITIONS) == set(GateEvent)
+    assert {event for event, *_ in TRANSITIONS} == set(GateEvent)
     assert list(REASONS) == list(Block)
 
 

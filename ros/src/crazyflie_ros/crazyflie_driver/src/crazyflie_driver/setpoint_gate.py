@@ -61,30 +61,32 @@ _NONE = Block(0)
 _ADDED = Block.OLD_STREAM | Block.NEW
 _ON_TRIAL = Block.UNCONFIRMED | Block.LANDED | Block.NOT_LIFTED
 
-#: Event -> (blocks that must hold, blocks that begin, blocks that end).
-TRANSITIONS = {
-    GateEvent.EMERGENCY_STOP: (_NONE, Block.EMERGENCY, _NONE),
-    GateEvent.REMOVAL: (_NONE, Block.REMOVAL, _NONE),
+#: Event, blocks of which one must hold (none: in any case), blocks that begin, blocks that end.
+#: Each row of an event is used, in this order.
+TRANSITIONS = (
+    (GateEvent.EMERGENCY_STOP, _NONE, Block.EMERGENCY, _NONE),
+    (GateEvent.REMOVAL, _NONE, Block.REMOVAL, _NONE),
     # The vehicle lands.
-    GateEvent.BATTERY_CRITICAL: (_NONE, Block.BATTERY, _NONE),
+    (GateEvent.BATTERY_CRITICAL, _NONE, Block.BATTERY, _NONE),
     # On the ground, where the voltage recovers: the old stream must not start another flight.
-    GateEvent.BATTERY_RECOVERED: (Block.BATTERY, Block.LANDED, Block.BATTERY),
-    GateEvent.LINK_LOST: (_NONE, Block.LINK_LOST, Block.UNCONFIRMED),
+    (GateEvent.BATTERY_RECOVERED, Block.BATTERY, Block.LANDED, Block.BATTERY),
+    (GateEvent.LINK_LOST, _NONE, Block.LINK_LOST, Block.UNCONFIRMED),
     # The vehicle may have been restarted, or its battery been changed, and be in a hand.
-    GateEvent.LINK_BACK: (Block.LINK_LOST, Block.UNCONFIRMED, Block.LINK_LOST),
+    (GateEvent.LINK_BACK, Block.LINK_LOST, Block.UNCONFIRMED, Block.LINK_LOST),
     # The vehicle reports a flight, as it does with thrust on the ground, too.
-    GateEvent.FLIGHT_REPORTED: (_NONE, _NONE, Block.UNCONFIRMED),
+    (GateEvent.FLIGHT_REPORTED, _NONE, _NONE, Block.UNCONFIRMED),
     # A service call makes the vehicle fly; it does not end a stream from before.
-    GateEvent.FLIGHT_CALLED: (_NONE, _NONE, _ON_TRIAL | Block.NEW),
+    (GateEvent.FLIGHT_CALLED, _ON_TRIAL, Block.OLD_STREAM, _ON_TRIAL),
+    (GateEvent.FLIGHT_CALLED, _NONE, _NONE, Block.NEW),
     # Setpoints have commanded a flight, and the vehicle has not lifted off.
-    GateEvent.NOT_LIFTED: (_NONE, Block.NOT_LIFTED, _NONE),
+    (GateEvent.NOT_LIFTED, _NONE, Block.NOT_LIFTED, _NONE),
     # After a pause, or with zero thrust.
-    GateEvent.STREAM_BEGUN: (_NONE, _NONE, _ON_TRIAL | Block.OLD_STREAM),
-    # By zero thrust, or a reference on the ground.
-    GateEvent.GROUND_COMMANDED: (_NONE, _NONE, _ADDED),
-}
+    (GateEvent.STREAM_BEGUN, _NONE, _NONE, Block.LANDED | Block.NOT_LIFTED | Block.OLD_STREAM),
+    # By zero thrust, or a reference that is on the ground, or follows a pause.
+    (GateEvent.GROUND_COMMANDED, _NONE, _NONE, _ADDED | Block.UNCONFIRMED),
+)
 
-_ADVICE = f"pause the stream for {STREAM_PAUSE:g} s, send zero thrust or call a service"
+_ADVICE = f"pause the stream for {STREAM_PAUSE:g} s, or send zero thrust"
 
 #: Block -> words of the warning; the first that holds is named.
 REASONS = {
@@ -93,14 +95,11 @@ REASONS = {
     Block.BATTERY: "the battery is critical",
     Block.LINK_LOST: "the link is lost",
     Block.OLD_STREAM: (
-        "it comes since before the vehicle was added: pause the stream for "
-        f"{STREAM_PAUSE:g} s, or send zero thrust"
+        f"it comes since before the vehicle was added, or was called to fly: {_ADVICE}"
     ),
     Block.NEW: "the vehicle has just been added: begin with zero thrust",
-    Block.UNCONFIRMED: (
-        f"the link was lost, and the vehicle does not fly: {_ADVICE} that makes it fly"
-    ),
-    Block.LANDED: f"the vehicle was landed for its battery: {_ADVICE} that makes it fly",
+    Block.UNCONFIRMED: "the link was lost, and the vehicle does not fly: begin with zero thrust",
+    Block.LANDED: f"the vehicle was landed for its battery: {_ADVICE}",
     Block.NOT_LIFTED: f"the vehicle was commanded to fly and did not lift off: {_ADVICE}",
 }
 
@@ -109,7 +108,8 @@ class SetpointGate:
     """Decide about each setpoint; times are s of one clock.
 
     The gate of a new vehicle is closed: what comes may be a stream from before, for a vehicle that
-    flew then, and thrust that begins above zero makes a vehicle leap.
+    flew then, and thrust that begins above zero makes a vehicle leap. So is that of one whose link
+    was lost, until it reports a flight.
 
     Callbacks, the link's thread and those of the vehicle's jobs use it at the same time.
     """
@@ -131,10 +131,10 @@ class SetpointGate:
 
     def handle(self, event: GateEvent) -> None:
         """Change the blocks as an event does."""
-        needed, begun, ended = TRANSITIONS[event]
         with self._lock:
-            if needed in self._blocks:
-                self._blocks = self._blocks & ~ended | begun
+            for each, needed, begun, ended in TRANSITIONS:
+                if each is event and (not needed or needed & self._blocks):
+                    self._blocks = self._blocks & ~ended | begun
 
     def listen(self, now: float) -> None:
         """Record that setpoints are subscribed to."""

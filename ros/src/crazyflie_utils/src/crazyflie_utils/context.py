@@ -10,7 +10,12 @@ from typing import Any
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
-from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED, Transforms
+from crazyflie_utils.tf.transforms import (
+    MAX_CLOCK_DELAY_SIMULATED,
+    MAX_FUTURE_STAMP,
+    MAX_FUTURE_STAMP_SIMULATED,
+    Transforms,
+)
 from crazyflie_utils.timers import (
     Executor,
     SimulatedClock,
@@ -234,6 +239,7 @@ class ProcessContext:
             lambda text, key: tf_log.warn(text, throttle=1.0, key=key),
             self.clock.nanoseconds,
             MAX_FUTURE_STAMP_SIMULATED if use_sim_time else MAX_FUTURE_STAMP,
+            MAX_CLOCK_DELAY_SIMULATED if use_sim_time else 0.0,
         )
         # The poses of all vehicles that are simulated in one tick form one message.
         tf = self.transforms.gather, self.transforms.send_gathered

@@ -191,8 +191,9 @@ class FrameTree:
     """Frames, their poses and parents. Not thread-safe.
 
     ``warn(text, key)`` is called for every dropped transform; the key identifies the reason.
-    ``ahead`` is how far the stamp of a transform may be ahead of now, s. ``on_new(pose)`` is called
-    with every pose that is the latest of its frame.
+    ``ahead`` is how far the stamp of a transform may be ahead of now, s; up to ``clock_delay`` (s)
+    beyond it is dropped without a warning. ``on_new(pose)`` is called with every pose that is the
+    latest of its frame.
     """
 
     def __init__(
@@ -200,11 +201,13 @@ class FrameTree:
         warn: Callable[[str, Hashable], None],
         ahead: float,
         on_new: Callable[[StampedPose], None],
+        clock_delay: float = 0.0,
     ):
         self.rejected: Counter[str] = Counter()  #: Number of dropped transforms by reason.
         self.followed: set[str] = set()  #: Frames that are decoded.
         self._warn = warn
         self._ahead = round(ahead * 1e9)
+        self._clock_delay = round(clock_delay * 1e9)
         self._on_new = on_new
         self._frames: dict[str, _Frame] = {}
         self._static: dict[str, StampedPose] = {}
@@ -380,7 +383,10 @@ class FrameTree:
         """Return whether a pose is new; delete the moving frames if its source's clock was set."""
         if pose.stamp > now + self._ahead:
             # Before the first /clock of a running simulation, now is 0.
-            return self._reject(pose, "is stamped in the future") if now else False
+            if not now:
+                return False
+            warns = pose.stamp > now + self._ahead + self._clock_delay
+            return self._reject(pose, "is stamped in the future", warns)
         frame = self._frames.get(pose.child)
         if frame is None:
             return True
@@ -393,8 +399,10 @@ class FrameTree:
             self.clear()
         return pose.stamp != frame.latest.stamp
 
-    def _reject(self, pose, reason):
+    def _reject(self, pose, reason, warns=True):
         self.rejected[reason] += 1
+        if not warns:
+            return False
         text = f"ignoring a transform {pose.parent[:50]} -> {pose.child[:50]} that {reason}"
         self._warn(text, (pose.parent, pose.child, reason))
         return False

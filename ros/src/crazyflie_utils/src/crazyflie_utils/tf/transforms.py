@@ -15,6 +15,8 @@ from crazyflie_utils.topics import Subscriber, Topics
 MAX_FUTURE_STAMP = 0.2
 #: The same limit in simulated time (s): pose and /clock come by different paths.
 MAX_FUTURE_STAMP_SIMULATED = 2.0
+#: In simulated time, /clock may be this late without a warning (s): 1 s at 60 times real time.
+MAX_CLOCK_DELAY_SIMULATED = 60.0
 
 
 class _Listener:
@@ -38,7 +40,7 @@ class _Listener:
 class Transforms:
     """The transforms that the process receives and sends on /tf and /tf_static.
 
-    ``warn`` and ``ahead`` are those of `FrameTree`; ``now()`` returns the present ROS time, ns.
+    ``warn``, ``ahead`` and ``clock_delay`` are those of `FrameTree`; ``now()`` returns the present ROS time, ns.
     """
 
     def __init__(
@@ -47,11 +49,12 @@ class Transforms:
         warn: Callable[[str, Hashable], None],
         now: Callable[[], int],
         ahead: float,
+        clock_delay: float = 0.0,
     ):
         self._topics = topics
         self._static: dict[str, TransformStamped] = {}
         self._now = now
-        self._tree = FrameTree(warn, ahead, self._note_arrival)
+        self._tree = FrameTree(warn, ahead, self._note_arrival, clock_delay)
         self._publisher: Any = None
         self._own: TFMessage | None = None
         self._broadcasters = 0

@@ -40,7 +40,8 @@ class _Listener:
 class Transforms:
     """The transforms that the process receives and sends on /tf and /tf_static.
 
-    ``warn``, ``ahead`` and ``clock_delay`` are those of `FrameTree`; ``now()`` returns the present ROS time, ns.
+    ``warn``, ``ahead`` and ``clock_delay`` are those of `FrameTree`; ``now()`` returns the present
+    ROS time, ns.
     """
 
     def __init__(

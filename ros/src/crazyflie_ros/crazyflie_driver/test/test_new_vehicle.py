@@ -144,3 +144,29 @@ def test_disarming_is_never_refused(server, standing):
     stream(server, full_thrust, 1.0)
     server.call("/cf1/arm", SetBoolRequest(False))
     assert len(arming(standing)) == 1
+
+
+@pytest.mark.parametrize("send", [full_thrust, position])
+def test_a_stream_does_not_start_a_vehicle_that_was_disarmed_in_it(server, standing, send):
+    """Most vehicles arm themselves again within 0.2 s."""
+    add(server, standing)
+    thrust(server, 0.0)
+    stream(server, send, 1.0)
+    assert flown(standing)
+    server.call("/cf1/arm", SetBoolRequest(False))
+    standing.received.clear()
+    stream(server, send, 3.0)
+    assert flown(standing) == []
+    assert any("disarmed" in w for w in server.process.logged("warn"))
+    thrust(server, 0.0)
+    stream(server, send, 0.1)
+    assert flown(standing)
+
+
+def test_a_vehicle_that_is_disarmed_in_a_stream_is_not_locked_for_its_end(server, standing):
+    add(server, standing)
+    thrust(server, 0.0)
+    stream(server, full_thrust, 1.0)
+    standing.received.clear()
+    server.call("/cf1/arm", SetBoolRequest(False))
+    assert standing.wait_for_packets(7, 1)

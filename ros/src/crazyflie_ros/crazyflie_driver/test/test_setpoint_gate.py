@@ -65,7 +65,7 @@ def test_a_call_for_a_flight_opens_it_for_another_stream_only(lost):
     lost.handle(GateEvent.FLIGHT_REPORTED)
     count, why = stream(lost, 2.0, 60.0)
     assert count == 2900
-    assert why.startswith("it comes since before the vehicle was added, or was called to fly")
+    assert why.startswith("it comes since before the vehicle was added, disarmed or called to fly")
     assert stream(lost, 60.0 + STREAM_PAUSE + 0.1, 62.0) == (0, "")
 
 
@@ -273,7 +273,7 @@ def test_nothing_that_happens_meanwhile_opens_the_gate_of_a_new_vehicle(new, eve
 
 def test_a_stream_of_references_that_begins_later_is_a_new_one_but_thrust_begins_at_zero(new):
     count, why = stream(new, 2.0, 3.0, control=THRUST)
-    assert (count, why) == (50, "the vehicle has just been added: begin with zero thrust")
+    assert (count, why) == (50, "the vehicle has just been added, or disarmed: begin with zero thrust")
     assert stream(new, 4.5, 5.5, control=REFERENCE) == (0, "")
 
 

@@ -314,9 +314,14 @@ class VehicleServices:
             if request.data:
                 vehicle.refuse_after_emergency()
                 vehicle.refuse_to_arm_in_stream()
+            else:
+                vehicle.gate.handle(GateEvent.DISARMED)
             vehicle.crazyflie.supervisor.arm(request.data)
             if request.data:
                 vehicle.gate.handle(GateEvent.FLIGHT_CALLED)
+            elif vehicle.setpoints.is_streaming:
+                # The end of a stream would lock it 2 s later.
+                vehicle.setpoints.notify_setpoints_stop()
         except (CrazyflieError, ServiceError) as error:
             return SetBoolResponse(False, str(error))
         return SetBoolResponse(True, "armed" if request.data else "disarmed")

@@ -52,6 +52,7 @@ class GateEvent(enum.Enum):
     LINK_BACK = enum.auto()
     FLIGHT_REPORTED = enum.auto()
     FLIGHT_CALLED = enum.auto()
+    DISARMED = enum.auto()
     NOT_LIFTED = enum.auto()
     STREAM_BEGUN = enum.auto()
     GROUND_COMMANDED = enum.auto()
@@ -78,6 +79,8 @@ TRANSITIONS = (
     # A service call makes the vehicle fly; it does not end a stream from before.
     (GateEvent.FLIGHT_CALLED, _ON_TRIAL, Block.OLD_STREAM, _ON_TRIAL),
     (GateEvent.FLIGHT_CALLED, _NONE, _NONE, Block.NEW),
+    # Most vehicles arm themselves again within 0.2 s.
+    (GateEvent.DISARMED, _NONE, _ADDED, _NONE),
     # Setpoints have commanded a flight, and the vehicle has not lifted off.
     (GateEvent.NOT_LIFTED, _NONE, Block.NOT_LIFTED, _NONE),
     # After a pause, or with zero thrust.
@@ -95,9 +98,9 @@ REASONS = {
     Block.BATTERY: "the battery is critical",
     Block.LINK_LOST: "the link is lost",
     Block.OLD_STREAM: (
-        f"it comes since before the vehicle was added, or was called to fly: {_ADVICE}"
+        f"it comes since before the vehicle was added, disarmed or called to fly: {_ADVICE}"
     ),
-    Block.NEW: "the vehicle has just been added: begin with zero thrust",
+    Block.NEW: "the vehicle has just been added, or disarmed: begin with zero thrust",
     Block.UNCONFIRMED: "the link was lost, and the vehicle does not fly: begin with zero thrust",
     Block.LANDED: f"the vehicle was landed for its battery: {_ADVICE}",
     Block.NOT_LIFTED: f"the vehicle was commanded to fly and did not lift off: {_ADVICE}",
@@ -108,8 +111,8 @@ class SetpointGate:
     """Decide about each setpoint; times are s of one clock.
 
     The gate of a new vehicle is closed: what comes may be a stream from before, for a vehicle that
-    flew then, and thrust that begins above zero makes a vehicle leap. So is that of one whose link
-    was lost, until it reports a flight.
+    flew then, and thrust that begins above zero makes a vehicle leap. So is that of one that was
+    disarmed, or whose link was lost, until it reports a flight.
 
     Callbacks, the link's thread and those of the vehicle's jobs use it at the same time.
     """

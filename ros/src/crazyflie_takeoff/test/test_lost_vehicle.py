@@ -68,13 +68,22 @@ def disarm(network):
     network.driver.tell(supervisor=VehicleStatus.CAN_BE_ARMED)
 
 
+def restart(network):
+    """Change the battery, so quickly that a lost link alone does not end the flight."""
+    network.driver.tell(supervisor=READY | VehicleStatus.FLYING)
+    network.advance(0.5)
+    network.driver.tell(has_supervisor=False)
+    network.advance(0.5)
+    network.driver.tell(supervisor=READY, has_supervisor=True)
+
+
 def rest(network):
     """Let the vehicle lie on the ground: its motors do not obey."""
     network.vehicle.__init__()
     network.vehicle.command = lambda thrust: None
 
 
-LOSSES = [disconnect, kill_driver, lock, stop_by_emergency, disarm]
+LOSSES = [disconnect, kill_driver, lock, stop_by_emergency, disarm, restart]
 
 
 @pytest.mark.parametrize("lose", LOSSES)
@@ -141,6 +150,23 @@ def test_a_driver_that_never_spoke_ends_no_flight():
     network.take_off()
     network.advance(10.0)
     assert network.last("/in_flight_state") == "flying"
+
+
+@pytest.mark.parametrize("flying", [VehicleStatus.FLYING, 0])
+def test_takeoffs_that_follow_each_other_are_not_ended(flying):
+    """Between them the vehicle says that it does not fly; a driver might never say that it does."""
+    network = HoverNetwork({**SERVER, **DRIVEN}, DRIVEN)
+    network.driver = network.start("driver", DriverNode())
+    for _ in range(2):
+        network.take_off()
+        network.driver.tell(supervisor=READY | flying)
+        network.advance(5.0)
+        assert network.last("/in_flight_state") == "flying"
+        landing = network.call("/land")
+        network.advance(10.0)
+        landing.result(0)
+        network.driver.tell(supervisor=READY)
+        network.advance(5.0)
 
 
 @pytest.mark.parametrize("moment", [0.3, 3.0])

@@ -287,8 +287,10 @@ class TakeoffControlFilterNode(Node):
     def _on_timer(self):
         time = self._handle.time()
         self._follow_clock(time)
-        if self._has_driver and (reason := self._vehicle.flight_end(time)):
-            self._filter.lose_vehicle(reason)
+        if self._has_driver:
+            is_airborne = not self._filter.is_on_ground
+            if reason := self._vehicle.flight_end(time, is_airborne):
+                self._filter.lose_vehicle(reason)
         if (control := self._filter.tick(time)) is not None:
             self._publish(control, self._handle.stamp())
         gap = self._filter.relay.gaps.longest

@@ -306,7 +306,8 @@ class TakeoffServerNode(Node):
     def _watch(self):
         """End a flight that is over; land for a battery or positioning by which it cannot go on."""
         checks, now = self._checks, self._handle.time()
-        if reason := checks.vehicle.flight_end(now):
+        is_airborne = self._flight.accepts(ServerEvent.VEHICLE_LOST)
+        if reason := checks.vehicle.flight_end(now, is_airborne):
             self._end_flight(reason)
         if complaint := checks.battery_complaint(now):
             self._handle.warn(complaint, throttle=30.0, key="battery")

@@ -34,6 +34,8 @@ class VehicleFacts:
         # Time, state, and whether an emergency is latched.
         self._status = -math.inf, _READY, False
         self._unready_since = -math.inf
+        self._is_flying: bool | None = None  # As the vehicle reports it; None if it does not.
+        self._has_flown = False  # Whether it has reported the present flight.
         self._time = -math.inf
         self._debounce = Debounce(MAX_FAULT_TIME)
 
@@ -45,6 +47,7 @@ class VehicleFacts:
         self, now: float, state: SupervisorState, is_known: bool, is_emergency: bool
     ) -> None:
         """Record the vehicle's state, if it is known, and whether an emergency is latched."""
+        self._is_flying = SupervisorState.FLYING in state if is_known else None
         if not is_known:
             state |= _READY
         was_ready = _READY in self._status[1]
@@ -65,11 +68,13 @@ class VehicleFacts:
             f"crazyflie_add.launch uri:=ADDRESS tf_prefix:={self._prefix.strip('/')}"
         )
 
-    def flight_end(self, now: float) -> str:
+    def flight_end(self, now: float, is_airborne: bool) -> str:
         """Return why a flight is over; empty if it is not. To be called in each period.
 
-        The motors of a vehicle that could not fly for `MAX_FAULT_TIME` are off. When it can fly
-        again, somebody may have it in a hand.
+        ``is_airborne`` is whether the vehicle is to be off the ground. The motors of one that could
+        not fly for `MAX_FAULT_TIME` are off; so are those of one that reports no flight any more,
+        which the firmware does while no motor turns. When it can fly again, somebody may have it in
+        a hand.
         """
         step, self._time = min(max(now - self._time, 0.0), _LONGEST_STEP), now
         was_connected = math.isfinite(self._connection[0])
@@ -77,6 +82,10 @@ class VehicleFacts:
         fault = fault or self._fault(now)
         if not fault and SupervisorState.ARMED not in self._state(now):
             fault = "the vehicle is not armed"
+        is_flying = self._is_flying if now - self._status[0] <= MAX_FACT_AGE else None
+        self._has_flown = is_airborne and (self._has_flown or is_flying is True)
+        if not fault and self._has_flown and is_flying is False:
+            fault = "the vehicle does not fly any more: has it restarted?"
         return self._debounce.advance(step, fault)
 
     def _state(self, now):

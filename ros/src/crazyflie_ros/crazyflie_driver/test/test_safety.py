@@ -236,6 +236,8 @@ def test_the_status_says_what_state_a_vehicle_is_in(server):
     wait_for_words(server, "ready: armed")
     is_(vehicle, 0b11010)
     wait_for_words(server, "flying: on high-level commands")
+    # Sooner, references may be a stream from before.
+    server.process.advance(1.5)
     position(server)
     wait_for_words(server, "flying: on setpoints")
     is_(vehicle, 1 << 6)

@@ -7,6 +7,7 @@ from filter_flight import G
 
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import (
+    LAST_DIFFERENCE,
     MAX_BRAKING,
     HoverThrust,
     SafeControl,
@@ -48,16 +49,21 @@ def test_a_state_that_is_the_last_one_is_not_taken_again():
     assert safe.advance(0.01, slow, False).thrust > G - 1.0
 
 
-def test_without_a_state_a_hover_thrust_that_is_too_high_hardly_lifts():
+@pytest.mark.parametrize("error", [0.015, LAST_DIFFERENCE])
+def test_without_a_state_a_hover_thrust_that_is_too_high_hardly_lifts(error):
+    """Up to that difference, the last motion before the loss does not correct it."""
     z, z_dot = 1.5, 0.05
-    safe = SafeControl(1.015 * G, Motion((0.0, 0.0, z), (0.0, 0.0, z_dot)))
-    highest = z
-    for k in range(800):
-        z_dot += 0.01 * (safe.advance(0.01, None, k >= 160).thrust - G)
+    motion = Motion((0.0, 0.0, z), (0.0, 0.0, z_dot))
+    safe = SafeControl((1.0 + error) * G, motion)
+    highest, time = z, 0.0
+    while z > 0.0:
+        z_dot += 0.01 * (safe.advance(0.01, None, time >= 1.6).thrust - G)
         z += 0.01 * z_dot
+        time += 0.01
         highest = max(highest, z)
-    assert highest < 1.65
-    assert z < 0.0
+        # Then the motors stop.
+        assert time < 1.6 + 5.0 + descent_time(motion, 0.0)
+    assert highest < 2.0
 
 
 # Figures by hand: 0.25 g per m and 0.3 g per m/s, tilt at most 0.15 rad.

@@ -156,6 +156,11 @@ class FlightCommands:
         what = f"checking {command.name}"
         return self._vehicle.jobs.submit(what, work, is_flight=True, urgent=command.ends_flight)
 
+    def end_stream(self) -> None:
+        """Send "setpoints stop" if setpoints come: their end would lock the vehicle 2 s later."""
+        if self._setpoints.is_streaming:
+            self._setpoints.notify_setpoints_stop()
+
     def notify(self, remain_valid_ms: int) -> None:
         """Announce that setpoints stop: at once on the ground, in flight with the next command."""
         may_fly = self._log.supervisor is None or self._log.is_flying

@@ -319,9 +319,8 @@ class VehicleServices:
             vehicle.crazyflie.supervisor.arm(request.data)
             if request.data:
                 vehicle.gate.handle(GateEvent.FLIGHT_CALLED)
-            elif vehicle.setpoints.is_streaming:
-                # The end of a stream would lock it 2 s later.
-                vehicle.setpoints.notify_setpoints_stop()
+            else:
+                self._commands.end_stream()
         except (CrazyflieError, ServiceError) as error:
             return SetBoolResponse(False, str(error))
         return SetBoolResponse(True, "armed" if request.data else "disarmed")

@@ -22,7 +22,7 @@ MD5 = {
     "PrioritizedControlStamped": "283a1ef833d93b1cfda5ddc7601205cd",
 }
 
-STATUS = ("FilterStatus", "FlightStatus", "VehicleStatus")
+STATUS = ("EstimateStatus", "FilterStatus", "FlightStatus", "VehicleStatus")
 """Of this workspace alone."""
 
 POSITION_VELOCITY = ["x", "y", "z", "x_dot", "y_dot", "z_dot"]

@@ -63,8 +63,8 @@ RESERVED_NAMES = frozenset(
     high_level imu in_flight in_flight_controller in_flight_filter in_flight_filter_status
     in_flight_flight_status in_flight_hover_thrust in_flight_state in_flight_status land
     magnetic_field packets pose positioning pressure ref ref_descent ref_descent_safe ref_safe rssi
-    state state_missing state_tilted status takeoff takeoff_inhibition temperature true_pose
-    vehicle_status
+    state state_missing state_status state_tilted status takeoff takeoff_inhibition temperature
+    true_pose vehicle_status
     """.split()
 )
 

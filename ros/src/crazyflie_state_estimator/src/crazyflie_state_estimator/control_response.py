@@ -145,6 +145,11 @@ class ResponseMonitor:
         self._before: _Estimate | None = None
         self._stay: _Stay | None = None
 
+    @property
+    def disturbance(self) -> Vector | None:
+        """What weight, battery and wind add to the acceleration (m/s^2); None while unknown."""
+        return self._latest[-1].disturbance if self._latest else None
+
     def update(self, time: float, position: Vector, acceleration: Vector) -> Departure | None:
         """Process a pose; return where the vehicle is if the poses do not respond to the control.
 
@@ -335,6 +340,16 @@ class FrozenPoseMonitor:
         #: Predicted state when a pose first contradicts the control.
         self.departure: Departure | None = None
         self._response.reset()
+
+    @property
+    def is_responding(self) -> bool:
+        """Whether poses follow the control, as far as is known; they may repeat."""
+        return self._place is None
+
+    @property
+    def disturbance(self) -> Vector | None:
+        """Acceleration (m/s^2) by what is not the control; None while it is unknown."""
+        return self._response.disturbance
 
     def update(
         self, time: float, position: Vector, rotation: Vector, acceleration: Vector | None

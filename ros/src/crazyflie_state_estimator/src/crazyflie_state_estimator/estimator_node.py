@@ -1,5 +1,9 @@
 """ROS interface of the state estimators."""
 
+import math
+from typing import Any
+
+import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Bool, Header, String
 from typing_extensions import override
@@ -8,6 +12,7 @@ from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.limits import CRASH_TILT, HOLD_LIMIT, MAX_SPEED
 from crazyflie_msgs.msg import (
     ControlStamped,
+    EstimateStatus,
     FullStateStamped,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
@@ -41,6 +46,9 @@ class StateEstimatorParameters(Parameters):
     fixed_frame: str = parameter(FRAME, "frame the state is in", name="frames/fixed")
     robot_frame: str = parameter(FRAME, "frame of the vehicle", name="frames/robot")
     state_topic: str = topic("state", "where states go")
+    own_status_topic: str | None = topic(
+        "estimate_status", "by default the name of state + `_status`", None
+    )
     acts_on_arrival: bool = parameter(
         BOOLEAN,
         "answer a new pose at once, at most one every `time_step`, instead of at the next time "
@@ -69,6 +77,11 @@ class StateEstimatorParameters(Parameters):
         CRASH_TILT,
         "pose/max_tilt",
     )
+
+    @property
+    def status_topic(self) -> str:
+        """Topic of the status of poses and estimate."""
+        return self.own_status_topic or f"{self.state_topic}_status"
 
 
 # Their squares, and quotients of these, are far from the ends of the range of floats.
@@ -124,7 +137,9 @@ class KalmanWithControlParameters(KalmanParameters):
 
 
 REPORT_PERIOD = 1.0  #: Period of the diagnostics, as REP 107 recommends (s).
-SILENCE_PERIOD = 0.1  #: Period at which an estimator that acts on arrival checks for silence (s).
+#: Period of the status; an estimator that acts on arrival checks for silence as often (s).
+STATUS_PERIOD = 0.1
+UNKNOWN = (math.nan,) * 3  #: A disturbance, while it is not known.
 
 
 class StateEstimatorNode(Node[StateEstimatorParameters]):
@@ -140,11 +155,16 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         #: Time of the last state, or of the first attempt: simulated time may begin anywhere.
         self._last_success: float | None = None
         self._stamp: int | None = None
+        self._last_pose = -math.inf  #: Time at which the last new pose came.
         self._is_tilted: bool | None = None
         self._frozen_poses = 0
         #: Text that was published last; None at the start, as others may still have one of a
         #: process before this one.
         self._tf_error: str | None = None
+        self._verdict: tuple[int, str] = (EstimateStatus.MISSING, "there has been no pose yet")
+        self._good_stamp = rospy.Time()
+        self._told: tuple[Any, ...] | None = None
+        self._told_at = -math.inf
         self._inner_type = type(self.state_type().state)
 
     def state(self, motion: EstimatedMotion) -> list[float]:
@@ -187,6 +207,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         self._publisher = handle.publisher(parameters.state_topic, self.state_type)
         self._tilted = handle.publisher(f"{parameters.state_topic}_tilted", Bool, latch=True)
         self._missing = handle.publisher(f"{parameters.state_topic}_missing", String, latch=True)
+        self._status = handle.publisher(parameters.status_topic, EstimateStatus, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._lookup = handle.listen_to_poses()
         if parameters.control_topic is not None:
@@ -195,7 +216,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
             )
         if parameters.acts_on_arrival:
             handle.on_pose(parameters.robot_frame, parameters.time_step, self._estimate)
-            handle.timer(max(parameters.time_step, SILENCE_PERIOD), self._watch)
+            handle.timer(max(parameters.time_step, STATUS_PERIOD), self._watch)
         else:
             handle.timer(parameters.time_step, self._estimate)
         handle.timer(REPORT_PERIOD, self._report, stagger=True)
@@ -205,8 +226,11 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
 
     def _watch(self):
         # Without arrivals `_estimate` would not run and report the silence.
-        if self._silence(self._handle.time()) >= HOLD_LIMIT:
+        now = self._handle.time()
+        if self._silence(now) >= HOLD_LIMIT:
             self._estimate()
+        else:
+            self._publish_status(now)
 
     def _silence(self, now):
         """Return the time since the last state, or since the first call (s)."""
@@ -216,6 +240,10 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
 
     def _estimate(self):
         now = self._handle.time()
+        self._read_pose(now)
+        self._publish_status(now)
+
+    def _read_pose(self, now):
         if self._silence(now) < 0.0:
             # The simulation was reset, and the estimate belongs to the previous run.
             self._estimator.reset()
@@ -240,7 +268,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
     def _update(self, pose, now):
         if pose.stamp == self._stamp:
             return None
-        self._stamp = pose.stamp
+        self._stamp, self._last_pose = pose.stamp, now
         self._publish_tilt(pose.rotation)
         stamp = pose.stamp * 1e-9
         if self._clock_steps.update(stamp, now, self._handle.nanoseconds):
@@ -248,13 +276,24 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         attitude = rpy_from_quaternion(*pose.rotation)
         acceleration = self._control.acceleration(attitude[2], now)
         classification = self._gate.classify(stamp, pose.position, acceleration)
+        robot = self._parameters.robot_frame
         if classification is Classification.BAD:
+            self._verdict = EstimateStatus.IMPOSSIBLE, f"{robot} cannot have flown to its pose"
             return None
         if classification is Classification.MOVED:
             self._restart()
         if self._frozen.update(stamp, pose.position, pose.rotation, acceleration):
             self._reject_frozen()
+            self._verdict = (
+                (EstimateStatus.REPEATED, f"the pose of {robot} repeats; is motion capture frozen?")
+                if self._frozen.is_responding
+                else (
+                    EstimateStatus.NOT_RESPONDING,
+                    f"the poses of {robot} do not follow its control; is motion capture frozen?",
+                )
+            )
             return self._departure(attitude)
+        self._verdict, self._good_stamp = (EstimateStatus.GOOD, ""), pose.time
         return self._estimator.update(pose.stamp, pose.position, attitude, acceleration)
 
     def _restart(self):
@@ -276,6 +315,23 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
             throttle=1.0,
             key="frozen",
         )
+
+    def _publish_status(self, now):
+        facts = *self._verdict, bool(self._is_tilted)
+        if facts == self._told and 0.0 <= now - self._told_at < STATUS_PERIOD - 1e-6:
+            return
+        self._told, self._told_at = facts, now
+        pose, reason, is_tilted = facts
+        status = stamped(
+            EstimateStatus,
+            self._good_stamp,
+            self._parameters.fixed_frame,
+            pose=pose,
+            reason=reason,
+            is_tilted=is_tilted,
+            disturbance=self._frozen.disturbance or UNKNOWN,
+        )
+        self._status.publish(status)
 
     def _publish_tilt(self, rotation):
         is_tilted = self._tilt.update(*rotation[:2])
@@ -315,6 +371,9 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         if silence < HOLD_LIMIT:
             return
         self._tell_tf_error(reason)
+        if now - self._last_pose >= HOLD_LIMIT:
+            frames = f"{self._parameters.fixed_frame} -> {self._parameters.robot_frame}"
+            self._verdict = EstimateStatus.MISSING, reason or f"no new transform {frames}"
         if pose is not None:
             rejected = sum(self._rejections().values())
             reason = (

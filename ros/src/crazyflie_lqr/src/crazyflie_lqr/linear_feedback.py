@@ -294,7 +294,8 @@ class IntegralStateFeedback(LinearFeedback):
     ... `MAX_THRUST`.
 
     While a control is at its limit, its integral does not grow into the limit. From
-    `reset_integrator` to the next flight it is zero. After `take_off`, height reference and height
+    `reset_integrator` to the next flight it is zero. While `foreign` controls are flown, the
+    integral stays, and the climb learns from their thrust. After `take_off`, height reference and height
     integral are those of a `Climb` until the vehicle has arrived; but not where a step of the
     reference does no harm, with a height loop that is well damped and has no integrator.
     """
@@ -311,6 +312,8 @@ class IntegralStateFeedback(LinearFeedback):
         self._integrator_k = [float(each) for each in integrator_k]
         self._integrator_limit = [float(each) for each in integrator_limit]
         self._integral = [0.0, 0.0, 0.0]
+        #: The control that is flown in place of this controller's; None if its own is flown.
+        self.foreign: Components | None = None
         self._time: float | None = None
         self._integrates = True
         self._climb: Climb | None = None
@@ -341,7 +344,7 @@ class IntegralStateFeedback(LinearFeedback):
         reference, climb_thrust = self._follow_climb(x, x_ref, dt)
         error = heading_error(x, reference, self.yaw_index)
         u = linear_control(self._rows, self._u_hover, error)
-        if self._integrates:
+        if self._integrates and self.foreign is None:
             self._integrate(error[:3], dt, u)
         u = with_integrals(u, self._integral, self._integrator_k)
         u[THRUST] += climb_thrust
@@ -369,6 +372,11 @@ class IntegralStateFeedback(LinearFeedback):
         self._thrust = previous._thrust
 
     @property
+    def has_integral(self) -> bool:
+        """Whether any integral acts on the control."""
+        return any(map(mul, self._integrator_k, self._integrator_limit))
+
+    @property
     def height_overshoots(self) -> bool:
         """Whether the height loop is damped too little for a step; then take-offs are a `Climb`."""
         # The height loop is s^2 + k_d s + k_p, apart from delays.
@@ -389,7 +397,8 @@ class IntegralStateFeedback(LinearFeedback):
         climb = self._climb
         if climb is None:
             return x_ref, 0.0
-        climb.advance(dt, x[2], x[5], x_ref[2], self._thrust - self._u_hover[THRUST])
+        thrust = self._thrust if self.foreign is None else self.foreign[THRUST]
+        climb.advance(dt, x[2], x[5], x_ref[2], thrust - self._u_hover[THRUST])
         k, limit = self._integrator_k[2], self._integrator_limit[2]
         if climb.disturbance != 0.0 and k != 0.0:
             self._integral[2] = clip(-climb.disturbance / k, -limit, limit)

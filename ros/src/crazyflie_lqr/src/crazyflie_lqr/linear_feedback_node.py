@@ -10,8 +10,14 @@ from numpy.typing import NDArray
 from std_msgs.msg import Float64
 from typing_extensions import override
 
+from crazyflie_lqr.flown_control import FlownControl
 from crazyflie_lqr.gain_file import CONTROL_FILE, MatrixFile
-from crazyflie_lqr.linear_feedback import GroundGuess, LinearFeedback, at_rest
+from crazyflie_lqr.linear_feedback import (
+    GroundGuess,
+    IntegralStateFeedback,
+    LinearFeedback,
+    at_rest,
+)
 from crazyflie_lqr.reference import GuardedReference, StateAge
 from crazyflie_model.limits import HOLD_LIMIT, MAX_SPEED, MAX_THRUST, MIN_THRUST
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
@@ -71,6 +77,12 @@ class LinearFeedbackParameters(Parameters):
         None,
     )
     flight: FlightTopics = group(FlightTopics, "topics")
+    own_final_control_topic: str | None = topic(
+        "final_control",
+        "controls that are flown; while others than those of this node are, the integrator rests. "
+        "By default the name of control with `final` for `lqr`",
+        None,
+    )
     hover_thrust_topic: str = topic(
         "hover_thrust",
         "thrust of hover that the takeoff server has measured",
@@ -110,6 +122,13 @@ class LinearFeedbackParameters(Parameters):
         """References of a descent."""
         return self.own_descent_topic or f"{self.reference_topic}_descent"
 
+    @property
+    def final_control_topic(self) -> str | None:
+        """Controls that are flown; None if their topic is not known."""
+        above, slash, name = self.control_topic.rpartition("/")
+        derived = above + slash + name.replace("lqr", "final") if "lqr" in name else None
+        return self.own_final_control_topic or derived
+
 
 class LinearFeedbackNode(Node[LinearFeedbackParameters]):
     """Answer every state with a control that moves the vehicle towards the reference.
@@ -134,6 +153,8 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
         self._clocks_agree = False
         self._ground_guess = GroundGuess()
         self._age = StateAge()
+        self._flown = FlownControl()
+        self._follows_flown = False
 
     def complete_reference(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the reference state, shape (x_dim,), of the fields of a reference message."""
@@ -165,12 +186,22 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
         )
         parameters.flight.subscribe(handle, self._on_flight_status)
         handle.subscribe(parameters.hover_thrust_topic, Float64, self._on_hover_thrust)
+        self._follow_flown()
         handle.subscribe(parameters.state_topic, self.state_type, self._on_state, finite="state")
 
     def _reconfigure(self, parameters):
         controller = self.make_controller(parameters)
         controller.take_over(self._controller)
         self._apply(parameters, controller)
+        self._follow_flown()
+
+    def _follow_flown(self):
+        """Subscribe to the controls that are flown, once there is an integrator."""
+        controller, topic = self._controller, self._parameters.final_control_topic
+        has_integral = isinstance(controller, IntegralStateFeedback) and controller.has_integral
+        if has_integral and topic is not None and not self._follows_flown:
+            self._follows_flown = True
+            self._handle.subscribe(topic, ControlStamped, self._on_flown, finite="control")
 
     def _apply(self, parameters, controller):
         self._reference.max_jump = parameters.max_jump
@@ -221,9 +252,13 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
         if MIN_THRUST <= message.data <= MAX_THRUST:
             self._controller.hover_thrust = message.data
 
+    def _on_flown(self, message):
+        self._flown.receive(to_tuple(message.control), self._handle.time())
+
     def _take_off(self):
         if not self._is_flown:
             self._is_flown = True
+            self._flown.forget()
             self._controller.take_off()
 
     def _on_state(self, message):
@@ -244,12 +279,16 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
                 self._controller.enable_integrator()
             else:
                 self._controller.reset_integrator()
+        if self._follows_flown:
+            self._controller.foreign = self._flown.foreign(now)
         u = self._law(x, x_ref, time)
         if not math.isfinite(sum(u)):
             self._handle.warn(
                 f"the control {u} is not finite and is not sent", throttle=1.0, key="not finite"
             )
             return
+        if self._follows_flown:
+            self._flown.send(u, now)
         control = from_vector(Control, u)
         self._publisher.publish(stamped(ControlStamped, message.header.stamp, control=control))
 

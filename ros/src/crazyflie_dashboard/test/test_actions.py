@@ -319,9 +319,11 @@ def test_paths_of_a_dry_run_are_in_the_scene_until_the_page_with_control_removes
 
 def test_lights_show_which_one_it_is_for_a_while(fleet):
     lights = []
+    parameters = fleet.process.transport.parameters
+    parameters |= {"/cf2/deck/bcColorLedBot": 1, "/cf2/colorLedBot/wrgb8888": 5.0}
 
     def update(request):
-        lights.append((request.params, fleet.process.transport.parameters["/cf2/led/bitmask"]))
+        lights.append([parameters[f"/cf2/{name}"] for name in request.params])
         return srv.UpdateParamsResponse()
 
     fleet.process.handle("/driver").advertise_service(
@@ -331,9 +333,9 @@ def test_lights_show_which_one_it_is_for_a_while(fleet):
     fleet.graph = Graph(fleet.graph.topics, fleet.graph.topics, services)
     fleet.process.advance(2.1)
     assert fleet.command(Action.IDENTIFY, ["cf2"]) == {"cf2": ""}
-    assert lights == [(["led/bitmask"], 255)]
+    assert lights == [[255, 0xFFFFFF]]
     fleet.process.advance(5.1)
-    assert lights[1:] == [(["led/bitmask"], 0)]
+    assert lights[1:] == [[0, 5.0]]
 
 
 def test_without_a_master_a_move_is_refused_with_the_reason(fleet, monkeypatch):

@@ -17,6 +17,8 @@ def test_faults_are_what_a_takeoff_cannot_end():
     faults = SupervisorState.of(tumbled=True, locked=True, crashed=True, deck_fault=True)
     assert SupervisorState(0xFFFF).faults == faults == 0x8E0
     assert SupervisorState(0x0800).words() == "deck fault"
+    assert "decks" in SupervisorState(0x0840).remedy
+    assert SupervisorState(0x40).remedy == "restart the vehicle"
 
 
 def test_firmware_before_protocol_12_does_not_report_its_planner():

@@ -63,6 +63,15 @@ def test_without_ffmpeg_a_video_is_an_animation(tmp_path, caplog):
     assert np.any((colors[:, 0] > 200) & (colors[:, 1] < 60) & (colors[:, 2] < 60))
 
 
+def test_a_color_is_that_of_color_led_decks_too():
+    one, two = swarm_with("--dt 0.5").allcfs.crazyflies
+    one.setParam("deck.bcColorLedTop", 1)
+    for each in (one, two):
+        each.setLEDColor(1.0, 0.5, 0.0)
+    assert one.getParam("colorLedTop.wrgb8888") == 0xFF8000
+    assert one.getParam("colorLedBot.wrgb8888") == two.getParam("colorLedTop.wrgb8888") == 0
+
+
 def test_a_script_writes_a_video_between_two_moments(tmp_path):
     swarm = swarm_with("--dt 0.5")
     swarm.timeHelper.sleep(1.0)

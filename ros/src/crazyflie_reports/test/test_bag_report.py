@@ -8,6 +8,9 @@ import bags
 import pytest
 from std_msgs.msg import String
 
+from crazyflie_msgs.msg import VehicleStatus
+from crazyflie_reports.bag_events import EventLog, Kind
+
 
 def values(flight):
     """Return the figures of a flight of report.json by name."""
@@ -385,3 +388,13 @@ def test_references_that_are_far_or_infinite(run, x, time):
     with (run.folder / "out" / "figures.csv").open() as file:
         values_of = {row["figure"]: row["value"] for row in csv.DictReader(file)}
     assert (values_of["time to hover"] == "") == (time is None)
+
+
+def test_a_vehicle_that_cannot_fly_is_an_event_once():
+    log = EventLog()
+    for time, bits in enumerate((0x0E, 0x840, 0x840, 0x0E)):
+        status = VehicleStatus(supervisor=bits)
+        log.add(time, "/cf1/vehicle_status", "cf1", "crazyflie_msgs/VehicleStatus", status)
+    (event,) = log.events
+    assert (event.time, event.kind) == (1, Kind.ERROR)
+    assert event.text == "the vehicle cannot fly: locked, deck fault"

@@ -104,6 +104,7 @@ def test_list_of_memories(bench):
         ({"positioning": "none"}, {"bcLedRing"}),
         ({}, {"bcLedRing", "bcFlow2", "bcLighthouse4", "bcZRanger2"}),
         ({"positioning": "none", "multiranger": True}, {"bcLedRing", "bcMultiranger"}),
+        ({"positioning": "none", "color_leds": True}, {"bcColorLedBot", "bcColorLedTop"}),
     ],
 )
 def test_decks_have_parameters_and_one_wire_memories(options, names):

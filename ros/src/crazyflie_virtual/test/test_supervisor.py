@@ -98,7 +98,7 @@ def test_levelling_overrides_all_but_the_height(flying):
     assert (flown.yaw_rate, flown.thrust) == (0.0, 40000.0)
 
 
-def test_levelling_ends_with_a_setpoint_and_disarming_it_is_no_emergency(flying):
+def test_levelling_ends_with_a_setpoint_and_disarming_has_an_effect_only_then(flying):
     flying.setpoint_age = 1.0
     assert flying.run(PERIOD) is State.WARNING_LEVEL_OUT
     flying.setpoint_age = 0.0
@@ -106,7 +106,59 @@ def test_levelling_ends_with_a_setpoint_and_disarming_it_is_no_emergency(flying)
     flying.setpoint_age = 1.0
     flying.run(PERIOD)
     flying.supervisor.arm(False)
-    assert flying.run(PERIOD) is State.RESET
+    assert flying.run(0.4) is State.WARNING_LEVEL_OUT
+    flying.setpoint_age = 0.0
+    assert flying.run(2 * PERIOD) is State.RESET
+
+
+def test_a_hard_shock_is_a_crash_where_its_limit_is_set(flying):
+    flying.force = (4.0, 0.0, 1.0)
+    assert flying.run(PERIOD) is State.FLYING
+    assert flying.supervisor.acceleration == pytest.approx(17**0.5)
+    flying.supervisor.crash_detect_gs = 3.0
+    assert flying.run(PERIOD) is State.CRASHED
+
+
+@pytest.fixture
+def brushless():
+    hand = Hand(auto_arm=False)
+    hand.supervisor.motor_speeds = (0, 0, 0, 0)
+    hand.run(0.2)
+    assert hand.supervisor.arm(True)
+    assert hand.run(0.2) is State.ARMING
+    return hand
+
+
+def test_motors_that_idle_end_the_arming(brushless):
+    assert brushless.supervisor.motors_may_run
+    assert not brushless.supervisor.can_fly
+    brushless.supervisor.motor_speeds = (1000, 3500, 2000, 2000)
+    assert brushless.run(0.2) is State.ARMING
+    assert brushless.run(PERIOD) is State.READY_TO_FLY
+
+
+@pytest.mark.parametrize("speed", [0, 999, 3501])
+def test_a_motor_that_does_not_idle_disarms(brushless, speed):
+    brushless.supervisor.motor_speeds = (2000, 2000, speed, 2000)
+    assert brushless.run(0.76) is State.ARMING
+    assert brushless.run(0.2) is State.PRE_FL_CHECKS_PASSED
+    assert not brushless.supervisor.is_armed
+    text = f"SUP: arming failed, the motors do not idle: 2000, 2000, {speed}, 2000 rpm"
+    assert brushless.said == [text]
+
+
+@pytest.mark.parametrize("runs", [True, False])
+def test_a_motor_that_hardly_turns_stops_all_of_them(brushless, runs):
+    brushless.supervisor.motor_speeds = (2000,) * 4
+    assert brushless.run(0.28) is State.READY_TO_FLY
+    brushless.motors_run = runs
+    brushless.supervisor.motor_speeds = (2000, 2000, 2000, 499)
+    assert brushless.run(0.2).name == ("FLYING" if runs else "READY_TO_FLY")
+    assert brushless.run(2 * PERIOD) is State.LOCKED
+    assert brushless.said == [
+        "SUP: motors not responding: M4",
+        "SUP: Locked, reboot required",
+    ]
 
 
 def test_tumbling_while_levelling_out_locks(flying):
@@ -184,6 +236,7 @@ def test_armed_and_not_flown():
     hand.supervisor.arm(True)
     assert hand.run(29.0) is State.READY_TO_FLY
     assert hand.run(1.2) is State.PRE_FL_CHECKS_PASSED
+    assert not hand.supervisor.is_armed
 
 
 def test_one_that_arms_by_itself_cannot_fly_for_a_moment_each_30_s():
@@ -193,7 +246,7 @@ def test_one_that_arms_by_itself_cannot_fly_for_a_moment_each_30_s():
     for _ in range(round(65.0 / PERIOD)):
         hand.run(PERIOD)
         could.append(hand.supervisor.can_fly)
-    assert could.count(False) == 2 * 2
+    assert could.count(False) == 2 * 3
 
 
 def test_lying_on_the_back_it_cannot_be_armed():

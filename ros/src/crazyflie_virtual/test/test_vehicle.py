@@ -281,3 +281,25 @@ def test_the_same_seed_gives_the_same_flight_however_often_it_is_asked():
 
     assert flight([2.0], 1) == flight([0.01] * 200, 1)
     assert flight([2.0], 1) != flight([2.0], 2)
+
+
+def test_a_brushless_vehicle_arms_when_its_motors_idle_and_stops_when_one_fails():
+    bench = Bench(model="brushless", auto_arm=False)
+    assert bench.ask_one(Port.SUPERVISOR, 1, b"\x01\x01")[1:] == b"\x01\x01"
+    bench.run(0.1)
+    assert bench.firmware.supervisor.state is State.ARMING
+    bench.run(1.0)
+    assert bench.firmware.supervisor.state is State.READY_TO_FLY
+    bench.take_off()
+    bench.vehicle.faults.motor_failure = 2
+    bench.run(0.8)
+    assert bench.firmware.supervisor.state is State.LOCKED
+    assert not bench.motors_run
+
+
+def test_a_brushless_vehicle_with_a_motor_that_stands_still_is_not_armed():
+    bench = Bench(model="brushless", auto_arm=False, motor_failure=3)
+    bench.ask_one(Port.SUPERVISOR, 1, b"\x01\x01")
+    bench.run(1.3)
+    assert bench.firmware.supervisor.state is State.PRE_FL_CHECKS_PASSED
+    assert not bench.motors_run

@@ -17,6 +17,7 @@ from crazyflie_dashboard.snapshot import Action, Triple, VehicleSnapshot
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import BUFFER
 from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_model.lights import COLOR_LED_DECKS, wrgb
 from crazyflie_takeoff.limits import Box
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.steps import Steps, follow
@@ -32,6 +33,7 @@ HEIGHTS = 0.1, 5.0  #: Lowest and highest takeoff (m).
 _HOLD_DURATION = 1.0  #: Duration of a move to a vehicle's own position (s).
 #: The firmware's parameter for lights, its value for all lights, and how long they are on (s).
 _LIGHTS, _ALL_LIGHTS, _LIGHT_TIME = "led/bitmask", 255, 5.0
+_COLOR_LEDS = {k.replace(".", "/"): v.replace(".", "/") for k, v in COLOR_LED_DECKS.items()}
 
 #: Actions that are refused in flight: the motors would stop.
 _GROUND_ONLY = (Action.DISARM, Action.REBOOT)
@@ -156,15 +158,24 @@ class Actions:
     def _light(self, driver, command):
         """Switch on all lights of a vehicle for `_LIGHT_TIME`, by its firmware."""
         service = Service(f"{driver}/update_params", srv.UpdateParams)
-        request = srv.UpdateParamsRequest([_LIGHTS])
+        names = [f"{driver}/{each}" for deck in _COLOR_LEDS.items() for each in deck]
+        known = yield self._model.workers.submit(self._model.master.parameters, names)
+        decks = [color for deck, color in _COLOR_LEDS.items() if known.get(f"{driver}/{deck}")]
+        lit = {_LIGHTS: _ALL_LIGHTS, **dict.fromkeys(decks, wrgb(1.0, 1.0, 1.0))}
+        before = {_LIGHTS: 0, **{color: known[f"{driver}/{color}"] for color in decks}}
+        request = srv.UpdateParamsRequest([*lit])
+
+        def write(values):
+            for name, value in values.items():
+                yield self._handle.set_param_later(f"{driver}/{name}", value)
 
         def off():
             timer.stop()
-            yield self._handle.set_param_later(f"{driver}/{_LIGHTS}", 0)
+            yield from write(before)
             self._handle.call_service(service.name, service.kind, request, _TIMEOUT)
 
         timer = self._handle.timer(_LIGHT_TIME, lambda: self._begin(off()), steady=True)
-        yield self._handle.set_param_later(f"{driver}/{_LIGHTS}", _ALL_LIGHTS)
+        yield from write(lit)
         yield from self._call(command, service, request)
 
     # Go-to commands for several vehicles.

@@ -43,6 +43,13 @@ class SupervisorState(enum.IntFlag):
         """Flags with which the vehicle cannot take off before it is put upright or restarted."""
         return self & (self.TUMBLED | self.LOCKED | self.CRASHED | self.DECK_FAULT)
 
+    @property
+    def remedy(self) -> str:
+        """What a person does about `faults`."""
+        if self.DECK_FAULT in self:
+            return "switch the vehicle off, and see that its decks sit right"
+        return "restart the vehicle"
+
     def words(self) -> str:
         """Return the state in words, such as "armed, flying"."""
         names = [name for name, flag in SupervisorState.__members__.items() if flag in self]

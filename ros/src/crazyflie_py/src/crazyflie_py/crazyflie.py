@@ -5,6 +5,7 @@ Angles are in rad unless a method says otherwise,
 lengths in m, times in s.
 """
 
+import contextlib
 import functools
 import logging
 import math
@@ -31,6 +32,7 @@ from crazyflie_mission_api.mission_vehicle import (
 )
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_model.collision_avoidance import AvoidanceSettings
+from crazyflie_model.lights import COLOR_LED_DECKS, wrgb
 from crazyflie_model.limits import MAX_YAW_RATE
 from crazyflie_py import arguments as check
 from crazyflie_py.swarm import DEFAULT_COLOR, Order, Swarm, SwarmVehicle, TimeHelper
@@ -307,13 +309,20 @@ class Crazyflie(ScriptCommands):
         self._set_parameters(check.parameters(self._where("setParams"), params))
 
     def setLEDColor(self, r: float, g: float, b: float) -> None:
-        """Set the colour of the LED ring, 0 to 1 each; its parameter ring/effect must be 7."""
+        """Set the colour, 0 to 1 each, of the LED ring and of Color LED decks.
+
+        The ring's parameter ring/effect must be 7.
+        """
         where = self._where("setLEDColor")
         colors = {"solidRed": ("r", r), "solidGreen": ("g", g), "solidBlue": ("b", b)}
         levels = {
             f"ring.{name}": int(255.0 * check.number(where, *color, 0.0, 1.0))
             for name, color in colors.items()
         }
+        for deck, name in COLOR_LED_DECKS.items():
+            # Older firmware knows no such deck.
+            with contextlib.suppress(ValueError):
+                levels |= {name: wrgb(r, g, b)} if self._vehicle.parameters[deck] else {}
         self._set_parameters(levels)
         self.ledRGB = (r, g, b)
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
 
 MERGE_TIME = 1.0  #: Time within which repetitions are one event (s).
@@ -114,6 +115,9 @@ class EventLog:
         self.links[namespace].extend((time, quality, ignored))
         if self._changes((topic, "link"), message.link) and message.link == VehicleStatus.LOST:
             yield namespace, Kind.LINK, message.link_text
+        faults = SupervisorState(message.supervisor).faults
+        if self._changes((topic, "faults"), faults) and faults:
+            yield namespace, Kind.ERROR, f"the vehicle cannot fly: {faults.words()}"
         if self._changes((topic, "emergency"), message.is_emergency) and message.is_emergency:
             yield namespace, Kind.EMERGENCY, message.text
         low = _LOW_BATTERIES.get(message.battery)

@@ -107,7 +107,7 @@ def test_a_vehicle_that_does_not_spin_up_does_not_take_off(flying):
     server.process.advance(OFF_AGE + 0.1)
     vehicle.answers[9, 0, 0x0C] = b"\x8c\x01\x00"
     with pytest.raises(
-        ServiceError, match="is armed, and cannot fly within 2 s; its state is: can"
+        ServiceError, match="armed, and cannot fly within 2 s: see that each motor .* is: can be"
     ):
         server.call("/cf1/takeoff", TAKEOFF)
     assert vehicle.packets(8, 0) == []

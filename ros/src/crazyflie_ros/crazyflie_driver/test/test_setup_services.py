@@ -37,11 +37,11 @@ def virtual(shared):
         shared.remove(uri)
 
 
-def value(server, name):
+def value(server, name, prefix="cf9"):
     (crazyflie,) = (
         vehicle.crazyflie
         for vehicle in server.node._vehicles.values()
-        if vehicle.parameters.name == "cf9"
+        if vehicle.parameters.name == prefix
     )
     return crazyflie.parameters.read(name)
 
@@ -54,6 +54,16 @@ def test_the_color_of_the_led_ring(virtual):
     for wrong in (1.5, -0.1, math.nan):
         with pytest.raises(ServiceError, match="color: green is .*; expected 0 to 1"):
             server.call("/cf9/set_led_color", SetLedColorRequest(ColorRGBA(g=wrong)))
+
+
+def test_the_color_of_color_led_decks(shared):
+    with virtual_vehicle(color_leds=True) as (_, uri):
+        shared.add(uri, "cf8")
+        shared.call("/cf8/set_led_color", SetLedColorRequest(ColorRGBA(1.0, 0.5, 0.0, 0.0)))
+        decks = ("colorLedBot", "colorLedTop")
+        assert [value(shared, f"{deck}.wrgb8888", "cf8") for deck in decks] == [0xFF8000] * 2
+        assert value(shared, "ring.solidRed", "cf8") == 20
+        shared.remove(uri)
 
 
 def test_stored_parameters(virtual):

@@ -113,7 +113,7 @@ def test_a_vehicle_without_these_variables(server, vehicle):
 def test_the_fault_of_a_deck_is_named(server, vehicle):
     """Of firmware 2026.08: such a vehicle disarms, and is not armed."""
     is_(vehicle, 0x804)
-    wait_for_words(server, "cannot fly: deck fault")
+    wait_for_words(server, "cannot fly: deck fault; switch the vehicle off, and see that its decks")
     with pytest.raises(ServiceError, match="the vehicle cannot fly, its state is: .*deck fault"):
         server.call("/cf1/takeoff", TAKEOFF)
     assert vehicle.packets(8, 0) == []

@@ -204,7 +204,7 @@ class Physics:
         thrust_error: float = 0.0,
         model: QuadrotorParameters = CRAZYFLIE,
     ):
-        self._model = model
+        self.model = model
         true = model.with_errors(mass_error, thrust_error)
         self._airframe = Airframe(true)
         self._lags = None if model.roll_lag is None else _Lags(true)
@@ -253,9 +253,14 @@ class Physics:
         return x, y, z
 
     @property
+    def rotor_speeds(self) -> Vector[float]:
+        """rad/s, of each rotor."""
+        return self._x[13:17]
+
+    @property
     def load(self) -> float:
         """Mean of the third powers of the rotor speeds over the hover speed's."""
-        return sum((speed / self._model.hover_speed) ** 3 for speed in self._x[13:17]) / 4.0
+        return sum((speed / self.model.hover_speed) ** 3 for speed in self.rotor_speeds) / 4.0
 
     def put_upright(self) -> None:
         """Put the vehicle upright on the ground."""
@@ -264,7 +269,7 @@ class Physics:
 
     def step(self, commands: MotorCommands, voltage: float) -> None:
         """Advance by `STEP`; the battery's voltage (V) limits the speed of the motors."""
-        top = self._model.max_rotor_speed * voltage / FULL_VOLTAGE
+        top = self.model.max_rotor_speed * voltage / FULL_VOLTAGE
         before = self._x
         if (carried := self.hand.carry(before)) is not None:
             self._x, self.specific_force = carried, (0.0, 0.0, GRAVITY)
@@ -272,10 +277,10 @@ class Physics:
         if self.is_overturned:
             commands = OFF
         if self._lags is not None:
-            speed = min(top, self._model.rotor_speed(sum(commands) / 4.0))
+            speed = min(top, self.model.rotor_speed(sum(commands) / 4.0))
             after = self._lags.step(before, self.desired, speed)
         else:
-            speeds = [min(top, self._model.rotor_speed(command)) for command in commands]
+            speeds = [min(top, self.model.rotor_speed(command)) for command in commands]
             after = self._airframe.step(0.0, before, speeds, STILL_AIR, STEP)
             if after[2] <= 0.0:
                 after = tip(self._airframe, before, after, STEP)

@@ -130,7 +130,7 @@ _GROUPS: dict[str, list[tuple[str, NumberType, Read]]] = {
         *_rows(U16, **{f"m{i}": f"stabilizer.commands.m{i}" for i in range(1, 5)}),
         *_rows(I32, **{f"m{i}req": f"stabilizer.requested.m{i}" for i in range(1, 5)}),
     ],
-    "supervisor": _rows(U16, info="info"),
+    "supervisor": [*_rows(U16, info="info"), *_rows(FLOAT, accNorm="supervisor.acceleration")],
     "sys": [
         *_rows(
             U8,

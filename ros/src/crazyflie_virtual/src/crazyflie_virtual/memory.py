@@ -135,10 +135,14 @@ _POSITIONING_DECKS = {
 }
 
 
-def one_wire(positioning: str, has_multiranger: bool) -> list[Memory]:
-    """Return the memories of the decks of a vehicle with a positioning system of its settings."""
-    multiranger = (("bcMultiranger", 0x0C, "D"),) if has_multiranger else ()
-    decks = (("bcLedRing", 0x01, "D1"), *_POSITIONING_DECKS.get(positioning, ()), *multiranger)
+_COLOR_LEDS = (("bcColorLedBot", 0x13, "A"), ("bcColorLedTop", 0x14, "A"))
+
+
+def one_wire(vehicle: settings.VehicleSettings) -> list[Memory]:
+    """Return the memories of the decks of a vehicle."""
+    lights = _COLOR_LEDS if vehicle.color_leds else (("bcLedRing", 0x01, "D1"),)
+    multiranger = (("bcMultiranger", 0x0C, "D"),) if vehicle.multiranger else ()
+    decks = (*lights, *_POSITIONING_DECKS.get(vehicle.positioning, ()), *multiranger)
     return [_one_wire(*deck) for deck in decks]
 
 

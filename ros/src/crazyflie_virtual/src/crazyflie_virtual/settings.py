@@ -57,6 +57,9 @@ class VehicleSettings(Parameters):
         "carry a Multi-ranger deck, which sees the ground and the objects of `world`",
         False,
     )
+    color_leds: bool = parameter(
+        BOOLEAN, "carry Color LED decks below and on top, in place of the LED ring", False
+    )
     world: str = parameter(
         Text(may_be_empty=True),
         "world file of crazyflie_world for ranging sensors; empty for the ground alone",

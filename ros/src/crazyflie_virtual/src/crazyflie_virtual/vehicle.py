@@ -26,7 +26,7 @@ class Storage:
 
     def __init__(self, settings: VehicleSettings):
         self.eeprom = memory.eeprom(_ADDRESS_PREFIX | settings.address)
-        self.one_wire = memory.one_wire(settings.positioning, settings.multiranger)
+        self.one_wire = memory.one_wire(settings)
         self.lighthouse = lighthouse_pages(settings)
         self.parameters: dict[str, float] = {}
 

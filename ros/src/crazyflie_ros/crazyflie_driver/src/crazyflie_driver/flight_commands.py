@@ -33,7 +33,7 @@ NOTIFY_WINDOW = 0.5
 _WATCHDOG_PERIOD = 0.2
 
 #: Time in which a vehicle arms itself, s. Firmware 2026.08 disarms and arms itself 3 s after a
-#: landing (0.16 s) and every 30 s on the ground (0.08 s).
+#: landing (0.16 s) and every 30 s on the ground (0.12 s).
 _REARMING = 0.5
 #: Time in which a vehicle that was armed can fly, s: two updates of its supervisor, or the spin-up
 #: of brushless motors, whose speeds firmware 2026.08 watches for 0.2 s.
@@ -321,8 +321,8 @@ class FlightCommands:
             job.check()
             if state.faults or time.monotonic() > end:
                 raise ServiceError(
-                    f"the vehicle is armed, and cannot fly within {_SPIN_UP_LIMIT:g} s; its state "
-                    f"is: {state.words()}"
+                    f"the vehicle was armed, and cannot fly within {_SPIN_UP_LIMIT:g} s: see that "
+                    f"each motor turns freely; its state is: {state.words()}"
                 )
             time.sleep(_REARMING / 10)
 

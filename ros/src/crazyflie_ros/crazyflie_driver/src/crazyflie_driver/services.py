@@ -19,6 +19,7 @@ from crazyflie_driver.vehicle_base import BaseVehicle, Job
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_link.triggers import is_trigger
+from crazyflie_model.lights import COLOR_LED_DECKS, wrgb
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
@@ -356,6 +357,12 @@ class VehicleServices:
             # One that is not a number is refused as well.
             if not 0.0 <= value <= 1.0:
                 raise ServiceError(f"color: {name.lower()} is {value:g}; expected 0 to 1")
+        known = self._vehicle.crazyflie.parameters.known
+        decks = [color for deck, color in COLOR_LED_DECKS.items() if known(deck)]
+        for name in decks:
+            self._mirror.set(name, wrgb(color.r, color.g, color.b))
+        if decks:
+            return
         for name, value in parts.items():
             self._mirror.set(f"ring.solid{name}", round(255 * value))
         self._mirror.set("ring.effect", _SOLID_COLOR)

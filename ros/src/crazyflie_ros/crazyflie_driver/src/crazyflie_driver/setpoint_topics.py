@@ -388,7 +388,7 @@ class SetpointTopics:
         parameters, state = self._vehicle.parameters, self._log.supervisor
         if thrust > 0.0 and state is not None:
             if state.faults & ~SupervisorState.TUMBLED:
-                self._warn(f"cannot fly ({state.words()}): restart the vehicle", key="locked")
+                self._warn(f"cannot fly ({state.words()}): {state.remedy}", key="locked")
             elif SupervisorState.ARMED not in state:
                 self._warn(f"not armed, call {parameters.prefix}/arm", key="armed")
         self._vehicle.crazyflie.setpoints.attitude(

@@ -85,7 +85,7 @@ def words(status: VehicleStatus) -> str:
     if status.link != VehicleStatus.CONNECTED:
         return f"{LINK_NAMES[status.link]}: {status.link_text}"
     if state.faults:
-        text = f"cannot fly: {state.faults.words()}; restart the vehicle"
+        text = f"cannot fly: {state.faults.words()}; {state.remedy}"
     elif SupervisorState.FLYING in state:
         text = "flying: on " + ("setpoints" if status.is_streamed else "high-level commands")
     elif not status.has_supervisor:

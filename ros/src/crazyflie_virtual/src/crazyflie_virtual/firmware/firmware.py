@@ -26,6 +26,10 @@ _STARTING_UPDATES = 4
 _POWER_STEPS = 50
 _POSITION_PERIOD = POSITION_STEPS * STEP
 
+#: Speed that the telemetry of an idling motor reports: the middle of what the supervisor expects.
+#: The rotors of the model `brushless` turn faster than real ones, as their thrust constant is less.
+_IDLE_RPM = 2250
+
 
 class Firmware:
     """The firmware, from packets to motor commands.
@@ -46,6 +50,8 @@ class Firmware:
         self._physics = physics
         self.faults = faults
         self.hand = physics.hand
+        self.has_color_leds = settings.color_leds
+        self.has_led_ring = not settings.color_leds
         self.protocol = settings.protocol
         self.address = settings.address  #: Last byte of the radio's address.
         self._steps = 0
@@ -63,6 +69,8 @@ class Firmware:
         self.attitude_decoder = AttitudeDecoder()
         self.supervisor = Supervisor(self.console.write_line, settings.auto_arm)
         idle_thrust = 0 if settings.auto_arm else IDLE_THRUST
+        # Whether the motors report their speeds (bidirectional DSHOT).
+        self._has_telemetry = settings.model == "brushless" and not settings.auto_arm
         self.stabilizer = Stabilizer(idle_thrust, has_attitude_loops=not physics.has_lags)
         self.power = PowerMonitor()
         self.health = Health(faults)
@@ -158,10 +166,14 @@ class Firmware:
             self.estimator.correct_on_ground(_POSITION_PERIOD)
 
     def _supervise(self):
-        idle = self.stabilizer.idle_thrust
-        motors_run = max(self.stabilizer.commands) > idle
+        physics = self._physics
+        motors_run = max(self.stabilizer.commands) > self.stabilizer.idle_thrust
         age = self.time - self.commander.setpoint.time
         self.supervisor.has_deck_fault = bool(self.faults.deck)
+        if self._has_telemetry:
+            idle = physics.model.rotor_speed(IDLE_THRUST)
+            speeds = (round(_IDLE_RPM * speed / idle) for speed in physics.rotor_speeds)
+            self.supervisor.motor_speeds = tuple(speeds)
         self.supervisor.update(self.time, self.sensors, age, motors_run)
         if self.supervisor.can_fly:
             self._warned_state = None

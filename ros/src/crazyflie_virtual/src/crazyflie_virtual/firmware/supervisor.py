@@ -2,13 +2,10 @@
 
 The states and the transitions between them are a table, as in the firmware:
 docs/functional-areas/supervisor of crazyflie-firmware explains the scheme. States, conditions and
-their order are those of its supervisor_state_machine.c (the last version we could read is of 2024)
-with what came later: that disarming in the air is no emergency (pull request 1426), that an arming
-has a time limit (1441), and the state before `State.READY_TO_FLY` (1641). The recorded flights
-(release 2026.08) confirm each transition but these, of which there is no record: the one out of
-`State.READY_TO_FLY` by time, those out of `State.LANDED` by disarming and of
-`State.WARNING_LEVEL_OUT` by disarming and tumbling, those of `State.CRASHED`, and those by the
-fault of a deck.
+their order are those of its release 2026.08. The recorded flights of that release confirm each
+transition but these, of which there is no record: the one out of `State.READY_TO_FLY` by time, the
+one out of `State.LANDED` by disarming, the one out of `State.WARNING_LEVEL_OUT` by tumbling, those
+of `State.CRASHED`, and those by the fault of a deck or by the speed of a motor.
 """
 
 import math
@@ -54,6 +51,9 @@ class Condition(Flag):
     PREFLIGHT_TIMEOUT = auto()  #: Armed for `Supervisor.preflight_timeout`.
     DECK_FAULT = auto()  #: A deck has reported a fault of its hardware.
     LANDING_TIMEOUT = auto()  #: Landed for `Supervisor.landed_timeout`.
+    SPEEDS_VALID = auto()  #: All motors idle, by their telemetry; always true without.
+    SPINUP_TIMEOUT = auto()  #: Arming for `Supervisor.spinup_timeout`.
+    MOTORS_NOT_RESPONDING = auto()  #: A motor that should turn hardly does, by its telemetry.
     ALWAYS = auto()
 
 
@@ -66,6 +66,7 @@ class Transition(NamedTuple):
 
 
 _S, _C = State, Condition
+_FATAL_IN_AIR = _C.EMERGENCY_STOP | _C.DECK_FAULT | _C.MOTORS_NOT_RESPONDING
 
 #: Transitions, of which the first one whose condition is met is made, one in each update.
 TRANSITIONS: dict[State, tuple[Transition, ...]] = {
@@ -81,28 +82,28 @@ TRANSITIONS: dict[State, tuple[Transition, ...]] = {
     ),
     _S.ARMING: (
         Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP),
-        Transition(_S.PRE_FL_CHECKS_NOT_PASSED, when=_C.IS_TUMBLED, unless=_C.ARMED),
-        # Brushless vehicles with motor telemetry wait for it in this state.
-        Transition(_S.READY_TO_FLY, when=_C.ALWAYS),
+        Transition(
+            _S.PRE_FL_CHECKS_NOT_PASSED, when=_C.IS_TUMBLED | _C.SPINUP_TIMEOUT, unless=_C.ARMED
+        ),
+        Transition(_S.READY_TO_FLY, when=_C.SPEEDS_VALID),
     ),
     _S.READY_TO_FLY: (
-        Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP),
+        Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP | _C.MOTORS_NOT_RESPONDING),
         Transition(
             _S.PRE_FL_CHECKS_NOT_PASSED, when=_C.IS_TUMBLED | _C.DECK_FAULT, unless=_C.ARMED
         ),
         Transition(_S.FLYING, when=_C.IS_FLYING),
-        Transition(_S.PRE_FL_CHECKS_PASSED, when=_C.PREFLIGHT_TIMEOUT),
+        Transition(_S.PRE_FL_CHECKS_NOT_PASSED, when=_C.PREFLIGHT_TIMEOUT),
     ),
     _S.FLYING: (
-        Transition(
-            _S.EXCEPT_FREE_FALL, when=_C.COMMANDER_WDT_TIMEOUT | _C.EMERGENCY_STOP | _C.DECK_FAULT
-        ),
+        Transition(_S.EXCEPT_FREE_FALL, when=_C.COMMANDER_WDT_TIMEOUT | _FATAL_IN_AIR),
         Transition(_S.CRASHED, when=_C.IS_TUMBLED),
         Transition(_S.RESET, unless=_C.ARMED),
         Transition(_S.WARNING_LEVEL_OUT, when=_C.COMMANDER_WDT_WARNING),
         Transition(_S.LANDED, unless=_C.IS_FLYING),
     ),
     _S.LANDED: (
+        Transition(_S.EXCEPT_FREE_FALL, when=_C.MOTORS_NOT_RESPONDING),
         Transition(_S.RESET, when=_C.LANDING_TIMEOUT, unless=_C.ARMED),
         Transition(_S.FLYING, when=_C.IS_FLYING),
     ),
@@ -110,10 +111,9 @@ TRANSITIONS: dict[State, tuple[Transition, ...]] = {
     # No transition to LANDED: without setpoints a vehicle is locked although its motors are off.
     _S.WARNING_LEVEL_OUT: (
         Transition(
-            _S.EXCEPT_FREE_FALL,
-            when=_C.COMMANDER_WDT_TIMEOUT | _C.IS_TUMBLED | _C.EMERGENCY_STOP | _C.DECK_FAULT,
+            _S.EXCEPT_FREE_FALL, when=_C.COMMANDER_WDT_TIMEOUT | _C.IS_TUMBLED | _FATAL_IN_AIR
         ),
-        Transition(_S.RESET, unless=_C.ARMED),
+        # Disarming has an effect after that.
         Transition(_S.FLYING, unless=_C.COMMANDER_WDT_WARNING),
     ),
     _S.EXCEPT_FREE_FALL: (Transition(_S.LOCKED, when=_C.ALWAYS),),
@@ -141,6 +141,10 @@ _TILTED, _UPSIDE_DOWN = (0.5, 1.0), (-0.2, 0.1)
 #: Accelerometer reading of all axes below which the vehicle is falling and not tumbled (g).
 _FREE_FALL = 0.1
 
+#: Speeds of motors (rpm) that idle, and the one below which a motor that turns does not respond;
+#: the time for which they last (s).
+_IDLE_SPEEDS, _LEAST_SPEED, _SPEEDS_LAST = (1000, 3500), 500, 0.2
+
 _RUNNING = (State.READY_TO_FLY, State.FLYING, State.LANDED, State.WARNING_LEVEL_OUT)
 _ARMED = (*_RUNNING, State.ARMING)
 _IN_AIR = (State.FLYING, State.WARNING_LEVEL_OUT)
@@ -164,10 +168,18 @@ class Supervisor:
         #: preflight_timeout, landed_timeout: ms after which a vehicle is disarmed when it does not
         #: take off, and after landing. With automatic arming it cannot fly for four updates then.
         self.preflight_timeout, self.landed_timeout = 30000, 3000
+        self.spinup_timeout = 1000  #: ms in which the motors of an arming vehicle idle: assumed.
+        #: Deviation of `acceleration` from 1 g beyond which the vehicle has tumbled; 0 for none.
+        self.crash_detect_gs = 0.0
+        self.acceleration = 1.0  #: Norm of the accelerometer's reading, g.
+        #: Speeds of the motors by their telemetry, rpm; empty for motors without.
+        self.motor_speeds: tuple[int, ...] = ()
         self._emergency = False
         # Of the last watchdog message, the last thrust, and the beginning of a tumble (s).
         self._watchdog_time, self._thrust_time, self._tumble_time = math.inf, -math.inf, math.inf
         self._state_time = 0.0
+        # Since when the motors have idled, and since when one has not responded (s).
+        self._idle_time = self._failure_time = math.inf
 
     @property
     def can_fly(self) -> bool:
@@ -229,10 +241,17 @@ class Supervisor:
         if motors_run:
             self._thrust_time = time
         runs = time - self._thrust_time < LANDED_AFTER
-        self.is_tumbled = bool(self.tumble_check) and self._has_tumbled(time, sensors)
+        has_tumbled = self._has_tumbled(time, sensors)
+        self.is_tumbled = bool(self.tumble_check) and has_tumbled
         state = next_state(self.state, self._conditions(time, setpoint_age, runs))
         if state is self.state:
             return
+        if state is State.EXCEPT_FREE_FALL and self._lasts(time, self._failure_time):
+            numbers = [f"M{i}" for i, rpm in enumerate(self.motor_speeds, 1) if rpm < _LEAST_SPEED]
+            self._write_line(f"SUP: motors not responding: {', '.join(numbers)}")
+        if self.state is State.ARMING and self._waited(time, self.spinup_timeout):
+            speeds = ", ".join(map(str, self.motor_speeds))
+            self._write_line(f"SUP: arming failed, the motors do not idle: {speeds} rpm")
         self.state = state
         self._state_time = time
         if state is State.CRASHED:
@@ -252,6 +271,11 @@ class Supervisor:
         return setpoint.leveled() if self.state is State.WARNING_LEVEL_OUT else setpoint
 
     def _conditions(self, time, setpoint_age, runs):
+        speeds, (least, most) = self.motor_speeds, _IDLE_SPEEDS
+        idles = self.state is State.ARMING and all(least <= rpm <= most for rpm in speeds)
+        self._idle_time = min(self._idle_time, time) if idles else math.inf
+        fails = self.can_fly and any(0 < rpm < _LEAST_SPEED for rpm in speeds)
+        self._failure_time = min(self._failure_time, time) if fails else math.inf
         holding = {
             Condition.ARMED: self.is_armed,
             Condition.IS_FLYING: runs,
@@ -263,11 +287,18 @@ class Supervisor:
             Condition.DECK_FAULT: self.has_deck_fault,
             Condition.PREFLIGHT_TIMEOUT: self._waited(time, self.preflight_timeout),
             Condition.LANDING_TIMEOUT: self._waited(time, self.landed_timeout),
+            Condition.SPINUP_TIMEOUT: self._waited(time, self.spinup_timeout),
+            Condition.SPEEDS_VALID: not speeds or self._lasts(time, self._idle_time),
+            Condition.MOTORS_NOT_RESPONDING: self._lasts(time, self._failure_time),
         }
         return reduce(or_, (each for each in holding if holding[each]), Condition.ALWAYS)
 
     def _waited(self, time, timeout):
         return time - self._state_time > timeout / 1000.0
+
+    @staticmethod
+    def _lasts(time: float, since: float) -> bool:
+        return time - since >= _SPEEDS_LAST
 
     def _is_emergency(self, time):
         starved = time - self._watchdog_time > EMERGENCY_WATCHDOG
@@ -275,6 +306,9 @@ class Supervisor:
 
     def _has_tumbled(self, time, sensors):
         forces = (sensors.acc_x, sensors.acc_y, sensors.acc_z)
+        self.acceleration = math.hypot(*forces)
+        if 0.0 < self.crash_detect_gs < abs(self.acceleration - 1.0):
+            return True
         is_falling = all(abs(force) < _FREE_FALL for force in forces)
         if is_falling or sensors.acc_z >= _TILTED[0]:
             self._tumble_time = math.inf

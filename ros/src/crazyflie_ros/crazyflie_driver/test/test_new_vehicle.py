@@ -2,7 +2,16 @@
 
 import pytest
 from conftest import result
-from safety_helpers import READY, TAKEOFF, is_, position, said, thrust
+from safety_helpers import (
+    HIGH_LEVEL,
+    READY,
+    TAKEOFF,
+    is_,
+    position,
+    said,
+    thrust,
+    wait_for_words,
+)
 from std_srvs.srv import SetBoolRequest
 
 from crazyflie_driver.msg import Position
@@ -108,6 +117,26 @@ def test_a_call_lets_no_stream_from_before_pass(server, standing):
     server.call("/cf1/takeoff", TAKEOFF)
     stream(server, full_thrust, 3.0)
     assert flown(standing) == []
+
+
+@pytest.mark.parametrize(
+    ("service", "request_"), [("arm", SetBoolRequest(True)), ("takeoff", TAKEOFF)]
+)
+def test_thrust_after_a_call_begins_at_zero_until_the_vehicle_flies(
+    server, standing, service, request_
+):
+    add(server, standing)
+    server.call(f"/cf1/{service}", request_)
+    server.process.advance(1.5)
+    stream(server, full_thrust, 0.5)
+    assert flown(standing) == []
+    assert any("has not reported a flight" in w for w in server.process.logged("warn"))
+    # It flies by the planner now: thrust takes it over.
+    is_(standing, HIGH_LEVEL)
+    wait_for_words(server, "flying")
+    server.process.advance(1.5)
+    full_thrust(server)
+    assert len(flown(standing)) == 1
 
 
 def test_references_that_begin_on_the_ground_pass_at_once(server, standing):

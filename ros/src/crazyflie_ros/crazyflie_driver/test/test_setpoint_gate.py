@@ -50,7 +50,7 @@ def lost():
 def test_what_was_streamed_before_a_loss_stays_blocked(lost):
     count, why = stream(lost, 2.0, 60.0)
     assert count == 2900
-    assert why.startswith("the link was lost, and the vehicle does not fly")
+    assert why.startswith("the link was lost, or the vehicle called to fly, and it has not reported")
     assert lost.is_blocking(60.0)
     assert not lost.is_blocking(62.0)
 
@@ -278,9 +278,14 @@ def test_a_stream_of_references_that_begins_later_is_a_new_one_but_thrust_begins
     assert stream(new, 4.5, 5.5, control=REFERENCE) == (0, "")
 
 
-def test_thrust_that_begins_after_a_call_for_a_flight_takes_the_vehicle_over(new):
+def test_thrust_that_begins_after_a_call_takes_over_a_vehicle_that_flies_and_no_other(new):
+    """The call may have armed it only, or it does not lift off."""
     new.handle(GateEvent.FLIGHT_CALLED)
-    assert stream(new, 2.0, 3.0, control=THRUST) == (0, "")
+    count, why = stream(new, 2.0, 3.0, control=THRUST)
+    assert count == 50
+    assert "has not reported a flight since: begin with zero thrust" in why
+    new.handle(GateEvent.FLIGHT_REPORTED)
+    assert stream(new, 3.0, 4.0, control=THRUST) == (0, "")
 
 
 def test_references_that_a_gate_never_listened_for_begin_no_stream():

@@ -61,6 +61,7 @@ class GateEvent(enum.Enum):
 _NONE = Block(0)
 _ADDED = Block.OLD_STREAM | Block.NEW
 _ON_TRIAL = Block.UNCONFIRMED | Block.LANDED | Block.NOT_LIFTED
+_CALLED = Block.OLD_STREAM | Block.UNCONFIRMED
 
 #: Event, blocks of which one must hold (none: in any case), blocks that begin, blocks that end.
 #: Each row of an event is used, in this order.
@@ -76,9 +77,9 @@ TRANSITIONS = (
     (GateEvent.LINK_BACK, Block.LINK_LOST, Block.UNCONFIRMED, Block.LINK_LOST),
     # The vehicle reports a flight, as it does with thrust on the ground, too.
     (GateEvent.FLIGHT_REPORTED, _NONE, _NONE, Block.UNCONFIRMED),
-    # A service call makes the vehicle fly; it does not end a stream from before.
-    (GateEvent.FLIGHT_CALLED, _ON_TRIAL, Block.OLD_STREAM, _ON_TRIAL),
-    (GateEvent.FLIGHT_CALLED, _NONE, _NONE, Block.NEW),
+    # A service call makes the vehicle fly, later, or only arms it: that does not end a stream from
+    # before, and until the vehicle reports a flight, thrust begins at zero.
+    (GateEvent.FLIGHT_CALLED, _ON_TRIAL | Block.NEW, _CALLED, Block.NEW | _ON_TRIAL),
     # Most vehicles arm themselves again within 0.2 s.
     (GateEvent.DISARMED, _NONE, _ADDED, _NONE),
     # Setpoints have commanded a flight, and the vehicle has not lifted off.
@@ -101,7 +102,10 @@ REASONS = {
         f"it comes since before the vehicle was added, disarmed or called to fly: {_ADVICE}"
     ),
     Block.NEW: "the vehicle has just been added, or disarmed: begin with zero thrust",
-    Block.UNCONFIRMED: "the link was lost, and the vehicle does not fly: begin with zero thrust",
+    Block.UNCONFIRMED: (
+        "the link was lost, or the vehicle called to fly, and it has not reported a flight since: "
+        "begin with zero thrust"
+    ),
     Block.LANDED: f"the vehicle was landed for its battery: {_ADVICE}",
     Block.NOT_LIFTED: f"the vehicle was commanded to fly and did not lift off: {_ADVICE}",
 }
@@ -112,7 +116,8 @@ class SetpointGate:
 
     The gate of a new vehicle is closed: what comes may be a stream from before, for a vehicle that
     flew then, and thrust that begins above zero makes a vehicle leap. So is that of one that was
-    disarmed, or whose link was lost, until it reports a flight.
+    disarmed, or whose link was lost, until it reports a flight. A call opens it for setpoints that
+    take over a vehicle that flies.
 
     Callbacks, the link's thread and those of the vehicle's jobs use it at the same time.
     """

@@ -123,6 +123,21 @@ def ctrl_c(process):
     process.send_signal(signal.SIGINT)
 
 
+SWALLOWING = """while True:
+        try:
+            fleet.wait(1e6)
+        except KeyboardInterrupt:
+            pathlib.Path(sys.argv[1] + ".again").touch()
+"""
+
+
+def ctrl_c_twice(process):
+    """Send a second signal when the script has handled the first one, and flies on."""
+    ctrl_c(process)
+    peer.wait_until(Path(f"{process.args[2]}.again").exists, "the first one's end", LIMIT)
+    ctrl_c(process)
+
+
 def kill_node(_):
     """Ask the script's node to shut down, as rosnode kill does."""
     assert rosnode.kill_nodes([NODE]) == ([NODE], [])
@@ -137,6 +152,7 @@ def start_second_node(_):
     ("ending", "end", "status"),
     [
         ("rospy.spin()", ctrl_c, 0),
+        (SWALLOWING, ctrl_c_twice, 1),
         ("rospy.spin()", kill_node, 0),
         ("fleet.wait(1e6)", kill_node, 1),
         ("fleet.wait(1e6)", start_second_node, 1),

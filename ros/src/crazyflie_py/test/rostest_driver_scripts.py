@@ -1,11 +1,14 @@
 """Examples on two virtual vehicles behind the driver; they stand at y = -0.5 and 0.5 m."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import rospy
 from scripted import EXAMPLES, ctrl_c, fly, kill_node, run, run_until
 
 from crazyflie_msgs.msg import VehicleStatus
+from crazyflie_utils.testing.programs import wait_until
 
 NEAR = 0.15
 """m; the vehicles estimate their positions."""
@@ -54,7 +57,26 @@ rospy.spin()
 """
 
 
-@pytest.mark.parametrize(("ending", "end"), [("rospy.spin()", ctrl_c), (STREAMING, kill_node)])
+SWALLOWING = """
+while True:
+    try:
+        swarm.timeHelper.sleep(1e6)
+    except KeyboardInterrupt:
+        pathlib.Path(sys.argv[1] + ".again").touch()
+"""
+
+
+def ctrl_c_twice(process):
+    """Send a second signal when the script has handled the first one, and flies on."""
+    ctrl_c(process)
+    wait_until(Path(process.args[2] + ".again").exists, "the first one's end")
+    ctrl_c(process)
+
+
+@pytest.mark.parametrize(
+    ("ending", "end"),
+    [("rospy.spin()", ctrl_c), (SWALLOWING, ctrl_c_twice), (STREAMING, kill_node)],
+)
 def test_vehicles_of_the_driver_are_landed_before_ros_is_shut_down(tmp_path, ending, end):
     errors = run_until(tmp_path, ending, end)
     assert "landing cf1, cf2" in errors

@@ -143,8 +143,8 @@ class Fleet(VehicleGroup):
         self._vehicles, self._commanded = {}, {}
         self._heartbeat: Timer | None = None
         if process is None:
-            process, self._end = begin_script("mission", self._on_shutdown)
-            catch_signals()
+            process, self._end = begin_script("mission", partial(self._end_early, "ROS shuts down"))
+            catch_signals(partial(self._end_early, "a second signal"))
         self._handle = process.handle("/mission")
         self._mission = f"{_program()}_{uuid.uuid4().hex[:8]}"
         self._missions = MissionWatch(self._handle, own=self._mission)
@@ -218,9 +218,8 @@ class Fleet(VehicleGroup):
         """Land the vehicles that still fly, also after an error; log those that cannot land."""
         self.ending.run(lambda: self.land_at_end(kind, error))
 
-    def _on_shutdown(self):
-        error = MissionError("ROS shuts down")
-        self.ending.run(lambda: self.land_at_end(MissionError, error))
+    def _end_early(self, why):
+        self.ending.run(lambda: self.land_at_end(MissionError, MissionError(why)))
 
     def land_at_end(self, kind: type[BaseException] | None, error: Any) -> None:
         """Land the vehicles that still fly as `__exit__` does, in a call by `ending`."""
@@ -435,19 +434,26 @@ def _program():
     return re.sub(r"\W", "_", Path(sys.argv[0]).stem) or "mission"
 
 
-def catch_signals() -> None:
+def catch_signals(land: Callable[[], None]) -> None:
     """Make SIGINT, SIGTERM and SIGHUP raise, so that a script lands its vehicles at the end.
 
-    A script that nohup has started continues without its terminal.
+    The script may handle the first one, and fly on. At each later one a thread calls ``land()``:
+    whatever the main thread was interrupted in may hold locks. A script that nohup has started
+    continues without its terminal.
     """
     # Also where the script is a node of rospy's.
     if threading.current_thread() is not threading.main_thread():
         return
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, _exit)
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        signal.signal(signal.SIGHUP, _exit)
+    caught = []
 
+    def interrupt(number, _):
+        caught.append(number)
+        if len(caught) > 1:
+            threading.Thread(target=land).start()
+        if number == signal.SIGINT:
+            raise KeyboardInterrupt
+        sys.exit(128 + number)
 
-def _exit(number, _):
-    sys.exit(128 + number)
+    for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if each != signal.SIGHUP or signal.getsignal(each) is not signal.SIG_IGN:
+            signal.signal(each, interrupt)

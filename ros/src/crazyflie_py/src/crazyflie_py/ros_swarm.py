@@ -253,5 +253,5 @@ def _begin(close):
             "for example, roslaunch crazyflie_examples sw_swarm.launch, or the option --sim"
         )
     process, end = begin_script("crazyswarm", close)
-    catch_signals()
+    catch_signals(close)
     return process, end

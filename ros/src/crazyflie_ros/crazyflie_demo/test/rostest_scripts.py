@@ -124,6 +124,53 @@ def test_a_script_of_a_user(observer, tmp_path):
     np.testing.assert_allclose(path[-1, :2], [x + 0.4, y + 0.4], atol=0.1)
 
 
+FLYING = """
+import pathlib, sys, rospy
+from crazyflie import Crazyflie
+
+rospy.init_node("script")
+cf = Crazyflie("crazyflie", "/crazyflie")
+cf.takeoff(targetHeight=0.5, duration=1.5)
+rospy.sleep(2.0)
+pathlib.Path(sys.argv[1]).touch()
+"""
+STREAM = """
+while not rospy.is_shutdown():
+    cf.cmdVelocityWorld([0.0, 0.0, 0.0], 0.0)
+    rospy.sleep(0.05)
+"""
+
+
+@pytest.mark.parametrize(
+    ("ending", "number", "status"),
+    [
+        ("", 0, 0),
+        ("1 / 0", 0, 1),
+        ("rospy.spin()", signal.SIGINT, 0),
+        (STREAM, signal.SIGTERM, 0),
+    ],
+)
+def test_a_vehicle_is_landed_at_the_end_of_a_script(observer, tmp_path, ending, number, status):
+    # A landing that ends a stream takes 2 s, in which the firmware refuses a takeoff.
+    at_rest(observer)
+    landed = observer.track_until(lambda truth: True)[-1].time
+    observer.track_until(lambda truth: truth.time > landed + 2.5)
+    script, flies = tmp_path / "script.py", tmp_path / "flies"
+    script.write_text(FLYING + ending)
+    with subprocess.Popen([sys.executable, script, flies]) as flight:
+        try:
+            observer.track_until(lambda truth: flies.exists() or flight.poll() is not None)
+            assert flies.exists()
+            if number:
+                flight.send_signal(number)
+            track = observer.track_until(lambda truth: truth.position[2] < 0.02)
+            assert flight.wait(LIMIT) == status
+        finally:
+            flight.kill()
+    assert track[0].position[2] > 0.3
+    assert min(truth.velocity[2] for truth in track) > -1.0
+
+
 def at_rest(observer):
     """Return where the vehicle stands."""
     truths = observer.track_until(

@@ -50,7 +50,9 @@ def lost():
 def test_what_was_streamed_before_a_loss_stays_blocked(lost):
     count, why = stream(lost, 2.0, 60.0)
     assert count == 2900
-    assert why.startswith("the link was lost, or the vehicle called to fly, and it has not reported")
+    assert why.startswith(
+        "the link was lost, or the vehicle called to fly, and it has not reported"
+    )
     assert lost.is_blocking(60.0)
     assert not lost.is_blocking(62.0)
 

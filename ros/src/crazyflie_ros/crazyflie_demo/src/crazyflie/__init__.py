@@ -32,6 +32,8 @@ _TF_LIMIT = 10.0  #: Timeout of a position or a voltage (s).
 #: Age limit of a position (s): tf keeps the last one of a vehicle that is not tracked any more.
 _MAX_POSITION_AGE = 0.5
 
+_LANDING = 5.0  #: Duration of the landing at the end of a script (s).
+
 #: Namespace, below a vehicle's name, of crazyflie_mission_api's high_level_node, which offers the
 #: driver's services for a vehicle that a controller of this workspace flies.
 _COMMANDER = "high_level"
@@ -60,6 +62,8 @@ _SERVICES = {
 class Crazyflie:
     """A vehicle of the driver, or a simulated one; the constructor blocks until it is available.
 
+    However the script ends, a vehicle that it has made fly, and not landed since, is landed.
+
     A command returns when the vehicle has received it, not when it has been carried out. Every
     method raises `rospy.ServiceException` when the driver refuses. ``prefix`` is the vehicle's
     namespace, its tf_prefix; ``tf`` is for `position` only: the vehicle's tf frame, or a
@@ -85,9 +89,30 @@ class Crazyflie:
         # Answered when the driver has read the parameters; values that are set earlier are
         # overwritten.
         self._call("update_params", [])
+        self._may_fly = False  # Whether the script has made it fly.
+        # Services still answer then, also after `rospy.spin()`.
+        rospy.on_shutdown(self._land_at_end)
 
     def _call(self, service, *arguments):
         self._services[service](*arguments)
+
+    def _fly(self, service, *arguments):
+        # Also one that is refused may have been obeyed.
+        self._may_fly = True
+        self._call(service, *arguments)
+
+    def _come_down(self, service, *arguments):
+        self._call(service, *arguments)
+        self._may_fly = False
+
+    def _land_at_end(self):
+        if not self._may_fly:
+            return
+        rospy.logwarn("landing %s, since the script ends", self.prefix)
+        try:
+            self.land(0.0, _LANDING)
+        except rospy.ServiceException as error:
+            rospy.logerr("MAY STILL FLY: %s: %s", self.prefix, error)
 
     def setGroupMask(self, groupMask: int) -> None:
         """Make the vehicle a member of groups, one for each bit."""
@@ -95,19 +120,19 @@ class Crazyflie:
 
     def takeoff(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
         """Climb to a height (m) within a duration (s)."""
-        self._call("takeoff", groupMask, targetHeight, rospy.Duration.from_sec(duration))
+        self._fly("takeoff", groupMask, targetHeight, rospy.Duration.from_sec(duration))
 
     def land(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
         """Sink to a height (m) within a duration (s)."""
-        self._call("land", groupMask, targetHeight, rospy.Duration.from_sec(duration))
+        self._come_down("land", groupMask, targetHeight, rospy.Duration.from_sec(duration))
 
     def stop(self, groupMask: int = 0) -> None:
         """Stop the motors."""
-        self._call("stop", groupMask)
+        self._come_down("stop", groupMask)
 
     def emergency(self) -> None:
         """Stop the motors at once, for good."""
-        self._call("emergency")
+        self._come_down("emergency")
 
     def notifySetpointsStop(self, remainValidMillisecs: int = 100, groupMask: int = 0) -> None:
         """Return from setpoints to commands; the last setpoint remains valid for some ms."""
@@ -123,7 +148,7 @@ class Crazyflie:
     ) -> None:
         """Fly to a point x, y, z (m) and a yaw (rad) within a duration (s)."""
         period = rospy.Duration.from_sec(duration)
-        self._call("go_to", groupMask, relative, Point(*goal), yaw, period)
+        self._fly("go_to", groupMask, relative, Point(*goal), yaw, period)
 
     def uploadTrajectory(self, trajectoryId: int, pieceOffset: int, trajectory: Trajectory) -> None:
         """Write a trajectory into the vehicle's memory, after ``pieceOffset`` pieces."""
@@ -145,7 +170,7 @@ class Crazyflie:
         groupMask: int = 0,
     ) -> None:
         """Fly along a trajectory; with ``timescale`` 2 it takes twice as long."""
-        self._call("start_trajectory", groupMask, trajectoryId, timescale, reverse, relative)
+        self._fly("start_trajectory", groupMask, trajectoryId, timescale, reverse, relative)
 
     def position(self) -> NDArray[np.float64]:
         """Return the vehicle's position by tf, shape (3,), m in the fixed frame.
@@ -218,10 +243,12 @@ class Crazyflie:
     def cmdStop(self) -> None:
         """Stop the motors, as a setpoint."""
         self._setpoints["cmd_stop"].publish(Empty())
+        self._may_fly = False
 
     def _send(self, name, message):
         message.header.stamp = rospy.Time.now()
         message.header.frame_id = self._world
+        self._may_fly = True
         self._setpoints[name].publish(message)
 
     def getParam(self, name: str) -> Any:

@@ -170,12 +170,16 @@ class FastRig:
         if supervisor.auto_arm:
             return
         supervisor.arm(False)
+        self._wait_for(SupervisorState.CAN_BE_ARMED)
+        assert supervisor.arm(True)
+        self._wait_for(SupervisorState.CAN_FLY)
+
+    def _wait_for(self, flag):
         for _ in range(500):
             self._tick()
-            if supervisor.flags & SupervisorState.CAN_BE_ARMED:
-                break
-        assert supervisor.arm(True)
-        self.run(0.1)
+            if flag in self._firmware.supervisor.flags:
+                return
+        raise AssertionError(f"not {flag.words()} within {500 * PERIOD:g} s")
 
     def driver_turn(self, yaw):
         self._command(12, "B??5f", 0, True, False, 0.0, 0.0, 0.0, math.radians(yaw), 2.0)

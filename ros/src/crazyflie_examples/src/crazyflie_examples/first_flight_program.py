@@ -363,6 +363,9 @@ class LiveRig:
         if not self._wait(lambda: read() & known == SupervisorState.CAN_BE_ARMED, _LIMIT):
             raise Stop(f"the vehicle cannot be armed; it reports: {read().words()}")
         arm(True)
+        # Brushless motors spin up.
+        if not self._wait(lambda: SupervisorState.CAN_FLY in read(), _LIMIT):
+            raise Stop(f"the vehicle was armed, and cannot fly; it reports: {read().words()}")
         return True
 
     def take_off(self) -> None:

@@ -87,7 +87,8 @@ class MemoryTester(Memory):
 class LighthouseMemory(Memory):
     """Geometry and calibration of base stations.
 
-    The ``stored`` pages, by number, persist over a restart.
+    The ``stored`` pages, by number, persist over a restart. There is room for a number of
+    ``stations``.
     """
 
     STATIONS = 4  #: Number of base stations in the firmware's default configuration.
@@ -98,15 +99,16 @@ class LighthouseMemory(Memory):
     _GEOMETRY_SIZE = 49
     _CALIBRATION_SIZE = 61
 
-    def __init__(self, stored: dict[int, bytes]):
-        size = self.CALIBRATION_PAGE * self._PAGE_SIZE + self.STATIONS * self._CALIBRATION_SIZE
+    def __init__(self, stored: dict[int, bytes], stations: int = STATIONS):
+        self.stations = stations
+        size = self.CALIBRATION_PAGE * self._PAGE_SIZE + stations * self._CALIBRATION_SIZE
         super().__init__(LIGHTHOUSE, b"", size=size)
         self._stored = stored
         sizes = ((0, self._GEOMETRY_SIZE), (self.CALIBRATION_PAGE, self._CALIBRATION_SIZE))
         self._pages = {
             first + i: bytearray(stored.get(first + i, bytes(size)))
             for first, size in sizes
-            for i in range(self.STATIONS)
+            for i in range(stations)
         }
 
     def store(self, geometries: int, calibrations: int) -> bool:

@@ -15,6 +15,7 @@ from crazyflie_virtual.crtp import MAX_DATA
 from crazyflie_virtual.firmware.estimator import COMPLEMENTARY, KALMAN
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.firmware.stabilizer import DEFAULT, MELLINGER
+from crazyflie_virtual.settings import MOST_STATIONS
 from crazyflie_virtual.toc import (
     ATTITUDE_PIDS,
     FLOAT,
@@ -272,7 +273,7 @@ _GROUPS = {
         *_limited(U8, 0, 1, lowBattery="faults.low_battery"),
         *_limited(U8, 0, 1, deck="faults.deck"),
         *_limited(U8, 0, 4, motorFailure="faults.motor_failure"),
-        *_limited(U8, 0, 3, occluded="faults.occluded"),
+        *_limited(U16, 0, (1 << MOST_STATIONS) - 1, occluded="faults.occluded"),
         *_limited(FLOAT, 0.0, 100.0, smooth="faults.smooth"),
         *_limited(FLOAT, -2.0, 2.0, handX="hand.x", handY="hand.y", handZ="hand.z"),
         *_limited(FLOAT, -180.0, 180.0, handYaw="hand.yaw"),

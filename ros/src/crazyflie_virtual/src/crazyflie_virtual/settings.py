@@ -19,6 +19,7 @@ def switches(settings: Parameters) -> SimpleNamespace:
 #: Positioning systems of a vehicle: decks that know the true pose, real decks, and none.
 DECK, FLOW, LIGHTHOUSE, LOCO, NONE = "deck", "flow", "lighthouse", "loco", "none"
 
+MOST_STATIONS = 16  #: Largest number of base stations of the firmware.
 OBSERVER_PORT = 19800  #: UDP port to which the true pose is sent.
 FIRST_PORT = 19850  #: UDP port of the first vehicle: clients scan from here to 19859.
 
@@ -48,7 +49,11 @@ class VehicleSettings(Parameters):
     )
     smooth_x: float = parameter(METRES, "middle of the patch of `fault/smooth`", 0.0, "smooth/x")
     smooth_y: float = parameter(METRES, "the same", 0.0, "smooth/y")
-    base_stations: int = parameter(Integer(1, 2), "of Lighthouse", 2)
+    base_stations: int = parameter(
+        Integer(1, MOST_STATIONS),
+        "of Lighthouse; with more than 4, a firmware with room for that many",
+        2,
+    )
     knows_stations: bool = parameter(
         BOOLEAN, "store the geometry of the base stations on the vehicle", True
     )
@@ -148,8 +153,9 @@ class VehicleSettings(Parameters):
         BOOLEAN, "a deck reports a fault of its hardware: no flight", False, "fault/deck", live=True
     )
     occluded: int = parameter(
-        Integer(0, 3),
-        "base stations that the Lighthouse deck does not see: 1 the first, 2 the second, 3 both",
+        Integer(0, (1 << MOST_STATIONS) - 1),
+        "base stations that the Lighthouse deck does not see, as a sum: 1 the first, 2 the second, "
+        "4 the third, and so on",
         0,
         "fault/occluded",
         live=True,

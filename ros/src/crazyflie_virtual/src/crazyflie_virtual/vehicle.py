@@ -44,7 +44,9 @@ class Board:
     ):
         firmware = self.firmware = Firmware(physics, faults, settings, failure)
         self._log = LogPort(firmware, log_variables())
-        lighthouse = firmware.deck.memory = LighthouseMemory(storage.lighthouse)
+        stations = max(LighthouseMemory.STATIONS, settings.base_stations)
+        lighthouse = LighthouseMemory(storage.lighthouse, stations)
+        firmware.deck.memory = lighthouse
         memories = [
             storage.eeprom,
             Memory(memory.TRAJECTORY, firmware.planner.memory),

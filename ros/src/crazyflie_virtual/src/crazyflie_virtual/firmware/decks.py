@@ -17,12 +17,12 @@ from crazyflie_model.angles import Quaternion, Triple, product, rotate
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.memory import LighthouseMemory
-from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO, VehicleSettings
+from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO, MOST_STATIONS, VehicleSettings
 
 _POSITION_DEVIATION = 0.003  #: Deviation of the deck that knows the true pose (m).
 _ATTITUDE_DEVIATION = 0.003  #: Deviation of all decks (rad).
 
-#: Deviations of a position by Lighthouse with one and with two base stations, m: one knows the
+#: Deviations of a position by Lighthouse with one and with more base stations, m: one knows the
 #: distance only from the angle between the deck's sensors, which are 3 cm apart.
 _LIGHTHOUSE_DEVIATIONS = (0.006, 0.0015)
 _LOCO_DEVIATION = 0.03  #: Deviation of a position by Loco with ultra-wideband ranging, m.
@@ -35,7 +35,15 @@ _UNMEASURED = 0.25
 
 #: Places of the base stations (m), which look at the middle of the floor; one for each that
 #: `VehicleSettings.base_stations` allows.
-_STATIONS = ((-2.0, 1.5, 2.2), (2.0, 1.0, 2.4))
+_STATIONS = (
+    (-2.0, 1.5, 2.2),
+    (2.0, 1.0, 2.4),
+    # The others on a circle.
+    *(
+        (2.5 * math.cos(angle), 2.5 * math.sin(angle), 2.3)
+        for angle in (k * math.tau / (MOST_STATIONS - 2) for k in range(MOST_STATIONS - 2))
+    ),
+)
 
 #: Places of the Lighthouse deck's four sensors on the vehicle (m).
 _SENSORS = tuple((x, y, 0.0) for x in (-0.015, 0.015) for y in (0.0075, -0.0075))
@@ -138,14 +146,14 @@ class PositioningDeck:
     @property
     def located_stations(self) -> int:
         """Bit mask of the base stations of which the vehicle has a valid geometry."""
-        pages = map(self.memory.page, range(len(_STATIONS)))
+        pages = map(self.memory.page, range(self.memory.stations))
         return sum(1 << i for i, page in enumerate(pages) if _frame(i, page) is not None)
 
     @property
     def calibrated_stations(self) -> int:
         """Bit mask of the base stations of which the vehicle has a valid calibration."""
         first = LighthouseMemory.CALIBRATION_PAGE
-        pages = (self.memory.page(first + i) for i in range(len(_STATIONS)))
+        pages = (self.memory.page(first + i) for i in range(self.memory.stations))
         return sum(1 << i for i, page in enumerate(pages) if page[-1])
 
     @property
@@ -182,7 +190,7 @@ class PositioningDeck:
         active = _numbers(self.active_stations)
         if not active:
             return
-        deviation = _LIGHTHOUSE_DEVIATIONS[len(active) - 1]
+        deviation = _LIGHTHOUSE_DEVIATIONS[min(len(active), 2) - 1]
         position = self._noisy(deviation)
         # Where the estimate of a base station's place is wrong, so is that of the vehicle.
         frames = [frame for i in active if (frame := _frame(i, self.memory.page(i)))]

@@ -284,3 +284,30 @@ def test_a_moving_vehicle_makes_no_references_that_nobody_reads(monkeypatch):
     is_heard.append("/cf1/ref")
     inside, outside = moved(0.0)
     assert outside == inside
+
+
+STACK = """
+robots:
+  lower: {initial_position: [0, 0, 0], model: quadrotor, hover_height: 0.5}
+  upper: {initial_position: [1, 0, 0], model: quadrotor, hover_height: 1.3}
+"""
+
+
+@pytest.mark.parametrize("downwash", [False, True])
+def test_a_vehicle_below_another_one_feels_its_downwash(tmp_path, downwash):
+    file = tmp_path / "fleet.yaml"
+    file.write_text(STACK)
+    gains = {"quadrotor": {"lqr_controller": {"K_file": str(GAINS / "K_quadrotor.txt")}}}
+    swarm = Swarm(fleet={"file": str(file)}, downwash=downwash, models=gains)
+    swarm.call("/all/takeoff", seconds=10.0)
+    swarm.call("/upper/go_to", GoToRequest(0, True, Point(-1.0, 0.0, 0.0), 0.0, rospy.Duration(2)))
+    swarm.process.advance(4.0)
+    assert swarm.position("upper") == pytest.approx((0.0, 0.0, 1.3), abs=0.05)
+    controls = swarm.process.published("/lower/control/final")[-50:]
+    thrust = sum(each.control.thrust for each in controls) / len(controls)
+    assert 1.05 < thrust / 9.81 < 1.2 if downwash else thrust == pytest.approx(9.81, abs=0.05)
+
+
+def test_downwash_that_no_model_feels_is_warned_of():
+    swarm = Swarm(fleet={"n": 2}, downwash=True)
+    assert "downwash has an effect on vehicles" in swarm.process.logged("warn")[0]

@@ -1,6 +1,7 @@
 """Missions without vehicles: what is refused, and what it says."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -299,3 +300,21 @@ def test_trajectories_are_moved_and_stretched():
     slow, quick = pieces[3].evaluate(1.5), figure8()[3].evaluate(0.5)
     np.testing.assert_allclose(slow.position, np.add(quick.position, (1.0, 0.0, 2.0)))
     np.testing.assert_allclose(slow.velocity, np.divide(quick.velocity, 3.0))
+
+
+def test_a_dry_run_warns_of_vehicles_that_fly_below_others(monkeypatch):
+    warnings = []
+    group = DryRun({"cf1": (0.0, 0.0, 0.0), "cf2": (1.0, 0.0, 0.0)})
+    monkeypatch.setattr(group.observer, "warn", warnings.append)
+    dry_run(group, lambda fleet: fleet.takeoff(1.0))
+    assert warnings == []
+
+    def stacked(fleet):
+        fleet.takeoff(0.5)
+        fleet.go_to({"cf2": (1.0, 0.0, 1.3)})
+        fleet.go_to({"cf1": (0.97, 0.0, 0.5)})
+
+    dry_run(group, stacked)
+    (warning,) = warnings
+    assert "cf1 flies below another vehicle" in warning
+    assert re.search(r"at \(0\.9., 0\.00, 0\.50\) m, their downwash is 3\.. m/s", warning), warning

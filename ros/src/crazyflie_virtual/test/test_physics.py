@@ -8,8 +8,9 @@ import pytest
 from cflib.utils.encoding import compress_quaternion as reference
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from virtual_bench import Bench, generic
+from virtual_bench import Bench, command, generic
 
+from crazyflie_model.aerodynamics import Air
 from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_model.quadrotor import CRAZYFLIE, TYPES
 from crazyflie_model.units import GRAVITY, HOVER_PWM
@@ -394,3 +395,37 @@ def test_a_virtual_vehicle_with_lags_goes_where_it_is_sent(tmp_path, controller)
     bench.stream(generic(7, "ffff", 0.5, -0.3, 1.0, 1.5 * 57.3), 6.0)
     assert bench.physics.position == pytest.approx((0.5, -0.3, 1.0), abs=0.1)
     assert attitude(bench.physics)[2] == pytest.approx(1.5, abs=0.1)
+
+
+def thrust(benches, duration=3.0):
+    """Return the mean thrust of the first one while all advance together, PWM."""
+    thrusts = []
+    for _ in range(round(duration / 0.02)):
+        for bench in benches:
+            bench.run(0.02)
+        thrusts.append(benches[0].firmware.stabilizer.thrust)
+    return sum(thrusts) / len(thrusts)
+
+
+def test_a_vehicle_needs_more_thrust_in_the_downwash_of_another():
+    lower, upper = Bench(), Bench(init_x=1.0)
+    air = lower.physics.air = upper.physics.air = Air()
+    lower.take_off(0.6)
+    upper.take_off(1.2)
+    alone = thrust((lower, upper))
+    command(upper, "go_to", -1.0, 0.0, 0.0, 0.0, 2.0, relative=True)
+    thrust((lower, upper), 4.0)
+    below = thrust((lower, upper))
+    # As measured, with the PID controller of the firmware that holds the height.
+    assert 1.05 < below / alone < 1.3
+    assert air.move("seen", (0.0, 0.0, 0.6), 0.0) > 3.0
+    assert lower.height == pytest.approx(0.6, abs=0.05)
+
+
+def test_ground_effect_saves_thrust_near_the_ground():
+    near, plain = Bench(ground_effect=True), Bench()
+    for bench in (near, plain):
+        command(bench, "takeoff", 0.05, 1.0)
+        bench.run(6.0)
+    # The model says 0.7 % at 5 cm.
+    assert 0.99 < thrust((near,)) / thrust((plain,)) < 0.998

@@ -109,6 +109,12 @@ class FlyParameters(FleetParameters):
         True,
         "together",
     )
+    downwash: bool = parameter(
+        BOOLEAN,
+        "whether simulated vehicles below others feel the air that those move; with the model "
+        "quadrotor, or a type of vehicle, that has no lags",
+        False,
+    )
     common: Mapping[str, Any] = parameter(
         NODE_PARAMETERS, "parameters of every vehicle's nodes, node by node", name="nodes"
     )

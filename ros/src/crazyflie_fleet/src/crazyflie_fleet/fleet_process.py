@@ -27,6 +27,8 @@ from crazyflie_fleet.vehicle_nodes import (
     node_classes,
     parameters,
 )
+from crazyflie_model.aerodynamics import Air
+from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_takeoff.all_emergency_node import AllEmergencyNode
 from crazyflie_utils import Node, NodeHandle, ParameterError
 
@@ -63,6 +65,11 @@ class _NodeFactory:
         }
         handle.set_param(OBSTACLES, obstacles)
         vehicles = tuple(fleet[name] for name in own_names)
+        self._air = Air() if config.downwash else None
+        if config.downwash and any(each.dynamics in MODELS for each in vehicles):
+            handle.warn(
+                "downwash has an effect on vehicles of the model quadrotor, or of a type, only"
+            )
         for model in MODELS if config.is_simulated and config.is_vectorized else ():
             of_model = tuple(each for each in vehicles if each.dynamics == model)
             if of_model:
@@ -130,7 +137,10 @@ class _NodeFactory:
             own = merged(tree.get(name, {}), {"frames": frames})
             self._add(f"/{vehicle.name}/{name}", node_class(), own)
         for name, node_class in classes.items():
-            self._add(f"/{vehicle.name}/{name}", node_class(), tree[name])
+            node = node_class()
+            if isinstance(node, QuadrotorSimulatorNode):
+                node.air = self._air
+            self._add(f"/{vehicle.name}/{name}", node, tree[name])
         self._has_clock = True
 
     def _add_high_level(self, vehicle, tracked):

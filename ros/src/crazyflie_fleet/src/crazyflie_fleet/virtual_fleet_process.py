@@ -4,8 +4,9 @@ from dataclasses import replace
 
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_fleet.mocap_process import bodies
+from crazyflie_model.aerodynamics import Air
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
-from crazyflie_utils.parameters.types import PORT, Number
+from crazyflie_utils.parameters.types import BOOLEAN, PORT, Number
 from crazyflie_virtual.nodes import VirtualCrazyflieNode, VirtualMocapNode
 from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO
 from mocap_optitrack.mocap_node import MocapNode
@@ -23,6 +24,10 @@ class VirtualFleetParameters(FleetParameters):
     thrust_error: float = parameter(
         _FRACTION, "how much more than nominal their rotors lift", -0.05
     )
+    downwash: bool = parameter(
+        BOOLEAN, "whether vehicles below others feel the air that those move", False
+    )
+    ground_effect: bool = parameter(BOOLEAN, "whether rotors lift more near the ground", False)
     position_noise: float = parameter(Number("m", minimum=0.0), "of motion capture", 0.0002)
     attitude_noise: float = parameter(Number("rad", minimum=0.0), "of motion capture", 0.001)
 
@@ -40,6 +45,7 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
         raise ParameterError(f"parameter {handle.name}/fleet/virtual_port is 0; expected a port")
     nodes: dict[str, Node] = {}
     fleet = config.fleet()
+    air = Air() if config.downwash else None
     for number, vehicle in enumerate(fleet.vehicles):
         x, y, z = vehicle.position
         if z != 0.0:
@@ -53,13 +59,15 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
             "model": vehicle.vehicle_model,
             "mass_error": config.mass_error,
             "thrust_error": config.thrust_error,
+            "ground_effect": config.ground_effect,
             "seed": number,
             "topics": {"true_pose": f"/{vehicle.name}/true_pose"},
             "positioning": vehicle.positioning if has_deck else DECK,
             "observer": observer,
         }
         handle.set_param(name, parameters)
-        nodes[name] = VirtualCrazyflieNode()
+        nodes[name] = node = VirtualCrazyflieNode()
+        node.air = air
     # Nothing measures obstacles: the fleet's process has them at their initial positions.
     if not (seen := bodies(replace(fleet, obstacles=()), config.fixed_frame)):
         # All vehicles use their decks for positioning.

@@ -6,7 +6,7 @@ from typing import Any
 
 from typing_extensions import override
 
-from crazyflie_mission_api.group_state import Rules
+from crazyflie_mission_api.group_state import Rules, text
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, MissionError
 from crazyflie_mission_api.mission_vehicle import (
     MEMORY,
@@ -19,10 +19,13 @@ from crazyflie_mission_api.mission_vehicle import (
 )
 from crazyflie_mission_api.trajectories import TimedTrajectory
 from crazyflie_mission_api.vehicle_group import VehicleGroup
+from crazyflie_model.aerodynamics import Air
 from crazyflie_model.angles import Triple
 from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import Goal, PolynomialPiece, at_rest
+from crazyflie_model.quadrotor import CRAZYFLIE
 from crazyflie_model.trajectory import Pieces, Trajectory
+from crazyflie_model.units import GRAVITY
 
 _DEFINITIONS = 31  #: Number of trajectories that can be defined at one time.
 _MIN_DURATION = 0.01  #: Shortest duration of a plan, as in the firmware (s).
@@ -236,6 +239,9 @@ class IdealVehicle(MissionVehicle):
 
 
 _STEP = 0.05  #: Time step (s).
+_LOOK_PERIOD = 0.2  #: Period at which the air between vehicles is looked at (s).
+_WEIGHT = CRAZYFLIE.mass * GRAVITY  #: Thrust of a vehicle (N), of which type is not known here.
+_FELT = 2.0  #: Speed of the air that changes the lift of a vehicle by 5 % (m/s).
 
 
 class DryRunClock(Clock):
@@ -274,7 +280,11 @@ class DryRun(VehicleGroup):
         start_skews: Mapping[str, float] | None = None,
         on_step: Callable[[VehicleGroup], None] = lambda group: None,
     ):
-        clock = DryRunClock(lambda: on_step(self))
+        clock = DryRunClock(self._step)
+        self._on_step = on_step
+        self._air, self._next_look = Air(), 0.0
+        # Vehicle -> the fastest air that others above it move: m/s, time (s) and place (m).
+        self._downwash: dict[str, tuple[float, float, Triple]] = {}
         fences, yaws, skews = bounds or {}, headings or {}, start_skews or {}
         vehicles = []
         for name, position in starts.items():
@@ -282,6 +292,26 @@ class DryRun(VehicleGroup):
             yaw, skew = yaws.get(name, 0.0), skews.get(name, 0.0)
             vehicles.append(IdealVehicle(name, clock.time, position, yaw, fence, skew))
         super().__init__(vehicles, clock, rules)
+
+    def stacked(self) -> list[str]:
+        """Return a sentence for each vehicle that has flown in the downwash of others so far."""
+        return [
+            f"{name} flies below another vehicle: {time:.1f} s after the beginning, at "
+            f"{text(place)} m, their downwash is {speed:.1f} m/s"
+            for name, (speed, time, place) in self._downwash.items()
+        ]
+
+    def _step(self):
+        self._on_step(self)
+        if self.time() < self._next_look:
+            return
+        self._next_look = self.time() + _LOOK_PERIOD
+        for name, vehicle in self._vehicles.items():
+            place = self.position(name)
+            flies = not vehicle.has_landed()
+            speed = self._air.move(name, place, _WEIGHT if flies else 0.0)
+            if flies and speed > self._downwash.get(name, (_FELT,))[0]:
+                self._downwash[name] = speed, self.time(), place
 
 
 def dry_run(group: VehicleGroup, mission: Callable[[VehicleGroup], Any]) -> float:
@@ -309,4 +339,6 @@ def dry_run(group: VehicleGroup, mission: Callable[[VehicleGroup], Any]) -> floa
     run.obstacles = lambda: obstacles
     with run:
         mission(run)
+    for each in run.stacked():
+        group.warn(each)
     return run.time()

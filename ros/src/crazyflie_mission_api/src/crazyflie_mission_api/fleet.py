@@ -206,6 +206,11 @@ class Fleet(VehicleGroup):
         """
         return dry_run(self, mission)
 
+    @override
+    def warn(self, text: str) -> None:
+        super().warn(text)
+        self._handle.warn(text)
+
     def fly(self, mission: Callable[[VehicleGroup], Any]) -> None:
         """Check ``mission(fleet)`` by a dry run, then fly it."""
         duration = self.dry_run(mission)

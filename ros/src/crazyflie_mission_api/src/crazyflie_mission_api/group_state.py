@@ -148,6 +148,10 @@ class GroupState:
     def _shortest_duration(self, pieces):
         return trajectory.duration(within_limits(pieces, self.rules.limits))
 
+    def warn(self, text: str) -> None:
+        """Report what a dry run has found that is no error."""
+        self.observer.warn(text)
+
     def _timed(self, name, pieces, begin):
         return TimedTrajectory(pieces, begin, self._vehicles[name].start_skew)
 

@@ -58,6 +58,7 @@ class _DryRunReport(MissionObserver):
     def __init__(self) -> None:
         self._paths: dict[str, list[list[float]]] = {}
         self._last = -_PERIOD
+        self._warnings: list[str] = []
 
     @override
     def step(self, group: Any) -> None:
@@ -68,8 +69,12 @@ class _DryRunReport(MissionObserver):
                 self._paths.setdefault(name, []).append(point)
 
     @override
+    def warn(self, text: str) -> None:
+        self._warnings.append(text)
+
+    @override
     def passed(self, vehicles: list[str], duration: float) -> None:
-        text = f"{', '.join(vehicles)} fly for {duration:.0f} s"
+        text = "; ".join([f"{', '.join(vehicles)} fly for {duration:.0f} s", *self._warnings])
         _print_result(True, text, duration, self._paths)
         raise Done
 

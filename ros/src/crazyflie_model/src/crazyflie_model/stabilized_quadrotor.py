@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from typing_extensions import override
 
@@ -32,10 +33,18 @@ class Airframe:
     frame, attitude quaternion (x, y, z, w) from body to fixed frame, body rates (3)
     in rad/s, rotor speeds (4) in rad/s. Input, 7 components: commanded rotor speeds
     (4) in rad/s, velocity of the air (3) in m/s in the fixed frame.
+
+    ``lift_near(height)`` is the thrust at a height (m) over that far above the ground, such as
+    `aerodynamics.ground_effect`; by default it is the same everywhere.
     """
 
-    def __init__(self, parameters: QuadrotorParameters):
+    def __init__(
+        self,
+        parameters: QuadrotorParameters,
+        lift_near: Callable[[Number], Number] | None = None,
+    ):
         self.parameters = parameters
+        self._lift_near: Callable[[Any], Any] | None = lift_near
 
     def initial_state(self, position: Sequence[Number]) -> Vector[Number]:
         """Return the state at rest and level, heading along x.
@@ -63,9 +72,11 @@ class Airframe:
     def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """Return the time derivative of the state; see the module for x and u."""
         parameters = self.parameters
-        _, _, _, vx, vy, vz, qx, qy, qz, qw, p, q, r, w1, w2, w3, w4 = x
+        _, _, z, vx, vy, vz, qx, qy, qz, qw, p, q, r, w1, w2, w3, w4 = x
         c1, c2, c3, c4, wind_x, wind_y, wind_z = u
         thrust, torque_x, torque_y, torque_z = self.wrench((w1, w2, w3, w4))
+        if self._lift_near is not None:
+            thrust = thrust * self._lift_near(z)
 
         # The body's up axis in the fixed frame, third column of R(q).
         up_x, up_y = 2.0 * (qx * qz + qw * qy), 2.0 * (qy * qz - qw * qx)
@@ -162,7 +173,8 @@ class StabilizedQuadrotor(Dynamics):
     vehicle, which has more of both by ``mass_error`` and ``thrust_error`` (fractions of the nominal
     ones, > -1), hovers at ``GRAVITY * (1 + mass_error) / (1 + thrust_error)``. Roll and pitch are
     those in the heading frame. ``wind(t)`` is the velocity of the air (3 components) at time t (s),
-    m/s, fixed frame.
+    m/s, fixed frame; ``wake(position, thrust)`` the speed, m/s down, of the air that other vehicles
+    move at the position (m) of this one, which has a thrust (N).
     """
 
     x_dim = BODY_DIM + inner_loops.MEMORY_DIM + 4
@@ -173,12 +185,14 @@ class StabilizedQuadrotor(Dynamics):
         mass_error: float = 0.0,
         thrust_error: float = 0.0,
         wind: Callable[[float], Triple] = still_air,
+        wake: Callable[[Any, Any], float] | None = None,
     ):
         self.airframe = Airframe(parameters.with_errors(mass_error, thrust_error))
         self._nominal = parameters
         # The default type uses the link's own conversion, which is the same and faster.
         self._pwm = pwm_from_thrust if parameters == CRAZYFLIE else parameters.pwm
         self._wind = wind
+        self._wake = wake
 
     def initial_state(self, position: Sequence[Number]) -> Vector[Number]:
         """See `Dynamics.initial_state`; in the air the rotors carry the vehicle."""
@@ -204,7 +218,11 @@ class StabilizedQuadrotor(Dynamics):
         if count % STEPS_PER_SAMPLE == 0:
             memory, commands = self._sample(body, memory, u)
         t = count * STEP
-        body = self.airframe.step(t, body, commands, self._wind(t), STEP)
+        wind = self._wind(t)
+        if self._wake is not None:
+            thrust = self.airframe.wrench(body[13:17])[0]
+            wind = wind[0], wind[1], wind[2] - self._wake((body[0], body[1], body[2]), thrust)
+        body = self.airframe.step(t, body, commands, wind, STEP)
         return body + memory + commands
 
     def _sample(self, body, memory, u):

@@ -1,7 +1,10 @@
 """ROS interface of a simulated vehicle with motors, inner loops and wind."""
 
+from functools import partial
+
 from typing_extensions import override
 
+from crazyflie_model.aerodynamics import Air, ground_effect
 from crazyflie_model.dynamics import Dynamics
 from crazyflie_model.first_order_quadrotor import FirstOrderQuadrotor
 from crazyflie_model.limits import CRASH_TILT
@@ -11,7 +14,7 @@ from crazyflie_simulator.wind import Wind
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import Number
+from crazyflie_utils.parameters.types import BOOLEAN, Number
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 
 _ERROR = Number(minimum=-0.5, maximum=0.5)
@@ -49,6 +52,9 @@ class QuadrotorSimulatorParameters(SimulatorParameters):
     thrust_error: float = parameter(
         _ERROR, "how much more than nominal its rotors lift, as a fraction", 0.0, live=True
     )
+    ground_effect: bool = parameter(
+        BOOLEAN, "whether the rotors lift more near the ground; not with a model with lags", False
+    )
     wind: WindParameters = group(WindParameters, "wind")
 
 
@@ -60,6 +66,8 @@ class QuadrotorSimulatorNode(SimulatorNode):
 
     parameters_type = QuadrotorSimulatorParameters
     max_tilt = CRASH_TILT
+
+    air: Air | None = None  #: Air that this vehicle and others of the process move; None for none.
 
     @override
     def make_dynamics(self, parameters: QuadrotorSimulatorParameters) -> Dynamics:
@@ -73,10 +81,10 @@ class QuadrotorSimulatorNode(SimulatorNode):
             return FirstOrderQuadrotor(model)
         self._quadrotor = StabilizedQuadrotor(
             model,
-            mass_error=parameters.mass_error,
-            thrust_error=parameters.thrust_error,
             wind=self._wind.velocity,
+            wake=None if self.air is None else partial(self.air.move, self),
         )
+        self._set_airframe(parameters)
         return self._quadrotor
 
     @override
@@ -84,7 +92,11 @@ class QuadrotorSimulatorNode(SimulatorNode):
         super().reconfigure(parameters)
         wind = parameters.wind
         self._wind.change((wind.x, wind.y, wind.z), wind.gust, wind.gust_time)
+        self._set_airframe(parameters)
+
+    def _set_airframe(self, parameters):
         if self._quadrotor is not None:
             self._quadrotor.airframe = Airframe(
-                self._model.with_errors(parameters.mass_error, parameters.thrust_error)
+                self._model.with_errors(parameters.mass_error, parameters.thrust_error),
+                ground_effect if parameters.ground_effect else None,
             )

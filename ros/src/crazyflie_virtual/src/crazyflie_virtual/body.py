@@ -5,6 +5,7 @@ import random
 from collections import deque
 from typing import NamedTuple
 
+from crazyflie_model.aerodynamics import Air, ground_effect
 from crazyflie_model.angles import (
     Quaternion,
     Triple,
@@ -193,7 +194,8 @@ class Physics:
     """Rigid body, four motors, ground; it begins at a position (m) and heading (rad).
 
     The errors are the excess of mass and thrust over those of the ``model``, as fractions. A model
-    with the lag of roll follows the ``desired`` attitude with its lags, trims and delay.
+    with the lag of roll follows the ``desired`` attitude with its lags, trims and delay, and
+    knows neither ground effect nor moving air.
     """
 
     def __init__(
@@ -203,10 +205,13 @@ class Physics:
         mass_error: float = 0.0,
         thrust_error: float = 0.0,
         model: QuadrotorParameters = CRAZYFLIE,
+        has_ground_effect: bool = False,
     ):
         self.model = model
         true = model.with_errors(mass_error, thrust_error)
-        self._airframe = Airframe(true)
+        self._airframe = Airframe(true, ground_effect if has_ground_effect else None)
+        #: Air that this vehicle and others move; None for still air.
+        self.air: Air | None = None
         self._lags = None if model.roll_lag is None else _Lags(true)
         #: Roll and pitch (rad, nose down) and yaw rate (rad/s) that the controllers ask for.
         self.desired: Triple = (0.0, 0.0, 0.0)
@@ -281,7 +286,11 @@ class Physics:
             after = self._lags.step(before, self.desired, speed)
         else:
             speeds = [min(top, self.model.rotor_speed(command)) for command in commands]
-            after = self._airframe.step(0.0, before, speeds, STILL_AIR, STEP)
+            wind = STILL_AIR
+            if self.air is not None:
+                thrust = self._airframe.wrench(before[13:17])[0]
+                wind = 0.0, 0.0, -self.air.move(self, self.position, thrust)
+            after = self._airframe.step(0.0, before, speeds, wind, STEP)
             if after[2] <= 0.0:
                 after = tip(self._airframe, before, after, STEP)
         self._x = after

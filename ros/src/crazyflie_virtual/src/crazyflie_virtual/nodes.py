@@ -6,6 +6,7 @@ from typing import ClassVar, cast
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from typing_extensions import override
 
+from crazyflie_model.aerodynamics import Air
 from crazyflie_utils import Node, NodeHandle, ParameterError, TransformError, topic
 from crazyflie_virtual.mocap import MocapServer, MocapSettings
 from crazyflie_virtual.server import Server, VehicleServer
@@ -83,10 +84,13 @@ class VirtualCrazyflieNode(ServerNode):
     parameters_type = VehicleParameters
     server_type = VehicleServer
 
+    air: Air | None = None  #: Air that this vehicle and others of the process move; None for none.
+
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         super().register_callbacks(handle)
         physics = cast(VehicleServer, self._server).vehicle.physics
+        physics.air = self.air
         self._true_pose = handle.publisher(self._parameters.true_pose_topic, PoseStamped)
         handle.timer(_POSE_PERIOD, partial(self._publish, physics))
         if physics.world is not None and physics.world.moving:

@@ -89,6 +89,7 @@ class VehicleSettings(Parameters):
     thrust_error: float = parameter(
         _FRACTION, "how much more than nominal its rotors lift, as a fraction", 0.0
     )
+    ground_effect: bool = parameter(BOOLEAN, "whether the rotors lift more near the ground", False)
     battery: float = parameter(SHARE, "state of charge at the beginning", 1.0)
     protocol: int = parameter(
         Integer(11, 12),

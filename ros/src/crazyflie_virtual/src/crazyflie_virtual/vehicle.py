@@ -121,6 +121,7 @@ class VirtualVehicle:
             settings.mass_error,
             settings.thrust_error,
             vehicle_model.load(settings.model),
+            settings.ground_effect,
         )
         if settings.world:
             self.physics.world = world_file.load(settings.world)

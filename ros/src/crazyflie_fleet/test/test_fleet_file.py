@@ -249,6 +249,26 @@ def test_what_is_wrong_is_named_with_its_line(load, text, expected):
     assert complaints_of(load, text)[0].startswith(expected)
 
 
+SIX = ", ".join(f"stateEstimate.{axis}" for axis in ("x", "y", "z", "vx", "vy", "vz"))
+
+
+@pytest.mark.parametrize(
+    ("variables", "size"),
+    # A variable of another firmware has a byte at least.
+    [(SIX + ", radio.rssi, my.own", 26), (SIX + ", pm.vbat", 28), (SIX + ", a.a, a.b, a.c", 27)],
+)
+def test_a_topic_that_exceeds_a_packet_is_refused_with_its_line(load, variables, size):
+    topics = f"{{estimate: {{frequency: 10,\n vars: [{variables}]}}}}"
+    text = TWO + f"    firmware_logging: {{custom_topics: {topics}}}\n"
+    if size <= 26:
+        assert list(load(text)["cf2"].log_topics) == ["estimate"]
+        return
+    assert complaints_of(load, text) == [
+        f":9: robots/cf2/firmware_logging/custom_topics/estimate/vars takes {size} bytes or more; "
+        "at most 26 fit in a packet: make it two topics"
+    ]
+
+
 def test_vehicles_may_merge_what_they_have_in_common(load):
     fleet = load("""\
 defaults: &cf

@@ -36,6 +36,7 @@ from crazyflie_utils.parameters.vehicle_model import load
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_utils.text import shortened, shown
 from crazyflie_utils.text_file import user_path
+from crazyflie_virtual.log import MAX_BYTES, log_variables
 
 #: Least similarity of an unknown key to a known one that is misspelt (0 to 1).
 _SIMILAR = 0.8
@@ -43,6 +44,9 @@ _SIMILAR = 0.8
 _TOP = ("robots", "robot_types", "all", "machines", "fileversion")
 _FIRMWARE = ("firmware_params", "firmware_logging")
 _LOGGING = ("enabled", "default_topics", "custom_topics")
+
+#: Firmware variable -> its size (bytes).
+_SIZES = {f"{each.group}.{each.name}": each.number_type.size for each in log_variables()}
 _DECLARATIONS = [*VehicleConfig.declarations()]
 _WITHOUT_EFFECT = [each.name for each in _DECLARATIONS if each.help == WITHOUT_EFFECT]
 _GROUPS = {each.name.partition("/")[0] for each in _DECLARATIONS if "/" in each.name}
@@ -299,10 +303,18 @@ class FleetParser:
                 if "frequency" in entry:
                     self.remarks.idle(entry["frequency"], "frequency of a default topic")
         for name, entry in _entries(parts, "custom_topics").items():
-            layer.log_topics[name] = self._read(entry, LogTopicSettings)
+            layer.log_topics[name] = topic = self._read(entry, LogTopicSettings)
+            if topic is not None:
+                self._check_size(topic.variables, entry["vars"])
             if name in RESERVED_NAMES:
                 self._error(entry, "is a name of the vehicle's own topics; expected another name")
             self._check_type(VEHICLE_NAME, name, entry)
+
+    def _check_size(self, variables, entry):
+        # The vehicle refuses it, too, but only when it is added. Another firmware may have others.
+        if (size := sum(_SIZES.get(each, 1) for each in variables)) > MAX_BYTES:
+            text = f"takes {size} bytes or more; at most {MAX_BYTES} fit in a packet: "
+            self._error(entry, text + "make it two topics")
 
     def _vehicle(self, name, robot, layers):
         """Return a vehicle of the layers, the nearest first."""

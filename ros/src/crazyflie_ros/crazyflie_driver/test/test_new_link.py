@@ -171,6 +171,21 @@ def test_a_link_that_is_set_up_again_while_services_are_announced(server, monkey
     assert commands(vehicle) == UNLOCKED
 
 
+def test_the_groups_of_a_vehicle_are_set_again_on_a_new_link(server):
+    """Its battery was changed: the firmware has begun without groups, and ignored commands."""
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri)
+    server.call("/cf1/set_group_mask", SetGroupMaskRequest(5))
+    crazyflie = server.node._vehicles[vehicle.uri].crazyflie
+    vehicle.is_frozen = True
+    wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
+    crazyflie.high_level.forget_trajectories()
+    vehicle.received.clear()
+    vehicle.is_frozen = False
+    assert vehicle.wait_for_packets(8, 0)[0] == b"\x00\x05"
+    wait_until(lambda: crazyflie.high_level.is_addressed(4), "the groups")
+
+
 def test_a_link_that_is_silent_while_it_is_taken_up_is_taken_up_when_it_is_heard(
     server, monkeypatch
 ):

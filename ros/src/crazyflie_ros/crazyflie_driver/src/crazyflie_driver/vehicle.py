@@ -27,7 +27,7 @@ from crazyflie_driver.vehicle_base import (
     Jobs,
 )
 from crazyflie_link.crazyflie import Crazyflie, LinkState
-from crazyflie_link.errors import CrazyflieError
+from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_link.transmission import REPLY_LIMIT
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ServiceError
@@ -161,6 +161,7 @@ class DriverVehicle(BaseVehicle):
             self.log.positioning.suspend(_ELSEWHERE)
         if not self.gate.is_emergency:
             self._restore_parameters(lost)
+            self._restore_groups()
             self.setpoints.open_thrust_lock(self.flight.read())
         # If it fails before, it is done when the vehicle is heard again.
         self._connection_count = count
@@ -177,6 +178,15 @@ class DriverVehicle(BaseVehicle):
             return
         for problem in self._mirror.reapply(lost):
             self.warn(f"not written again: {problem}")
+
+    def _restore_groups(self):
+        # Also in flight, where it changes nothing.
+        try:
+            self.crazyflie.high_level.restore_group_mask()
+        except LinkLostError:
+            raise
+        except CrazyflieError as error:
+            self.warn(f"not set again: {error}; call set_group_mask again")
 
     def _on_estimate_reset(self):
         if self.log.positioning is not None:

@@ -71,6 +71,7 @@ class HighLevel(Subsystem):
     def __init__(self, current_link: Callable[[], Link]):
         super().__init__(current_link)
         self._knowledge = _Knowledge()
+        self._asked_groups: int | None = None
         self._is_dry = False
         self._shared: SharedCommand | None = None
 
@@ -110,8 +111,14 @@ class HighLevel(Subsystem):
     def set_group_mask(self, group_mask: int) -> None:
         """Set the groups (bits) that the vehicle belongs to."""
         check_byte("group mask", group_mask)
+        self._asked_groups = group_mask
         self._command("the group mask", lambda c: c.set_group_mask(group_mask))
         self._knowledge.groups = group_mask
+
+    def restore_group_mask(self) -> None:
+        """Set the groups again that were set last, if any: a vehicle that was off has none."""
+        if self._asked_groups is not None:
+            self.set_group_mask(self._asked_groups)
 
     def take_off(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
         """Climb to a height (m) in a duration (s), keeping position and heading."""

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from crazyflie_utils import Node, Parameters, parameter, topic
 from crazyflie_utils.parameters.declaration import ParameterError
 from crazyflie_utils.parameters.types import (
     BOOLEAN,
@@ -19,6 +20,7 @@ from crazyflie_utils.parameters.types import (
     TEXT,
     TIME_STEP,
     TOPIC,
+    Converted,
     Integer,
     Number,
     Text,
@@ -184,3 +186,45 @@ def test_default_counts_only_where_nothing_is_set():
     assert handle.get_param("~optional", TOPIC, None) is None
     with pytest.raises(ParameterError, match="/node/bad"):
         handle.get_param("~bad", FINITE, 5.0)
+
+
+class Gains(Parameters):
+    """Parameters of `Controller`."""
+
+    control_topic: str = topic("control", "controls")
+    gains: object = parameter(Converted(dict, "a dictionary", "dictionary"), "gains by name", None, "gains")
+
+
+class Controller(Node[Gains]):
+    """A node that reads one more parameter, and sets one."""
+
+    def register_callbacks(self, handle):
+        handle.get_param("~limits/tilt", Number(), 0.2)
+        handle.set_param("/lqr/child", {"own": 1})
+
+
+def test_parameters_that_no_node_reads_are_named_in_one_warning():
+    process = FakeProcess()
+    process.transport.set_param(
+        "/lqr",
+        {
+            "topics": {"control": "u", "contrl": "v"},
+            "gains": {"any": 1.0},
+            "limits": {"tilt": 0.1},
+            "control": {"max_roll": 0.1},
+            "fast": True,
+        },
+    )
+    assert process.launch(Controller(), "/lqr")
+    (warning,) = process.logged("warn")
+    assert warning == (
+        "/lqr: parameters that no node reads, and which have no effect: "
+        "~topics/contrl (~topics/control?), ~control/max_roll, ~fast"
+    )
+
+
+def test_parameters_that_are_read_are_no_warning():
+    process = FakeProcess()
+    process.transport.set_param("/lqr", {"topics": {"control": "u"}, "limits": {"tilt": 0.1}})
+    assert process.launch(Controller(), "/lqr")
+    assert process.logged("warn") == []

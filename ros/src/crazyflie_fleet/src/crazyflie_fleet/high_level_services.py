@@ -115,6 +115,9 @@ class HighLevelParameters(Parameters):
     )
     plan_topic: str = topic("plan", "trajectory that is flown, until its end", "~plan/markers")
     fixed_frame: str = parameter(FRAME, "frame the references are in", "world", "frames/fixed")
+    robot_frame: str = parameter(
+        FRAME, "frame of the vehicle, which missions read", "crazyflie", "frames/robot"
+    )
     time_step: float = parameter(TIME_STEP, "period of the references", 0.02)
 
     @property

@@ -248,6 +248,8 @@ class ProcessContext:
         self._clock_publisher: Publisher | None = None
         #: Work and decoder of each input of `NodeHandle.input`, by its number - 1.
         self.inputs: list[tuple[Callable[..., None], Callable[[Any], Any]]] = []
+        #: Absolute names of the parameters that nodes of the process have declared, read or set.
+        self.known_parameters: set[str] = set()
         self.flights = OwnFlights(self.topics)
         #: Exit status with which the process is to end; None while it is not to end.
         self.exit_status: int | None = None

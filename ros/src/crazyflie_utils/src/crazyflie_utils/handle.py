@@ -48,6 +48,7 @@ class NodeHandle:
         self._submit = process.executor.submit
         self._undo: list[Callable[[], None]] = []
         self._latest: list[LatestMessage] = []
+        self._own_parameters: PrivateParameters | None = None
         log = NodeLog(process.transport, name)
         self.info, self.warn, self.error = log.info, log.warn, log.error  #: See `NodeLog`.
         self._faults = FaultHandler(log)
@@ -94,10 +95,19 @@ class NodeHandle:
         change.
         """
         source = PrivateParameters(self._process.transport.get_param, self.name, self.resolve)
+        declarations = parameters.declarations()
+        self._process.known_parameters.update(source.full_name(d.name) for d in declarations)
         loaded = parameters.read(source.get, source.full_name)
+        self._own_parameters = source
         if on_change is not None and any(each.live for each in parameters.declarations()):
             Reconfiguration(self, loaded, source.get, on_change)
         return loaded
+
+    def warn_unknown_parameters(self) -> None:
+        """Warn of the node's own parameters that no node of the process has declared or read."""
+        source = self._own_parameters
+        if source and (words := source.unknown(self._process.known_parameters)):
+            self.warn(f"parameters that no node reads, and which have no effect: {words}")
 
     def get_param(self, name: str, type: ParameterType, default: Any = REQUIRED) -> Any:  # noqa: A002
         """Return a parameter that cannot be declared: another node's, or with a varying name.
@@ -105,10 +115,12 @@ class NodeHandle:
         Blocks on the master; do not call it in a callback. Raises `ParameterError`, see `load`.
         """
         declaration = Declaration(self.resolve(name), type, "", default, live=False)
+        self._process.known_parameters.add(declaration.name)
         return read_parameter(declaration, self._process.transport.get_param)
 
     def set_param(self, name: str, value: Any) -> None:
         """Set a parameter, or a namespace to a dictionary; waits for the master."""
+        self._process.known_parameters.add(self.resolve(name))
         self._process.transport.set_param(self.resolve(name), value)
 
     def set_param_later(self, name: str, value: Any) -> "Future[None]":

@@ -60,6 +60,7 @@ class Node(Generic[P]):
         try:
             self.load_parameters(handle)
             self.register_callbacks(handle)
+            handle.warn_unknown_parameters()
         except Exception as error:
             handle.error(initialization_failure(error))
             return False

@@ -7,8 +7,9 @@ modules (20 MiB) that find packages in the file system.
 """
 
 import contextlib
+import difflib
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import Future
 from typing import Any
 
@@ -44,6 +45,17 @@ class PrivateParameters:
         except KeyError:
             self._own = {}
 
+    def unknown(self, known: Collection[str]) -> str:
+        """Return the node's parameters that are not among, or below, absolute names, as words."""
+        names = [name.removeprefix(self._prefix) for name in known if name.startswith(self._prefix)]
+        found = []
+        for path in _leaves(self._own):
+            if any(f"{path}/".startswith(f"{name}/") for name in names):
+                continue
+            near = difflib.get_close_matches(path, names, 1)
+            found.append(f"~{path}" + (f" (~{near[0]}?)" if near else ""))
+        return ", ".join(found)
+
     def full_name(self, name: str) -> str:
         """Return the absolute name of a parameter: of the node, unless it begins with a slash."""
         return self._resolve(name if name.startswith("/") else "~" + name)
@@ -59,6 +71,14 @@ class PrivateParameters:
                 raise KeyError(name)
             value = value[key]
         return value
+
+
+def _leaves(tree: Any, path: str = "") -> Iterator[str]:
+    if not isinstance(tree, dict):
+        yield path
+        return
+    for key, value in tree.items():
+        yield from _leaves(value, f"{path}/{key}" if path else str(key))
 
 
 class ParameterWriter:

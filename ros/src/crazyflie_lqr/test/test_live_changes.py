@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from lift_controller import answer, lifting, publish_flight_state, refer
 
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
-from crazyflie_lqr.reference import GuardedReference
 from crazyflie_model.dynamics import Coupled7D
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_references.governor import ReferenceGovernor
 from crazyflie_utils import ServiceError
 
 SOFT = np.zeros((4, 7))
@@ -106,7 +106,7 @@ def test_gains_that_overflow_are_refused(tmp_path):
     st.tuples(*[st.floats(-10.0, 10.0)] * 3),
 )
 def test_any_reach_of_references_leaves_them_finite(max_jump, place, vehicle):
-    reference = GuardedReference(6, max_jump)
+    reference = ReferenceGovernor(6, max_jump)
     reference.update([*place, 0.0, 0.0, 0.0, 0.0])
     followed = reference.value(0.0, [*vehicle, 0.0, 0.0, 0.0, 0.0])
     assert all(map(math.isfinite, followed))

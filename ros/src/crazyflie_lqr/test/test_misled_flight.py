@@ -7,10 +7,10 @@ import pytest
 
 from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
-from crazyflie_lqr.reference import GuardedReference
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.dynamics import STEP, Coupled7D, NearHover
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
+from crazyflie_references.governor import ReferenceGovernor
 
 CONFIG = Path(__file__).parents[1] / "config"
 PERIOD = 0.01
@@ -32,7 +32,7 @@ def flown(vehicle, references, duration=8.0):
     controller = IntegralStateFeedback(
         load_matrix(str(CONFIG / gains), 4, 7), (0.0, 0.0, 0.0, 9.81), 6, k, limit
     )
-    guard = GuardedReference(6, 3.0, max_speed=2.0)
+    guard = ReferenceGovernor(6, 3.0, max_speed=2.0)
     guard.update([*HOVER, 0.0])
     x = model.initial_state(HOVER[:3])
     states = []

@@ -39,7 +39,7 @@ def test_a_controller_of_ones_own_replaces_the_lift_controller(node):
     process = FakeProcess()
     assert process.launch(node, "/lqr_controller", {**PARAMETERS, "reach": 0.2})
     state = PositionVelocityYawStateStamped(state=PositionVelocityYawState(z=1.0))
-    for x in (0.1, 0.2, 5.0):
+    for x in (0.1, 0.2, 2.0):
         reference = PositionVelocityStateStamped(state=PositionVelocityState(x=x, z=1.0))
         process.publish("/ref", reference)
         process.publish("/state", state)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_lqr.reference import StateAge
+from crazyflie_lqr.state_age import StateAge
 
 NOW = 1.7e9
 

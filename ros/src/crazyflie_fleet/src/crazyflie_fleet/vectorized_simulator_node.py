@@ -25,21 +25,20 @@ from crazyflie_lqr.linear_feedback import (
     limited,
     linear_control,
 )
-from crazyflie_lqr.reference import GuardedReference
 from crazyflie_model.angles import quaternion_from_rpy, wrap_to_pi
 from crazyflie_model.dynamics import Coupled7D, NearHover, SevenDimensional
 from crazyflie_model.elementwise import join, split
-from crazyflie_model.limits import MAX_SPEED
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_references.governed_references import GovernedReferences, ReferenceLimits
 from crazyflie_simulator.simulator_node import MAX_CATCH_UP, ClockParameters, RealTimeWatch
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import FRAME, TIME_STEP, Number
+from crazyflie_utils.parameters.types import FRAME, TIME_STEP
 from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import to_tuple
@@ -114,18 +113,7 @@ class VectorizedSimulatorParameters(Parameters):
     u_ref: NDArray[np.float64] = parameter(
         CONTROL_FILE, "control at the reference", name="lqr_controller/u_ref_file"
     )
-    max_jump: float = parameter(
-        Number("m", above=0.0),
-        "largest distance of a new reference from its vehicle",
-        3.0,
-        "lqr_controller/reference/max_jump",
-    )
-    max_speed: float = parameter(
-        Number("m/s", above=0.0, maximum=MAX_SPEED),
-        "a larger velocity of a reference is made as large as this",
-        2.0,
-        "lqr_controller/reference/max_speed",
-    )
+    limits: ReferenceLimits = group(ReferenceLimits, "lqr_controller/reference")
 
 
 class VectorizedSimulatorNode(Node):
@@ -139,7 +127,7 @@ class VectorizedSimulatorNode(Node):
         self._ticks = 0
         self._measured: tuple[float, NDArray[np.float64]] | None = None
         self._broadcast_time = math.nan
-        self._references: list[GuardedReference] = []
+        self._references: list[GovernedReferences] = []
         self._states: list[Publisher] = []
         self._controls: list[Publisher] = []
 
@@ -173,13 +161,7 @@ class VectorizedSimulatorNode(Node):
             handle.timer(parameters.time_step, self._on_timer)
 
     def _register_vehicle(self, handle, number, below):
-        def warn(text: str) -> None:
-            handle.warn(below + SAFE_REFERENCE + ": " + text, throttle=1.0, key=(below, "jump"))
-
-        parameters = self._parameters
         handle.claim_controls(below + FINAL_CONTROL, "simulated")
-        reference = GuardedReference(YAW, parameters.max_jump, warn, parameters.max_speed)
-        self._references.append(reference)
         self._states.append(handle.publisher(below + STATE, PositionVelocityYawStateStamped))
         self._controls.append(handle.publisher(below + LQR_CONTROL, ControlStamped))
         handle.subscribe(
@@ -188,30 +170,12 @@ class VectorizedSimulatorNode(Node):
             partial(self._on_control, number),
             finite="control",
         )
-        handle.subscribe(
-            below + SAFE_REFERENCE,
-            PositionVelocityYawStateStamped,
-            partial(self._on_reference, reference),
-            finite="state",
-            on_invalid=lambda: reference.invalidate(handle.time()),
-        )
-        handle.subscribe(
-            below + SAFE_DESCENT,
-            PositionVelocityYawStateStamped,
-            partial(self._on_descent, reference),
-            finite="state",
-        )
+        topics = below + SAFE_REFERENCE, below + SAFE_DESCENT
+        limits, message_type = self._parameters.limits, PositionVelocityYawStateStamped
+        self._references.append(GovernedReferences(handle, topics, message_type, YAW, limits))
 
     def _on_control(self, number, message):
         self._batch.command(number, to_tuple(message.control), self._handle.time())
-
-    def _on_reference(self, reference, message):
-        x_ref = to_tuple(message.state)
-        stamp, now = message.header.stamp.to_sec(), self._handle.stamp().to_sec()
-        reference.update(x_ref, stamp, now, self._handle.time())
-
-    def _on_descent(self, reference, message):
-        reference.descend(to_tuple(message.state), self._handle.time())
 
     # Time steps.
 
@@ -273,11 +237,10 @@ class VectorizedSimulatorNode(Node):
         rows = estimates.tolist()
         for publisher, row in zip(self._states, rows, strict=True):
             publisher.publish(state_message(header, row))
-        now = self._handle.time()
         found = [
             (number, x_ref)
-            for number, (reference, row) in enumerate(zip(self._references, rows, strict=True))
-            if (x_ref := reference.value(now, row)) is not None
+            for number, (references, row) in enumerate(zip(self._references, rows, strict=True))
+            if (x_ref := references.value(row)) is not None
         ]
         if not found:
             return

@@ -2,13 +2,13 @@
 
 from collections import deque
 
-from crazyflie_lqr.linear_feedback import PITCH, ROLL, THRUST, Components
+from crazyflie_lqr.linear_feedback import PITCH, ROLL, THRUST
+from crazyflie_references.governor import Components
 
 #: Difference of roll and pitch (rad), and of thrust (m/s^2), of two controls that are the same.
 #: The last node before the vehicle, or a filter of a user's own, may change a control a little.
 SAME_TILT, SAME_THRUST = 0.02, 0.2
-#: Time on the way to the vehicle after which a control is not a sent one any more, and from the last
-#: control to the vehicle until nothing is flown (s).
+#: Longest time on the way to the vehicle, and from one control to the vehicle to the next (s).
 MAX_AGE = 0.3
 _MEMORY = 32  #: Number of sent controls that are compared.
 

@@ -22,6 +22,7 @@ from typing_extensions import override
 from crazyflie_model.angles import wrap_to_pi
 from crazyflie_model.elementwise import Number, Vector, clip, functions, where
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_references.governor import Components
 
 ROLL, PITCH, YAW_DOT, THRUST = range(4)
 
@@ -199,15 +200,6 @@ class GroundGuess:
 
 
 _LEAST_DAMPING = 0.7  #: A height loop with this damping ratio overshoots a step by 5 %.
-#: A state or a control; for so few numbers, plain floats are several times quicker than arrays.
-Components = Sequence[float]
-
-
-def at_rest(x: Components, yaw_index: int) -> list[float]:
-    """Return the reference, x_dim components, that stays at the place and heading of a state."""
-    x_ref = [*x[:3], *[0.0] * (len(x) - 3)]
-    x_ref[yaw_index] = x[yaw_index]
-    return x_ref
 
 
 class LinearFeedback:
@@ -294,10 +286,10 @@ class IntegralStateFeedback(LinearFeedback):
     ... `MAX_THRUST`.
 
     While a control is at its limit, its integral does not grow into the limit. From
-    `reset_integrator` to the next flight it is zero. While `foreign` controls are flown, the
-    integral stays, and the climb learns from their thrust. After `take_off`, height reference and height
-    integral are those of a `Climb` until the vehicle has arrived; but not where a step of the
-    reference does no harm, with a height loop that is well damped and has no integrator.
+    `reset_integrator` to the next flight it is zero. While `foreign` controls are flown, it stays.
+    After `take_off`, height reference and height integral are those of a `Climb`, which learns from
+    the thrust that is flown, until the vehicle has arrived; but not where a step of the reference
+    does no harm, with a height loop that is well damped and has no integrator.
     """
 
     def __init__(

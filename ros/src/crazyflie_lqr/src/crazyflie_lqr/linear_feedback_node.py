@@ -16,17 +16,17 @@ from crazyflie_lqr.linear_feedback import (
     GroundGuess,
     IntegralStateFeedback,
     LinearFeedback,
-    at_rest,
 )
-from crazyflie_lqr.reference import GuardedReference, StateAge
-from crazyflie_model.limits import HOLD_LIMIT, MAX_SPEED, MAX_THRUST, MIN_THRUST
+from crazyflie_lqr.state_age import StateAge
+from crazyflie_model.limits import HOLD_LIMIT, MAX_THRUST, MIN_THRUST
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
-from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter, topic
+from crazyflie_references.governed_references import ReferenceParameters
+from crazyflie_utils import Node, NodeHandle, ParameterError, parameter, topic
 from crazyflie_utils.flight_status import FlightTopics
 from crazyflie_utils.parameters import vehicle_model
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import TEXT, Converted, Integer, Number
-from crazyflie_utils.vectors import from_vector, stamped, to_tuple, to_vector
+from crazyflie_utils.vectors import from_vector, stamped, to_tuple
 
 MAX_GAIN = 1e6  #: Largest entry of a gain file: larger ones give controls that are not finite.
 
@@ -49,7 +49,7 @@ _GAIN_FILE = MatrixFile(4, 7)
 GAINS = Converted(_gains, f"{_GAIN_FILE}, or a model of a vehicle", _GAIN_FILE.label)
 
 
-class LinearFeedbackParameters(Parameters):
+class LinearFeedbackParameters(ReferenceParameters):
     """Parameters of a controller of 7 states; subclasses declare other `x_dim` and `K`."""
 
     x_dim: int = parameter(Integer(7, 7), "length of the state")
@@ -67,15 +67,8 @@ class LinearFeedbackParameters(Parameters):
         name="u_ref_file",
         live=True,
     )
-    reference_topic: str = topic("reference", "where references come from")
     state_topic: str = topic("state", "where states come from")
     control_topic: str = topic("control", "where controls go")
-    own_descent_topic: str | None = topic(
-        "descent_reference",
-        "references of a descent, which override all others; by default the name of reference + "
-        "`_descent`",
-        None,
-    )
     flight: FlightTopics = group(FlightTopics, "topics")
     own_final_control_topic: str | None = topic(
         "final_control",
@@ -87,20 +80,6 @@ class LinearFeedbackParameters(Parameters):
         "hover_thrust",
         "thrust of hover that the takeoff server has measured",
         "in_flight_hover_thrust",
-    )
-    max_jump: float = parameter(
-        Number("m", above=0.0),
-        "largest distance of a new reference from the vehicle; a further one is moved nearer",
-        3.0,
-        name="reference/max_jump",
-        live=True,
-    )
-    max_speed: float = parameter(
-        Number("m/s", above=0.0, maximum=MAX_SPEED),
-        "largest velocity of a reference; a larger one is limited",
-        2.0,
-        name="reference/max_speed",
-        live=True,
     )
     max_age: float = parameter(
         Number("s", above=0.0),
@@ -116,11 +95,6 @@ class LinearFeedbackParameters(Parameters):
             largest = max(map(abs, numbers))
             if largest > MAX_GAIN:
                 yield f"{name} has {largest:g} among its numbers; expected at most {MAX_GAIN:g}"
-
-    @property
-    def descent_topic(self) -> str:
-        """References of a descent."""
-        return self.own_descent_topic or f"{self.reference_topic}_descent"
 
     @property
     def final_control_topic(self) -> str | None:
@@ -147,7 +121,6 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
     reference_tail: tuple[float, ...] = ()
 
     def __init__(self) -> None:
-        self._reference = GuardedReference(self.yaw_index, report=self._warn_of_reference)
         self._flight_state: int = FlightStatus.UNKNOWN
         self._is_flown = False
         self._clocks_agree = False
@@ -168,21 +141,14 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
     def load_parameters(self, handle: NodeHandle) -> None:
         super().load_parameters(handle)
         self._completes_itself = _overrides(self, LinearFeedbackNode, "complete_reference")
-        self._apply(self._parameters, self.make_controller(self._parameters))
+        self._apply(self.make_controller(self._parameters))
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._publisher = handle.publisher(parameters.control_topic, ControlStamped)
-        handle.subscribe(
-            parameters.reference_topic,
-            self.reference_type,
-            self._on_reference,
-            finite="state",
-            on_invalid=lambda: self._reference.invalidate(handle.time()),
-        )
-        handle.subscribe(
-            parameters.descent_topic, self.reference_type, self._on_descent, finite="state"
+        self._references = parameters.follow(
+            handle, self.reference_type, self.yaw_index, self._completed, self._on_reference
         )
         parameters.flight.subscribe(handle, self._on_flight_status)
         handle.subscribe(parameters.hover_thrust_topic, Float64, self._on_hover_thrust)
@@ -192,7 +158,8 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
     def _reconfigure(self, parameters):
         controller = self.make_controller(parameters)
         controller.take_over(self._controller)
-        self._apply(parameters, controller)
+        self._references.change(parameters.limits)
+        self._apply(controller)
         self._follow_flown()
 
     def _follow_flown(self):
@@ -203,9 +170,7 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             self._follows_flown = True
             self._handle.subscribe(topic, ControlStamped, self._on_flown, finite="control")
 
-    def _apply(self, parameters, controller):
-        self._reference.max_jump = parameters.max_jump
-        self._reference.max_speed = parameters.max_speed
+    def _apply(self, controller):
         uses_arrays = _overrides(controller, LinearFeedback, "control")
         self._controller = controller
         self._law = self._control_by_arrays if uses_arrays else controller.law
@@ -213,26 +178,15 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
     def _control_by_arrays(self, x, x_ref, time):
         return self._controller.control(np.array(x), np.array(x_ref), time).tolist()
 
-    def _on_reference(self, message):
-        x_ref = self._completed(message)
-        now, time = self._handle.stamp().to_sec(), self._handle.time()
-        if not self._reference.update(x_ref, message.header.stamp.to_sec(), now, time):
-            self._handle.warn(
-                f"ignoring a reference on {self._parameters.reference_topic}: it is older than "
-                "the present one; are there two publishers?",
-                throttle=1.0,
-                key="old reference",
-            )
-        elif self._flight_state == FlightStatus.TAKING_OFF:
+    def _on_reference(self):
+        if self._flight_state == FlightStatus.TAKING_OFF:
             self._take_off()
 
-    def _completed(self, message):
+    def _completed(self, reference):
         if self._completes_itself:
-            return [float(each) for each in self.complete_reference(to_vector(message.state))]
-        return [*to_tuple(message.state), *self.reference_tail]
-
-    def _on_descent(self, message):
-        self._reference.descend(self._completed(message), self._handle.time())
+            completed = self.complete_reference(np.array(reference))
+            return [float(each) for each in completed]
+        return [*reference, *self.reference_tail]
 
     def _on_flight_status(self, status):
         if status.state in (self._flight_state, FlightStatus.UNKNOWN):
@@ -266,12 +220,12 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
         if self._is_old(time, now):
             return
         x = to_tuple(message.state)
-        x_ref = self._reference.value(now, x)
+        x_ref = self._references.value(x)
         if x_ref is None and self._flight_state == FlightStatus.FLYING:
             # The node was restarted in flight; the reference may have been published once, long
             # ago.
-            self._reference.update(at_rest(x, self.yaw_index))
-            x_ref = self._reference.value(now, x)
+            self._references.stay(x)
+            x_ref = self._references.value(x)
         if x_ref is None:
             return
         if self._flight_state == FlightStatus.UNKNOWN:
@@ -310,12 +264,6 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             key="old state",
         )
         return True
-
-    def _warn_of_reference(self, text):
-        # The last reference of every descent has a velocity.
-        if self._flight_state == FlightStatus.LANDING:
-            return
-        self._handle.warn(text, throttle=1.0, key="reference")
 
 
 def _overrides(instance, base, name):

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from crazyflie_lqr.reference import VelocityCheck, limited
+from crazyflie_references.velocity_check import VelocityCheck, limited
 
 ZERO = (0.0, 0.0, 0.0)
 

@@ -7,14 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_lqr.reference import VELOCITY_LIMIT, GuardedReference
+from crazyflie_references.governor import ReferenceGovernor
+from crazyflie_references.velocity_check import VELOCITY_LIMIT
 
 HERE = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
 
 
 def guarded(reports=None, max_speed=2.0):
-    report = (lambda text: None) if reports is None else reports.append
-    return GuardedReference(6, 3.0, report, max_speed)
+    report = (lambda *_: None) if reports is None else lambda _, text: reports.append(text)
+    return ReferenceGovernor(6, 3.0, report, max_speed)
 
 
 def streamed(reference, period, duration, point, velocity, begin=0.0):

@@ -3,6 +3,7 @@
 import re
 import struct
 import tempfile
+import zlib
 from pathlib import Path
 from random import Random
 
@@ -33,14 +34,19 @@ def record(kind, *parts):
     return struct.pack("<BQ", kind, len(data)) + data
 
 
-def convert(bag, path, compression="", profile="ros1", encoding="ros1", md5=True, change=str):
-    """Write the messages of a bag as MCAP, 200 in a chunk; ``change`` alters the definitions."""
+def convert(
+    bag, path, compression="", profile="ros1", encoding="ros1", md5=True, change=str, summed="file"
+):
+    """Write the messages of a bag as MCAP, 200 in a chunk; ``change`` alters the definitions.
+
+    ``summed`` is what the check sum at the end is of: "file", "data" (without the header) or "".
+    """
     parts, messages, numbers = [MAGIC, record(1, text(profile), text("a test"))], [], {}
 
     def end_chunk():
         content = b"".join(messages)
         packed = COMPRESS[compression](content)
-        head = struct.pack("<QQQI", 0, 0, len(content), 0) + text(compression)
+        head = struct.pack("<QQQI", 0, 0, len(content), zlib.crc32(content)) + text(compression)
         parts.append(record(6, head, struct.pack("<Q", len(packed)), packed))
         messages.clear()
 
@@ -58,7 +64,13 @@ def convert(bag, path, compression="", profile="ros1", encoding="ros1", md5=True
             if len(messages) >= 200:
                 end_chunk()
     end_chunk()
-    parts += [record(0x0F, struct.pack("<I", 0)), record(2, struct.pack("<QQI", 0, 0, 0)), MAGIC]
+    skipped = {"file": 0, "data": 2, "": len(parts)}[summed]
+    checksum = zlib.crc32(b"".join(parts[skipped:]))
+    parts += [
+        record(0x0F, struct.pack("<I", checksum)),
+        record(2, struct.pack("<QQI", 0, 0, 0)),
+        MAGIC,
+    ]
     path.write_bytes(b"".join(parts))
     return path
 
@@ -160,6 +172,42 @@ def test_a_file_that_is_cut_is_read_as_far_as_it_goes(tmp_path, bag, load, compr
     some, every = (each.sources["/cf1/state"].rows().tolist() for each in (log, whole))
     assert 0 < len(some) <= len(every)
     assert some == every[: len(some)]
+
+
+@pytest.mark.parametrize("summed", ["file", "data", ""])
+@pytest.mark.parametrize("compression", COMPRESS)
+def test_a_file_that_is_whole_has_the_check_sums_of_its_writer(
+    tmp_path, bag, load, compression, summed
+):
+    assert load(convert(bag, tmp_path / "a.mcap", compression, summed=summed)).remarks == []
+
+
+@pytest.mark.parametrize("summed", ["file", "data", ""])
+def test_a_number_that_was_changed_is_named_and_not_shown(tmp_path, bag, load, summed):
+    file = convert(bag, tmp_path / "a.mcap", summed=summed)
+    whole, data = load(file).sources["/cf1/state"].rows().tolist(), bytearray(file.read_bytes())
+    # A byte of a message in the middle.
+    data[len(data) // 2] ^= 1
+    file.write_bytes(data)
+    log = load(file)
+    assert "a chunk does not have the check sum that was written" in log.remarks[0]
+    some = log.sources["/cf1/state"].rows().tolist()
+    assert 0 < len(some) < len(whole)
+    assert some == whole[: len(some)]
+
+
+@pytest.mark.parametrize("summed", ["file", "data"])
+def test_a_number_that_was_changed_outside_chunks_is_named(tmp_path, bag, load, summed):
+    file = convert(bag, tmp_path / "a.mcap", summed=summed)
+    data = file.read_bytes()
+    begin = len(MAGIC) + len(record(1, text("ros1"), text("a test")))
+    # The time at which its first chunk begins.
+    file.write_bytes(data[: begin + 9] + b"\1" + data[begin + 10 :])
+    assert (
+        load(file)
+        .remarks[0]
+        .endswith("is damaged: its data does not have the check sum that was written")
+    )
 
 
 def test_a_file_without_messages_is_named(tmp_path, load):

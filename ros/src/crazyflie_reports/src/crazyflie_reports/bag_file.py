@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 
 import lz4.frame
 import roslib.message
+from typing_extensions import override
 
 MAGIC = b"#ROSBAG V2.0\n"
 
@@ -124,19 +125,55 @@ class Connection:
         return self.message_type()().deserialize
 
 
-class BagFile:
-    """A bag file that is read once, from its beginning; `BagError`: not a bag of version 2.0."""
+class RecordFile:
+    """A recording that is read once, from its beginning, as far as it is not damaged.
 
-    def __init__(self, path: Path):
-        self._path = path
+    ``source`` is the file itself, or what it was decompressed to.
+    """
+
+    _magic: bytes
+
+    def __init__(self, path: Path, source: Path):
+        self._path, self._source = path, source
         self.connections: list[Connection] = []  #: Connections that have been read so far.
         self.interruption = ""  #: Reason why reading has ended early; empty if it has not.
+        self.size = source.stat().st_size
         self.done = 0  #: Number of bytes that have been read.
+        self._expansion = Expansion(self.size)
+
+    def messages(
+        self, is_wanted: Callable[[Connection], bool]
+    ) -> Iterator[tuple[Connection, float, bytes]]:
+        """Yield connection, time of recording (s) and serialized message."""
+        with self._source.open("rb") as file:
+            file.seek(len(self._magic))
+            try:
+                yield from self._messages_in(file, self.size, is_wanted)
+            except BrokenOffError as error:
+                self.interruption = broken_off(self._path, self.size, file.tell(), error)
+            except ExpansionError as error:
+                self.interruption = f"{self._path} is read up to {self.done / 1e6:.2f} MB: {error}"
+            # Damaged records, and decompressors, may raise any error.
+            except Exception:
+                self.interruption = broken_off(self._path, self.size, file.tell(), "it is damaged")
+
+    def _messages_in(
+        self, file: BinaryIO, end: int, is_wanted: Callable[[Connection], bool]
+    ) -> Iterator[tuple[Connection, float, bytes]]:
+        """Yield the messages in the records of a file, or of a chunk."""
+        raise NotImplementedError
+
+
+class BagFile(RecordFile):
+    """A bag file; `BagError`: not a bag of version 2.0."""
+
+    _magic = MAGIC
+
+    def __init__(self, path: Path):
+        super().__init__(path, path)
         self._by_id: dict[bytes, Connection | None] = {}  # None: not wanted.
         with path.open("rb") as file:
             start = file.read(len(MAGIC))
-        self.size = path.stat().st_size
-        self._expansion = Expansion(self.size)
         if not start:
             raise BagError(f"{path} is empty; expected a bag, as rosbag record writes")
         if start.startswith(b"#ROSBAG V1"):
@@ -144,23 +181,8 @@ class BagFile:
         if start != MAGIC:
             raise BagError(f"{path} is not a bag: it begins with {start!r}, expected {MAGIC!r}")
 
-    def messages(
-        self, is_wanted: Callable[[Connection], bool]
-    ) -> Iterator[tuple[Connection, float, bytes]]:
-        """Yield connection, time of recording (s) and serialized message."""
-        with self._path.open("rb") as file:
-            file.seek(len(MAGIC))
-            try:
-                yield from self._messages_in(file, self.size, is_wanted)
-            except BrokenOffError as error:
-                self.interruption = broken_off(self._path, self.size, file.tell(), error)
-            except ExpansionError as error:
-                self.interruption = f"{self._path} is read up to {self.done / 1e6:.2f} MB: {error}"
-            except (struct.error, KeyError, ValueError, EOFError, RecursionError):
-                self.interruption = broken_off(self._path, self.size, file.tell(), "it is damaged")
-
+    @override
     def _messages_in(self, file, end, is_wanted):
-        """Yield the messages in the records of a file, or of a chunk."""
         while file.tell() < end:
             fields = _fields(_sized(file, end))
             op = fields[b"op"]

@@ -7,7 +7,8 @@ Format: https://mcap.dev/spec, https://mcap.dev/spec/registry.
 
 import re
 import struct
-from collections.abc import Callable, Iterator
+import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -19,14 +20,13 @@ from typing_extensions import override
 from crazyflie_reports.bag_file import (
     BrokenOffError,
     Connection,
-    Expansion,
-    ExpansionError,
+    RecordFile,
     TopicError,
-    broken_off,
 )
 from crazyflie_reports.bag_ros2 import MCAP_MAGIC, Ros2Connection, chunk_content
 
-_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END, _FOOTER = 0x03, 0x04, 0x05, 0x06, 0x0F, 0x02
+_HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 1, 2, 3, 4, 5, 6, 15
+_OTHER_SUM = "{} does not have the check sum that was written"
 _RECORD, _MESSAGE_HEAD = struct.Struct("<BQ"), struct.Struct("<HIQQ")
 _LARGEST_PROFILE = 100  # Length of the text that names the profile (bytes).
 
@@ -78,48 +78,34 @@ def _fields(definition):
     return [line for line in lines if line]
 
 
-class McapFile:
-    """An MCAP file that is read once, from its beginning, as `bag_file.BagFile`.
+class McapFile(RecordFile):
+    """An MCAP file; ``source`` is the file itself, or what `bag_ros2.expanded` has made of it."""
 
-    ``source`` is the file itself, or what `bag_ros2.expanded` has made of it.
-    """
+    _magic = MCAP_MAGIC
 
     def __init__(self, path: Path, source: Path):
-        self._path, self._source = path, source
-        self.connections: list[Connection] = []  #: Connections that have been read so far.
-        self.interruption = ""  #: Reason why reading has ended early; empty if it has not.
-        self.size = source.stat().st_size
-        self.done = 0  #: Number of bytes that have been read.
-        self._expansion = Expansion(self.size)
+        super().__init__(path, source)
         self._schemas: dict[int, tuple[str, str]] = {}  # Name and definition.
         self._channels: dict[int, Connection | None] = {}  # None: not wanted.
 
-    def messages(
-        self, is_wanted: Callable[[Connection], bool]
-    ) -> Iterator[tuple[Connection, float, bytes]]:
-        """Yield connection, time of recording (s) and serialized message."""
-        with self._source.open("rb") as file:
-            file.seek(len(MCAP_MAGIC))
-            try:
-                yield from self._messages_in(file, self.size, is_wanted)
-            except BrokenOffError as error:
-                self.interruption = broken_off(self._path, self.size, file.tell(), error)
-            except ExpansionError as error:
-                self.interruption = f"{self._path} is read up to {self.done / 1e6:.2f} MB: {error}"
-            # A decompressor may raise any error.
-            except Exception:
-                self.interruption = broken_off(self._path, self.size, file.tell(), "it is damaged")
-
+    @override
     def _messages_in(self, file, end, is_wanted, is_chunk=False):
-        """Yield the messages in the records of a file, or of a chunk."""
+        sums = [zlib.crc32(self._magic), 0]  # From the beginning, and after the header.
         while file.tell() < end:
-            kind, size = _RECORD.unpack(_exactly(file, _RECORD.size))
+            kind, size = _RECORD.unpack(head := _exactly(file, _RECORD.size))
+            data = file.read(min(size, end - file.tell()))
+            if kind == _DATA_END and int.from_bytes(data[:4], "little") not in (0, *sums):
+                self.interruption = f"{self._path} is damaged: {_OTHER_SUM.format('its data')}"
             if kind in (_DATA_END, _FOOTER):
                 return
-            data = file.read(min(size, end - file.tell()))
+            if not is_chunk:
+                sums = [zlib.crc32(data, zlib.crc32(head, each)) for each in sums]
+                sums[1] *= kind != _HEADER
             if kind == _CHUNK and not is_chunk:
                 self.done = file.tell()
                 content = b"".join(chunk_content(data, self._expansion))
+                if len(data) == size and _chunk_sum(data) not in (0, zlib.crc32(content)):
+                    raise BrokenOffError(_OTHER_SUM.format("a chunk"))
                 yield from self._messages_in(BytesIO(content), len(content), is_wanted, True)
             if len(data) < size:
                 raise BrokenOffError("it ends within a record")
@@ -159,6 +145,10 @@ class McapFile:
             connection = _OtherConnection(topic, datatype, "", encoding)
         self.connections.append(connection)
         self._channels[number] = connection if is_wanted(connection) else None
+
+
+def _chunk_sum(data):
+    return int.from_bytes(data[24:28], "little")
 
 
 def _exactly(file, size):

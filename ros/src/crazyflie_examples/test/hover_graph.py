@@ -10,14 +10,27 @@ from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
 
-LAUNCH = Path(RosPack().get_path("crazyflie_examples")) / "launch/sw_hover.launch"
+PACKAGES = RosPack()
+LAUNCH = Path(PACKAGES.get_path("crazyflie_examples")) / "launch/sw_hover.launch"
+#: Arguments with the gains of hardware.
+HARDWARE = {
+    **{"dynamics": "quadrotor", "estimator_filter": "kalman"},
+    "K_file": str(Path(PACKAGES.get_path("crazyflie_lqr")) / "references/K_manual.txt"),
+    **{"integrator_k_x": -0.05, "integrator_k_y": 0.05, "integrator_k_z": -0.5},
+    **{"integrator_thresh_x": 1.0, "integrator_thresh_y": 1.0, "integrator_thresh_z": 6.0},
+}
 
 
 class HoverGraph:
-    """The software example with some of its arguments, and its course."""
+    """The software example with some of its arguments, and its course.
 
-    def __init__(self, mass_error=0.0, **arguments):
+    ``without`` are parameters that are not set.
+    """
+
+    def __init__(self, mass_error=0.0, without=(), **arguments):
         _, parameters = expand(LAUNCH, composed=True, rviz=False, **arguments)
+        for name in without:
+            del parameters[name]
         if mass_error:
             parameters["/simulator/mass_error"] = mass_error
         self.graph = FakeGraph(parameters)

@@ -1,23 +1,15 @@
 """Flights with hardware gains in which the controller's output is not flown for a while."""
 
-from pathlib import Path
-
 import pytest
-from hover_graph import HoverGraph
-from rospkg import RosPack
+from hover_graph import HARDWARE, HoverGraph
 
-GAINS = {
-    "K_file": str(Path(RosPack().get_path("crazyflie_lqr")) / "references/K_manual.txt"),
-    **{"integrator_k_x": -0.05, "integrator_k_y": 0.05, "integrator_k_z": -0.5},
-    **{"integrator_thresh_x": 1.0, "integrator_thresh_y": 1.0, "integrator_thresh_z": 6.0},
-}
 FILTER = "/takeoff_control_filter"
 GAP = 2.8  # s; the filter lands a vehicle whose control stays away for 3 s.
 
 
 def heights_after(begin, end, height):
     """Return the heights (m) after a gap with a step of the reference at its beginning."""
-    flight = HoverGraph(0.05, dynamics="quadrotor", estimator_filter="kalman", **GAINS)
+    flight = HoverGraph(0.05, **HARDWARE)
     flight.take_off()
     begin(flight.graph)
     flight.refer(0.0, 0.0, height)

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import hover_graph
 import pytest
 from rospkg import RosPack
 from std_srvs.srv import EmptyRequest
@@ -109,3 +110,15 @@ def test_no_takeoff_passes_its_hover_point_whatever_thrust_the_vehicle_needs(hov
     assert course[-1] == pytest.approx(height, abs=0.05)
     # It does not fall back to the ground.
     assert min(course[course.index(max(course)) :]) > 0.6 * height
+
+
+def test_a_controller_follows_the_flight_of_its_namespace_whatever_its_topic_is_called():
+    """Its launch file names the topic for the takeoff server and the filter only."""
+    flight = hover_graph.HoverGraph(
+        0.05,
+        ["/lqr_controller/topics/in_flight"],
+        in_flight_topic="/in_flightHY4",
+        **hover_graph.HARDWARE,
+    )
+    flight.take_off(12.0)
+    assert max(z for _, _, z in flight.course) < HEIGHT + 0.1

@@ -2,11 +2,21 @@
 
 import numpy as np
 import pytest
-from lift_controller import answer, launch, lifting, publish_flight_state, refer
+from lift_controller import (
+    LIFT,
+    PARAMETERS,
+    answer,
+    launch,
+    lifting,
+    publish_flight_state,
+    refer,
+)
 from std_msgs.msg import Float64, String
 
+from crazyflie_lqr.lqr_nodes import PositionVelocityYawStateLiftLqrNode
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import ServiceError
+from crazyflie_utils.testing import FakeProcess
 
 
 @pytest.fixture
@@ -73,6 +83,21 @@ def test_the_topic_of_the_flight_state_can_be_chosen(parameter, message):
     process.publish("/cf1/state_of_flight", message)
     refer(process, z=1.0)
     assert thrusts(process, 2.0) == pytest.approx([9.81 + 1.5] * 20)
+
+
+@pytest.mark.parametrize("nodes", [("lqr_controller",), ("takeoff_server", "filter")])
+def test_the_flight_is_that_of_the_topic_in_flight_also_if_only_its_neighbours_have_it(nodes):
+    process = FakeProcess()
+    for node in nodes:
+        process.transport.parameters[f"/HY4/{node}/topics/in_flight"] = "/in_flightHY4"
+    process.transport.parameters["/HY5/takeoff_server/topics/in_flight"] = "/in_flightHY5"
+    node = PositionVelocityYawStateLiftLqrNode()
+    assert process.launch(node, "/HY4/lqr_controller", {**PARAMETERS, **LIFT})
+    status = FlightStatus(state=FlightStatus.ON_GROUND)
+    process.publish("/in_flightHY4_flight_status", status)
+    process.publish("/in_flightHY4_hover_thrust", Float64(9.0))
+    refer(process, z=1.0)
+    assert thrusts(process, 2.0) == pytest.approx([9.0 + 1.5] * 20)
 
 
 # Changes in flight.

@@ -192,7 +192,9 @@ class Gains(Parameters):
     """Parameters of `Controller`."""
 
     control_topic: str = topic("control", "controls")
-    gains: object = parameter(Converted(dict, "a dictionary", "dictionary"), "gains by name", None, "gains")
+    gains: object = parameter(
+        Converted(dict, "a dictionary", "dictionary"), "gains by name", None, "gains"
+    )
 
 
 class Controller(Node[Gains]):

@@ -97,8 +97,7 @@ def parameters(
                 "descent_reference": SAFE_DESCENT,
                 "state": STATE,
                 "control": LQR_CONTROL,
-                "flight_status": FLIGHT_STATUS,
-                "hover_thrust": f"{IN_FLIGHT}_hover_thrust",
+                "in_flight": IN_FLIGHT,
             },
         },
         "takeoff_server": {

@@ -76,10 +76,11 @@ class LinearFeedbackParameters(ReferenceParameters):
         "By default the name of control with `final` for `lqr`",
         None,
     )
-    hover_thrust_topic: str = topic(
+    own_hover_thrust_topic: str | None = topic(
         "hover_thrust",
-        "thrust of hover that the takeoff server has measured",
-        "in_flight_hover_thrust",
+        "thrust of hover that the takeoff server has measured; by default the name of in_flight + "
+        "`_hover_thrust`",
+        None,
     )
     max_age: float = parameter(
         Number("s", above=0.0),
@@ -151,7 +152,10 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             handle, self.reference_type, self.yaw_index, self._completed, self._on_reference
         )
         parameters.flight.subscribe(handle, self._on_flight_status)
-        handle.subscribe(parameters.hover_thrust_topic, Float64, self._on_hover_thrust)
+        hover_thrust = parameters.own_hover_thrust_topic or parameters.flight.derived(
+            handle, "_hover_thrust"
+        )
+        handle.subscribe(hover_thrust, Float64, self._on_hover_thrust)
         self._follow_flown()
         handle.subscribe(parameters.state_topic, self.state_type, self._on_state, finite="state")
 

@@ -163,12 +163,16 @@ class ReferenceGovernor:
             self.stay(x)
         if self._is_new:
             self._is_new = False
-            self._begin(time, x)
+            self._begin(self._goal, time, x)
         if self._travel is not None:
-            x_ref = self._on_the_way(time, x)
+            if self._has_rival(time):
+                # Afterwards the way begins at the vehicle.
+                self._travel.restart(x[:3], time)
+                return self._near
+            x_ref = self._travel.advance(time, x, self._goal)
             if x_ref is not self._goal:
                 return x_ref
-            self._accept()
+            self._accept(self._goal)
         if any(self._goal[3:6]) and not 0.0 <= time - self._time < VELOCITY_LIMIT:
             self._goal = at_rest(self._goal, self._yaw_index)
             # A landing ends a stream of references as it should.
@@ -204,18 +208,18 @@ class ReferenceGovernor:
     def _has_rival(self, time):
         return 0.0 <= time - self._rival_time < RIVAL_TIME
 
-    def _accept(self):
-        self._accepted, self._far, self._travel = self._goal, None, None
+    def _accept(self, goal):
+        self._accepted, self._far, self._travel = goal, None, None
 
-    def _begin(self, time, x):
-        distance = math.dist(self._goal[:3], x[:3])
-        is_same = self._travel is not None and self._travel.is_towards(self._goal)
+    def _begin(self, goal, time, x):
+        distance = math.dist(goal[:3], x[:3])
+        is_same = self._travel is not None and self._travel.is_towards(goal)
         if distance <= self.max_jump and not is_same:
-            self._accept()
+            self._accept(goal)
             return
         speed = min(TRAVEL_SPEED, self.max_speed)
         if self._has_rival(time):
-            self._stop_short(x)
+            self._stop_short(goal, x)
             self._report(
                 "distance",
                 f"the reference is {distance:.1f} m away, and another node sends some, too; "
@@ -229,21 +233,14 @@ class ReferenceGovernor:
             self._travel = Travel(speed)
             self._travel.restart(x[:3], time)
 
-    def _on_the_way(self, time, x):
-        if self._has_rival(time):
-            # Afterwards the way begins at the vehicle.
-            self._travel.restart(x[:3], time)
-            return self._near
-        return self._travel.advance(time, x, self._goal)
-
-    def _stop_short(self, x):
+    def _stop_short(self, distant, x):
         """Set the position at rest that takes the place of a distant goal."""
         # A distant reference that is repeated must not lead the vehicle there step by step.
-        goal, far = self._goal[:3], self._far
+        goal, far = distant[:3], self._far
         if far is not None and math.dist(goal, far[:3]) < self.max_jump:
             return
-        self._far = self._goal
-        near = at_rest(self._goal, self._yaw_index)
+        self._far = distant
+        near = at_rest(distant, self._yaw_index)
         last = self._accepted
         # A vehicle that is far from there has been carried since.
         if last is not None and math.dist(last[:3], x[:3]) <= 2.0 * self.max_jump:

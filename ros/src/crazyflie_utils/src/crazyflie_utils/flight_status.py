@@ -7,7 +7,9 @@ from std_msgs.msg import String
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.handle import NodeHandle
 from crazyflie_utils.parameters.declaration import Parameters, parameter
-from crazyflie_utils.parameters.types import TOPIC
+from crazyflie_utils.parameters.types import TOPIC, Converted
+
+_TREE = Converted(dict, "a namespace")
 
 #: Constant of `FlightStatus` to words.
 WORDS = {
@@ -21,12 +23,19 @@ WORDS = {
 
 
 class FlightTopics(Parameters):
-    """Topics of a takeoff server with the flight status, for a group of the prefix "topics"."""
+    """Topics of a takeoff server, for a group of the prefix "topics"."""
 
+    in_flight: str | None = parameter(
+        TOPIC,
+        "topics/in_flight of the takeoff server, after which its other topics are named; by "
+        "default that of the nodes in the same namespace, or else `in_flight`",
+        None,
+        name="in_flight",
+    )
     status: str | None = parameter(
         TOPIC,
-        "flight status of the takeoff server",
-        "in_flight_flight_status",
+        "flight status of the takeoff server; by default the name of in_flight + `_flight_status`",
+        None,
         name="flight_status",
     )
     #: std_msgs/String: names of states in small letters; any other text is `FlightStatus.UNKNOWN`.
@@ -34,12 +43,25 @@ class FlightTopics(Parameters):
         TOPIC, "text of a takeoff server without flight status", None, name="flight_state"
     )
 
+    def derived(self, handle: NodeHandle, suffix: str) -> str:
+        """Return a topic of the takeoff server; asks the master."""
+        return (self.in_flight or _launched(handle) or "in_flight") + suffix
+
     def subscribe(self, handle: NodeHandle, callback: Callable[[FlightStatus], None]) -> None:
-        """Call ``callback(status)`` for each flight status on the topics that are set."""
-        if self.status is not None:
-            handle.subscribe(self.status, FlightStatus, callback)
+        """Call ``callback(status)`` for each flight status."""
+        status = self.status or self.derived(handle, "_flight_status")
+        handle.subscribe(status, FlightStatus, callback)
         if self.state is not None:
             handle.subscribe(self.state, String, lambda message: callback(_from_text(message.data)))
+
+
+def _launched(handle):
+    """Return the one topic in_flight of the nodes in the same namespace, or None."""
+    namespace = handle.resolve("in").rpartition("/")[0] or "/"
+    nodes = handle.get_param(namespace, _TREE, {}).values()
+    groups = [each.get("topics") for each in nodes if isinstance(each, dict)]
+    found = {each.get("in_flight") for each in groups if isinstance(each, dict)} - {None}
+    return found.pop() if len(found) == 1 else None
 
 
 def _from_text(text):

@@ -104,7 +104,7 @@ class OfflineTransport(Transport):
             return self.parameters[name]
         below = ParamDictionary(None)
         for key, value in self.parameters.items():
-            if key.startswith(f"{name}/"):
+            if key.startswith(f"{name.rstrip('/')}/"):
                 below.set_param(key, value)
         return below.get_param(name)
 

@@ -10,7 +10,7 @@ from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
 from crazyflie_utils.flight_status import FlightTopics
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
+from crazyflie_utils.parameters.types import TIME_STEP
 from crazyflie_world.shapes import Ball, Box, Cylinder, Shape
 from crazyflie_world.world import World
 from crazyflie_world.world_file import WORLD_FILE
@@ -45,27 +45,21 @@ def pose(shape: Shape) -> Pose:
     return Pose(Point(*shape.centre), Quaternion(*quaternion_from_rpy(0.0, 0.0, yaw)))
 
 
-class _FlightTopics(FlightTopics):
-    status: str | None = parameter(
-        TOPIC,
-        "flight status of the takeoff server: paths begin when a vehicle flies; by default at once",
-        None,
-        name="flight_status",
-    )
-
-
 class WorldNodeParameters(Parameters):
     """Parameters of `WorldNode`."""
 
     world: World = parameter(WORLD_FILE, "the world, a YAML file")
     markers_topic: str = topic("markers", "markers for RViz, latched", "world/markers")
     poses_topic: str = topic("poses", "namespace of the moving objects' poses, NAME/pose", "world")
-    flight: _FlightTopics = group(_FlightTopics, "topics")
+    flight: FlightTopics = group(FlightTopics, "topics")
     time_step: float = parameter(TIME_STEP, "period of the poses", 0.02)
 
 
 class WorldNode(Node[WorldNodeParameters]):
-    """Show a world in RViz; move objects with a path, on /tf and as poses."""
+    """Show a world in RViz; move objects with a path, on /tf and as poses.
+
+    Paths begin when a vehicle flies, if there is a topic of its flight; otherwise at once.
+    """
 
     def __init__(self) -> None:
         self._begin: float | None = None
@@ -80,8 +74,10 @@ class WorldNode(Node[WorldNodeParameters]):
         }
         self._broadcast = handle.broadcast_transforms()
         handle.publisher(parameters.markers_topic, MarkerArray, latch=True).publish(markers(world))
-        parameters.flight.subscribe(handle, self._on_flight_status)
-        if not (parameters.flight.status or parameters.flight.state):
+        flight = parameters.flight
+        if flight.in_flight or flight.status or flight.state:
+            flight.subscribe(handle, self._on_flight_status)
+        else:
             self._begin = handle.time()
         if world.moving:
             handle.timer(parameters.time_step, self._on_timer)

@@ -136,6 +136,28 @@ def test_the_port_of_vrpn(tmp_path, entry):
     assert parameters["/mocap_node/motioncapture_config/hostname"] == "10.0.0.3:3999"
 
 
+@pytest.mark.parametrize(
+    ("entry", "argument", "others"),
+    [
+        ("mocap_optitrack/mocap.launch", "mocap_config_file", {}),
+        ("crazyflie_examples/fleet_mocap.launch", "mocap_config_file", {"fleet": "fleet.yaml"}),
+        ("crazyflie_driver/crazyflie_add.launch", "genericLogTopicVariables_file", {}),
+        ("crazyflie_ranging/ranging.launch", "genericLogTopicVariables_file", {"deck": True}),
+        ("crazyflie_ranging/follow_object.launch", "follow_config", {}),
+        ("crazyflie_sweep/sweep.launch", "sweep_config", {}),
+    ],
+)
+def test_files_that_roslaunch_loads_are_found_from_home(
+    tmp_path, monkeypatch, entry, argument, others
+):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "mine.yaml").write_text("mine: 3\n")
+    needed = {"uri": "udp://127.0.0.1:19999", "tf_prefix": "cf1"} if "add" in entry else {}
+    for file in ("~/mine.yaml", tmp_path / "mine.yaml"):
+        _, parameters = launch_files.expand(path_of(entry), **{argument: file, **needed, **others})
+        assert [value for name, value in parameters.items() if name.endswith("/mine")] == [3]
+
+
 def test_arguments_without_a_meaning_are_told():
     file = path_of("crazyflie_examples/hw_hover.launch")
     nodes, _ = launch_files.expand(file, rviz="false", sim_init_x="1.0")

@@ -10,16 +10,18 @@ from rospkg import RosPack
 from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_model.limits import MAX_SPEED
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import GRAVITY
 from crazyflie_simulator.vehicle import MotionCapture, SimulatedVehicle
 from crazyflie_simulator.wind import Wind
-from crazyflie_state_estimator.control_response import ControlInput, FrozenPoseMonitor
+from crazyflie_state_estimator.control_response import ControlInput
 from crazyflie_state_estimator.motion import (
     ConstantAccelerationFilter,
     FiniteDifference,
     MotionEstimator,
 )
+from crazyflie_state_estimator.pose_monitor import PoseMonitor, Verdict
 
 PERIOD = 0.01
 LIFT_OFF, CLIMB = 0.3, 1.0
@@ -50,7 +52,7 @@ class Flight:
             filters = [ConstantAccelerationFilter(1e-3, 1.0), ConstantAccelerationFilter(5e-3, 30)]
         self.estimator = MotionEstimator(*filters)
         self.control = ControlInput()
-        self.monitor = FrozenPoseMonitor(knows_control=True)
+        self.monitor = PoseMonitor(MAX_SPEED, knows_control=True)
         self.goal = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
         self.next_goal = 6.0
         self.rejected_at = None
@@ -80,7 +82,8 @@ class Flight:
     def _is_rejected(self, time, stamp, position, quaternion):
         attitude = rpy_from_quaternion(*quaternion)
         acceleration = self.control.acceleration(attitude[2], time)
-        if self.monitor.update(stamp, position, quaternion, acceleration):
+        verdict = self.monitor.update(stamp, position, quaternion, acceleration)
+        if verdict is not Verdict.GOOD:
             return True
         motion = self.estimator.update(round(stamp * 1e9), position, attitude, acceleration)
         if time < CLIMB or motion is None:

@@ -7,8 +7,9 @@ import pytest
 from estimator_helpers import fly, launch
 
 from crazyflie_msgs.msg import Control, ControlStamped
-from crazyflie_state_estimator.control_response import FrozenPoseMonitor
+from crazyflie_state_estimator.pose_monitor import PoseMonitor, Verdict
 
+GOOD = (Verdict.GOOD, Verdict.MOVED)
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 STILL = (0.0, 0.0, 0.0)
 PERIOD = 0.01
@@ -18,20 +19,21 @@ class Camera:
     """Poses of a vehicle, 100 a second, with noise."""
 
     def __init__(self, noise=0.0, knows_control=True):
-        self.monitor = FrozenPoseMonitor(knows_control)
+        self.monitor = PoseMonitor(5.0, knows_control)
         self.random = np.random.default_rng(1)
         self.noise = noise
         self.time = 0.0
 
     def show(self, position, acceleration, duration=PERIOD, rotation=LEVEL):
-        """Show poses, a constant one or a function of the time; return what is said of each."""
+        """Show poses, a constant one or a function of the time; return whether each is rejected."""
         verdicts = []
         for _ in range(round(duration / PERIOD)):
             self.time += PERIOD
             there = position(self.time) if callable(position) else position
             seen = [each + self.noise * self.random.normal() for each in there]
             control = acceleration(self.time) if callable(acceleration) else acceleration
-            verdicts.append(self.monitor.update(self.time, seen, rotation, control))
+            verdict = self.monitor.update(self.time, seen, rotation, control)
+            verdicts.append(verdict not in GOOD)
         return verdicts
 
     def move(self, height, balance=STILL, start=0.0, duration=2.5):
@@ -64,7 +66,8 @@ def test_it_is_rejected_also_when_the_motors_have_stopped_meanwhile():
     camera = Camera().lift()
     camera.show((0.0, 0.0, 1.001), STILL, 1.0)
     assert all(camera.show((0.0, 0.0, 1.001), None, 9.0))
-    assert not any(camera.show((0.0, 0.0, 0.0), None, 1.0))
+    # It is found on the ground.
+    assert not any(camera.show((0.0, 0.0, 0.0), None, 1.0)[30:])
 
 
 def test_another_attitude_is_another_pose():
@@ -127,7 +130,7 @@ def test_poses_that_do_not_respond_to_the_control_are_rejected(noise, accelerati
     assert all(verdicts[-20:])
     assert all(camera.show(hover, acceleration, 30.0))
     # The camera goes on.
-    assert not any(camera.show((0.3, 0.0, 0.5), STILL, 3.0)[2:])
+    assert not any(camera.show((0.04, 0.0, 0.96), STILL, 3.0)[2:])
 
 
 @pytest.mark.parametrize("disturbance", [(0.0, 0.0, -3.0), (1.3, -1.3, 0.5)])
@@ -240,26 +243,21 @@ def test_the_last_state_before_the_silence_is_the_predicted_one():
 
 
 def test_a_camera_that_goes_on_shows_the_vehicle_elsewhere_three_times_in_a_row():
-    monitor = FrozenPoseMonitor(True)
-    monitor._place = (0.0, 0.0, 1.0)
-    offsets = (0.031, 0.0, 0.031, 0.031, 0.029, 0.031, 0.031, 0.031, 0.031)
-    frozen = [
-        monitor.update(0.01 * k, (offset, 0.0, 1.0), (0.0, 0.0, 1e-3 * k, 1.0), STILL)
-        for k, offset in enumerate(offsets)
-    ]
-    assert frozen == [True] * 7 + [False] * 2
-    monitor.restart()
-    monitor._place = (0.0, 0.0, 1.0)
-    for time, is_frozen in ((0.2, True), (0.21, True), (0.22, False)):
-        assert monitor.update(time, (time, 0.0, 1.0), LEVEL, STILL) == is_frozen
+    camera = Camera(0.001).lift()
+    there, elsewhere = (0.0, 0.0, 1.0), (0.04, 0.0, 1.0)
+    camera.show(there, STILL, 2.0)
+    assert all(camera.show(there, (0.0, 0.0, 2.0), 2.0)[-50:])
+    for position, count in ((elsewhere, 2), (there, 1), (elsewhere, 2)):
+        assert all(camera.show(position, STILL, count * PERIOD))
+    assert not any(camera.show(elsewhere, STILL, 3 * PERIOD))
 
 
 @pytest.mark.parametrize("knows_control", [True, False])
 def test_the_ground_is_the_lowest_place_only_where_controls_are_not_known(knows_control):
     camera = Camera(knows_control=knows_control)
     camera.show((0.0, 0.0, 1.0), None, 0.1)
-    camera.show((0.0, 0.0, 0.5), STILL, 0.1)
-    assert all(camera.show((0.0, 0.0, 0.8), STILL, 0.1)[1:]) != knows_control
+    camera.show((0.0, 0.0, 0.95), STILL, 0.1)
+    assert all(camera.show((0.0, 0.0, 0.98), STILL, 0.1)[1:]) != knows_control
 
 
 def test_a_vehicle_that_is_lifted_for_long_is_not_on_the_ground():

@@ -32,23 +32,23 @@ class _Filter(motion.ConstantAccelerationFilter):
 
     @property
     def memory(self) -> Vector[Any]:
-        return [*self._value, *self._rate, *self.acceleration, *self._covariance]
+        return [*self.value, *self.rate, *self.acceleration, *self._covariance]
 
     @memory.setter
     def memory(self, memory: Vector[Any]) -> None:
-        self._value, self._rate, self.acceleration = memory[:3], memory[3:6], memory[6:9]
+        self.value, self.rate, self.acceleration = memory[:3], memory[3:6], memory[6:9]
         self._covariance = tuple(memory[9:])
 
     @override
     def step(self, dt: Any, value: Any, acceleration: Any = None) -> Any:
         before = self.memory
-        self._begin(value, [(a - b) / dt for a, b in zip(value, self._value, strict=True)])
+        self._begin(value, [(a - b) / dt for a, b in zip(value, self.value, strict=True)])
         restarted, self.memory = self.memory, before
-        self._predict(dt)
-        self._correct(value)
+        self.predict(dt)
+        self.correct(value)
         is_late = dt > motion.MEMORY
         self.memory = [where(is_late, a, b) for a, b in zip(restarted, self.memory, strict=True)]
-        return self._value, self._rate
+        return self.value, self.rate
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-import rospy
+import genpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Bool, Header, String
 from typing_extensions import override
@@ -17,7 +17,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_state_estimator.control_response import ControlInput, FrozenPoseMonitor
+from crazyflie_state_estimator.control_response import ControlInput
 from crazyflie_state_estimator.motion import (
     ACCELERATION_WALK,
     ACCELERATION_WALK_WITH_CONTROL,
@@ -30,7 +30,7 @@ from crazyflie_state_estimator.motion import (
     FiniteDifference,
     MotionEstimator,
 )
-from crazyflie_state_estimator.pose_gate import Classification, PoseGate, TiltMonitor
+from crazyflie_state_estimator.pose_monitor import PoseMonitor, TiltMonitor, Verdict
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter, topic
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, Integer, Number, Text
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple
@@ -141,6 +141,20 @@ REPORT_PERIOD = 1.0  #: Period of the diagnostics, as REP 107 recommends (s).
 STATUS_PERIOD = 0.1
 UNKNOWN = (math.nan,) * 3  #: A disturbance, while it is not known.
 
+_STATUS = {
+    Verdict.GOOD: (EstimateStatus.GOOD, ""),
+    Verdict.MOVED: (EstimateStatus.GOOD, ""),
+    Verdict.REPEATED: (
+        EstimateStatus.REPEATED,
+        "the pose of {} repeats in flight; is motion capture frozen?",
+    ),
+    Verdict.IMPOSSIBLE: (EstimateStatus.IMPOSSIBLE, "{} cannot have flown to its pose"),
+    Verdict.NOT_RESPONDING: (
+        EstimateStatus.NOT_RESPONDING,
+        "the poses of {} do not follow its control; is motion capture frozen?",
+    ),
+}
+
 
 class StateEstimatorNode(Node[StateEstimatorParameters]):
     """Publishes the state of a vehicle from its pose on tf."""
@@ -157,12 +171,11 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         self._stamp: int | None = None
         self._last_pose = -math.inf  #: Time at which the last new pose came.
         self._is_tilted: bool | None = None
-        self._frozen_poses = 0
         #: Text that was published last; None at the start, as others may still have one of a
         #: process before this one.
         self._tf_error: str | None = None
-        self._verdict: tuple[int, str] = (EstimateStatus.MISSING, "there has been no pose yet")
-        self._good_stamp = rospy.Time()
+        self._pose_status: tuple[int, str] = (EstimateStatus.MISSING, "there has been no pose yet")
+        self._good_stamp = genpy.Time()
         self._told: tuple[Any, ...] | None = None
         self._told_at = -math.inf
         self._inner_type = type(self.state_type().state)
@@ -174,9 +187,9 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(self.parameters_type)
-        self._gate = PoseGate(self._parameters.max_speed)
+        knows_control = self._parameters.control_topic is not None
+        self._monitor = PoseMonitor(self._parameters.max_speed, knows_control)
         self._tilt = TiltMonitor(self._parameters.max_tilt)
-        self._frozen = FrozenPoseMonitor(self._parameters.control_topic is not None)
         if self._parameters.filter_type == KALMAN:
             self._estimator = self._load_kalman_filters(handle)
         else:
@@ -247,8 +260,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         if self._silence(now) < 0.0:
             # The simulation was reset, and the estimate belongs to the previous run.
             self._estimator.reset()
-            self._gate.reset()
-            self._frozen.reset()
+            self._monitor.reset()
             self._last_success = now
         try:
             pose = self._lookup(self._parameters.fixed_frame, self._parameters.robot_frame)
@@ -275,49 +287,32 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
             self._restart()
         attitude = rpy_from_quaternion(*pose.rotation)
         acceleration = self._control.acceleration(attitude[2], now)
-        classification = self._gate.classify(stamp, pose.position, acceleration)
-        robot = self._parameters.robot_frame
-        if classification is Classification.BAD:
-            self._verdict = EstimateStatus.IMPOSSIBLE, f"{robot} cannot have flown to its pose"
+        verdict = self._monitor.update(stamp, pose.position, pose.rotation, acceleration)
+        status, reason = _STATUS[verdict]
+        self._pose_status = status, reason.format(self._parameters.robot_frame)
+        if verdict is Verdict.IMPOSSIBLE:
             return None
-        if classification is Classification.MOVED:
-            self._restart()
-        if self._frozen.update(stamp, pose.position, pose.rotation, acceleration):
-            self._reject_frozen()
-            self._verdict = (
-                (EstimateStatus.REPEATED, f"the pose of {robot} repeats; is motion capture frozen?")
-                if self._frozen.is_responding
-                else (
-                    EstimateStatus.NOT_RESPONDING,
-                    f"the poses of {robot} do not follow its control; is motion capture frozen?",
-                )
-            )
+        if status != EstimateStatus.GOOD:
+            self._handle.warn(self._pose_status[1], throttle=1.0, key="frozen")
             return self._departure(attitude)
-        self._verdict, self._good_stamp = (EstimateStatus.GOOD, ""), pose.time
+        if verdict is Verdict.MOVED:
+            self._estimator.reset()
+        self._good_stamp = pose.time
         return self._estimator.update(pose.stamp, pose.position, attitude, acceleration)
 
     def _restart(self):
         self._estimator.reset()
-        self._frozen.restart()
+        self._monitor.restart()
 
     def _departure(self, attitude):
         """Return the predicted motion if the measured one has just turned out to be wrong."""
-        departure = self._frozen.departure
+        departure = self._monitor.departure
         if departure is None:
             return None
         return EstimatedMotion(departure.position, departure.velocity, attitude, (0.0, 0.0, 0.0))
 
-    def _reject_frozen(self):
-        self._frozen_poses += 1
-        self._handle.warn(
-            f"the poses of {self._parameters.robot_frame} do not follow its control, or repeat; is "
-            "motion capture frozen?",
-            throttle=1.0,
-            key="frozen",
-        )
-
     def _publish_status(self, now):
-        facts = *self._verdict, bool(self._is_tilted)
+        facts = *self._pose_status, bool(self._is_tilted)
         if facts == self._told and 0.0 <= now - self._told_at < STATUS_PERIOD - 1e-6:
             return
         self._told, self._told_at = facts, now
@@ -329,7 +324,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
             pose=pose,
             reason=reason,
             is_tilted=is_tilted,
-            disturbance=self._frozen.disturbance or UNKNOWN,
+            disturbance=self._monitor.disturbance or UNKNOWN,
         )
         self._status.publish(status)
 
@@ -345,8 +340,8 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
     def _rejections(self):
         """Return the numbers of rejected poses by reason."""
         return {
-            "is too far away": self._gate.rejected,
-            "does not follow the control": self._frozen_poses,
+            "is too far away": self._monitor.impossible,
+            "does not follow the control": self._monitor.frozen,
             **self._handle.rejected_transforms(),
         }
 
@@ -373,7 +368,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         self._tell_tf_error(reason)
         if now - self._last_pose >= HOLD_LIMIT:
             frames = f"{self._parameters.fixed_frame} -> {self._parameters.robot_frame}"
-            self._verdict = EstimateStatus.MISSING, reason or f"no new transform {frames}"
+            self._pose_status = EstimateStatus.MISSING, reason or f"no new transform {frames}"
         if pose is not None:
             rejected = sum(self._rejections().values())
             reason = (

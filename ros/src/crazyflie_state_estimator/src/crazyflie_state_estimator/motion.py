@@ -115,8 +115,8 @@ class ConstantAccelerationFilter(RateFilter):
     ):
         self.tune(noise, acceleration_walk)
         self._first_variances = first_rate**2, 0.0, first_acceleration**2
-        self._value: list[float] = []
-        self._rate: list[float] = []
+        self.value: list[float] = []  #: Estimate, units.
+        self.rate: list[float] = []  #: Estimate, units / s.
         self.acceleration: list[float] = []  #: Estimate, the known part included, units / s^2.
         # The upper half, by rows.
         self._covariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -126,6 +126,11 @@ class ConstantAccelerationFilter(RateFilter):
         """Change the parameters; the state and its covariance stay."""
         self._noise_variance = noise**2
         self._walk_density = acceleration_walk**2
+
+    @property
+    def innovation_deviation(self) -> float:
+        """Standard deviation of the next sample about `value`, along each axis."""
+        return math.sqrt(self._covariance[0] + self._noise_variance)
 
     @property
     def covariance(self) -> list[list[float]]:
@@ -146,15 +151,14 @@ class ConstantAccelerationFilter(RateFilter):
         self, dt: float, value: Components, acceleration: Components | None = None
     ) -> tuple[Components, Components]:
         if dt > MEMORY:
-            self._begin(value, [(a - b) / dt for a, b in zip(value, self._value, strict=True)])
+            self._begin(value, [(a - b) / dt for a, b in zip(value, self.value, strict=True)])
         else:
-            self._take_over(acceleration)
-            self._predict(dt)
-            self._correct(value)
-        return self._value, self._rate
+            self.predict(dt, acceleration)
+            self.correct(value)
+        return self.value, self.rate
 
     def _begin(self, value, rate):
-        self._value, self._rate = list(value), rate
+        self.value, self.rate = list(value), rate
         self.acceleration = [0.0] * len(rate)
         self._covariance = (self._noise_variance, 0.0, 0.0, *self._first_variances)
         self._known = None
@@ -169,12 +173,19 @@ class ConstantAccelerationFilter(RateFilter):
             ]
         self._known = known
 
-    def _predict(self, dt):
+    def predict(
+        self, dt: float, acceleration: Components | None = None, rate_variance: float = 0.0
+    ) -> None:
+        """Predict to ``dt`` (s) later, with the acceleration known since then, n components.
+
+        ``rate_variance`` is that of an error of the rate beside the random walk.
+        """
+        self._take_over(acceleration)
         # x = F x, P = F P F' + Q, written out; F = [[1, dt, dt^2 / 2], [0, 1, dt], [0, 0, 1]].
         half, third, walk = dt * dt / 2.0, dt * dt * dt, self._walk_density
-        axes = list(zip(self._value, self._rate, self.acceleration, strict=True))
-        self._value = [x + dt * v + half * a for x, v, a in axes]
-        self._rate = [v + dt * a for _, v, a in axes]
+        axes = list(zip(self.value, self.rate, self.acceleration, strict=True))
+        self.value = [x + dt * v + half * a for x, v, a in axes]
+        self.rate = [v + dt * a for _, v, a in axes]
         p00, p01, p02, p11, p12, p22 = self._covariance
         fp00, fp01, fp02 = (
             p00 + dt * p01 + half * p02,
@@ -186,18 +197,19 @@ class ConstantAccelerationFilter(RateFilter):
             fp00 + dt * fp01 + half * fp02 + walk * third * dt * dt / 20.0,
             fp01 + dt * fp02 + walk * third * dt / 8.0,
             fp02 + walk * third / 6.0,
-            fp11 + dt * fp12 + walk * third / 3.0,
+            fp11 + dt * fp12 + walk * third / 3.0 + rate_variance,
             fp12 + walk * half,
             p22 + walk * dt,
         )
 
-    def _correct(self, value):
+    def correct(self, value: Components) -> None:
+        """Correct by a sample of the time that was predicted to, n components."""
         p00, p01, p02, p11, p12, p22 = self._covariance
         scale = 1.0 / (p00 + self._noise_variance)
         g0, g1, g2 = p00 * scale, p01 * scale, p02 * scale
-        innovations = [z - x for z, x in zip(value, self._value, strict=True)]
-        self._value = [x + g0 * y for x, y in zip(self._value, innovations, strict=True)]
-        self._rate = [v + g1 * y for v, y in zip(self._rate, innovations, strict=True)]
+        innovations = [z - x for z, x in zip(value, self.value, strict=True)]
+        self.value = [x + g0 * y for x, y in zip(self.value, innovations, strict=True)]
+        self.rate = [v + g1 * y for v, y in zip(self.rate, innovations, strict=True)]
         self.acceleration = [
             a + g2 * y for a, y in zip(self.acceleration, innovations, strict=True)
         ]

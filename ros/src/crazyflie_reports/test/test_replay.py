@@ -17,7 +17,7 @@ from crazyflie_reports.replay import Status, replay
 from crazyflie_reports.replay_program import main
 from crazyflie_utils import Node
 from crazyflie_utils.journal import journal_file
-from crazyflie_utils.journal.journal_file import WITH_DATA, Journal, JournalWriter, Kind
+from crazyflie_utils.journal.journal_file import Journal, JournalWriter, Kind
 from crazyflie_utils.journal.recording import Recorder
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import Number
@@ -361,7 +361,7 @@ def test_a_journal_into_which_anything_was_written_ends_with_an_outcome(
     writer = JournalWriter(path, journal.header, 1e9, pytest.fail)
     for row in [*good[:begin], *rows, *good[begin:]]:
         kind, number, value, data = row
-        writer.row(kind, number, value, data if kind in WITH_DATA else None)
+        writer.row(kind, number, value, data)
     writer.close()
     outcome = replay(path)
     assert outcome.text.startswith(("/scale: ", str(path)))

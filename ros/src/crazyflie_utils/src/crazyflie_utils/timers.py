@@ -148,9 +148,10 @@ class Executor:
     """
 
     def __init__(self) -> None:
-        #: Called with true before the first of the timers that are due, and with false before each
-        #: later one.
-        self.on_timers: Callable[[bool], None] | None = None
+        #: before_timers, before_timer: Called before the first of the timers that are due, and
+        #: before each later one.
+        self.before_timers: Callable[[], None] | None = None
+        self.before_timer: Callable[[], None] | None = None
         self._inputs: deque[tuple[Callable[..., None], tuple[Any, ...]]] = deque()
         self._consequences: deque[tuple[Callable[..., None], tuple[Any, ...]]] = deque()
         self._running = _FairLock()
@@ -192,7 +193,7 @@ class Executor:
     def post(self, work: Callable[..., None], *arguments: Any) -> None:
         """Run ``work(*arguments)`` as an input, also from inside running work; see `submit`."""
         self._inputs.append((work, arguments))
-        if not self.is_running_here:
+        if self._runner != threading.get_ident():
             self._drain()
 
     def submit_all(self, works: Iterable[Callable[[], None]]) -> None:
@@ -213,14 +214,14 @@ class Executor:
             try:
                 self._run_queued()
                 is_first = True
-                if works and self.on_timers is not None:
-                    self.on_timers(True)
+                if works and self.before_timers is not None:
+                    self.before_timers()
                 for work in works:
                     if not is_first:
                         self._running.give_way()
                         self._runner = threading.get_ident()
-                        if self.on_timers is not None:
-                            self.on_timers(False)
+                        if self.before_timer is not None:
+                            self.before_timer()
                     is_first = False
                     work()
                     self._run_queued()

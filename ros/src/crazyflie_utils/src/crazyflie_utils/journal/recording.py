@@ -11,13 +11,14 @@ import builtins
 import io
 import json
 import struct
-import threading
 import time
 import zlib
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from functools import partial
+from threading import get_ident
+from types import SimpleNamespace
 from typing import Any
 from weakref import WeakSet
 
@@ -42,20 +43,15 @@ SAME_COLLECTION = 0xFFFFFFFF  #: Value of `Kind.COLLECTED` for more messages of 
 ORIGIN = struct.Struct("<H")  #: Before a message: `PLAIN`, and the number of its connection, or 0.
 PLAIN = 0x8000  #: It came decoded.
 _LONGEST = 0xFFFFFFFF  #: Longest time between two inputs that is written (us).
-_LOOK_PERIOD = 10_000  #: Period at which an input looks at the wall clock, and at the file (us).
+_LOOK_PERIOD = 10_000  #: Period of such looks at inputs (us).
+_CHECKED_TOGETHER = 64  #: Number of messages that are checked together.
 
 # Plain numbers: those of an enumeration take longer to pack.
-_TIMERS, _TIMER, _MESSAGE, _COLLECTED, _PUBLISHED, _TIME, _WALL = map(
-    int,
-    (
-        Kind.TIMERS,
-        Kind.TIMER,
-        Kind.MESSAGE,
-        Kind.COLLECTED,
-        Kind.PUBLISHED,
-        Kind.TIME,
-        Kind.WALL,
-    ),
+_TIMERS, _TIMER, _MESSAGE, _COLLECTED = map(
+    int, (Kind.TIMERS, Kind.TIMER, Kind.MESSAGE, Kind.COLLECTED)
+)
+_PUBLISHED, _CHECKED, _TIME, _WALL = map(
+    int, (Kind.PUBLISHED, Kind.CHECKED, Kind.TIME, Kind.WALL)
 )
 
 
@@ -112,87 +108,98 @@ class RecordedClock(SteadyClock):
     def __init__(self, recorder: "Recorder", executor: Executor):
         super().__init__()
         self.now = 0  #: Moment of the present input, ns.
-        self.wall_offset = self._offset  #: Wall clock minus this clock, ns.
         self._recorder, self._executor = recorder, executor
-
-    def look_at_wall(self) -> int:
-        """Measure and return `wall_offset`."""
-        self.wall_offset = self.measure_offset()
-        return self.wall_offset
-
-    def _read(self):
-        if self._executor.is_running_here:
-            return self.now
-        moment = time.monotonic_ns()
-        if self._executor.is_in_turn:
-            self._recorder.row(_TIME, 0, 0, _U64.pack(moment))
-            self._recorder.look_at_wall()
-        return moment
 
     @override
     def time(self) -> float:
+        if self._executor._runner == get_ident():
+            return self.now * 1e-9
         return self._read() * 1e-9
+
+    def _read(self):
+        moment = time.monotonic_ns()
+        if self._executor.is_in_turn:
+            self._recorder.row(_TIME, 0, 0, _U64.pack(moment))
+        return moment
 
     @override
     def nanoseconds(self, moment: float | None = None) -> int:
-        if not self._executor.is_in_turn:
+        if self._executor._runner == get_ident():
+            now = self.now
+        elif self._executor.is_in_turn:
+            now = self._read()
+        else:
             return super().nanoseconds(moment)
-        now = self._read()
-        return (now if moment is None else round(moment * 1e9)) + self.wall_offset
+        offset = self._recorder.look_at_wall(is_read=True)
+        return (now if moment is None else round(moment * 1e9)) + offset
 
 
 class Recorder:
     """Writes the rows of one process by a `JournalWriter`; an error of it ends the journal only.
 
     What is called for each input or message has few calls of its own: a simulator has a thousand of
-    both in a second.
+    both in a second, and a process that has slept for 10 ms runs each of them for the first time
+    again, by its caches. The checks of messages, which take the longest, are calculated for many at
+    a time.
     """
 
     def __init__(self, writer: JournalWriter):
         self._writer = writer
         self.row = writer.row
+        writer.before_chunk = self._check
         self.executor: Executor
         self.clock: RecordedClock
         #: Returns wall clock minus the process's clock (ns).
-        self.wall: Callable[[], int]
-        self.look_period = _LOOK_PERIOD  #: Time between two such looks (us).
+        self.wall: Callable[[], int] = lambda: 0
+        self.look_period = _LOOK_PERIOD  #: Time between two looks at what is to be written (us).
         self._next_look = 0
         self._last = int(writer.header["us"])
         self._wall = 0
         self._digest = Digest()
+        self._unchecked: list[genpy.Message] = []
         self._callers: dict[tuple[str, str], int] = {("", ""): 0}
 
     def attach(self, transport: Transport, executor: Executor) -> "RecordingTransport":
         """Begin to record; return the transport that the process is to use."""
         self.executor = executor
         self.clock = RecordedClock(self, executor)
-        self.wall = self.clock.look_at_wall
-        executor.on_timers = self._on_timers
+        self.wall = self.clock.measure_offset
+        executor.before_timers = partial(self.input, _TIMERS)
+        executor.before_timer = partial(self.input, _TIMER)
         _recorders.add(self)
         return RecordingTransport(transport, self)
 
-    def input(self, kind: int, number: int = 0, data: bytes | None = None) -> None:
+    def input(self, kind: int, number: int = 0, data: bytes = b"") -> None:
         """Begin an input of a `Kind`, in its turn."""
-        nanoseconds = time.monotonic_ns()
-        now = nanoseconds // 1000
-        self.clock.now = nanoseconds - nanoseconds % 1000
+        now = time.monotonic_ns() // 1000
+        self.clock.now = now * 1000
         try:
             if now >= self._next_look:
                 self._next_look = now + self.look_period
+                if len(self._unchecked) >= _CHECKED_TOGETHER or not self.look_period:
+                    self._check()
                 self._writer.pause(now * 1e-6)
-                self.look_at_wall()
             passed = now - self._last
             self._last = now
             self.row(kind, number, passed if passed < _LONGEST else _LONGEST, data)
         except Exception as error:
             self._writer.end(repr(error))
 
-    def look_at_wall(self) -> None:
-        """Write by how much the wall clock is ahead of the machine's, if that has changed."""
+    def look_at_wall(self, is_read: bool = False) -> int:
+        """Return by how much the wall clock is ahead of the machine's (ns); write changes."""
         offset = self.wall()
         if offset != self._wall:
             self._wall = offset
-            self.row(_WALL, 0, 0, _I64.pack(offset))
+            self.row(_WALL, is_read, 0, _I64.pack(offset))
+        return offset
+
+    def _check(self):
+        """Write the checks of the messages that have none yet, and look at the wall clock."""
+        self.look_at_wall()
+        if self._unchecked:
+            add = self._digest.add
+            self.row(_CHECKED, 0, 0, bytes([add(each) for each in self._unchecked]))
+            self._unchecked.clear()
 
     def submit_input(self, number: int, work: Callable[..., None], *arguments: Any) -> None:
         """Run a function of `NodeHandle.input`, by its number, with at most one argument."""
@@ -246,19 +253,21 @@ class Recorder:
 
     def published(self, number: int, message: genpy.Message) -> None:
         """Write that a callback publishes a message."""
-        executor = self.executor
-        if executor._runner == threading.get_ident() or executor.is_in_turn:
+        if self.executor._runner == get_ident() or self.executor.is_in_turn:
             try:
-                self.row(_PUBLISHED, number, self._digest.add(message))
+                self.row(_PUBLISHED, number, 0)
+                self._unchecked.append(message)
             except Exception as error:
                 self._writer.end(repr(error))
 
     def end_start(self) -> None:
         """Write that all nodes are initialized."""
+        self._check()
         self._writer.end_start()
 
     def close(self) -> None:
         """End the journal."""
+        self._check()
         self._writer.close()
 
     def origin(self, header: dict[str, str] | None) -> int:
@@ -291,9 +300,6 @@ class Recorder:
         self.row(Kind.VALUE, 0, 0, json.dumps([what, True, value], default=str).encode())
         return value
 
-    def _on_timers(self, is_first):
-        self.input(_TIMERS if is_first else _TIMER)
-
 
 _recorders: WeakSet[Recorder] = WeakSet()
 _read_file = text_file.content
@@ -315,32 +321,18 @@ class _Flag:
 
     def __init__(self, recorder: Recorder, number: int, read: Condition):
         self._recorder, self._number, self._read = recorder, number, read
+        self._executor = recorder.executor
         self._value, self._same = False, 0
 
     def __call__(self) -> bool:
         value = self._read()
-        if self._recorder.executor.is_in_turn:
-            if value == self._value:
+        if self._executor._runner == get_ident() or self._executor.is_in_turn:
+            if value is self._value:
                 self._same += 1
             else:
                 self._recorder.row(Kind.FLAG, self._number, self._same)
                 self._value, self._same = value, 0
         return value
-
-
-class _RecordedPublisher(ExternalPublisher):
-    def __init__(self, recorder: Recorder, number: int, external: ExternalPublisher, flag: _Flag):
-        self._external, self._flag = external, flag
-        self.note = partial(recorder.published, number)
-
-    def has_subscribers(self) -> bool:
-        return self._flag()
-
-    def publish(self, *messages: genpy.Message) -> None:
-        self._external.publish(*messages)
-
-    def close(self) -> None:
-        self._external.close()
 
 
 class _RecordedSubscriber(ExternalSubscriber):
@@ -351,6 +343,7 @@ class _RecordedSubscriber(ExternalSubscriber):
         self.flag: _Flag
         self._recorder, self._number = recorder, number
         self._plain_type, self._deliver = plain, deliver
+        self._post = recorder.executor.post
         self._is_collecting, self._empty = False, 0
         self._header: dict[str, str] | None = None
         self._origin = ORIGIN.pack(0)
@@ -358,12 +351,12 @@ class _RecordedSubscriber(ExternalSubscriber):
     def receive(self, message: Any) -> None:
         """Write a message and pass it on, in turn unless it was waiting."""
         recorder = self._recorder
-        if self._is_collecting and recorder.executor.is_running_here:
+        if self._is_collecting and recorder.executor._runner == get_ident():
             recorder.row(_COLLECTED, self._number, self._empty, self._data(message))
             self._empty = SAME_COLLECTION
             self._deliver(message)
         else:
-            recorder.executor.post(self._pass_on, message)
+            self._post(self._pass_on, message)
 
     def _pass_on(self, message):
         self._recorder.input(_MESSAGE, self._number, self._data(message))
@@ -444,11 +437,17 @@ class RecordingTransport(Transport):
 
     def advertise(self, topic: str, message_type: Any, latch: bool) -> ExternalPublisher:
         """Announce a topic."""
-        external = self._transport.advertise(topic, message_type, latch)
+        external: Any = self._transport.advertise(topic, message_type, latch)
         self._publishers += 1
         self._recorder.name(Kind.ADVERTISED, self._publishers, topic, message_type._type)
-        flag = self._flag(external.has_subscribers)
-        return _RecordedPublisher(self._recorder, self._publishers, external, flag)
+        # Called for each message: not a class around the other.
+        recorded: Any = SimpleNamespace(
+            note=partial(self._recorder.published, self._publishers),
+            has_subscribers=self._flag(external.has_subscribers),
+            publish=external.publish,
+            close=external.close,
+        )
+        return recorded
 
     def subscribe(
         self, topic: str, message_type: Any, deliver: Receiver, may_wait: Condition = never

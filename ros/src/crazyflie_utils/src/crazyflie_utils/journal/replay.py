@@ -95,9 +95,14 @@ class _ReplayClock(SteadyClock):
         if not self._executor.is_running_here:
             row = self._rows.expect(Kind.TIME, 0, "reads the clock")
             (self.now,) = _U64.unpack(row.data)
-            if self._rows.next is not None and self._rows.next.kind is Kind.WALL:
-                (self.wall_offset,) = _I64.unpack(self._rows.take().data)
+            # As the format 1 has it.
+            self._look_at_wall(0)
         return self.now
+
+    def _look_at_wall(self, number):
+        row = self._rows.next
+        if row is not None and row.kind is Kind.WALL and row.number == number:
+            (self.wall_offset,) = _I64.unpack(self._rows.take().data)
 
     @override
     def time(self) -> float:
@@ -106,6 +111,7 @@ class _ReplayClock(SteadyClock):
     @override
     def nanoseconds(self, moment: float | None = None) -> int:
         now = self._read()
+        self._look_at_wall(1)
         return (now if moment is None else round(moment * 1e9)) + self.wall_offset
 
 
@@ -131,8 +137,13 @@ class _RosProcess(Process):
             return self.machine.now + self.machine.wall_offset
         return self.clock.nanoseconds()
 
-    def set_wall(self, offset: int) -> None:
-        """Set the wall clock minus the machine's (ns)."""
+    @property
+    def wall_offset(self) -> int:
+        """Wall clock minus the machine's (ns)."""
+        return self.machine.wall_offset
+
+    @wall_offset.setter
+    def wall_offset(self, offset: int) -> None:
         self.machine.wall_offset = offset
 
     def find_due(self) -> None:
@@ -155,8 +166,13 @@ class _OfflineProcess(OfflineProcess):
         """Return the ROS time of the present input (ns)."""
         return self.clock.nanoseconds()
 
-    def set_wall(self, offset: int) -> None:
-        """Set the wall clock minus the process's (ns)."""
+    @property
+    def wall_offset(self) -> int:
+        """Wall clock minus the process's (ns)."""
+        return round(self.clock.wall_offset * 1e9)
+
+    @wall_offset.setter
+    def wall_offset(self, offset: int) -> None:
         self.clock.wall_offset = offset * 1e-9
 
     def find_due(self) -> None:
@@ -177,7 +193,6 @@ class Replay:
         self.transport = ReplayTransport(self.rows)
         self.nodes: dict[str, Node] = {}
         self.input: Row | None = None  #: The input that is processed, or was last.
-        self.wall_offset = 0  #: Wall clock minus the machine's, or a manual one (ns).
         self._executor = _ReplayExecutor()
         header = journal.header
         self._us = self._begin = header["us"]
@@ -223,7 +238,7 @@ class Replay:
     @property
     def wall_time(self) -> int:
         """Wall time of the present input (ns)."""
-        return self._us * 1000 + self.wall_offset
+        return self._us * 1000 + self.process.wall_offset
 
     @property
     def input_name(self) -> str:
@@ -277,8 +292,7 @@ class Replay:
         if row is None:
             return False
         if row.kind is Kind.WALL:
-            (self.wall_offset,) = _I64.unpack(self.rows.take().data)
-            self.process.set_wall(self.wall_offset)
+            (self.process.wall_offset,) = _I64.unpack(self.rows.take().data)
             return True
         if row.kind not in INPUTS:
             raise DifferenceError(f"now the callback has ended; then {self.rows.describe(row)}")

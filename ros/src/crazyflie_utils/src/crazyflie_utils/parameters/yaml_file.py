@@ -36,23 +36,18 @@ class _Loader(yaml.SafeLoader):
 
     @override
     def compose_node(self, parent: Any, index: Any) -> yaml.Node:
-        event = self.peek_event()
-        before = self._count
+        event, before = self.peek_event(), self._count
         self._depth += 1
         if self._depth > MAX_DEPTH:
             raise self._error(event, f"is nested too deeply; expected at most {MAX_DEPTH} levels")
         node = super().compose_node(parent, index)
         self._depth -= 1
-        if not isinstance(event, yaml.AliasEvent):
-            self._count += 1
-            self._sizes[id(node)] = self._count - before
-        elif id(node) in self._sizes:
-            self._count += self._sizes[id(node)]
-        else:
-            raise self._error(
-                event,
-                f"has the alias *{shortened(event.anchor)} within the node to which it refers",
-            )
+        is_alias = isinstance(event, yaml.AliasEvent)
+        if is_alias and id(node) not in self._sizes:
+            alias = f"the alias *{shortened(event.anchor)}"
+            raise self._error(event, f"has {alias} within the node to which it refers")
+        self._count += self._sizes[id(node)] if is_alias else 1
+        self._sizes[id(node)] = self._count - before
         if self._count > MAX_NODES:
             raise self._error(event, f"has too many values; expected at most {MAX_NODES}")
         return node

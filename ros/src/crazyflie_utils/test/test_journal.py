@@ -14,6 +14,7 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, Trig
 from crazyflie_utils import Node
 from crazyflie_utils.journal import journal_file
 from crazyflie_utils.journal.journal_file import (
+    UNCHECKED,
     Journal,
     JournalError,
     JournalWriter,
@@ -262,7 +263,7 @@ def test_rows_are_read_as_they_were_written(tmp_path_factory, rows, is_ended):
         writer.close()
     # Without a check, the value of a message is not known.
     expected = [
-        Row(kind, number, None if kind is Kind.PUBLISHED else value, data)
+        Row(kind, number, UNCHECKED if kind is Kind.PUBLISHED else value, data)
         for kind, number, value, data in rows
     ]
     assert list(Journal(path).rows()) == expected

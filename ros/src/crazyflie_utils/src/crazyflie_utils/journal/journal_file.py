@@ -32,9 +32,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 FORMAT = "crazyflie journal 2"  #: The first field of the header; another format has another number.
-#: Of some days in November 2026, which is only read: heads are followed by their data, if their kind
-#: has any: length (u16, or 0xFFFF and u32) and bytes, of a message the difference to the one before,
-#: if that is as long, both as numbers, the first byte the least. `PUBLISHED` has the check itself.
+#: Only read. A head is followed by its data, if its kind has any: length (u16, or 0xFFFF and u32)
+#: and bytes, of a message the difference to the one before, if that is as long; both are taken as
+#: numbers, the first byte the least. `PUBLISHED` has its check itself.
 _FORMAT_1 = "crazyflie journal 1"
 #: Fields of each header: absolute name of the process's node; "package.module:name" of what made
 #: the nodes; "steady", "simulated" or "manual"; the machine's clock at the beginning, us; time of a
@@ -104,12 +104,15 @@ INPUTS = frozenset(kind for kind in Kind if kind < Kind.TIME)
 _DIFFERENCES = (int(Kind.MESSAGE), int(Kind.COLLECTED))
 
 
+UNCHECKED = -1  #: Value of a message that was published before its process died without the check.
+
+
 class Row(NamedTuple):
     """A row of a journal."""
 
     kind: Kind
     number: int
-    value: int | None  #: None: a message was published, and the process has died before its check.
+    value: int
     data: bytes = b""
 
 
@@ -152,9 +155,7 @@ def _from_columns(content: bytes) -> tuple[NDArray[Any], bytes]:
     return heads, data.tobytes()
 
 
-def _places(
-    heads: NDArray[Any], total: int
-) -> tuple[list[tuple[int, NDArray[Any]]], list[slice]]:
+def _places(heads: NDArray[Any], total: int) -> tuple[list[tuple[int, NDArray[Any]]], list[slice]]:
     """Return size and places of the messages of each subscription, and the places of other data."""
     heads = heads[heads["size"] > 0]
     sizes = heads["size"].astype(np.int64)
@@ -484,5 +485,5 @@ def _with_checks(rows: Iterable[Row]) -> Iterator[Row]:
         checks = iter(row.data)
         for each in waiting:
             is_message = each.kind is Kind.PUBLISHED
-            yield each._replace(value=next(checks, None)) if is_message else each
+            yield each._replace(value=next(checks, UNCHECKED)) if is_message else each
         waiting.clear()

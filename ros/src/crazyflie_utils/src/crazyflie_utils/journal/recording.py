@@ -50,9 +50,7 @@ _CHECKED_TOGETHER = 64  #: Number of messages that are checked together.
 _TIMERS, _TIMER, _MESSAGE, _COLLECTED = map(
     int, (Kind.TIMERS, Kind.TIMER, Kind.MESSAGE, Kind.COLLECTED)
 )
-_PUBLISHED, _CHECKED, _TIME, _WALL = map(
-    int, (Kind.PUBLISHED, Kind.CHECKED, Kind.TIME, Kind.WALL)
-)
+_PUBLISHED, _CHECKED, _TIME, _WALL = map(int, (Kind.PUBLISHED, Kind.CHECKED, Kind.TIME, Kind.WALL))
 
 
 def keeps_data(message_type: Any) -> Any:

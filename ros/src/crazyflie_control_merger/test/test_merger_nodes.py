@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from rospy import Time
 
 from crazyflie_control_merger.merger_nodes import NoYawMergerNode, RegularControlMergerNode
 from crazyflie_msgs.msg import (
@@ -59,6 +60,39 @@ def push(process, node_class, priority, control=PUSH):
         prioritized = PrioritizedControl(Control(*control), priority)
         message = PrioritizedControlStamped(control=prioritized)
     process.publish("/control/prioritized", message)
+
+
+def test_a_prioritised_control_is_published_at_once(node_class):
+    process = launch(node_class)
+    push(process, node_class, 1.0)
+    assert process.published("/control/merged") == []
+    answer(process)
+    process.advance(0.06)
+    push(process, node_class, 0.0)
+    assert len(process.published("/control/merged")) == 1
+    push(process, node_class, 0.5)
+    merged = process.published("/control/merged")[1:]
+    (control,) = (to_vector(each.control) for each in merged)
+    np.testing.assert_allclose(control, expected(node_class, 0.5))
+    # The regular controller has died.
+    process.advance(0.06)
+    push(process, node_class, 1.0)
+    assert len(process.published("/control/merged")) == 2
+
+
+def test_the_stamp_is_the_newer_one(node_class):
+    process = launch(node_class)
+    answer(process)
+    push(process, node_class, 1.0)
+    first, second = process.published("/control/merged")
+    assert second.header.stamp == first.header.stamp > Time()
+
+
+def test_a_prioritised_control_without_effect_is_not_published(node_class):
+    process = launch(node_class, "LQR")
+    answer(process)
+    push(process, node_class, 1.0)
+    assert len(process.published("/control/merged")) == 1
 
 
 def answer(process, control=REGULAR):

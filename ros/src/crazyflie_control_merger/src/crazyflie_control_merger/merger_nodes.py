@@ -1,5 +1,7 @@
 """ROS interfaces of the mergers of two controls."""
 
+import math
+
 import genpy
 from numpy.typing import ArrayLike
 from typing_extensions import override
@@ -18,6 +20,9 @@ from crazyflie_utils.parameters.types import Text
 from crazyflie_utils.vectors import from_vector, to_vector
 
 
+REGULAR_AGE = 0.1  #: Age of a regular control beyond which a prioritised one is not mixed in (s).
+
+
 class MergerParameters(Parameters):
     """Parameters of both mergers."""
 
@@ -30,7 +35,7 @@ class MergerParameters(Parameters):
 
 
 class MergerNode(Node[MergerParameters]):
-    """Publish each regular control with the prioritised one mixed in.
+    """Publish each regular control with the prioritised one mixed in, and each prioritised one.
 
     A subclass names its prioritised control in class attributes and implements `split`.
     """
@@ -48,6 +53,8 @@ class MergerNode(Node[MergerParameters]):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._merger = Merger(self.entries)
+        self._regular: ControlStamped | None = None
+        self._regular_time = -math.inf
         self._publisher = handle.publisher(parameters.merged_topic, ControlStamped)
         handle.subscribe(
             parameters.prioritized_topic,
@@ -68,13 +75,22 @@ class MergerNode(Node[MergerParameters]):
                 throttle=1.0,
                 key="priority",
             )
-        self._merger.prioritize(control, priority, self._handle.time())
+        now = self._handle.time()
+        self._merger.prioritize(control, priority, now)
+        # After the end of the regular controls, the vehicle's next node must see that they end.
+        is_fresh = 0.0 <= now - self._regular_time < REGULAR_AGE
+        if is_fresh and self._merger.weight(now, self._parameters.mode) > 0.0:
+            self._publish(self._regular, message.header.stamp)
 
     def _on_control(self, message):
-        regular, mode = to_vector(message.control), self._parameters.mode
-        u = self._merger.merged(regular, self._handle.time(), mode)
+        self._regular, self._regular_time = message, self._handle.time()
+        self._publish(message, message.header.stamp)
+
+    def _publish(self, regular, stamp):
+        now, mode = self._handle.time(), self._parameters.mode
+        u = self._merger.merged(to_vector(regular.control), now, mode)
         merged = ControlStamped(control=from_vector(Control, u))
-        merged.header.stamp = message.header.stamp
+        merged.header.stamp = max(stamp, regular.header.stamp)
         self._publisher.publish(merged)
 
 

@@ -43,14 +43,15 @@ class Merger:
 
     def merged(self, regular: NDArray[np.float64], time: float, mode: str) -> NDArray[np.float64]:
         """Return (1 - p) regular + p prioritised, shape (4,), at ``time`` (s), in a mode."""
-        p = self._weight(time, mode)
+        p = self.weight(time, mode)
         if p == 0.0:
             return regular
         merged = regular.copy()
         merged[self._entries] = (1.0 - p) * regular[self._entries] + p * self._prioritized
         return merged
 
-    def _weight(self, time, mode):
+    def weight(self, time: float, mode: str) -> float:
+        """Return the share p of the prioritised control at ``time`` (s) in a mode, 0 to 1."""
         # A time that has stepped back belongs to another run.
         if self._time is None or not 0.0 <= time - self._time < HOLD_LIMIT:
             return 0.0

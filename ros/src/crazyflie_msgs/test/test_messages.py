@@ -10,6 +10,8 @@ from crazyflie_msgs import msg
 MD5 = {
     "Control": "e914b14edeed586f23e350ad344ba302",
     "ControlStamped": "e85f24c467a6496a2e0c3b92ff0fe75d",
+    "Disturbance": "c9aa644cdeaad9584fb826b2ed94d4e6",
+    "DisturbanceStamped": "80be8921e09bd4e48576b3f7ed47cf46",
     "FullState": "1478f01b4f726b5b1e488813cdcd71d7",
     "FullStateStamped": "95ca4cda6afad75c125ca4a75fb052d8",
     "NoYawControl": "47183c443d602278cf66b107317355b1",
@@ -28,6 +30,7 @@ STATUS = ("EstimateStatus", "FilterStatus", "FlightStatus", "VehicleStatus")
 POSITION_VELOCITY = ["x", "y", "z", "x_dot", "y_dot", "z_dot"]
 FIELDS = {
     "Control": ["roll", "pitch", "yaw_dot", "thrust"],
+    "Disturbance": [*POSITION_VELOCITY, "yaw"],
     "FullState": [*POSITION_VELOCITY, "roll", "pitch", "yaw", "roll_dot", "pitch_dot", "yaw_dot"],
     "NoYawControl": ["roll", "pitch", "thrust", "priority"],
     "PositionVelocityState": POSITION_VELOCITY,
@@ -54,7 +57,8 @@ def test_fields_are_in_order(name, fields):
 @pytest.mark.parametrize("name", FIELDS)
 def test_stamped_messages_hold_a_header_and_the_plain_message(name):
     stamped = getattr(msg, f"{name}Stamped")
-    content = "control" if "Control" in name else "state"
+    contents = ("control", "disturbance", "state")
+    (content,) = (each for each in contents if name.lower().endswith(each))
     assert stamped.__slots__ == ["header", content]
     assert stamped._slot_types == ["std_msgs/Header", f"crazyflie_msgs/{name}"]
 
@@ -67,6 +71,12 @@ UNITS = {
     "thrust": "m/s^2",
     "priority": "0",
 }
+#: Units of the derivatives.
+RATES = {
+    **dict.fromkeys(["x", "y", "z"], "m/s"),
+    **dict.fromkeys(["x_dot", "y_dot", "z_dot"], "m/s^2"),
+    "yaw": "rad/s",
+}
 
 
 @pytest.mark.parametrize("name", MD5)
@@ -75,7 +85,8 @@ def test_the_comment_of_every_field_has_its_unit(name):
     for line in definition.read_text().splitlines():
         if line.startswith("float64"):
             field, _, comment = line.removeprefix("float64").partition("#")
-            assert UNITS[field.strip()] in re.split("[ ,;]+", comment), line
+            units = RATES if "Disturbance" in name else UNITS
+            assert units[field.strip()] in re.split("[ ,;]+", comment), line
 
 
 @pytest.mark.parametrize("name", STATUS)

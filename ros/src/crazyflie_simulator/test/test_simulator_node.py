@@ -8,7 +8,7 @@ from simulators import NODES, PARAMETERS, command, heights, launch, refusal, tra
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_model.dynamics import NearHover
-from crazyflie_msgs.msg import Control, ControlStamped
+from crazyflie_msgs.msg import Control, ControlStamped, Disturbance, DisturbanceStamped
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_simulator.simulator_node import (
     NearHoverSimulatorCoupled7DNode,
@@ -334,3 +334,29 @@ def test_poses_are_those_of_their_stamps_where_a_control_is_interrupted(monkeypa
     speeds = np.diff(ways) / np.diff(stamps)
     assert len(speeds) > 190
     assert np.ptp(speeds) < 0.01
+
+
+@pytest.mark.parametrize("node_class", [NearHoverSimulatorNode, NearHoverSimulatorCoupled7DNode])
+def test_a_disturbance_is_added_to_the_derivatives_until_the_next_one(node_class):
+    process = launch(node_class, **{"topics/disturbance": "/disturbance", "init/z": 1.0})
+    fly(process, 5, 9.81)
+
+    def disturb(**values):
+        process.publish("/disturbance", DisturbanceStamped(disturbance=Disturbance(**values)))
+
+    def place():
+        translation = transforms(process)[-1].transform.translation
+        return translation.x, translation.y, translation.z
+
+    begin = place()
+    disturb(x_dot=0.5, y=0.2)
+    fly(process, 10, 9.81)
+    accelerated = place()
+    assert np.subtract(accelerated, begin) == pytest.approx((0.25, 0.2, 0.0), abs=0.01)
+    disturb()
+    fly(process, 10, 9.81)
+    assert np.subtract(place(), accelerated) == pytest.approx((0.5, 0.0, 0.0), abs=0.01)
+    # One that is not a number changes nothing.
+    disturb(z_dot=math.nan)
+    fly(process, 1, 9.81)
+    assert place()[2] == pytest.approx(begin[2], abs=1e-6)

@@ -19,7 +19,6 @@ from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
 from crazyflie_utils.parameters.types import Text
 from crazyflie_utils.vectors import from_vector, to_vector
 
-
 REGULAR_AGE = 0.1  #: Age of a regular control beyond which a prioritised one is not mixed in (s).
 
 

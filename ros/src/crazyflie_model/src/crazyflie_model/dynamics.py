@@ -123,6 +123,9 @@ class SevenDimensional(Dynamics):
 
     x_dim = 7
 
+    #: What is added to the derivative of each component, units of a state over s; None for nothing.
+    disturbance: Sequence[float] | None = None
+
     def __init_subclass__(cls) -> None:
         # A model that is derived from one with a formula may have other rates.
         cls.has_exact_steps = "acceleration" in vars(cls)
@@ -133,7 +136,10 @@ class SevenDimensional(Dynamics):
 
     def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.rates`."""
-        return x[3:6] + self.acceleration(u, x[6]) + [u[2]]
+        rates = x[3:6] + self.acceleration(u, x[6]) + [u[2]]
+        if self.disturbance is None:
+            return rates
+        return [a + b for a, b in zip(rates, self.disturbance, strict=True)]
 
     def initial_state(self, position: Sequence[Number]) -> Vector[Number]:
         """See `Dynamics.initial_state`; yaw is 0."""
@@ -176,13 +182,13 @@ class SevenDimensional(Dynamics):
 
     def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.step`."""
-        if not self.has_exact_steps:
+        if not self.has_exact_steps or self.disturbance is not None:
             return super().step(count, x, u)
         return self.apply_ground_contact(self._flight(x, u)(STEP, x))
 
     def steps(self, n: int, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.steps`."""
-        if not self.has_exact_steps:
+        if not self.has_exact_steps or self.disturbance is not None:
             return super().steps(n, count, x, u)
         flown = self._flight(x, u)
         duration = n * STEP

@@ -9,7 +9,7 @@ from std_srvs.srv import Empty
 from typing_extensions import override
 
 from crazyflie_model.dynamics import Coupled7D, Dynamics, NearHover
-from crazyflie_msgs.msg import ControlStamped
+from crazyflie_msgs.msg import ControlStamped, DisturbanceStamped
 from crazyflie_simulator.vehicle import MotionCapture, SimulatedVehicle
 from crazyflie_utils import (
     Node,
@@ -311,7 +311,35 @@ class SimulatorNode(Node[SimulatorParameters]):
             self._broadcast(poses)
 
 
-class NearHoverSimulatorNode(SimulatorNode):
+class SevenDimensionalSimulatorParameters(SimulatorParameters):
+    """Parameters of the simulators of models with 7 states."""
+
+    disturbance_topic: str | None = topic(
+        "disturbance", "what is added to the derivative of each state, until the next one", None
+    )
+
+
+class SevenDimensionalSimulatorNode(SimulatorNode):
+    """A vehicle with 7 states, which a topic may disturb."""
+
+    parameters_type = SevenDimensionalSimulatorParameters
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        super().register_callbacks(handle)
+        if name := self._parameters.disturbance_topic:
+            handle.subscribe(name, DisturbanceStamped, self._on_disturbance, finite="disturbance")
+
+    def _on_disturbance(self, message):
+        # As for a control: the vehicle is first where the old disturbance has brought it.
+        now = self._handle.time()
+        self._catch_up(now)
+        if not self._publishes_clock:
+            self._advance_to(now)
+        self._vehicle.disturb(to_tuple(message.disturbance))
+
+
+class NearHoverSimulatorNode(SevenDimensionalSimulatorNode):
     """A vehicle with near-hover dynamics."""
 
     @override
@@ -319,7 +347,7 @@ class NearHoverSimulatorNode(SimulatorNode):
         return NearHover()
 
 
-class NearHoverSimulatorCoupled7DNode(SimulatorNode):
+class NearHoverSimulatorCoupled7DNode(SevenDimensionalSimulatorNode):
     """A vehicle whose thrust, tilt and yaw are coupled."""
 
     @override

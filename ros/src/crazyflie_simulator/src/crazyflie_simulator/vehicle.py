@@ -13,7 +13,7 @@ from numpy.random import Generator, default_rng
 from numpy.typing import NDArray
 
 from crazyflie_model.angles import Quaternion, Triple, turned
-from crazyflie_model.dynamics import STEP, Dynamics, watchdog_control
+from crazyflie_model.dynamics import STEP, Dynamics, SevenDimensional, watchdog_control
 from crazyflie_model.elementwise import Vector
 
 _OFF: Vector[float] = [0.0, 0.0, 0.0, 0.0]
@@ -79,6 +79,12 @@ class SimulatedVehicle:
             self._pending.append((self._steps + self._delay_steps, _floats(u)))
             return
         self._set_control(_floats(u), self._steps)
+
+    def disturb(self, disturbance: Sequence[float]) -> None:
+        """Set the `SevenDimensional.disturbance` of the dynamics from the present step on."""
+        assert isinstance(self._dynamics, SevenDimensional)
+        self._dynamics.disturbance = _floats(disturbance)
+        self._origin, self._x_origin = self._steps, self._x
 
     def recover(self) -> None:
         """Enable the motors of a crashed vehicle from the next control on."""

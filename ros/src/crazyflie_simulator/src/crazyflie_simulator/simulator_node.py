@@ -323,6 +323,7 @@ class SevenDimensionalSimulatorNode(SimulatorNode):
     """A vehicle with 7 states, which a topic may disturb."""
 
     parameters_type = SevenDimensionalSimulatorParameters
+    _parameters: SevenDimensionalSimulatorParameters
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

@@ -38,15 +38,15 @@ class Planner:
             return
         if self._start is None:
             self._start = place
-        way = [b - a for a, b in zip(self._start, self._goal)]
+        way = [b - a for a, b in zip(self._start, self._goal, strict=True)]
         length = math.hypot(*way)
         share = min(1.0, SPEED * (rospy.get_time() - self._begin) / length)
-        target = [a + share * each for a, each in zip(self._start, way)]
+        target = [a + share * each for a, each in zip(self._start, way, strict=True)]
         reference = PositionVelocityStateStamped()
         reference.header.stamp = message.header.stamp
         reference.state.x, reference.state.y, reference.state.z = target
         self._reference.publish(reference)
-        ahead, left, up = (t - p for t, p in zip(target, place))
+        ahead, left, up = (t - p for t, p in zip(target, place, strict=True))
         output = PrioritizedControlStamped()
         output.header.stamp = message.header.stamp
         output.control.priority = float(math.hypot(ahead, left, up) > BOUND)

@@ -8,6 +8,7 @@ from test_program import run_doctor
 
 from crazyflie_doctor.finding import lines
 from crazyflie_doctor.vehicle import ALL_MOTORS, VehicleFacts, checks, examine
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.testing import virtual_vehicle
 
 GOOD = VehicleFacts(
@@ -43,6 +44,8 @@ def test_nothing_is_wrong_with_a_good_vehicle():
         ({"deviations": (0.0, 2.0, 0.0)}, "error", "deviation of 2.00 m/s at rest"),
         ({"changes": (0.0, 0.5, 0.0)}, "error", "has changed by 0.50 m/s"),
         ({"deviations": (), "changes": ()}, "warn", "its variance is not logged"),
+        ({"state": SupervisorState.of(deck_fault=True)}, "error", "cannot fly: deck fault"),
+        ({"state": SupervisorState.of(locked=True)}, "error", "the vehicle cannot fly: locked"),
         ({"estimator": 1}, "error", "the complementary filter estimates, which ignores poses"),
         ({"motors": 0b1011}, "error", "motor 3 fails its self test"),
         ({"battery_passed": False}, "error", "its voltage sags too far"),
@@ -67,6 +70,7 @@ def test_a_virtual_vehicle_is_examined():
     assert "bcFlow2" in facts.decks and "bcLighthouse4" not in facts.decks
     assert facts.firmware.startswith("2026.08")
     assert facts.estimator == 2
+    assert facts.state is not None and SupervisorState.CAN_FLY in facts.state
     assert all(0.0 < each < 0.1 for each in facts.deviations)
     assert facts.motors == 0b1101
     assert facts.battery_passed is True

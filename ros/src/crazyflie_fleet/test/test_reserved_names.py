@@ -75,3 +75,14 @@ def test_all_topics_of_the_driver_and_of_virtual_vehicles_are_reserved():
     topics = process.transport.parameters["/virtual_fleet/cf1/topics/true_pose"]
     assert nodes
     assert topics.removeprefix("/cf1/") in RESERVED_NAMES
+
+
+@pytest.mark.parametrize("downwash", [False, True])
+def test_virtual_vehicles_share_their_air_if_they_are_to_feel_it(downwash):
+    process = FakeProcess()
+    parameters = {"fleet": {"n": 2, "virtual_port": 19850}, "downwash": downwash}
+    process.transport.set_param("/virtual_fleet", parameters)
+    nodes = make_nodes(process.handle("/virtual_fleet"))
+    first, second = (nodes[f"/virtual_fleet/{name}"].air for name in ("cf1", "cf2"))
+    assert first is second
+    assert (first is not None) is downwash

@@ -15,6 +15,7 @@ from crazyflie_doctor.graph import COMPLEMENTARY
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.log import LogBlock
+from crazyflie_model.supervisor import SupervisorState
 
 #: Lowest voltage for a flight of some minutes, and highest voltage of one cell (V).
 MIN_VOLTAGE, FULL_VOLTAGE = 3.7, 4.25
@@ -49,6 +50,7 @@ class VehicleFacts:
     latency: float = math.nan  # s.
     decks: tuple[str, ...] = ()  # Such as bcFlow2.
     firmware: str = ""  # Release.
+    state: SupervisorState | None = None  # None: firmware that does not report it.
     # Standard deviations of the estimated velocity along each axis (m/s).
     deviations: tuple[float, ...] = ()
     estimator: float | None = None  # Number of the firmware's estimator.
@@ -71,6 +73,8 @@ def checks(facts: VehicleFacts) -> Iterator[Check]:
     )
     yield Check("decks", ", ".join(facts.decks) or "none", [])
     yield Check("firmware", facts.firmware, _firmware(facts))
+    words = "unknown" if facts.state is None else facts.state.words()
+    yield Check("state", words, _state(facts))
     deviations = ", ".join(f"{each:.3f}" for each in facts.deviations)
     yield Check("estimate", f"velocity within {deviations} m/s, at rest", _estimate(facts))
     yield Check("motors", _tested(facts.motors, "all four pass"), _motors(facts))
@@ -111,6 +115,11 @@ def _firmware(facts: VehicleFacts) -> Iterator[Finding]:
             f"release {facts.firmware or 'unknown'}; flown against {', '.join(KNOWN_FIRMWARE)}",
             "update it with cfclient, or watch the first flights",
         )
+
+
+def _state(facts: VehicleFacts) -> Iterator[Finding]:
+    if facts.state is not None and facts.state.faults:
+        yield error(f"the vehicle cannot fly: {facts.state.faults.words()}", facts.state.remedy)
 
 
 def _estimate(facts: VehicleFacts) -> Iterator[Finding]:
@@ -205,6 +214,7 @@ def _watch(
         latency=vehicle.latency(),
         decks=tuple(sorted(name for prefix, _, name in decks if prefix == "deck")),
         firmware=versions[-1].decode(errors="replace") if versions else "",
+        state=vehicle.supervisor.read(),
         estimator=vehicle.parameters.known(_ESTIMATOR),
         deviations=deviations[-1] if deviations else (),
         changes=tuple(max(axis) - min(axis) for axis in zip(*deviations, strict=True)),

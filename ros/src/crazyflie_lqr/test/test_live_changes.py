@@ -55,7 +55,7 @@ def test_any_integrator_and_gains_at_any_moment_of_a_takeoff(changes):
                 changed = IntegralStateFeedback(SOFT * factor, U_REF, 6, k, limit)
                 changed.take_over(controller)
                 controller = changed
-        u = controller.law(x, goal, 0.05 * tick)
+        u = controller.control(x, goal, 0.05 * tick)
         sound(u)
         for _ in range(50):
             x = model.step(0, x, u)
@@ -80,11 +80,11 @@ def test_a_smaller_limit_holds_for_what_the_climb_has_learned():
     before.take_off()
     standing, goal = [0.0] * 7, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
     for tick in range(100):
-        before.law(standing, goal, 0.01 * tick)
+        before.control(standing, goal, 0.01 * tick)
     after = IntegralStateFeedback(SOFT, U_REF, 6, (0.0, 0.0, -0.5), (0.0, 0.0, 0.1))
     after.take_over(before)
     for tick in range(100, 200):
-        u = after.law(standing, goal, 0.01 * tick)
+        u = after.control(standing, goal, 0.01 * tick)
     # The height error is 0.15 m at most, its rate 0.4 m/s: what is more is the integral.
     assert u[3] <= 9.81 + 0.15 * 1.5 + 0.4 + 0.5 + 0.5 * 0.1
 

@@ -43,7 +43,7 @@ def flown(vehicle, references, duration=8.0):
         yaw = x[6] if len(x) == 7 else rpy_from_quaternion(*x[6:10])[2]
         state = [*x[:6], yaw]
         states.append(state)
-        u = controller.law(state, guard.value(time, state), time)
+        u = controller.control(state, guard.value(time, state), time)
         for step in range(round(PERIOD / STEP)):
             x = model.step(round(PERIOD / STEP) * tick + step, x, u)
     return states

@@ -90,7 +90,7 @@ class Flight:
             u = [0.0, 0.0, 0.0, GRAVITY + 0.2 if time > LIFT_OFF else 0.0]
         else:
             x = [*motion.position, *motion.velocity, attitude[2]]
-            u = self.controller.law(x, self.goal, stamp)
+            u = self.controller.control(x, self.goal, stamp)
         self.vehicle.command(u)
         self.control.command(u, time)
         return False

@@ -16,7 +16,7 @@ from operator import mul
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 
 from crazyflie_model.angles import wrap_to_pi
@@ -50,7 +50,11 @@ def heading_error(
     ``yaw_index`` of the state, and the yaw error wrapped to [-pi, pi].
     """
     e = [a - b for a, b in zip(x, x_ref, strict=True)]
-    yaw = x[yaw_index]
+    return _turned(e, x[yaw_index], yaw_index)
+
+
+def _turned(e, yaw, yaw_index):
+    """Turn an error into the heading frame, in place."""
     f = functions(yaw)
     c, s = f.cos(yaw), f.sin(yaw)
     e[0], e[1] = c * e[0] + s * e[1], c * e[1] - s * e[0]
@@ -205,12 +209,13 @@ _LEAST_DAMPING = 0.7  #: A height loop with this damping ratio overshoots a step
 class LinearFeedback:
     """The control law u = u_ref + K e, with e of `heading_error`.
 
-    A subclass overrides `control`; or `law`, which is the same in plain floats and what `control`
-    calls. K has the shape (u_dim, x_dim), with the sign of this formula; u_ref is the control at
-    the reference, hover; ``yaw_index`` is where the yaw is in the state.
+    A subclass overrides `control`. K has the shape (u_dim, x_dim), with the sign of this formula;
+    u_ref is the control at the reference, hover; ``yaw_index`` is where the yaw is in the state.
     """
 
     def __init__(self, K: Iterable[Iterable[float]], u_ref: Iterable[float], yaw_index: int):
+        #: The control that is flown in place of this controller's; None if its own is flown.
+        self.foreign: Components | None = None
         self._hover_thrust: float | None = None
         self.K = K
         self.u_ref = u_ref
@@ -247,19 +252,17 @@ class LinearFeedback:
         if thrust is not None:
             self._u_hover[THRUST] = thrust
 
-    def control(
-        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
-    ) -> NDArray[np.float64]:
+    def control(self, x: ArrayLike, x_ref: ArrayLike, time: float) -> NDArray[np.float64]:
         """Return the control, shape (u_dim,), for a state and a reference, both of shape (x_dim,).
 
         ``time`` is the state's stamp, s.
         """
-        return np.array(self.law(_floats(x), _floats(x_ref), time))
+        return np.array(linear_control(self._rows, self._u_hover, self._error(x, x_ref)))
 
-    def law(self, x: Components, x_ref: Components, time: float) -> list[float]:
-        """Return the same as `control`, from floats and in floats."""
-        error = heading_error(x, x_ref, self.yaw_index)
-        return linear_control(self._rows, self._u_hover, error)
+    def _error(self, x, x_ref):
+        # In plain floats, which are faster for so few numbers; see `heading_error`.
+        yaw = float(x[self.yaw_index])
+        return _turned(np.subtract(x, x_ref).tolist(), yaw, self.yaw_index)
 
     def take_over(self, previous: Self) -> None:
         """Continue in flight where a controller with other parameters ends."""
@@ -303,9 +306,9 @@ class IntegralStateFeedback(LinearFeedback):
         super().__init__(K, u_ref, yaw_index)
         self._integrator_k = [float(each) for each in integrator_k]
         self._integrator_limit = [float(each) for each in integrator_limit]
+        # Axes whose integral acts on the control.
+        self._axes = [k for k in range(3) if integrator_k[k] and integrator_limit[k]]
         self._integral = [0.0, 0.0, 0.0]
-        #: The control that is flown in place of this controller's; None if its own is flown.
-        self.foreign: Components | None = None
         self._time: float | None = None
         self._integrates = True
         self._climb: Climb | None = None
@@ -330,19 +333,20 @@ class IntegralStateFeedback(LinearFeedback):
         self._thrust = self._u_hover[THRUST]
 
     @override
-    def law(self, x: Components, x_ref: Components, time: float) -> list[float]:
+    def control(self, x: ArrayLike, x_ref: ArrayLike, time: float) -> NDArray[np.float64]:
         """Return the control; states with a gap before them, see `MAX_GAP`, are not integrated."""
         dt = self._time_since_last(time)
         reference, climb_thrust = self._follow_climb(x, x_ref, dt)
-        error = heading_error(x, reference, self.yaw_index)
+        error = self._error(x, reference)
         u = linear_control(self._rows, self._u_hover, error)
-        if self._integrates and self.foreign is None:
-            self._integrate(error[:3], dt, u)
-        u = with_integrals(u, self._integral, self._integrator_k)
+        if self._axes:
+            if self._integrates and self.foreign is None:
+                self._integrate(error[:3], dt, u)
+            u = with_integrals(u, self._integral, self._integrator_k)
         u[THRUST] += climb_thrust
         u = limited(u)
         self._thrust = u[THRUST]
-        return u
+        return np.array(u)
 
     @override
     def take_over(self, previous: Self) -> None:
@@ -366,7 +370,7 @@ class IntegralStateFeedback(LinearFeedback):
     @property
     def has_integral(self) -> bool:
         """Whether any integral acts on the control."""
-        return any(map(mul, self._integrator_k, self._integrator_limit))
+        return bool(self._axes)
 
     @property
     def height_overshoots(self) -> bool:
@@ -390,14 +394,15 @@ class IntegralStateFeedback(LinearFeedback):
         if climb is None:
             return x_ref, 0.0
         thrust = self._thrust if self.foreign is None else self.foreign[THRUST]
-        climb.advance(dt, x[2], x[5], x_ref[2], thrust - self._u_hover[THRUST])
+        z, z_dot, goal = float(x[2]), float(x[5]), float(x_ref[2])
+        climb.advance(dt, z, z_dot, goal, thrust - self._u_hover[THRUST])
         k, limit = self._integrator_k[2], self._integrator_limit[2]
         if climb.disturbance != 0.0 and k != 0.0:
             self._integral[2] = clip(-climb.disturbance / k, -limit, limit)
         if climb.has_arrived:
             self._climb = None
             return x_ref, 0.0
-        x_ref = [*x_ref]
+        x_ref = np.array(x_ref)
         x_ref[2], x_ref[5] = climb.z, climb.z_dot
         return x_ref, climb.z_ddot
 
@@ -405,8 +410,10 @@ class IntegralStateFeedback(LinearFeedback):
         # An error that overflowed must not stay in the integral.
         if dt == 0.0 or not math.isfinite(sum(error)):
             return
-        # The climb has an integral of its own for the height.
-        for axis in range(3 if self._climb is None else 2):
+        for axis in self._axes:
+            # The climb has an integral of its own for the height.
+            if axis == 2 and self._climb is not None:
+                continue
             k, limit = self._integrator_k[axis], self._integrator_limit[axis]
             integral = self._integral[axis]
             self._integral[axis] = integrate(axis, integral, error[axis], dt, linear, k, limit)

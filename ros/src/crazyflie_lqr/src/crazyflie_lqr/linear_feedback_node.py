@@ -3,16 +3,17 @@
 import math
 from collections.abc import Iterator
 from itertools import chain
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from std_msgs.msg import Float64
 from typing_extensions import override
 
 from crazyflie_lqr.flown_control import FlownControl
 from crazyflie_lqr.gain_file import CONTROL_FILE, MatrixFile
 from crazyflie_lqr.linear_feedback import (
+    U_DIM,
     GroundGuess,
     IntegralStateFeedback,
     LinearFeedback,
@@ -105,11 +106,21 @@ class LinearFeedbackParameters(ReferenceParameters):
         return self.own_final_control_topic or derived
 
 
+class Controller(Protocol):
+    """A control law."""
+
+    def control(self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float) -> ArrayLike:
+        """Return the control, shape (u_dim,), for a state and a reference, both of shape (x_dim,).
+
+        ``time`` is the state's stamp, s.
+        """
+
+
 class LinearFeedbackNode(Node[LinearFeedbackParameters]):
     """Answer every state with a control that moves the vehicle towards the reference.
 
     A subclass describes its state in class attributes, and may override `complete_reference` and
-    `make_controller`. Unless it does, or the controller overrides `control`, no arrays are created.
+    `make_controller`.
     """
 
     needed_in_flight = True
@@ -132,16 +143,15 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
 
     def complete_reference(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the reference state, shape (x_dim,), of the fields of a reference message."""
-        return np.append(reference, self.reference_tail)
+        return np.array([*reference.tolist(), *self.reference_tail])
 
-    def make_controller(self, parameters: Any) -> LinearFeedback:
+    def make_controller(self, parameters: Any) -> Controller:
         """Return the control law for parameters of the type `parameters_type`."""
         return LinearFeedback(parameters.K, parameters.u_ref, self.yaw_index)
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         super().load_parameters(handle)
-        self._completes_itself = _overrides(self, LinearFeedbackNode, "complete_reference")
         self._apply(self.make_controller(self._parameters))
 
     @override
@@ -160,37 +170,32 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
         handle.subscribe(parameters.state_topic, self.state_type, self._on_state, finite="state")
 
     def _reconfigure(self, parameters):
-        controller = self.make_controller(parameters)
-        controller.take_over(self._controller)
+        before = self._feedback
+        self._apply(self.make_controller(parameters))
+        self._feedback.take_over(before)
         self._references.change(parameters.limits)
-        self._apply(controller)
         self._follow_flown()
 
     def _follow_flown(self):
         """Subscribe to the controls that are flown, once there is an integrator."""
-        controller, topic = self._controller, self._parameters.final_control_topic
-        has_integral = isinstance(controller, IntegralStateFeedback) and controller.has_integral
+        feedback, topic = self._feedback, self._parameters.final_control_topic
+        has_integral = isinstance(feedback, IntegralStateFeedback) and feedback.has_integral
         if has_integral and topic is not None and not self._follows_flown:
             self._follows_flown = True
             self._handle.subscribe(topic, ControlStamped, self._on_flown, finite="control")
 
     def _apply(self, controller):
-        uses_arrays = _overrides(controller, LinearFeedback, "control")
         self._controller = controller
-        self._law = self._control_by_arrays if uses_arrays else controller.law
-
-    def _control_by_arrays(self, x, x_ref, time):
-        return self._controller.control(np.array(x), np.array(x_ref), time).tolist()
+        # Of any other controller, nothing but the control is asked.
+        is_feedback = isinstance(controller, LinearFeedback)
+        self._feedback = controller if is_feedback else LinearFeedback((), (0.0,) * U_DIM, 0)
 
     def _on_reference(self):
         if self._flight_state == FlightStatus.TAKING_OFF:
             self._take_off()
 
     def _completed(self, reference):
-        if self._completes_itself:
-            completed = self.complete_reference(np.array(reference))
-            return [float(each) for each in completed]
-        return [*reference, *self.reference_tail]
+        return np.asarray(self.complete_reference(np.array(reference)), dtype=float).tolist()
 
     def _on_flight_status(self, status):
         if status.state in (self._flight_state, FlightStatus.UNKNOWN):
@@ -201,14 +206,14 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             self._take_off()
         else:
             self._is_flown = False
-            self._controller.reset_integrator()
+            self._feedback.reset_integrator()
             if status.state == FlightStatus.ON_GROUND:
                 # The battery, or the load, may be changed.
-                self._controller.hover_thrust = None
+                self._feedback.hover_thrust = None
 
     def _on_hover_thrust(self, message):
         if MIN_THRUST <= message.data <= MAX_THRUST:
-            self._controller.hover_thrust = message.data
+            self._feedback.hover_thrust = message.data
 
     def _on_flown(self, message):
         self._flown.receive(to_tuple(message.control), self._handle.time())
@@ -217,7 +222,7 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
         if not self._is_flown:
             self._is_flown = True
             self._flown.forget()
-            self._controller.take_off()
+            self._feedback.take_off()
 
     def _on_state(self, message):
         now, time = self._handle.time(), message.header.stamp.to_sec()
@@ -234,12 +239,13 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             return
         if self._flight_state == FlightStatus.UNKNOWN:
             if self._ground_guess.is_flying(x[2], x_ref[2], now):
-                self._controller.enable_integrator()
+                self._feedback.enable_integrator()
             else:
-                self._controller.reset_integrator()
+                self._feedback.reset_integrator()
         if self._follows_flown:
-            self._controller.foreign = self._flown.foreign(now)
-        u = self._law(x, x_ref, time)
+            self._feedback.foreign = self._flown.foreign(now)
+        control = self._controller.control(np.array(x), np.array(x_ref), time)
+        u = np.asarray(control, dtype=float).tolist()
         if not math.isfinite(sum(u)):
             self._handle.warn(
                 f"the control {u} is not finite and is not sent", throttle=1.0, key="not finite"
@@ -247,8 +253,8 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             return
         if self._follows_flown:
             self._flown.send(u, now)
-        control = from_vector(Control, u)
-        self._publisher.publish(stamped(ControlStamped, message.header.stamp, control=control))
+        answer = from_vector(Control, u)
+        self._publisher.publish(stamped(ControlStamped, message.header.stamp, control=answer))
 
     def _is_old(self, stamp, now):
         age = self._age.update(stamp, self._handle.nanoseconds(now) * 1e-9, now)
@@ -268,7 +274,3 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             key="old state",
         )
         return True
-
-
-def _overrides(instance, base, name):
-    return getattr(type(instance), name) is not getattr(base, name)

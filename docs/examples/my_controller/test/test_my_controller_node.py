@@ -60,9 +60,9 @@ def test_turns_towards_the_heading(parameters):
 
 
 def test_tilts_no_more_than_it_may(parameters):
-    assert control_at(parameters, -100.0).pitch == 0.2
-    assert control_at({**parameters, "max_tilt": 0.05}, 100.0).pitch == -0.05
-    assert control_at(parameters, 100.0, max_tilt=0.05).pitch == -0.05
+    assert control_at(parameters, -2.0).pitch == 0.2
+    assert control_at({**parameters, "max_tilt": 0.05}, 2.0).pitch == -0.05
+    assert control_at(parameters, 2.0, max_tilt=0.05).pitch == -0.05
 
 
 def test_a_bad_parameter_is_named(parameters):

@@ -26,7 +26,7 @@ from crazyflie_dashboard.snapshot import (
     VehicleSnapshot,
 )
 from crazyflie_dashboard.surroundings import grouped
-from crazyflie_takeoff.limits import Box
+from crazyflie_takeoff.envelope import Box
 from crazyflie_utils.refusal import RefusalError
 
 ACTIONS = frozenset(

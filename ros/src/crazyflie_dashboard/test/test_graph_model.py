@@ -22,7 +22,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
     VehicleStatus,
 )
-from crazyflie_takeoff.limits import Box
+from crazyflie_takeoff.envelope import Box
 from crazyflie_utils.tf.frame_tree import StampedPose, encode_poses
 
 

@@ -21,7 +21,7 @@ from visualization_msgs.msg import Marker
 
 from crazyflie_dashboard.snapshot import Action, LogLine, Placed, Sentence
 from crazyflie_dashboard.surroundings import grouped
-from crazyflie_takeoff.limits import Box
+from crazyflie_takeoff.envelope import Box
 
 
 def test_vehicles_take_off_go_where_the_floor_is_clicked_and_land(browser, server):

@@ -1,7 +1,8 @@
 """A flight with a clock that is moved by hand."""
 
-from crazyflie_takeoff.server_table import FlightStateMachine, ServerEvent, ServerState, TakeoffPlan
-from crazyflie_takeoff.transition_table import FlightState
+from crazyflie_takeoff.phases import FlightState
+from crazyflie_takeoff.profiles import TakeoffPlan
+from crazyflie_takeoff.server_table import FlightStateMachine, Request, ServerState
 
 G = 9.81
 PLAN = TakeoffPlan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.3)
@@ -62,7 +63,7 @@ class Clock:
 def flying(plan=PLAN):
     """Return a flight that has taken off."""
     flight = grounded(plan)
-    flight.request(ServerEvent.TAKEOFF)
+    flight.request(Request.TAKEOFF)
     Clock(flight, start=0.0).run(6.01)
     assert flight.flight_state is FLYING
     return flight
@@ -73,14 +74,14 @@ def in_state(state):
     flight = grounded()
     if state is ON_GROUND:
         return flight
-    flight.request(ServerEvent.TAKEOFF)
+    flight.request(Request.TAKEOFF)
     flight.tick(0.0)
     if state is TAKING_OFF:
         return flight
     flight.tick(6.01)
     if state is FLYING:
         return flight
-    flight.request(ServerEvent.LAND)
+    flight.request(Request.LAND)
     flight.tick(6.02, (0.0, 0.0, 1.0 if state is DESCENDING else 0.0))
     assert flight.flight_state is state
     return flight

@@ -56,9 +56,9 @@ def state(z, z_dot=0.0, stamp=None):
 
 
 def filter_status(remembered="unknown", state=FilterStatus.PASSING, **fields):
-    """Return what a filter publishes that has heard a flight state last."""
+    """Return what a filter publishes that has heard a flight state last, and has a controller."""
     code = getattr(FlightStatus, remembered.upper())
-    return FilterStatus(state=state, flight_state=code, **fields)
+    return FilterStatus(state=state, flight_state=code, **{"has_controller": True, **fields})
 
 
 class PointMass:

@@ -8,7 +8,7 @@ from std_srvs.srv import EmptyRequest
 from takeoff_helpers import SERVER, filter_status, state
 
 from crazyflie_msgs.msg import FlightStatus
-from crazyflie_takeoff.takeoff_checks import BatteryCheck, Charge
+from crazyflie_takeoff.refusals import BatteryCheck, Charge
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing import FakeProcess
@@ -140,7 +140,6 @@ def test_status_in_words():
     assert process.launch(TakeoffServerNode(), "/takeoff_server", SERVER)
     process.advance(0.2)
     process.publish("/in_flight_filter_status", filter_status("on_ground"))
-    process.publish("/in_flight_controller", Bool(True))
     process.advance(2.0)
     process.publish("/state", state(0.0))
     process.advance(0.3)

@@ -1,26 +1,17 @@
 """Which control is passed on, with a clock moved by hand."""
 
 import pytest
-from filter_flight import (
-    DESCENDING,
-    FLYING,
-    LANDING,
-    LIMITS,
-    ON_GROUND,
-    TAKING_OFF,
-    G,
-    level,
-)
+from filter_flight import DESCENDING, FLYING, LANDING, ON_GROUND, TAKING_OFF, G, Supervised, level
 
-from crazyflie_takeoff.filter_machine import FilterMachine, LossTimeouts
-from crazyflie_takeoff.transition_table import FlightState
+from crazyflie_takeoff.facts import Timeouts
+from crazyflie_takeoff.phases import FlightState
 
 
-class ControlFilter(FilterMachine):
-    """A machine whose commanded controls are level hover, and which is given thrusts only."""
+class ControlFilter(Supervised):
+    """A supervisor whose commanded controls are level hover, and which is given thrusts only."""
 
     def __init__(self):
-        super().__init__(LossTimeouts(0.25, 0.5, 5.0, 3.0), LIMITS)
+        super().__init__(Timeouts(0.25, 0.5, 5.0, 3.0))
 
     def takeoff(self, time, control, thrust):
         return super().takeoff(time, control, level(thrust))
@@ -63,10 +54,6 @@ def test_commanded_control_is_passed_on_when_takeoff_control_is_old(control_filt
     assert control_filter.commanded(2.6, "c") == "c"
 
 
-def test_commanded_control_is_passed_on_without_any_takeoff_control(control_filter):
-    assert control_filter.commanded(0.0, "c") == "c"
-
-
 def test_a_clock_that_is_reset_does_not_keep_the_controller_out(control_filter):
     control_filter.takeoff(5000.0, "t", 9.0)
     assert control_filter.commanded(0.0, "c") == "t"
@@ -103,7 +90,7 @@ def test_the_flight_state_decides(control_filter, state):
     control_filter.takeoff(0.0, "t", 9.0)
     control_filter.flight_state = state
     assert control_filter.commanded(0.1, "c") == ("c" if state in (FLYING, DESCENDING) else "t")
-    assert control_filter.in_flight == state.in_flight
+    assert control_filter.facts.in_flight == state.in_flight
 
 
 @pytest.mark.parametrize("toggle_first", [True, False])
@@ -117,7 +104,7 @@ def test_state_and_toggle_of_one_event_do_not_cancel_each_other(control_filter, 
 
     for state in (FLYING, LANDING, ON_GROUND, TAKING_OFF, FLYING):
         happen(state)
-        assert control_filter.in_flight == state.in_flight
+        assert control_filter.facts.in_flight == state.in_flight
 
 
 def test_on_the_ground_the_controller_stays_out_when_the_server_dies(control_filter):
@@ -136,70 +123,69 @@ def test_a_server_without_flight_state_may_take_over(control_filter):
 
 
 def test_remembers_what_it_has_been_told(control_filter):
-    assert control_filter.remembered is None
+    assert control_filter.facts.remembered is None
     control_filter.toggle()
-    assert control_filter.remembered is FLYING
+    assert control_filter.facts.remembered is FLYING
     control_filter.toggle()
-    assert control_filter.remembered is None
+    assert control_filter.facts.remembered is None
     for state in FlightState:
         control_filter.flight_state = state
         control_filter.toggle()
-        assert control_filter.remembered is state
+        assert control_filter.facts.remembered is state
 
 
 @pytest.mark.parametrize(
-    ("thrust", "state", "in_flight", "reports_ground"),
+    ("thrust", "state", "in_flight", "reports_ground", "stands"),
     [
-        (0.0, None, False, True),
-        (0.0, ON_GROUND, False, True),
-        (-0.5, ON_GROUND, False, True),
-        (0.5, ON_GROUND, False, False),
-        (0.0, TAKING_OFF, False, False),
-        (0.0, FLYING, False, False),
-        (0.0, None, True, False),
-        (None, None, False, False),
-        (None, ON_GROUND, False, False),
+        (0.0, None, False, True, True),
+        (0.0, ON_GROUND, False, True, True),
+        (-0.5, ON_GROUND, False, True, True),
+        (0.5, ON_GROUND, False, False, False),
+        (0.5, None, False, False, False),
+        (0.0, TAKING_OFF, False, False, False),
+        (0.0, LANDING, False, False, True),
+        (0.0, FLYING, False, False, False),
+        (0.0, DESCENDING, False, False, False),
+        (0.0, None, True, False, False),
+        (None, None, False, False, True),
+        (None, ON_GROUND, False, False, True),
     ],
 )
-def test_the_server_reports_the_ground_by_zero_thrust(
-    control_filter, thrust, state, in_flight, reports_ground
+def test_what_shows_that_the_vehicle_is_on_the_ground(
+    control_filter, thrust, state, in_flight, reports_ground, stands
 ):
     if thrust is not None:
         control_filter.takeoff(0.0, "t", thrust)
     if in_flight:
         control_filter.toggle()
     control_filter.flight_state = state
-    assert control_filter.server_reports_ground == reports_ground
-
-
-@pytest.mark.parametrize(
-    ("thrust", "state", "on_ground"),
-    [
-        (0.0, None, True),
-        (0.5, None, False),
-        (0.0, TAKING_OFF, False),
-        (0.0, LANDING, True),
-        (0.0, FLYING, False),
-        (0.0, DESCENDING, False),
-    ],
-)
-def test_a_vehicle_is_on_the_ground_as_far_as_is_known(control_filter, thrust, state, on_ground):
-    control_filter.takeoff(0.0, "t", thrust)
-    control_filter.flight_state = state
-    assert control_filter.is_on_ground == on_ground
-    control_filter.stop("it was called")
-    control_filter.tick(3.0)
-    control_filter.tick(9.0)
-    assert control_filter.is_on_ground
+    facts = control_filter.facts
+    assert (facts.server_reports_ground, facts.stands) == (reports_ground, stands)
 
 
 def test_the_controller_is_needed_between_takeoff_and_flight_after_half_a_second(control_filter):
-    assert not control_filter.selects_controller(9.0)
+    facts = control_filter.facts
+
+    def needs(time):
+        control_filter.tick(time)
+        return facts.needs_controller
+
+    assert not needs(0.9)
     control_filter.takeoff(1.0, "t", 0.5)
-    assert control_filter.takeoff_age(1.25) == 0.25
-    assert [control_filter.selects_controller(time) for time in (1.5, 1.51)] == [False, True]
+    assert [needs(time) for time in (1.5, 1.51)] == [False, True]
+    assert facts.takeoff_age == pytest.approx(0.51)
     control_filter.toggle()
-    assert [control_filter.selects_controller(time) for time in (1.25, 1.26)] == [False, True]
-    assert control_filter.remembered is FLYING
+    control_filter.takeoff(2.0, "t", 0.5)
+    assert [needs(time) for time in (2.25, 2.26)] == [False, True]
+    assert facts.remembered is FLYING
     control_filter.flight_state = ON_GROUND
-    assert control_filter.remembered is ON_GROUND
+    assert facts.remembered is ON_GROUND
+
+
+@pytest.mark.parametrize("state", [ON_GROUND, LANDING])
+def test_nothing_passes_to_a_vehicle_that_stands_after_its_flight(control_filter, state):
+    """The supervisor has ended the flight, and the server has not said a word since."""
+    control_filter.flight_state = state
+    control_filter.facts.end_flight()
+    assert control_filter.commanded(1.0, "climb") is None
+    assert control_filter.commanded(9.0, "climb") is None

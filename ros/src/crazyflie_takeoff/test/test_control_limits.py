@@ -3,25 +3,27 @@
 import math
 
 import pytest
+from filter_flight import G, level
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
-from crazyflie_takeoff.limits import (
-    MEMORY,
+from crazyflie_takeoff.envelope import (
+    LANDING_CLIMB,
     NO_BOX,
     Box,
-    Callers,
-    ClimbLimit,
     Limits,
-    RunGaps,
     Walls,
+    cannot_climb_too_far,
+    is_any_within_pause,
+    within_climb,
+    within_pause,
 )
+from crazyflie_takeoff.fallback import MAX_BRAKING, MAX_SUBSTITUTE, SafeSetpoint
+from crazyflie_takeoff.guards import CLIMB_TIMEOUT
 from crazyflie_takeoff.motion import Delay, Motion
-from crazyflie_takeoff.relay import Relay
-from crazyflie_takeoff.safe_control import MAX_BRAKING, MAX_SUBSTITUTE, SafeSetpoint
+from crazyflie_takeoff.publishers import Pauses, Publishers
 
-G = 9.81
 ANY = st.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -37,55 +39,31 @@ def test_any_control_ends_in_range(roll, pitch, yaw_dot, thrust, lowest):
 
 def test_a_model_may_have_closer_limits():
     limits = Limits(NO_BOX, 0.5, -0.5, 3.0, 10.0, 0.1, 1.0, 12.0)
-    relay = Relay(limits, 0.1)
     beyond = (
         SafeSetpoint(0.11, 0.0, 0.0, 10.0),
         SafeSetpoint(0.0, -0.11, 0.0, 10.0),
         SafeSetpoint(0.0, 0.0, 1.1, 10.0),
-        SafeSetpoint(0.0, 0.0, 0.0, 12.1),
+        level(12.1),
+        level(3.9),
     )
     for control in beyond:
-        assert not relay.pass_unchanged(0.0, control)
+        assert not limits.contain(control)
         result = limits.in_range(control, MIN_THRUST)
         assert result != control
-        assert relay.pass_unchanged(0.0, result)
+        assert limits.contain(result)
+
+
+# Pauses.
 
 
 def test_a_control_within_limits_is_passed_on_by_a_filter_that_runs():
-    gaps = RunGaps()
+    pauses = Pauses()
     control = SafeSetpoint(MAX_TILT, -MAX_TILT, 3.0, MAX_THRUST)
-    for k in range(1000):
+    for _ in range(1000):
         # As often as a filter runs that has little to do.
-        gaps.run(0.04 * k)
-        assert gaps.apply(control, G) == control
-
-
-@pytest.mark.parametrize("gap", [0.1, 0.3, 0.6])
-def test_what_is_kept_for_long_changes_the_speed_by_half_a_metre_per_second(gap):
-    gaps = RunGaps()
-    gaps.run(1.0)
-    gaps.run(1.0 + gap)
-    high = gaps.apply(SafeSetpoint(MAX_TILT, 0.0, 0.0, MAX_THRUST), G)
-    low = gaps.apply(SafeSetpoint(-MAX_TILT, 0.0, 0.0, MIN_THRUST), G)
-    assert (high.thrust - G) * gap == pytest.approx(0.5)
-    assert (low.thrust - G) * gap == pytest.approx(-0.5)
-    assert G * math.tan(high.roll) * gap <= 0.5 + 1e-9
-    # The ramp of a landing ends at zero thrust all the same.
-    assert gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, 0.0), G, is_ramp=True).thrust == 0.0
-    for k in range(400):
-        gaps.run(1.0 + gap + 0.01 * (k + 1))
-    assert gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, 14.0), G).thrust == 14.0
-
-
-def test_speeds_do_not_add_up_over_long_gaps():
-    gaps = RunGaps()
-    gaps.run(1.0)
-    gaps.run(1.3)
-    assert gaps.apply(
-        SafeSetpoint(0.0, 0.0, 0.0, MAX_THRUST), G, climb=0.4
-    ).thrust == pytest.approx(G + 0.1 / 0.3)
-    assert gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, MAX_THRUST), G, climb=0.8).thrust < G
-    assert gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, MIN_THRUST), G, climb=-0.8).thrust > G
+        pauses.note(0.04, 0.04)
+        assert within_pause(control, pauses.longest, G) == control
+        assert is_any_within_pause(pauses.longest)
 
 
 @given(
@@ -94,13 +72,10 @@ def test_speeds_do_not_add_up_over_long_gaps():
     st.floats(0.75 * G, 1.25 * G),
     st.floats(MIN_THRUST, MAX_THRUST),
 )
-@example(0.25, -3.0, G, 11.0)  # Within the gap the fall would end with 2 g,
+@example(0.25, -3.0, G, 11.0)  # Within the pause the fall would end with 2 g,
 @example(0.25, 3.0, G, 11.0)  # and the climb with less than no thrust.
-def test_no_speed_is_ended_with_a_thrust_that_the_filter_does_not_give(gap, climb, hover, thrust):
-    gaps = RunGaps()
-    gaps.run(1.0)
-    gaps.run(1.0 + gap)
-    result = gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, thrust), hover, climb).thrust
+def test_no_speed_is_ended_with_a_thrust_that_the_filter_does_not_give(pause, climb, hover, thrust):
+    result = within_pause(level(thrust), pause, hover, climb).thrust
     assert MIN_THRUST <= result <= max(thrust, MAX_SUBSTITUTE)
     assert result >= min(thrust, hover - MAX_BRAKING)
 
@@ -110,28 +85,20 @@ def test_no_speed_is_ended_with_a_thrust_that_the_filter_does_not_give(gap, clim
     [(0.035, 0.315, True), (0.05, 0.3, True), (0.3, 0.2, False), (0.5, 0.4, False)],
 )
 def test_a_filter_that_hardly_runs_says_so(runs, stops, is_starved):
-    gaps, time = RunGaps(), 0.0
+    pauses = Pauses()
+    pauses.note(5.0, 5.0)
+    assert pauses.complaint == ""
     for _ in range(20):
-        for _ in range(round(runs / 0.01)):
-            time += 0.01
-            gaps.run(time)
-        time += stops
-    gaps.run(time)
-    assert bool(gaps.complaint) == is_starved
-
-
-def test_a_filter_that_was_stopped_once_does_not_say_so():
-    gaps = RunGaps()
-    for k in range(10):
-        gaps.run(0.01 * k)
-    gaps.run(5.0)
-    assert gaps.complaint == ""
+        for _ in range(round(runs / 0.01) - 1):
+            pauses.note(0.01, 0.01)
+        pauses.note(stops + 0.01, stops + 0.01)
+    assert bool(pauses.complaint) == is_starved
 
 
 @pytest.mark.parametrize(
-    ("gap", "climb", "least", "most"),
+    ("pause", "climb", "least", "most"),
     [
-        # 0.5 m/s within the longest gap; after 0.2 s the present speed is included.
+        # 0.5 m/s within the longest pause; after 0.2 s the present speed is included.
         (0.25, 0.0, -2.0, 2.0),
         (0.25, 0.25, -3.0, 1.0),
         (0.25, -0.25, -1.0, 3.0),
@@ -140,101 +107,88 @@ def test_a_filter_that_was_stopped_once_does_not_say_so():
         (0.125, -0.25, -4.0, 6.0),
     ],
 )
-def test_how_much_thrust_a_filter_passes_on_that_has_not_run(gap, climb, least, most):
-    gaps = RunGaps()
-    gaps.run(1.0)
-    assert gaps.longest == 0.0
-    gaps.run(1.0 + gap)
-    assert gaps.longest == gap
+def test_how_much_thrust_a_filter_passes_on_that_has_not_run(pause, climb, least, most):
+    assert not is_any_within_pause(pause)
     for asked, passed in ((-90.0, least), (0.5, 0.5), (90.0, most)):
-        control = gaps.apply(SafeSetpoint(0.0, 0.0, 3.0, G + asked), G, climb)
+        control = within_pause(SafeSetpoint(0.0, 0.0, 3.0, G + asked), pause, G, climb)
         assert control.thrust - G == pytest.approx(passed)
         assert control.yaw_dot == 3.0
-    tilted = gaps.apply(SafeSetpoint(1.0, -1.0, 0.0, G), G)
-    assert math.tan(tilted.roll) == pytest.approx(0.5 / gap / G)
+    tilted = within_pause(SafeSetpoint(1.0, -1.0, 0.0, G), pause, G)
+    assert math.tan(tilted.roll) == pytest.approx(0.5 / pause / G)
     assert tilted.pitch == -tilted.roll
-    ramp = gaps.apply(SafeSetpoint(0.0, 0.0, 0.0, -90.0), G, climb, is_ramp=True)
-    assert ramp.thrust == -90.0
+    assert within_pause(level(-90.0), pause, G, climb, is_ramp=True).thrust == -90.0
 
 
-def test_a_gap_is_forgotten_in_two_seconds():
-    gaps = RunGaps()
-    gaps.run(1.0)
-    gaps.run(9.0)
+def test_a_pause_is_forgotten_in_two_seconds():
+    pauses = Pauses()
+    pauses.note(8.0, 8.0)
     # A clock that steps further was set: 1 s is used.
-    assert gaps.longest == 1.0
-    gaps.run(9.0)
-    gaps.run(8.0)
-    gaps.run(8.5)
-    assert gaps.longest == pytest.approx(math.exp(-0.25))
+    assert pauses.longest == 1.0
+    pauses.note(0.5, 0.01)
+    assert pauses.longest == pytest.approx(math.exp(-0.25))
+
+
+# Climbs.
 
 
 @pytest.mark.parametrize(
-    ("z", "z_dot", "is_landing", "most"),
+    ("z", "z_dot", "climb", "most"),
     [
-        (0.0, 0.0, False, 30.0),
-        (0.0, 2.5, False, 5.0),
-        (0.0, 0.0, True, 5.0),
+        (0.0, 0.0, 3.0, 30.0),
+        (0.0, 2.5, 3.0, 5.0),
+        (0.0, 0.0, LANDING_CLIMB, 5.0),
         # With 4 m/s^2 a climb of 2 m/s ends within 0.5 m; above, it returns at 0.5/s.
-        (9.5, 1.5, False, 5.0),
-        (11.0, 0.0, False, -5.0),
-        (10.0, 0.0, False, 0.0),
-        (10.0, 3.0, False, 4.0 - G),
+        (9.5, 1.5, 3.0, 5.0),
+        (11.0, 0.0, 3.0, -5.0),
+        (10.0, 0.0, 3.0, 0.0),
+        (10.0, 3.0, 3.0, 4.0 - G),
     ],
 )
-def test_the_most_thrust_of_a_climb(z, z_dot, is_landing, most):
+def test_the_most_thrust_of_a_climb(z, z_dot, climb, most):
     motion = Motion((0.0, 0.0, z), (0.0, 0.0, z_dot))
-    limit = ClimbLimit(3.0)
-    assert limit.apply(99.0, G, motion, 10.0, is_landing) - G == pytest.approx(most)
-    assert limit.apply(4.0, G, motion, 10.0, is_landing) == 4.0
-    assert limit.apply(99.0, G, None, 10.0, is_landing) == 99.0
+    thrust, excess = within_climb(99.0, G, motion, 10.0, climb)
+    assert thrust - G == pytest.approx(most)
+    assert excess
+    assert within_climb(4.0, G, motion, 10.0, climb) == (4.0, "")
+    assert within_climb(99.0, G, None, 10.0, climb) == (99.0, "")
 
 
-def test_too_much_climb_is_complained_of_after_two_seconds_but_not_in_a_landing():
-    fast, landing = ClimbLimit(3.0), ClimbLimit(3.0)
-    said = []
-    for _ in range(9):
-        motion = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 2.9))
-        fast.apply(MAX_THRUST, G, motion, 10.0, False)
-        landing.apply(MAX_THRUST, G, motion, 10.0, True)
-        said.append((fast.advance(0.25), landing.advance(0.25)))
-    assert said[:8] == [("", "")] * 8
-    assert said[8] == ("the controls climb faster than 3 m/s", "")
-    fast.apply(G, G, motion, 10.0, False)
-    assert fast.advance(0.25) == ""
+@given(st.floats(0.0, 12.0), st.floats(-3.0, 4.0), st.floats(0.75 * G, 1.25 * G))
+def test_where_no_climb_can_be_too_far_no_thrust_is_changed(z, z_dot, hover):
+    motion = Motion((0.0, 0.0, z), (0.0, 0.0, z_dot))
+    passed, _ = within_climb(MAX_THRUST, hover, motion, 10.0, 3.0)
+    assert passed == MAX_THRUST or not cannot_climb_too_far(motion, 10.0, 3.0)
 
 
-def climb(limit, z, z_dot, seconds, highest=10.0):
+def climb(z, z_dot, seconds):
     """Fly full thrust for a while; return z, z_dot and what is said at last."""
     said = ""
     for _ in range(round(seconds * 100)):
         motion = Motion((0.0, 0.0, z), (0.0, 0.0, z_dot))
-        thrust = limit.apply(MAX_THRUST, G, motion, highest, is_landing=False)
-        said = limit.advance(0.01)
+        thrust, said = within_climb(MAX_THRUST, G, motion, 10.0, 3.0)
         z_dot += 0.01 * (thrust - G)
         z += 0.01 * z_dot
     return z, z_dot, said
 
 
 def test_a_climb_ends_at_its_speed_and_then_at_its_height():
-    limit = ClimbLimit(3.0)
-    z, z_dot, said = climb(limit, 0.0, 0.0, 1.0)
+    z, z_dot, said = climb(0.0, 0.0, 1.0)
     assert z_dot == pytest.approx(3.0, abs=0.01)
-    assert said == ""
-    z, z_dot, said = climb(limit, z, z_dot, 5.0)
+    assert said == "the controls climb faster than 3 m/s"
+    z, z_dot, said = climb(z, z_dot, 5.0)
     assert (z, z_dot) == (pytest.approx(10.0, abs=0.2), pytest.approx(0.0, abs=0.1))
     assert said == "the controls climb beyond 10.00 m"
 
 
 def test_a_step_of_three_metres_is_no_climb_to_complain_of():
     """The steepest that the shipped gains fly: 200 / s^2 and 28.28 / s (K_lqr.txt)."""
-    limit = ClimbLimit(3.0)
-    z = z_dot = 0.0
+    z = z_dot = exceeds = 0.0
     for _ in range(500):
         thrust = min(max(G + 200.0 * (3.0 - z) - 28.28 * z_dot, MIN_THRUST), MAX_THRUST)
         motion = Motion((0.0, 0.0, z), (0.0, 0.0, z_dot))
-        passed = limit.apply(thrust, G, motion, 10.0, is_landing=False)
-        assert limit.advance(0.01) == ""
+        passed, said = within_climb(thrust, G, motion, 10.0, 3.0)
+        exceeds = exceeds + 0.01 if said else 0.0
+        assert exceeds < CLIMB_TIMEOUT
         z_dot += 0.01 * (passed - G)
         z += 0.01 * z_dot
     assert z == pytest.approx(3.0, abs=0.01)
@@ -247,44 +201,33 @@ def test_the_wall_above_counts_before_the_height():
     assert walls.highest(0.5) == 10.5
 
 
-# Callers.
-
-
-@pytest.mark.parametrize("period", [0.01, 0.1, 0.45])
-def test_two_nodes_at_once_are_noticed_and_forgotten(period):
-    callers = Callers("controls", 3)
-    for k in range(10):
-        callers.note(k * period, "/a")
-        callers.note(k * period + 0.3 * period, "/b")
-    assert callers.complaint == "two nodes publish controls, /a and /b; expected one"
-    callers.advance(10 * period + MEMORY)
-    assert callers.complaint == ""
+# Publishers.
 
 
 def test_a_rare_publisher_beside_a_busy_one_is_noticed():
-    callers = Callers("controls", 3)
+    publishers = Publishers("controls", 3)
     for k in range(300):
-        callers.note(k / 100, "/busy")
+        publishers.note(k / 100, "/busy")
         if k % 100 == 50:
-            callers.note(k / 100, "/rare")
-    assert "/busy and /rare" in callers.complaint
+            publishers.note(k / 100, "/rare")
+    assert "/busy and /rare" in publishers.complaint
 
 
 def test_one_after_the_other_are_not_two():
-    callers = Callers("controls", 3)
+    publishers = Publishers("controls", 3)
     time = 0.0
     for name in "abcdefgh":
         for _ in range(10):
-            callers.note(time, f"/{name}")
+            publishers.note(time, f"/{name}")
             time += 0.01
         time += 0.6
-    assert callers.complaint == ""
+    assert publishers.complaint == ""
     # Nor is a handover without a gap, or the clock set back.
     for k, name in enumerate(["/x", "/y", "/x", "/y", "/y"]):
-        callers.note(time + 0.01 * k, name)
-    assert callers.complaint == ""
-    callers.note(0.0, "/z")
-    assert callers.complaint == ""
+        publishers.note(time + 0.01 * k, name)
+    assert publishers.complaint == ""
+    publishers.note(0.0, "/z")
+    assert publishers.complaint == ""
 
 
 # Delays.

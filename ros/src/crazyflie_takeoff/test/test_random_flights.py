@@ -1,27 +1,29 @@
 """The server's state machine under random events at random times."""
 
+from flight_clock import BARE, PLAN, G
 from hypothesis import given
 from hypothesis import strategies as st
 
+from crazyflie_takeoff.phases import FilterState, FlightState
 from crazyflie_takeoff.server_table import (
     TABLE,
-    TAKEOVERS,
     FilterReport,
     FlightStateMachine,
-    ServerEvent,
+    Request,
     ServerState,
-    TakeoffPlan,
 )
-from crazyflie_takeoff.transition_table import FlightState
-
-G = 9.81
-PLAN = TakeoffPlan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.3)
-BARE = TakeoffPlan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.0)
 
 POSITIONS = st.none() | st.tuples(st.just(0.0), st.just(0.0), st.floats(-0.1, 2.0))
-CALLS = st.sampled_from([ServerEvent.TAKEOFF, ServerEvent.LAND])
+CALLS = st.sampled_from([Request.TAKEOFF, Request.LAND])
 TICKS = st.tuples(st.floats(0.0, 2.5), POSITIONS)
-FILTER = st.sampled_from([ServerEvent.FILTER_PASSES, ServerEvent.FILTER_HOLDS, *TAKEOVERS])
+REFUSES = FilterReport(refusal="two nodes publish")
+FILTER = st.sampled_from([*map(FilterReport, FilterState), REFUSES])
+
+
+def ask(flight, request):
+    """Make a request, unless it is refused."""
+    if flight.accepts(request):
+        flight.request(request)
 
 
 @given(st.lists(CALLS | TICKS, max_size=40), st.sampled_from([PLAN, BARE]))
@@ -30,13 +32,13 @@ def test_flights_that_the_filter_does_not_end(steps, plan):
     flight = FlightStateMachine(plan, ServerState.ON_GROUND)
     time, in_flight, ramp, last = 0.0, False, None, FlightState.ON_GROUND
     for step in steps:
-        if isinstance(step, ServerEvent):
+        if isinstance(step, Request):
             accepted = flight.accepts(step)
             starts = (ServerState.ON_GROUND,)
-            if step is ServerEvent.LAND:
+            if step is Request.LAND:
                 starts = (ServerState.LIFTING_OFF, ServerState.CLIMBING, ServerState.FLYING)
             assert accepted == (flight.state in starts)
-            flight.handle(step)
+            ask(flight, step)
             continue
         time += step[0]
         output, state = flight.tick(time, step[1]), flight.flight_state
@@ -68,7 +70,7 @@ def test_flights_that_the_filter_does_not_end(steps, plan):
 )
 def test_walks_through_the_table(remembered, position, steps, plan):
     """Every change is a row; a vehicle that the filter has is left to it; walks end at rest."""
-    rows = {(row.state, row.next) for row in TABLE}
+    rows = {(state, row.next) for row in TABLE for state in row.phases}
     flight = FlightStateMachine(plan)
     flight.set_filter(FilterReport(remembered=remembered))
     flight.recover(position, 0.0)
@@ -76,19 +78,20 @@ def test_walks_through_the_table(remembered, position, steps, plan):
     time = 0.0
     for step in steps:
         before = flight.state
-        if isinstance(step, tuple):
+        if isinstance(step, tuple) and not isinstance(step, FilterReport):
             time += step[0]
             output = flight.tick(time, step[1])
             if flight.state is ServerState.YIELDED:
                 assert output.thrust is output.reference is None
             continue
-        if step in (ServerEvent.TAKEOFF, ServerEvent.LAND):
-            flight.handle(step)
+        if step in (Request.TAKEOFF, Request.LAND):
+            ask(flight, step)
         else:
-            flight.set_filter(FilterReport(step))
+            flight.set_filter(step)
         assert before is flight.state or (before, flight.state) in rows
-        takes_off = before in (ServerState.LIFTING_OFF, ServerState.CLIMBING)
-        if step in TAKEOVERS and not (takes_off and step is ServerEvent.FILTER_DOWN):
+        takes_off = before in (ServerState.LIFTING_OFF, ServerState.LIFTED, ServerState.CLIMBING)
+        is_report = isinstance(step, FilterReport)
+        if is_report and step.takes_over and not (takes_off and step.state is FilterState.DOWN):
             assert flight.state in (ServerState.ON_GROUND, ServerState.YIELDED)
     for _ in range(80):
         time += 1.0
@@ -98,4 +101,4 @@ def test_walks_through_the_table(remembered, position, steps, plan):
 
 def test_every_state_is_reached_and_left():
     assert {row.next for row in TABLE} == set(ServerState) - {ServerState.RECOVERING}
-    assert {row.state for row in TABLE} == set(ServerState)
+    assert {state for row in TABLE for state in row.phases} == set(ServerState)

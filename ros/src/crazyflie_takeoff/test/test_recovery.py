@@ -2,15 +2,13 @@
 
 import pytest
 
+from crazyflie_takeoff.phases import FilterState, FlightState
+from crazyflie_takeoff.profiles import TakeoffPlan
 from crazyflie_takeoff.server_table import (
-    TAKEOVERS,
     FilterReport,
     FlightStateMachine,
-    ServerEvent,
     ServerState,
-    TakeoffPlan,
 )
-from crazyflie_takeoff.transition_table import FlightState
 
 ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState
 
@@ -61,11 +59,15 @@ def test_toggles_only_what_the_former_server_has_not(remembered, height):
     assert flight.tick(0.0, position).toggle == is_changed
 
 
-@pytest.mark.parametrize("event", TAKEOVERS)
+@pytest.mark.parametrize(
+    "report",
+    [{"state": state} for state in FilterState if state >= FilterState.SINKING]
+    + [{"refusal": "two"}],
+)
 @pytest.mark.parametrize("remembered", [None, FLYING, LANDING])
-def test_a_filter_that_has_the_vehicle_keeps_it(event, remembered):
-    flight = recovered(remembered, 1.0, event=event)
-    sinks = event is ServerEvent.FILTER_SINKS
+def test_a_filter_that_has_the_vehicle_keeps_it(report, remembered):
+    flight = recovered(remembered, 1.0, **report)
+    sinks = report.get("state") is FilterState.SINKING
     assert flight.state is (ServerState.YIELDED if sinks else ServerState.ON_GROUND)
     assert flight.tick(0.0).toggle == (remembered is FLYING)
 
@@ -87,7 +89,7 @@ def test_is_on_a_table_when_no_controller_sends_commands():
 
 
 def test_a_recovered_descent_waits_while_the_filter_holds_the_vehicle():
-    flight = recovered(DESCENDING, 1.0, event=ServerEvent.FILTER_HOLDS)
+    flight = recovered(DESCENDING, 1.0, state=FilterState.HOLDING)
     for k in range(100):
         output = flight.tick(k / 100, (0.0, 0.0, 1.0))
     assert output.reference[2] == 1.0

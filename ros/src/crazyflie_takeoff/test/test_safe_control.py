@@ -5,8 +5,7 @@ import math
 import pytest
 from filter_flight import G
 
-from crazyflie_takeoff.motion import Motion
-from crazyflie_takeoff.safe_control import (
+from crazyflie_takeoff.fallback import (
     LAST_DIFFERENCE,
     MAX_BRAKING,
     HoverThrust,
@@ -15,6 +14,7 @@ from crazyflie_takeoff.safe_control import (
     braking_time,
     descent_time,
 )
+from crazyflie_takeoff.motion import Motion
 
 
 def test_learns_the_thrust_of_hover_also_from_a_climb():

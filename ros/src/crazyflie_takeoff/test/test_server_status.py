@@ -2,7 +2,6 @@
 
 import pytest
 from lone_server import call, flying, launch, on_ground, states
-from std_msgs.msg import Bool
 from takeoff_helpers import SERVER, filter_status, state
 
 from crazyflie_msgs.msg import FilterStatus, FlightStatus
@@ -36,7 +35,7 @@ def test_the_status_is_published_when_it_changes_and_not_before_it_is_known():
     process.advance(2.0)
     (status,) = statuses(process)
     assert (status.state, status.takeoff_refusal) == (FlightStatus.ON_GROUND, "")
-    process.publish("/in_flight_controller", Bool(False))
+    process.publish(FILTER_STATUS, filter_status(has_controller=False))
     process.advance(2.0)
     (refused,) = statuses(process)[1:]
     assert refused.takeoff_refusal.startswith("no commanded controls come")

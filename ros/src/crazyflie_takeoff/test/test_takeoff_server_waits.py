@@ -62,7 +62,7 @@ def test_a_state_that_does_not_exist_is_ignored():
     process.publish("/in_flight_filter_status", filter_status(state=77))
     process.advance(0.5)
     assert states(process) == []
-    assert "ignoring state 77" in process.logged("warn")[0]
+    assert "ignoring state 77" in process.logged("warn")[-1]
 
 
 def test_calls_wait_until_it_is_known_where_the_flight_stands():
@@ -136,13 +136,19 @@ def test_a_stamp_that_is_missing_or_ahead_says_nothing_about_age(ahead):
     assert not call(process, "/takeoff").done()
 
 
+def publish_controller(process, has_controller, flight="on_ground"):
+    process.publish(
+        "/in_flight_filter_status", filter_status(flight, has_controller=has_controller)
+    )
+
+
 def test_takeoff_without_a_controller_is_refused():
     process = on_ground(SERVER)
     for is_there in (True, False):
-        process.publish("/in_flight_controller", Bool(is_there))
+        publish_controller(process, is_there)
     with pytest.raises(ServiceError, match="is the controller running"):
         call(process, "/takeoff")
-    process.publish("/in_flight_controller", Bool(True))
+    publish_controller(process, True)
     assert not call(process, "/takeoff").done()
 
 
@@ -167,10 +173,11 @@ def test_takeoff_waits_for_the_first_state():
 
 
 def test_takeoff_waits_for_a_controller():
-    process = on_ground(SERVER)
-    process.publish("/in_flight_controller", Bool(False))
+    process = launch(SERVER)
+    publish_controller(process, False)
+    process.advance(RECOVERY_LIMIT + 0.01)
     call(process, "/takeoff")
-    process.publish("/in_flight_controller", Bool(True))
+    publish_controller(process, True)
     process.publish("/state", state(0.0))
     process.advance(0.02)
     assert states(process)[-1] == "taking_off"
@@ -188,7 +195,7 @@ def test_takeoff_does_not_wait_for_ever():
 
 def test_landing_needs_neither():
     process = flying(SERVER)
-    process.publish("/in_flight_controller", Bool(False))
+    publish_controller(process, False, "flying")
     process.advance(1.0)
     assert not call(process, "/land").done()
 
@@ -336,15 +343,28 @@ def test_a_landing_that_the_filter_finishes_has_succeeded_but_not_one_that_it_st
         land.result(0)
 
 
-def test_a_vehicle_that_arms_itself_again_may_take_off_meanwhile():
+@pytest.mark.parametrize("is_armed_again", [True, False])
+def test_a_takeoff_waits_for_a_vehicle_that_arms_itself_again(is_armed_again):
     """It is not armed for 0.2 s after a landing, and every 30 s on the ground."""
     process = on_ground(DRIVEN)
     auto, ready = VehicleStatus.AUTO_ARMED, VehicleStatus.ARMED | VehicleStatus.CAN_FLY
-    for state_of_vehicle in (auto | ready, auto):
+
+    def publish(state_of_vehicle):
         status = VehicleStatus(supervisor=state_of_vehicle, has_supervisor=True)
         process.publish("/cf1/vehicle_status", status)
+
+    publish(auto | ready)
+    publish(auto)
     process.publish("/cf1/connected", Bool(True))
     process.publish("/state", state(0.0))
-    call(process, "/takeoff")
-    process.advance(0.02)
-    assert states(process)[-1] == "taking_off"
+    takeoff = call(process, "/takeoff")
+    process.advance(0.2)
+    assert not takeoff.done()
+    assert states(process)[-1] == "on_ground"
+    if is_armed_again:
+        publish(auto | ready)
+    process.advance(0.32)
+    assert states(process)[-1] == ("taking_off" if is_armed_again else "on_ground")
+    if not is_armed_again:
+        with pytest.raises(ServiceError, match="the vehicle cannot fly yet"):
+            takeoff.result(0)

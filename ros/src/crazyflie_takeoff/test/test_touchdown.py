@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from takeoff_helpers import PointMass, feedback
 
-from crazyflie_takeoff.server_table import FlightStateMachine, ServerEvent, ServerState, TakeoffPlan
+from crazyflie_takeoff.profiles import TakeoffPlan
+from crazyflie_takeoff.server_table import FlightStateMachine, Request, ServerState
 
 STIFF, SOFT = (20.0, 20.98), (1.5, 1.0)
 """Height gains of the simulation's and of the hardware's controller."""
@@ -22,7 +23,7 @@ def land(height, gains, speed=0.3, miscalibration=0.0):
     )
     vehicle = PointMass(height)
     reference = (height - miscalibration / gains[0], 0.0)
-    flight.request(ServerEvent.LAND)
+    flight.request(Request.LAND)
     for tick in range(6000):
         output = flight.tick(tick / 100, (0.0, 0.0, vehicle.z))
         if output.reference is not None:

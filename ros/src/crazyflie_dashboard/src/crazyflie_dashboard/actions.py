@@ -18,7 +18,7 @@ from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import BUFFER
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.lights import COLOR_LED_DECKS, wrgb
-from crazyflie_takeoff.limits import Box
+from crazyflie_takeoff.envelope import Box
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.steps import Steps, follow
 

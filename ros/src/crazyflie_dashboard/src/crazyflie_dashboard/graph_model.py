@@ -32,7 +32,7 @@ from crazyflie_dashboard.snapshot import (
 )
 from crazyflie_dashboard.surroundings import Surroundings
 from crazyflie_dashboard.vehicle_model import VehicleModel, frame_of
-from crazyflie_takeoff.limits import Box
+from crazyflie_takeoff.envelope import Box
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.tf.frame_tree import RawTransforms, StampedPose
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED

@@ -12,7 +12,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from crazyflie_takeoff.limits import Box
+from crazyflie_takeoff.envelope import Box
 
 Triple = tuple[float, float, float]
 Rotation = tuple[float, float, float, float]

@@ -14,8 +14,8 @@ from crazyflie_dashboard.discovery import Graph
 from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.snapshot import Placed, Solids, Triple
 from crazyflie_model.angles import rotate
+from crazyflie_takeoff.envelope import Box
 from crazyflie_takeoff.flight_topics import follow_box
-from crazyflie_takeoff.limits import Box
 from crazyflie_utils import NodeHandle
 
 _MARKERS = ("world/markers", "sweep/markers", "plan/markers")  #: Last names of topics with markers.

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from crazyflie_model.limits import OFF_AGE
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.safe_control import SINK_SPEED
-from crazyflie_takeoff.transition_table import flight_state
+from crazyflie_takeoff.fallback import SINK_SPEED
+from crazyflie_takeoff.phases import flight_state
 from crazyflie_utils.testing import FakeGraph
 
 MOST_THRUST = 16.0  #: Limit of a final control (m/s^2): that of the controller.

@@ -45,7 +45,12 @@ from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.log import LogBlock
 from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped, VehicleStatus
+from crazyflie_msgs.msg import (
+    FilterStatus,
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    VehicleStatus,
+)
 from crazyflie_utils import Parameters, ServiceError, parameter
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.parameters import model_file, vehicle_model
@@ -121,7 +126,7 @@ class LiveRig:
         handle.subscribe(f"{PREFIX}/battery", Float32, self._on_battery)
         handle.subscribe(f"{PREFIX}/vehicle_status", VehicleStatus, self._on_status)
         handle.subscribe(f"{PREFIX}/connected", Bool, self._on_connected)
-        handle.subscribe("/in_flight_controller", Bool, self._on_controller)
+        handle.subscribe("/in_flight_filter_status", FilterStatus, self._on_filter_status)
         handle.subscribe("/tf", TFMessage, self._on_tf)
         process.start()
 
@@ -138,8 +143,8 @@ class LiveRig:
     def _on_connected(self, message):
         self._is_connected = message.data
 
-    def _on_controller(self, message):
-        self._has_controller = message.data
+    def _on_filter_status(self, message):
+        self._has_controller = message.has_controller
 
     def _on_tf(self, message):
         for each in message.transforms:

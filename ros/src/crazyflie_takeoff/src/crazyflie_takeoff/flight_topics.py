@@ -10,7 +10,7 @@ from std_msgs.msg import Bool
 
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import VehicleStatus
-from crazyflie_takeoff.limits import NO_BOX, Box
+from crazyflie_takeoff.envelope import NO_BOX, Box
 from crazyflie_takeoff.vehicle_facts import VehicleFacts
 from crazyflie_utils import NodeHandle, Parameters, parameter, topic
 from crazyflie_utils.parameters.declaration import group
@@ -55,8 +55,13 @@ class FlightTopicParameters(Parameters):
     own_filter_state_topic: str | None = named_after("in_flight", "_filter", "filter_state")
     own_flight_status_topic: str | None = named_after("in_flight", "_flight_status")
     own_filter_status_topic: str | None = named_after("in_flight", "_filter_status")
-    own_controller_topic: str | None = named_after("in_flight", "_controller")
 
+    state_topic: str | None = topic(
+        "state",
+        "where the vehicle is; without it there is no descent, and limits are not watched",
+        None,
+    )
+    own_estimate_status_topic: str | None = named_after("state", "_status", "estimate_status")
     connected_topic: str | None = topic(
         "connected",
         "whether the driver is connected; while it is not /takeoff is refused, and a flight ends",
@@ -95,10 +100,10 @@ class FlightTopicParameters(Parameters):
         namespace, slash, _ = self.connected_topic.rpartition("/")
         return f"{namespace}{slash}{name}"
 
+    estimate_status_topic = derived_topic("estimate_status", "state", "_status")
     filter_state_topic = derived_topic("filter_state", "in_flight", "_filter")
     flight_status_topic = derived_topic("flight_status", "in_flight", "_flight_status")
     filter_status_topic = derived_topic("filter_status", "in_flight", "_filter_status")
-    controller_topic = derived_topic("controller", "in_flight", "_controller")
 
 
 def follow_box(handle: NodeHandle, topic: str, callback: Callable[[Box], None]) -> None:

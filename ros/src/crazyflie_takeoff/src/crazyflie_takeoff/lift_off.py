@@ -4,9 +4,9 @@ Speeds are in m/s, z up; thrusts in m/s^2, mass-normalised for a vehicle that ho
 """
 
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.safe_control import MAX_BRAKING, MAX_CORRECTION, SETTLING, limited
+from crazyflie_takeoff.fallback import MAX_BRAKING, MAX_CORRECTION, SETTLING, limited
 
-LIFT_OFF_THRUST = GRAVITY + 0.2  #: Thrust of the open-loop part of a takeoff (m/s^2).
+LIFT_OFF_THRUST = GRAVITY + 0.2  #: Default thrust of the open-loop part of a takeoff (m/s^2).
 #: Speed of a vehicle that has lifted off (m/s). One that hovers at g reaches it after 1 s of
 #: `LIFT_OFF_THRUST`; one that hovers at 0.65 g, after 0.04 s.
 LIFT_OFF_SPEED = 0.2
@@ -20,13 +20,15 @@ HOVER_RANGE = 0.4  #: Largest deviation of the thrust of hover from g, as a frac
 class LiftOff:
     """Thrust of a takeoff until the controller has the vehicle, and the thrust of hover.
 
+    It begins with ``thrust`` (m/s^2).
+
     A vehicle that hovers at the thrust h accelerates with (thrust / h - 1) g. So h is g times the
     mean thrust over g plus the mean acceleration, both filtered with the same time constant.
     """
 
-    def __init__(self) -> None:
-        self.thrust = LIFT_OFF_THRUST  #: The thrust to send, m/s^2.
-        self._delayed = self._mean = LIFT_OFF_THRUST
+    def __init__(self, thrust: float = LIFT_OFF_THRUST) -> None:
+        self.thrust = thrust  #: The thrust to send, m/s^2.
+        self._delayed = self._mean = thrust
         self._speed: float | None = None
         self._acceleration = 0.0
 

@@ -1,4 +1,4 @@
-"""Measured motion of a vehicle, the age of measurements, and the ground below the vehicle."""
+"""Measured motion of a vehicle, its age, and the ground below the vehicle."""
 
 import math
 from typing import NamedTuple
@@ -17,6 +17,7 @@ TOUCHDOWN_SPEED = 0.1  #: Largest speed of a vehicle that is down (m/s).
 #: speeds below `TOUCHDOWN_SPEED` within 0.1 s.
 SINKING_THRUST = 0.75
 REST_TIME = 0.3  #: Time for which a vehicle that is down rests with so little thrust (s).
+PROGRESS = 0.02  #: Least decrease of the height of a vehicle that sinks (m).
 SPEED_AVERAGING = 0.5  #: Time constant of the mean of the vertical speed in a descent (s).
 
 Position = tuple[float, float, float]  #: x, y, z in m, fixed frame, z up.
@@ -31,65 +32,47 @@ class Motion(NamedTuple):
     yaw: float = 0.0  #: rad.
 
 
-class Measurement:
-    """The last measured state, and its age."""
+class Measured:
+    """The last measured motion; times are s of any clock.
 
-    def __init__(self) -> None:
-        self.age = math.inf  # s; infinite before the first one.
-        self._motion: Motion | None = None
-
-    def update(self, motion: Motion, age: float) -> None:
-        """Process a state that was measured ``age`` s ago."""
-        self._motion, self.age = motion, age
-
-    def within(self, age: float) -> Motion | None:
-        """Return the state if it is younger than ``age`` (s)."""
-        return self._motion if self.age < age else None
-
-    @property
-    def fresh(self) -> Motion | None:
-        """The state, unless it is older than `MAX_FEEDBACK_AGE`."""
-        return self._motion if self.age < MAX_FEEDBACK_AGE else None
-
-
-class MeasuredPosition:
-    """The last measured position, and its age.
-
-    Times are s of any clock. If the clock is reset, the age goes on from there.
+    If the clock is reset, the age goes on from there.
     """
 
     def __init__(self) -> None:
-        self._position: Position | None = None
-        self._age = 0.0
+        self.motion: Motion | None = None
+        self.missing_reason = ""  #: Why the estimator has no state; empty if it has one.
+        self._age = 0.0  # At the receipt (s).
         self._received = 0.0
         self._gap, self._gap_end = 0.0, -math.inf
-        self.missing_reason = ""  #: Why the estimator has no state; empty if it has one.
 
-    @property
-    def is_measured(self) -> bool:
-        """Whether a position has ever been measured."""
-        return self._position is not None
-
-    def measure(self, time: float, position: Position, age: float) -> None:
-        """Record a position (m) that was received at ``time`` with an age (s)."""
-        gap = time - self._received
-        if self._position is not None and (
-            gap > self._gap or not 0.0 <= time - self._gap_end < GAP_MEMORY
+    def update(self, now: float, motion: Motion, age: float) -> None:
+        """Record a motion that is received ``age`` s after it was measured."""
+        gap = now - self._received
+        if self.motion is not None and (
+            gap > self._gap or not 0.0 <= now - self._gap_end < GAP_MEMORY
         ):
-            self._gap, self._gap_end = gap, time
-        self._position, self._received, self._age = position, time, age
+            self._gap, self._gap_end = gap, now
+        self.motion, self._received, self._age = motion, now, age
 
-    def value(self, time: float, max_age: float = MAX_POSITION_AGE) -> Position | None:
-        """Return the position, m; None when it is older than ``max_age`` (s) at ``time``."""
-        is_known = self._silence(time) + self._age < max_age
-        return self._position if is_known else None
+    def age(self, now: float) -> float:
+        """Return the age of the motion, s; infinite before the first one."""
+        return math.inf if self.motion is None else self._silence(now) + self._age
 
-    def explanation(self, time: float, topic: str) -> str:
+    def within(self, now: float, age: float = MAX_FEEDBACK_AGE) -> Motion | None:
+        """Return the motion if it is younger than ``age`` (s)."""
+        return self.motion if self._silence(now) + self._age < age else None
+
+    def position(self, now: float) -> Position | None:
+        """Return the position, m; None when it is older than `MAX_POSITION_AGE`."""
+        motion = self.within(now, MAX_POSITION_AGE)
+        return None if motion is None else motion.position
+
+    def explanation(self, now: float, topic: str) -> str:
         """Return why the position, from states on ``topic``, is not known; empty if it is."""
-        if self.value(time) is not None:
+        if self.position(now) is not None:
             return ""
-        silence = self._silence(time)
-        if self._position is not None and silence < MAX_POSITION_AGE:
+        silence = self._silence(now)
+        if self.motion is not None and silence < MAX_POSITION_AGE:
             if self._age < MAX_POSITION_AGE:
                 oldest = max(silence, self._gap) + self._age
                 return (
@@ -103,9 +86,10 @@ class MeasuredPosition:
         why = self.missing_reason or "are the estimator and the source of /tf running?"
         return f"no state has come on {topic} for {MAX_POSITION_AGE:g} s; {why}"
 
-    def _silence(self, time):
-        self._received = min(self._received, time)
-        return time - self._received
+    def _silence(self, now):
+        if now < self._received:
+            self._received = now
+        return now - self._received
 
 
 class Delay:

@@ -9,16 +9,15 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.lift_off import LiftOff, has_lifted_off
+from crazyflie_takeoff.guards import Guard, first_firing
+from crazyflie_takeoff.lift_off import LIFT_OFF_THRUST, LiftOff, has_lifted_off
 from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Position
-from crazyflie_takeoff.transition_table import FlightState, Table, Transition, find, step
+from crazyflie_takeoff.phases import FilterState, FlightState
+from crazyflie_takeoff.profiles import Descent, TakeoffPlan
 from crazyflie_utils.refusal import RefusalError
 
 #: Time after which a vehicle that is still on the ground is unable to fly (s).
 LIFT_OFF_TIME = 3.0
-RAMP_DURATION = 1.0  #: Duration of the thrust ramp of a landing; zero thrust follows (s).
-RAMP_RATE = 5.0  #: Decrease of the thrust in that ramp, which begins at g (m/s^2 per s).
 RAMP_DROP = 0.1  #: A vehicle that sinks further in the ramp was not on the ground (m).
 TOUCHDOWN_LIMIT = 2.0  #: Longest time from the end of the ramp to the touchdown (s).
 ZERO_THRUST_PERIOD = 0.1  #: Period of zero thrust on the ground (s).
@@ -28,15 +27,9 @@ FILTER_LIMIT = 60.0  #: Longest time for which the filter may hold or land the v
 ROUNDING = 1e-6  #: Tolerance of comparisons between times (s).
 
 SHORTEST_DESCENT = 1.0  #: Least duration of a descent with a time limit (s).
-DESCENT_MARGIN = 3.0  #: Time that a descent may take beyond its calculated duration (s).
-#: Depth of the last reference of a descent below the ground (m): the vehicle meets the ground with
-#: its speed also when it hangs above the reference.
-PRESS_DEPTH = 0.3
-#: In a descent to an unknown ground, a vehicle that has not sunk for this time is down (s). The
-#: filter notices a controller that does not follow sooner (`DESCENT_TIMEOUT`).
-STOP_TIME = 2.0
-PROGRESS = 0.02  #: Least decrease of the height of a vehicle that sinks (m).
-SEARCH_LIMIT = 20.0  #: Longest descent to an unknown ground (s).
+
+ARRIVED = 0.3  #: Distance from the hover point of a vehicle that has reached it (m).
+ARRIVAL_LIMIT = 10.0  #: Longest wait for that after a takeoff (s).
 
 #: Reason for which a takeoff or a landing is refused in a flight state.
 REFUSALS = {
@@ -68,85 +61,36 @@ class ServerState(enum.Enum):
         self.flight_state = flight_state
 
 
-class ServerEvent(enum.Enum):
-    """Event that can change the state of the server."""
+class Request(enum.Enum):
+    """What the server is asked to do."""
 
     RECOVER = enum.auto()  # The evidence is complete, or the time for it is over.
     TAKEOFF = enum.auto()  # /takeoff was called, and no check refuses it.
     LAND = enum.auto()  # /land, critical battery, end of the launch, fault in a takeoff.
-    TICK = enum.auto()  # Time has passed.
-    FILTER_PASSES = enum.auto()  # The filter passes controls on.
-    FILTER_HOLDS = enum.auto()  # It keeps the vehicle in place until a control comes back.
-    FILTER_SINKS = enum.auto()  # It brings the vehicle down.
-    FILTER_DOWN = enum.auto()  # It has brought the vehicle down; the motors are off.
-    FILTER_EMERGENCY = enum.auto()  # It has stopped the motors at once.
-    FILTER_REFUSES = enum.auto()  # It keeps the motors off and passes no takeoff on.
-    VEHICLE_LOST = enum.auto()  # The vehicle has not been able to fly for a while.
-
-
-#: Events after which the motors are off, and those after which the filter has the vehicle.
-STOPS = (ServerEvent.FILTER_EMERGENCY, ServerEvent.FILTER_REFUSES)
-TAKEOVERS = (ServerEvent.FILTER_SINKS, ServerEvent.FILTER_DOWN, *STOPS)
+    END = enum.auto()  # The vehicle cannot fly any more: nothing flies it.
 
 
 class FilterReport(NamedTuple):
-    """The last status of the filter."""
+    """The last status of the filter; what it says is so."""
 
-    event: ServerEvent = ServerEvent.FILTER_PASSES
+    state: FilterState = FilterState.PASSING
     remembered: FlightState | None = None  # Flight state that the filter received last.
     is_commanded: bool = True  # Whether a controller sends commands, or may do so.
-    reason: str = ""  # Why the filter does not pass controls on, or refuses takeoffs.
+    reason: str = ""  # Why the filter does not pass controls on.
+    refusal: str = ""  # Why it passes no takeoff on.
+
+    @property
+    def stops(self) -> bool:
+        """Whether the motors are off at once, or it passes no takeoff on."""
+        return self.state is FilterState.EMERGENCY or bool(self.refusal)
+
+    @property
+    def takes_over(self) -> bool:
+        """Whether the filter has the vehicle, or has stopped its motors."""
+        return self.state >= FilterState.SINKING or self.stops
 
 
 NO_FILTER = FilterReport()  #: Before a filter has published anything.
-
-
-class Descent:
-    """A reference that sinks at a constant speed (m/s) to the ground (z, m).
-
-    Times are s since the landing began; at ``begin`` it is at ``position`` (m). With an unknown
-    ground (None) it sinks until the vehicle does not follow any more.
-    """
-
-    def __init__(self, begin: float, position: Position, ground: float | None, speed: float):
-        self._begin = begin
-        self._x, self._y, self._z = position
-        self._speed = speed
-        self._is_search = ground is None
-        # The lowest height that was measured (m), and when (s).
-        self._reached = (self._z, begin)
-        if ground is None:
-            self._lowest, self._end = -math.inf, begin + SEARCH_LIMIT
-        else:
-            self._lowest = min(ground - PRESS_DEPTH, self._z)
-            self._end = begin + max(self._z - ground, 0.0) / speed + DESCENT_MARGIN
-
-    def measure(self, time: float, z: float) -> None:
-        """Record a measured height of the vehicle (m)."""
-        if z < self._reached[0] - PROGRESS:
-            self._reached = z, time
-
-    def is_over(self, time: float) -> bool:
-        """Return whether a vehicle that follows is on the ground."""
-        has_stopped = self._is_search and time - self._reached[1] > STOP_TIME
-        return has_stopped or time > self._end
-
-    def reference(self, time: float) -> tuple[float, float, float, float, float, float]:
-        """Return x, y, z in m and x_dot, y_dot, z_dot in m/s."""
-        z = self._z - self._speed * (time - self._begin)
-        if z <= self._lowest:
-            return (self._x, self._y, self._lowest, 0.0, 0.0, 0.0)
-        return (self._x, self._y, z, 0.0, 0.0, -self._speed)
-
-
-@dataclass(frozen=True)
-class TakeoffPlan:
-    """Durations and speed of takeoffs and landings."""
-
-    hover: Position
-    open_loop: float  # Duration of `LIFT_OFF_THRUST` (s).
-    settle: float  # Time for the controller to reach the hover point (s).
-    descent_speed: float  # m/s; 0 for a landing without a descent, by the ramp alone.
 
 
 @dataclass(frozen=True)
@@ -160,15 +104,21 @@ class Output:
 
 
 class FlightStateMachine:
-    """The vehicle's flight, from the ground to the ground; `TABLE` has its transitions."""
+    """The vehicle's flight, from the ground to the ground; `TABLE` has its transitions.
+
+    `REQUESTS` are made when they come, `FOLLOWS` when the filter says something, and `PROFILE` in
+    time.
+    """
 
     def __init__(self, plan: TakeoffPlan, state: ServerState = ServerState.RECOVERING):
         self.state = state
+        self.requested: Request | None = None  #: While it is decided.
         self.plan = plan  #: May be replaced; a takeoff or landing that has begun keeps its plan.
         self.filter = NO_FILTER  #: The last status of the filter.
         self.ground = 0.0  #: Height (z) of the ground where the vehicle took off (m).
         self.ground_is_known = True  # False where the vehicle has sunk further.
         self.time = -math.inf  # Time of the last tick (s).
+        self.left_ground = -math.inf  # When the flight began (s).
         self.measured: Position | None = None  # Present position (m); None if it is not known.
         self.z_dot: float | None = None  # Present vertical speed (m/s); None if it is not known.
         self.reference: tuple[float, ...] | None = None  # See `Output`.
@@ -184,7 +134,7 @@ class FlightStateMachine:
         self.descent_end = math.inf  # Latest end of a descent, s after it began.
         self.ramp_height: float | None = None  # First height measured in the ramp of a landing (m).
         self.zero_sent = -math.inf  # When zero thrust was sent last (s).
-        self.lift_off = LiftOff()
+        self.lift_off = LiftOff(self.plan.thrust or LIFT_OFF_THRUST)
         self.hover_thrust: float | None = None  # See `Output`.
 
     @property
@@ -197,24 +147,51 @@ class FlightStateMachine:
         """Time since the present state began, s."""
         return 0.0 if self.begun is None else self.time - self.begun
 
-    def set_filter(self, report: FilterReport) -> None:
-        """Set the status of the filter."""
+    def set_filter(self, report: FilterReport) -> bool:
+        """Set the status of the filter; return whether the state has changed by it."""
         self.filter = report
-        self.handle(report.event)
+        return self._judge(FOLLOWS)
 
-    def accepts(self, event: ServerEvent) -> bool:
-        """Return whether the present state has a transition for an event."""
-        return find(TABLE, self.state, event, self) is not None
+    def accepts(self, request: Request) -> bool:
+        """Return whether the present state has a transition for a request."""
+        self.requested = request
+        accepts = first_firing(_in(self.state, REQUESTS), {}, 0.0, None, self) is not None
+        self.requested = None
+        return accepts
 
-    def handle(self, event: ServerEvent) -> None:
-        """Make the transition of an event, if the present state has one."""
-        self.state = step(TABLE, self.state, event, self)
-
-    def request(self, event: ServerEvent) -> None:
-        """Make the transition of an event; `RefusalError` if the present state has none."""
-        if not self.accepts(event):
+    def request(self, request: Request) -> None:
+        """Make the transition of a request; `RefusalError` if the present state has none."""
+        self.requested = request
+        is_accepted = self._judge(REQUESTS)
+        self.requested = None
+        if not is_accepted:
             raise RefusalError(REFUSALS[self.flight_state])
-        self.handle(event)
+
+    @property
+    def yields(self) -> bool:
+        """Whether the filter brings the vehicle down."""
+        return self.state is ServerState.YIELDED
+
+    def _judge(self, rows, ticks=False):
+        """Make the first transition of a table whose guard fires; return whether there is one."""
+        found = first_firing(_in(self.state, rows), {}, 0.0, None, self)
+        if found is None:
+            return False
+        before, self.state = self.state, found[0].next
+        if before in (ServerState.RECOVERING, ServerState.ON_GROUND):
+            self.left_ground = self.time
+        if (before, self.state) not in _PARTS and before is not ServerState.RECOVERING:
+            self._begin()
+            self.begun = self.time if ticks else None
+        if self.state is ServerState.CLIMBING:
+            self.reference = (*self.plan.hover, 0.0, 0.0, 0.0)
+            if before is ServerState.LIFTED:
+                self.hover_thrust = self.lift_off.hover
+        elif before is ServerState.RAMPING_DOWN and self.state is ServerState.DESCENDING:
+            # It has sunk in the ramp: the ground is lower than where it took off.
+            self.ground_is_known = False
+            self._plan_descent(is_seen_again=False)
+        return True
 
     def recover(self, position: Position | None, ground: float) -> None:
         """Derive the state from the status of the filter and the measured position (m).
@@ -225,7 +202,9 @@ class FlightStateMachine:
         remembered = self.filter.remembered
         self.measured = position
         self.ground = 0.0 if remembered is None else ground
-        self.handle(ServerEvent.RECOVER)
+        self.requested = Request.RECOVER
+        self._judge(REQUESTS)
+        self.requested = None
         self._in_flight = self._is_in_flight() if remembered is None else remembered.in_flight
 
     def limit_descent(self, duration: float) -> None:
@@ -249,8 +228,8 @@ class FlightStateMachine:
             self._measure(position)
         if self.state is ServerState.DESCENDING:
             self._plan_descent(is_seen_again)
-        while self.accepts(ServerEvent.TICK):
-            self.handle(ServerEvent.TICK)
+        while self._judge(FOLLOWS, ticks=True) or self._judge(PROFILE, ticks=True):
+            pass
         if self.state is ServerState.LIFTED:
             self.lift_off.climb(self._distance() or 0.0, self.z_dot)
         if self.descent is not None:
@@ -260,6 +239,20 @@ class FlightStateMachine:
         was_in_flight, self._in_flight = self._in_flight, self._is_in_flight()
         toggle = self._in_flight != was_in_flight
         return Output(self._thrust(), self.reference, self.hover_thrust, toggle)
+
+    def arrival(self) -> str | None:
+        """Return whether a takeoff has succeeded: an empty text, or why not; None if it may yet."""
+        if self.measured is None:
+            return ""
+        distance = math.dist(self.measured, self.plan.hover)
+        if distance < ARRIVED:
+            return ""
+        if self.elapsed < self.plan.open_loop + self.plan.settle + ARRIVAL_LIMIT:
+            return None
+        return (
+            f"the vehicle flies, but it is {distance:.2f} m away from the hover point "
+            f"{self.plan.hover}: it has not come there within {self.elapsed:.0f} s"
+        )
 
     def _is_in_flight(self):
         return self.flight_state is not None and self.flight_state.in_flight
@@ -279,7 +272,7 @@ class FlightStateMachine:
 
     def _plan_descent(self, is_seen_again):
         position, elapsed = self._position, self.elapsed
-        waits = self.filter.event is ServerEvent.FILTER_HOLDS and elapsed < FILTER_LIMIT
+        waits = self.filter.state is FilterState.HOLDING and elapsed < FILTER_LIMIT
         if position is None or not (self.descent is None or is_seen_again or waits):
             return
         if not self.ground_is_known:
@@ -296,7 +289,7 @@ class FlightStateMachine:
             # The filter repeats it until the controller has the vehicle.
             return self.hover_thrust
         if self.state is ServerState.RAMPING_DOWN and self.begun is not None:
-            return GRAVITY - RAMP_RATE * self.elapsed
+            return self.plan.ramp_thrust(self.elapsed)
         if self.state not in (ServerState.ON_GROUND, ServerState.TOUCHING_DOWN):
             return None
         if self.time - self.zero_sent < ZERO_THRUST_PERIOD - ROUNDING:
@@ -312,31 +305,7 @@ class FlightStateMachine:
             self.zero_sent += time - self.time
         self.time = time
 
-    # Actions.
-
-    def _begin_at_once(self):
-        self._begin()
-        self.begun = self.time
-
-    def _descend_further(self):
-        self._begin_at_once()
-        self.ground_is_known = False
-        self._plan_descent(is_seen_again=False)
-
-    def _send_hover_point(self):
-        self.reference = (*self.plan.hover, 0.0, 0.0, 0.0)
-
-    def _send_hover_point_and_thrust(self):
-        self._send_hover_point()
-        self.hover_thrust = self.lift_off.hover
-
     # Guards.
-
-    def _filter_sinks(self):
-        return self.filter.event is ServerEvent.FILTER_SINKS
-
-    def _filter_has_stopped_motors(self):
-        return self.filter.event in (ServerEvent.FILTER_DOWN, *STOPS)
 
     def _high_and_commanded_but_not_remembered(self):
         is_high = self.measured is not None and self.measured[2] > FLYING_HEIGHT
@@ -382,10 +351,10 @@ class FlightStateMachine:
         return self.measured[2] < self.ramp_height - RAMP_DROP and self.descent_speed > 0.0
 
     def _ramp_over(self):
-        return self.elapsed + ROUNDING >= RAMP_DURATION
+        return self.elapsed + ROUNDING >= self.plan.ramp
 
     def _down_or_not_seen_or_too_late(self):
-        is_late = self.elapsed + ROUNDING > RAMP_DURATION + TOUCHDOWN_LIMIT
+        is_late = self.elapsed + ROUNDING > self.plan.ramp + TOUCHDOWN_LIMIT
         # The motors are off already: without a height there is nothing to wait for.
         return self.measured is None or self._down() or is_late
 
@@ -393,64 +362,80 @@ class FlightStateMachine:
         return self.elapsed + ROUNDING >= FILTER_LIMIT
 
 
-_S, _E, _M = ServerState, ServerEvent, FlightStateMachine
-_TAKEOFF = (_S.LIFTING_OFF, _S.LIFTED, _S.CLIMBING)
-_AIRBORNE_OR_LANDING = (_S.FLYING, _S.DESCENDING, _S.RAMPING_DOWN, _S.TOUCHING_DOWN)
+def _in(state, rows):
+    return [row for row in rows if state in row.phases]
 
-TABLE: Table[ServerState, FlightStateMachine] = (
-    # In doubt the vehicle is flying: the controller keeps it, and the operator can land.
-    Transition(_S.RECOVERING, _E.RECOVER, _M._filter_sinks, _S.YIELDED),
-    Transition(_S.RECOVERING, _E.RECOVER, _M._filter_has_stopped_motors, _S.ON_GROUND),
-    Transition(_S.RECOVERING, _E.RECOVER, _M._high_and_commanded_but_not_remembered, _S.FLYING),
-    Transition(_S.RECOVERING, _E.RECOVER, _M._no_flight_remembered, _S.ON_GROUND),
-    Transition(_S.RECOVERING, _E.RECOVER, _M._flying_remembered, _S.FLYING),
-    # The caller of an interrupted takeoff or landing got an error, and expects safety.
-    Transition(_S.RECOVERING, _E.RECOVER, _M._down, _S.RAMPING_DOWN, _M._begin),
-    Transition(
-        _S.RECOVERING, _E.RECOVER, _M._seen_and_landings_have_a_descent, _S.DESCENDING, _M._begin
-    ),
-    Transition(_S.RECOVERING, _E.RECOVER, None, _S.FLYING),
-    Transition(_S.ON_GROUND, _E.TAKEOFF, None, _S.LIFTING_OFF, _M._begin),
-    Transition(_S.LIFTING_OFF, _E.TICK, _M._open_loop_over, _S.CLIMBING, _M._send_hover_point),
-    Transition(_S.LIFTING_OFF, _E.TICK, _M._lifted_off, _S.LIFTED),
-    Transition(
-        _S.LIFTED, _E.TICK, _M._open_loop_over, _S.CLIMBING, _M._send_hover_point_and_thrust
-    ),
-    Transition(_S.CLIMBING, _E.TICK, _M._takeoff_over_but_still_down, _S.RAMPING_DOWN, _M._begin),
-    Transition(_S.CLIMBING, _E.TICK, _M._takeoff_over, _S.FLYING),
-    *(
-        row
-        for state in (*_TAKEOFF, _S.FLYING)
-        for row in (
-            Transition(state, _E.LAND, _M._landings_have_a_descent, _S.DESCENDING, _M._begin),
-            Transition(state, _E.LAND, None, _S.RAMPING_DOWN, _M._begin),
-        )
-    ),
-    Transition(
-        _S.DESCENDING, _E.TICK, _M._down_or_descent_over, _S.RAMPING_DOWN, _M._begin_at_once
-    ),
-    # The ground may be lower than at the takeoff, for example next to a table.
-    Transition(_S.RAMPING_DOWN, _E.TICK, _M._still_sinks, _S.DESCENDING, _M._descend_further),
-    Transition(_S.RAMPING_DOWN, _E.TICK, _M._ramp_over, _S.TOUCHING_DOWN),
-    Transition(
-        _S.TOUCHING_DOWN, _E.TICK, _M._down_or_not_seen_or_too_late, _S.ON_GROUND, _M._begin
-    ),
-    *(
-        Transition(state, _E.FILTER_SINKS, None, _S.YIELDED, _M._begin)
-        for state in (*_TAKEOFF, *_AIRBORNE_OR_LANDING)
-    ),
-    Transition(_S.YIELDED, _E.FILTER_SINKS, None, _S.YIELDED),
-    Transition(_S.YIELDED, _E.FILTER_PASSES, None, _S.RAMPING_DOWN, _M._begin),
-    Transition(_S.YIELDED, _E.FILTER_HOLDS, None, _S.RAMPING_DOWN, _M._begin),
-    Transition(_S.YIELDED, _E.TICK, _M._filter_too_late, _S.ON_GROUND, _M._begin),
-    # At the beginning of a takeoff the filter may still be down from the last flight.
-    *(
-        Transition(state, _E.FILTER_DOWN, None, _S.ON_GROUND, _M._begin)
-        for state in (*_AIRBORNE_OR_LANDING, _S.YIELDED)
-    ),
-    *(
-        Transition(state, event, None, _S.ON_GROUND, _M._begin)
-        for state in (*_TAKEOFF, *_AIRBORNE_OR_LANDING, _S.YIELDED)
-        for event in (*STOPS, _E.VEHICLE_LOST)
-    ),
+
+def _requested(request, guard=None):
+    """Return a guard that fires for a request, and if another guard fires, too."""
+    return lambda _, flight: flight.requested is request and (guard is None or guard(flight))
+
+
+def _if(guard):
+    """Return a guard of the flight alone."""
+    return lambda _, flight: guard(flight)
+
+
+def _filter(*states):
+    return lambda _, flight: flight.filter.state in states
+
+
+_S, _F, _M = ServerState, FilterState, FlightStateMachine
+_TAKEOFF = (_S.LIFTING_OFF, _S.LIFTED, _S.CLIMBING)
+_ALOFT = (_S.FLYING, _S.DESCENDING, _S.RAMPING_DOWN, _S.TOUCHING_DOWN)
+FLYING = (*_TAKEOFF, _S.FLYING)  #: The states that a landing ends.
+AIRBORNE = (*_TAKEOFF, *_ALOFT, _S.YIELDED)
+_BEGIN = (_S.RECOVERING,)
+#: Parts of one takeoff or landing, whose times go on.
+_PARTS = (
+    (_S.LIFTING_OFF, _S.LIFTED),
+    (_S.LIFTING_OFF, _S.CLIMBING),
+    (_S.LIFTED, _S.CLIMBING),
+    (_S.CLIMBING, _S.FLYING),
+    (_S.RAMPING_DOWN, _S.TOUCHING_DOWN),
 )
+
+
+def _recover(name, guard, next_state):
+    return Guard(name, _BEGIN, _requested(Request.RECOVER, guard), next_state)
+
+
+REQUESTS: tuple[Guard, ...] = (
+    # In doubt the vehicle is flying: the controller keeps it, and the operator can land.
+    _recover("filter sinks", lambda m: m.filter.state is _F.SINKING, _S.YIELDED),
+    _recover("filter has stopped the motors", lambda m: m.filter.takes_over, _S.ON_GROUND),
+    _recover("high and commanded", _M._high_and_commanded_but_not_remembered, _S.FLYING),
+    _recover("no flight is remembered", _M._no_flight_remembered, _S.ON_GROUND),
+    _recover("flying is remembered", _M._flying_remembered, _S.FLYING),
+    # The caller of an interrupted takeoff or landing got an error, and expects safety.
+    _recover("is down", _M._down, _S.RAMPING_DOWN),
+    _recover("is seen in the air", _M._seen_and_landings_have_a_descent, _S.DESCENDING),
+    _recover("is not seen", None, _S.FLYING),
+    Guard("takeoff", (_S.ON_GROUND,), _requested(Request.TAKEOFF), _S.LIFTING_OFF),
+    Guard("land", FLYING, _requested(Request.LAND, _M._landings_have_a_descent), _S.DESCENDING),
+    Guard("land without descent", FLYING, _requested(Request.LAND), _S.RAMPING_DOWN),
+    Guard("flight is over", AIRBORNE, _requested(Request.END), _S.ON_GROUND),
+)
+
+FOLLOWS: tuple[Guard, ...] = (
+    Guard("filter stops", AIRBORNE, lambda _, m: m.filter.stops, _S.ON_GROUND),
+    Guard("filter sinks", (*_TAKEOFF, *_ALOFT), _filter(_F.SINKING), _S.YIELDED),
+    # At the beginning of a takeoff the filter may still be down from the last flight.
+    Guard("filter is down", (*_ALOFT, _S.YIELDED), _filter(_F.DOWN), _S.ON_GROUND),
+    Guard("filter is new", (_S.YIELDED,), _filter(_F.PASSING, _F.HOLDING), _S.RAMPING_DOWN),
+)
+
+PROFILE: tuple[Guard, ...] = (
+    Guard("open loop is over", (_S.LIFTING_OFF, _S.LIFTED), _if(_M._open_loop_over), _S.CLIMBING),
+    Guard("has lifted off", (_S.LIFTING_OFF,), _if(_M._lifted_off), _S.LIFTED),
+    Guard("has not left", (_S.CLIMBING,), _if(_M._takeoff_over_but_still_down), _S.RAMPING_DOWN),
+    Guard("takeoff is over", (_S.CLIMBING,), _if(_M._takeoff_over), _S.FLYING),
+    Guard("is down", (_S.DESCENDING,), _if(_M._down_or_descent_over), _S.RAMPING_DOWN),
+    # The ground may be lower than at the takeoff, for example next to a table.
+    Guard("still sinks", (_S.RAMPING_DOWN,), _if(_M._still_sinks), _S.DESCENDING),
+    Guard("ramp is over", (_S.RAMPING_DOWN,), _if(_M._ramp_over), _S.TOUCHING_DOWN),
+    Guard("touchdown", (_S.TOUCHING_DOWN,), _if(_M._down_or_not_seen_or_too_late), _S.ON_GROUND),
+    Guard("filter is too late", (_S.YIELDED,), _if(_M._filter_too_late), _S.ON_GROUND),
+)
+
+TABLE = (*REQUESTS, *FOLLOWS, *PROFILE)

@@ -1,26 +1,30 @@
 """ROS interface of the filter between takeoff control and commanded control."""
 
+import math
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from std_msgs.msg import Bool, Empty, String
+from std_msgs.msg import Empty, Header, String
 from std_srvs.srv import Empty as EmptyService
 from typing_extensions import override
 
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
+    EstimateStatus,
     FilterStatus,
     FlightStatus,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_takeoff import flight_topics
-from crazyflie_takeoff.filter_machine import FilterMachine, FilterState, LossTimeouts, Status
-from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic, named_after
-from crazyflie_takeoff.limits import Limits
+from crazyflie_takeoff import flight_topics, supervisor
+from crazyflie_takeoff.envelope import Limits
+from crazyflie_takeoff.facts import Facts, Timeouts
+from crazyflie_takeoff.fallback import SafeSetpoint
+from crazyflie_takeoff.flight_topics import FlightTopicParameters
+from crazyflie_takeoff.guards import Memory
 from crazyflie_takeoff.motion import Delay, Motion
-from crazyflie_takeoff.safe_control import SafeSetpoint
-from crazyflie_takeoff.transition_table import FlightState, flight_state
+from crazyflie_takeoff.phases import FilterState, FlightState, Phase, flight_state
+from crazyflie_takeoff.supervisor import Given
 from crazyflie_takeoff.vehicle_facts import VehicleFacts
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter, topic
 from crazyflie_utils.parameters import vehicle_model
@@ -38,7 +42,7 @@ LISTENING_TIME = 0.4
 SERVER_LIMIT = 2.0  #: Longest time that it waits for a server that recovers the flight state (s).
 FRESH_TIME = 5.0  #: Time after the start in which commanded controls do not prove a flight (s).
 CONTROLLER_POLL_PERIOD = 0.1  #: Period of the search for publishers of controls (s).
-BUSY_GAP = 0.1  #: Gap after which the log says that the computer is too busy (s).
+BUSY_PAUSE = 0.1  #: Pause after which the log says that the computer is too busy (s).
 REPETITION = 10.0  #: Shortest time between two such messages (s).
 
 
@@ -48,10 +52,6 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
     takeoff_control_topic: str = topic("takeoff_control", "the takeoff server's control")
     commanded_control_topic: str = topic("commanded_control", "the controller's control")
     final_control_topic: str = topic("final_control", "the control that is passed on")
-    state_topic: str | None = topic(
-        "state", "where the vehicle is; without it the limits are not watched", None
-    )
-    own_tilted_topic: str | None = named_after("state", "_tilted")
     all_emergency_topic: str = topic(
         "all_emergency", "stops the motors of all vehicles", "/all/emergency"
     )
@@ -59,8 +59,12 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
     reset_service: str = parameter(
         SERVICE, "ends an emergency", "/emergency_reset", "srv/emergency_reset"
     )
-    hold: float = parameter(
-        DURATION, "control that is older in flight is replaced", 0.1, "loss/hold_after"
+    hold: float | None = parameter(
+        DURATION,
+        "control that is older in flight is replaced; by default after three of the controller's "
+        "usual periods, 0.1 s to 0.5 s",
+        None,
+        "loss/hold_after",
     )
     recovery: float = parameter(
         DURATION,
@@ -98,11 +102,9 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
         "cf21",
     )
 
-    tilted_topic = derived_topic("tilted", "state", "_tilted")
-
-    def timeouts(self) -> LossTimeouts:
+    def timeouts(self) -> Timeouts:
         """Return the timeouts of the filter after a loss."""
-        return LossTimeouts(self.hold, self.recovery, self.descent, self.place)
+        return Timeouts(self.hold, self.recovery, self.descent, self.place)
 
     def limits(self) -> Limits:
         """Return the limits of a flight."""
@@ -113,30 +115,29 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
 
 
 class TakeoffControlFilterNode(Node):
-    """Passes on takeoff controls always, and commanded controls in flight; see `FilterMachine`."""
+    """Passes on takeoff controls always, and commanded controls in flight; see `supervisor`."""
 
     needed_in_flight = True
 
     def __init__(self) -> None:
-        self._published_controller: bool | None = None
+        self._has_controller = False  # Whether a node publishes commanded controls.
         self._is_fresh = True
         self._state_delay, self._control_delay = Delay(), Delay()
         self._wall_offset = 0.0  # Wall clock minus `handle.time`, as of the last tick (s).
         # Connection of the last commanded control; None if this process has sent it.
         self._connection: Any = self
-        self._is_settled = False  # Whether the status of a nominal flight has been published.
-        self._status: Status | None = None  # As it was published last.
+        self._status: tuple[object, ...] | None = None  # As it was published last.
         self._text = self._logged_explanation = ""
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         parameters = handle.load(TakeoffControlFilterParameters)
         self._parameters = parameters
-        self._vehicle = VehicleFacts(parameters.connected_topic, handle.resolve)
-        self._has_driver = parameters.vehicle_status_topic is not None
-        self._filter: FilterMachine[ControlStamped] = FilterMachine(
-            parameters.timeouts(), parameters.limits(), parameters.state_topic is not None
-        )
+        has_driver = parameters.vehicle_status_topic is not None
+        vehicle = VehicleFacts(parameters.connected_topic, handle.resolve) if has_driver else None
+        sees = parameters.state_topic is not None
+        self._facts = Facts(parameters.timeouts(), parameters.limits(), sees, vehicle)
+        self._memory = Memory()
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -147,8 +148,7 @@ class TakeoffControlFilterNode(Node):
             parameters.filter_status_topic, FilterStatus, latch=True
         )
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
-        self._controller = handle.publisher(parameters.controller_topic, Bool, latch=True)
-        self._publish_state()
+        self._publish_status()
         self._advertise(handle, parameters.emergency_service, self._on_emergency)
         self._advertise(handle, parameters.reset_service, self._on_reset)
         handle.subscribe(
@@ -166,11 +166,13 @@ class TakeoffControlFilterNode(Node):
                 finite="state",
                 latest_only=True,
             )
-        if parameters.tilted_topic is not None:
-            handle.subscribe(parameters.tilted_topic, Bool, self._on_tilted)
+            handle.subscribe(
+                parameters.estimate_status_topic, EstimateStatus, self._on_estimate_status
+            )
         if parameters.box_topic is not None:
-            flight_topics.follow_box(handle, parameters.box_topic, self._filter.set_box)
-        flight_topics.follow_driver(handle, parameters, self._vehicle)
+            flight_topics.follow_box(handle, parameters.box_topic, self._facts.set_box)
+        if self._facts.vehicle is not None:
+            flight_topics.follow_driver(handle, parameters, self._facts.vehicle)
         self._takeoffs = handle.subscribe(
             parameters.takeoff_control_topic,
             ControlStamped,
@@ -188,7 +190,7 @@ class TakeoffControlFilterNode(Node):
         self._listening_timer = handle.timer(LISTENING_TIME, self._stop_listening, steady=True)
         self._server_timer = handle.timer(SERVER_LIMIT, self._stop_waiting, steady=True)
         self._fresh_timer = handle.timer(FRESH_TIME, self._end_freshness, steady=True)
-        handle.timer(CONTROLLER_POLL_PERIOD, self._publish_controller, steady=True, stagger=True)
+        handle.timer(CONTROLLER_POLL_PERIOD, self._look_for_publishers, steady=True, stagger=True)
         period = flight_topics.DIAGNOSTICS_PERIOD
         handle.timer(period, self._publish_diagnostics, steady=True, stagger=True)
 
@@ -220,12 +222,19 @@ class TakeoffControlFilterNode(Node):
             )
             return
         if state is not None:
-            self._filter.flight_state = state
-            self._follow_filter()
+            self._facts.flight = state
+            self._notice()
 
     def _on_toggle(self, _):
-        self._filter.toggle()
-        self._follow_filter()
+        # No toggle restores a flight that has ended.
+        if self._memory.phase.follows or self._memory.phase is Phase.HOLDING:
+            self._facts.toggled = not self._facts.toggled
+            self._notice()
+
+    def _notice(self):
+        """Have the next control, or the timer, look at what has come."""
+        self._memory.clear_until = -math.inf
+        self._report()
 
     def _on_measured_state(self, message):
         state = message.state
@@ -235,35 +244,40 @@ class TakeoffControlFilterNode(Node):
         time = self._handle.time()
         self._follow_clock(time)
         stamp, now = message.header.stamp.to_sec(), time + self._wall_offset
-        self._filter.measure(motion, self._state_delay.excess(stamp, now, time))
+        supervisor.measure(
+            self._memory, self._facts, time, motion, self._state_delay.excess(stamp, now, time)
+        )
 
     def _follow_clock(self, time):
         self._wall_offset = self._handle.nanoseconds(time) * 1e-9 - time
 
-    def _on_tilted(self, message):
-        self._filter.set_tilted(message.data)
-        self._set_pace()
+    def _on_estimate_status(self, message):
+        if message.is_tilted != self._facts.is_tilted:
+            self._facts.is_tilted = message.is_tilted
+            self._notice()
 
     def _on_takeoff_control(self, message):
-        now, caller = self._handle.time(), self._takeoffs.caller(message)
-        chosen = self._filter.takeoff(now, message, _setpoint(message), caller)
-        self._publish(chosen, message.header.stamp)
-        self._follow_filter()
+        memory, facts, name = self._memory, self._facts, self._takeoffs.caller(message)
+        stands = supervisor.is_on_ground(memory, facts)
+        facts.hear_takeoff(self._handle.time(), message, _setpoint(message), name, stands)
+        self._publish(supervisor.step(memory, facts, Given.TAKEOFF), message.header.stamp)
+        self._report()
 
     def _on_commanded_control(self, message):
         time, stamp = self._handle.time(), message.header.stamp
         seconds, now = stamp.secs + 1e-9 * stamp.nsecs, time + self._wall_offset
         age = self._control_delay.excess(seconds, now, time)
         connection = getattr(message, "_connection_header", None)
+        memory, facts = self._memory, self._facts
         is_same = connection is self._connection
-        if is_same and self._filter.pass_unchanged(time, message.control, age):
+        if is_same and supervisor.passes(memory, facts, time, message.control, age):
             self._final.publish(message)
             return
         self._connection = connection
-        caller = self._commands.caller(message)
-        chosen = self._filter.commanded(time, message, _setpoint(message), caller, age)
-        self._publish(chosen, stamp)
-        self._publish_state()
+        name = self._commands.caller(message)
+        facts.hear_commanded(time, message, _setpoint(message), name, age)
+        self._publish(supervisor.step(memory, facts, Given.COMMANDED), stamp)
+        self._report()
 
     # Emergencies.
 
@@ -271,63 +285,66 @@ class TakeoffControlFilterNode(Node):
         self._stop(f"{self._handle.resolve(self._parameters.emergency_service)} was called")
 
     def _stop(self, reason):
-        self._filter.stop(reason)
+        self._facts.emergency = reason
         self._on_timer()
 
     def _on_reset(self, _):
         try:
-            self._filter.reset()
+            supervisor.reset(self._memory, self._facts)
         except RefusalError as reason:
             name = self._handle.resolve(self._parameters.reset_service)
             raise ServiceError(f"{name} refused: {reason}") from None
-        self._publish_state()
+        self._report()
 
     # Timers.
 
     def _on_timer(self):
         time = self._handle.time()
         self._follow_clock(time)
-        if self._has_driver:
-            is_airborne = not self._filter.is_on_ground
-            if reason := self._vehicle.flight_end(time, is_airborne):
-                self._filter.lose_vehicle(reason)
-        if (control := self._filter.tick(time)) is not None:
-            self._publish(control, self._handle.stamp())
-        gap = self._filter.relay.gaps.longest
-        if gap > BUSY_GAP:
+        memory, facts = self._memory, self._facts
+        was_clear = time < memory.clear_until
+        facts.advance(time)
+        control = supervisor.step(memory, facts, Given.TIME)
+        if was_clear and time < memory.clear_until:
+            return
+        self._publish(control, self._handle.stamp())
+        pause = facts.pauses.longest
+        if pause > BUSY_PAUSE:
             self._handle.warn(
-                f"this computer is too busy: the filter has not run for {gap:.2f} s; expected "
+                f"this computer is too busy: the filter has not run for {pause:.2f} s; expected "
                 f"every {NOMINAL_TIME_STEP:g} s. Controls are kept near hover meanwhile",
                 throttle=REPETITION,
                 key="busy",
             )
-        self._follow_filter()
-
-    def _follow_filter(self):
-        was_settled, self._is_settled = self._is_settled, self._filter.passes_unchanged
-        if not (was_settled and self._is_settled):
-            self._publish_state()
-            self._set_pace()
+        self._report()
 
     def _set_pace(self):
         # A nominal tick leaves time for quick ones before the takeover.
-        nominal = max(TIME_STEP, min(NOMINAL_TIME_STEP, 0.4 * self._parameters.hold))
-        self._timer.set_period(nominal if self._filter.is_nominal else TIME_STEP)
+        nominal = max(TIME_STEP, min(NOMINAL_TIME_STEP, 0.4 * self._facts.hold))
+        is_nominal = supervisor.may_look_rarely(self._memory, self._facts)
+        self._timer.set_period(nominal if is_nominal else TIME_STEP)
 
     def _stop_listening(self):
         # A server that recovers the flight state publishes it soon.
-        if self._filter.remembered is not None or not self._server.has_publishers():
+        if self._facts.remembered is not None or not self._server.has_publishers():
             self._stop_waiting()
 
     def _stop_waiting(self):
         self._listening_timer.stop()
         self._server_timer.stop()
-        self._publish(self._filter.stop_listening(self._handle.time()), self._handle.stamp())
+        facts = self._facts
+        facts.advance(self._handle.time())
+        facts.has_listened = True
+        # The last control has waited.
+        waits = self._memory.phase is Phase.LISTENING and facts.is_commanded
+        given = Given.COMMANDED if waits else Given.TIME
+        self._publish(supervisor.step(self._memory, facts, given), self._handle.stamp())
+        self._report()
 
     def _end_freshness(self):
         self._fresh_timer.stop()
         self._is_fresh = False
-        self._publish_state()
+        self._report()
 
     # Outputs.
 
@@ -337,30 +354,29 @@ class TakeoffControlFilterNode(Node):
         if control is not None:
             self._final.publish(control)
 
-    def _publish_controller(self):
-        machine, is_there = self._filter, self._commands.has_publishers()
-        if not is_there:
-            machine.miss_controller()
+    def _look_for_publishers(self):
+        facts, self._has_controller = self._facts, self._commands.has_publishers()
+        if not self._has_controller:
+            # The next one is new.
+            facts.controller_failed = -math.inf
         if not self._takeoffs.has_publishers():
-            machine.miss_server()
-        has_controller = is_there and not machine.lacks_controller
-        if has_controller != self._published_controller:
-            self._published_controller = has_controller
-            self._controller.publish(Bool(has_controller))
+            facts.server_missed = facts.ran
+            self._memory.clear_until = -math.inf
+        self._publish_status()
 
-    def _publish_state(self):
-        status = self._filter.status
-        if self._is_fresh and status.is_commanded:
-            # Commanded controls right after a launch do not prove a flight.
-            status = status._replace(is_commanded=False)
+    def _report(self):
+        self._publish_status()
+        self._set_pace()
+
+    def _publish_status(self):
+        status = self._content()
         if status == self._status:
             return
         self._status = status
-        message = stamped(FilterStatus, self._handle.stamp(), **status._asdict())
-        message.flight_state = status.flight_state or FlightStatus.UNKNOWN
+        message = FilterStatus(Header(stamp=self._handle.stamp()), *status)
         self._typed_status.publish(message)
-        explanation = status.takeoff_refusal or status.reason
-        text = ": ".join(filter(None, (_words(status), explanation)))
+        explanation = message.takeoff_refusal or message.reason
+        text = ": ".join(filter(None, (_words(message), explanation)))
         if text == self._text:
             return
         self._text = text
@@ -370,19 +386,30 @@ class TakeoffControlFilterNode(Node):
             self._handle.warn(text)
         self._logged_explanation = explanation
 
+    def _content(self):
+        """Return the fields of the status, in the order of the message."""
+        memory, facts = self._memory, self._facts
+        # Commanded controls right after a launch do not prove a flight.
+        is_commanded = facts.is_commanded and not self._is_fresh
+        refusal = supervisor.takeoff_refusal(memory, facts)
+        has_controller = self._has_controller and not facts.lacks_controller
+        flight_state = facts.remembered or FlightStatus.UNKNOWN
+        state = memory.phase.state
+        return state, memory.reason, refusal, flight_state, is_commanded, has_controller
+
     def _publish_diagnostics(self):
         if not self._diagnostics.has_subscribers():
             return
-        machine = self._filter
-        level = flight_topics.ERROR if machine.state.passes_nothing else flight_topics.WARN
-        is_acknowledged = machine.remembered is FlightState.ON_GROUND
-        is_down = machine.state is FilterState.DOWN
-        if machine.state is FilterState.PASSING or (is_down and is_acknowledged):
+        memory, facts = self._memory, self._facts
+        state = memory.phase.state
+        level = flight_topics.ERROR if state >= FilterState.SINKING else flight_topics.WARN
+        is_acknowledged = facts.remembered is FlightState.ON_GROUND
+        if memory.phase.follows or (memory.phase is Phase.DOWN and is_acknowledged):
             level = flight_topics.OK
         figures = {
-            "takeovers": str(machine.takeovers),
-            "hover thrust (m/s^2)": f"{machine.relay.hover:.2f}",
-            "age of the commanded control (s)": f"{max(machine.silence, 0.0):.2f}",
+            "takeovers": str(memory.takeovers),
+            "hover thrust (m/s^2)": f"{facts.hover:.2f}",
+            "age of the commanded control (s)": f"{max(facts.silence, 0.0):.2f}",
         }
         self._diagnostics.publish(flight_topics.report(self._handle, level, self._text, figures))
 
@@ -397,8 +424,8 @@ def _words(status):
     words = []
     if status.takeoff_refusal:
         words.append("refusing")
-    elif status.state not in (FilterState.PASSING, FilterState.HOLDING):
-        words.append(status.state.name.lower())
-    if status.flight_state is not None:
-        words.append(status.flight_state.word)
+    elif status.state > FilterState.HOLDING:
+        words.append(FilterState(status.state).name.lower())
+    if status.flight_state:
+        words.append(FlightState(status.flight_state).word)
     return " from ".join(words) or ("commanded" if status.is_commanded else "unknown")

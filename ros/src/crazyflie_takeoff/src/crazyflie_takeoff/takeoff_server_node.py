@@ -3,13 +3,14 @@
 from concurrent.futures import Future
 
 from diagnostic_msgs.msg import DiagnosticArray
-from std_msgs.msg import Bool, Empty, Float32, Float64, String
+from std_msgs.msg import Empty, Float32, Float64, String
 from std_srvs.srv import Empty as EmptyService
 from typing_extensions import override
 
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
+    EstimateStatus,
     FilterStatus,
     FlightStatus,
     PositionVelocityState,
@@ -17,24 +18,19 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_takeoff import flight_topics
-from crazyflie_takeoff.motion import MAX_FEEDBACK_AGE
+from crazyflie_takeoff.guards import first_firing
+from crazyflie_takeoff.motion import Motion
+from crazyflie_takeoff.phases import FilterState, FlightState, flight_state
+from crazyflie_takeoff.refusals import WATCH, TakeoffChecks, hover_complaint
+from crazyflie_takeoff.server_parameters import TakeoffServerParameters
 from crazyflie_takeoff.server_table import (
     NO_FILTER,
     REFUSALS,
-    STOPS,
-    TAKEOVERS,
     FilterReport,
     FlightStateMachine,
-    ServerEvent,
+    Request,
     ServerState,
 )
-from crazyflie_takeoff.takeoff_checks import (
-    Charge,
-    TakeoffChecks,
-    TakeoffServerParameters,
-    hover_complaint,
-)
-from crazyflie_takeoff.transition_table import FlightState, flight_state
 from crazyflie_utils import Node, NodeHandle, ParameterError, ServiceError, flight_status
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import from_vector, stamped
@@ -45,10 +41,6 @@ GROUND_TIME_STEP = 0.05  #: Period on the ground, where it repeats zero thrust (
 STATUS_PERIOD = 0.1  #: Period at which the status is compared with the published one (s).
 RECOVERY_LIMIT = 1.0  #: Time that a server waits for evidence of the flight when it starts (s).
 
-#: A complaint about the vehicle's own positioning that lasts longer ends the flight, s: before the
-#: driver stops to publish poses, so that a landing begins while there are some.
-POSITIONING_PATIENCE = 0.3
-
 #: Longest descent when the process is to end (s): together with the ramp that is less than the 10 s
 #: for which a process with a flight goes on.
 LEAVE_LIMIT = 7.0
@@ -56,15 +48,6 @@ LEAVE_LIMIT = 7.0
 #: Time after the start of the server during which a takeoff waits for the first state and for a
 #: controller (s): nodes that are launched together need a while to find each other.
 START_LIMIT = 5.0
-
-_EVENTS = {
-    FilterStatus.PASSING: ServerEvent.FILTER_PASSES,
-    FilterStatus.HOLDING: ServerEvent.FILTER_HOLDS,
-    FilterStatus.SINKING: ServerEvent.FILTER_SINKS,
-    FilterStatus.DOWN: ServerEvent.FILTER_DOWN,
-    FilterStatus.EMERGENCY: ServerEvent.FILTER_EMERGENCY,
-}
-_IDLE = (ServerEvent.FILTER_PASSES, ServerEvent.FILTER_DOWN)  # In them, it may refuse a takeoff.
 
 # For an operator, both parts of a landing are one.
 _LOG_WORDS = flight_status.WORDS | {FlightStatus.DESCENDING: "landing"}
@@ -81,14 +64,15 @@ class TakeoffServerNode(Node):
         # Service calls are answered at the end of a takeoff or a landing. At most one is under way;
         # of those that wait, in their order, it is not known yet whether they may begin.
         self._under_way: Future[None] = Future()
-        self._waiting: list[tuple[ServerEvent, Future[None]]] = []
+        self._waiting: list[tuple[Request, Future[None]]] = []
         self._state: FlightState | None = None  # The last state that was published.
         self._reason = ""  # Why the last landing or abort began.
         self._published: tuple[object, ...] | None = None
         self._published_text = ""
         self._logged_word = self._logged_reason = ""
-        self._positioning_since = 0.0
-        self._z_dot = 0.0  # Vertical speed of the last state (m/s).
+        # Time for which this process has run, the last look, and since when guards fire (s).
+        self._ran, self._watched = 0.0, 0.0
+        self._firing: dict[str, float] = {}
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -120,9 +104,6 @@ class TakeoffServerNode(Node):
         handle.advertise_service(parameters.takeoff_service, EmptyService, self._on_takeoff)
         handle.advertise_service(parameters.land_service, EmptyService, self._on_land)
         handle.subscribe(parameters.filter_status_topic, FilterStatus, self._on_filter_status)
-        handle.subscribe(
-            parameters.controller_topic, Bool, lambda message: checks.set_controller(message.data)
-        )
         if parameters.box_topic is not None:
             flight_topics.follow_box(handle, parameters.box_topic, checks.set_box)
         if parameters.battery_topic is not None:
@@ -140,7 +121,14 @@ class TakeoffServerNode(Node):
                 finite="state",
                 latest_only=True,
             )
-            handle.subscribe(f"{parameters.state_topic}_missing", String, self._on_missing_state)
+            handle.subscribe(
+                parameters.estimate_status_topic, EstimateStatus, self._on_estimate_status
+            )
+        else:
+            handle.warn(
+                "topics/state is not set: a landing is a fall of the thrust from wherever the "
+                "vehicle is; set it to the topic of the vehicle's states for a descent"
+            )
         self._timer = handle.timer(TIME_STEP, self._on_timer)
         # Connections are made in real time, also where time is simulated.
         self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover, steady=True)
@@ -158,7 +146,7 @@ class TakeoffServerNode(Node):
         self._land_soon(f"{name} is to end")
 
     def _land_soon(self, reason, failure=""):
-        self._land(reason, failure)
+        self._end(Request.LAND, reason, failure)
         self._flight.limit_descent(LEAVE_LIMIT)
         self._set_pace()
 
@@ -166,7 +154,7 @@ class TakeoffServerNode(Node):
     def enter_safe_state(self) -> None:
         """Abort a takeoff with a landing, continue a landing, and fail the calls."""
         if self._flight.flight_state is FlightState.TAKING_OFF:
-            self._flight.handle(ServerEvent.LAND)
+            self._flight.request(Request.LAND)
         failure = f"{self._handle.name} has failed or is shutting down; see its log"
         self._answer(failure)
         while self._waiting:
@@ -175,10 +163,10 @@ class TakeoffServerNode(Node):
     # Services.
 
     def _on_takeoff(self, _):
-        return self._serve(ServerEvent.TAKEOFF)
+        return self._serve(Request.TAKEOFF)
 
     def _on_land(self, _):
-        return self._serve(ServerEvent.LAND)
+        return self._serve(Request.LAND)
 
     def _serve(self, event):
         future: Future[None] = Future()
@@ -189,17 +177,19 @@ class TakeoffServerNode(Node):
     def _serve_waiting(self):
         if self._flight.state is ServerState.RECOVERING:
             return
-        may_wait = self._is_starting and self._checks.may_become_complete(self._handle.time())
+        now, checks = self._handle.time(), self._checks
+        may_wait = self._is_starting and checks.may_become_complete(now)
+        may_wait = may_wait or checks.vehicle.arms_again(now)
         waiting, self._waiting = self._waiting, []
         for event, future in waiting:
-            if event is ServerEvent.TAKEOFF and may_wait:
+            if event is Request.TAKEOFF and may_wait:
                 self._waiting.append((event, future))
             else:
                 self._begin(event, future)
         self._set_pace()
 
     def _begin(self, event, future):
-        takes_off = event is ServerEvent.TAKEOFF
+        takes_off = event is Request.TAKEOFF
         parameters = self._parameters
         name = self._handle.resolve(
             parameters.takeoff_service if takes_off else parameters.land_service
@@ -235,8 +225,8 @@ class TakeoffServerNode(Node):
 
     def _on_filter_status(self, message):
         try:
-            event, remembered = _EVENTS[message.state], flight_state(message.flight_state)
-        except (KeyError, ValueError):
+            state, remembered = FilterState(message.state), flight_state(message.flight_state)
+        except ValueError:
             self._handle.warn(
                 f"ignoring state {message.state}, flight_state {message.flight_state} on "
                 f"{self._parameters.filter_status_topic}; expected constants of FilterStatus and "
@@ -245,22 +235,22 @@ class TakeoffServerNode(Node):
                 key="filter status",
             )
             return
-        reason = message.reason
-        if message.takeoff_refusal and event in _IDLE:
-            event, reason = ServerEvent.FILTER_REFUSES, message.takeoff_refusal
-        if event in TAKEOVERS and self._flight.accepts(event):
-            self._reason = reason
-            if event in STOPS or self._flight.flight_state is FlightState.TAKING_OFF:
-                self._answer(f"the flight was ended by the filter: {reason}")
-        self._flight.set_filter(FilterReport(event, remembered, message.is_commanded, reason))
+        self._checks.set_controller(message.has_controller)
+        # Only of an idle filter: another one says more by its state.
+        is_idle = state in (FilterState.PASSING, FilterState.DOWN)
+        refusal = message.takeoff_refusal if is_idle else ""
+        report = FilterReport(state, remembered, message.is_commanded, message.reason, refusal)
+        before, flight = self._flight.flight_state, self._flight
+        if (flight.set_filter(report) or flight.yields) and report.takes_over:
+            self._reason = refusal or message.reason
+            if report.stops or before is FlightState.TAKING_OFF:
+                self._answer(f"the flight was ended by the filter: {self._reason}")
         self._set_pace()
 
     def _on_inhibition(self, message):
         self._checks.inhibition = message.data
 
     def _on_positioning(self, message):
-        if not self._checks.positioning:
-            self._positioning_since = self._handle.time()
         self._checks.positioning = message.data
 
     def _on_battery(self, message):
@@ -268,16 +258,15 @@ class TakeoffServerNode(Node):
             self._checks.battery.measure(self._handle.time(), message.data)
 
     def _on_state(self, message):
-        state = message.state
-        age = self._handle.age(message.header.stamp)
-        self._checks.position.measure(self._handle.time(), (state.x, state.y, state.z), age)
-        self._z_dot = state.z_dot
+        state, age = message.state, self._handle.age(message.header.stamp)
+        motion = Motion((state.x, state.y, state.z), (state.x_dot, state.y_dot, state.z_dot))
+        self._checks.measured.update(self._handle.time(), motion, age)
 
-    def _on_missing_state(self, message):
-        self._checks.position.missing_reason = message.data
+    def _on_estimate_status(self, message):
+        self._checks.measured.missing_reason = message.reason
 
     def _measured_position(self):
-        return self._checks.position.value(self._handle.time())
+        return self._checks.measured.position(self._handle.time())
 
     # The flight.
 
@@ -304,34 +293,29 @@ class TakeoffServerNode(Node):
         self._serve_waiting()
 
     def _watch(self):
-        """End a flight that is over; land for a battery or positioning by which it cannot go on."""
-        checks, now = self._checks, self._handle.time()
-        is_airborne = self._flight.accepts(ServerEvent.VEHICLE_LOST)
-        if reason := checks.vehicle.flight_end(now, is_airborne):
-            self._end_flight(reason)
+        """End a flight that is over; land one that cannot go on."""
+        checks, now, flight = self._checks, self._handle.time(), self._flight
+        self._ran += min(max(now - self._watched, 0.0), CRUISE_TIME_STEP)
+        self._watched = now
         if complaint := checks.battery_complaint(now):
             self._handle.warn(complaint, throttle=30.0, key="battery")
-            if checks.battery.charge(now) is Charge.CRITICAL:
-                self._land(complaint)
-        if checks.positioning and now - self._positioning_since > POSITIONING_PATIENCE:
-            self._land(checks.positioning)
+        rows = [row for row in WATCH if flight.state in row.phases]
+        if found := first_firing(rows, self._firing, self._ran, checks, flight):
+            row, reason = found
+            self._end(row.next, row.says.format(reason))
 
-    def _land(self, reason, failure=""):
-        if self._flight.accepts(ServerEvent.LAND):
-            self._answer(f"takeoff aborted: {failure or reason}")
-            self._flight.handle(ServerEvent.LAND)
-            self._reason = reason
-
-    def _end_flight(self, reason):
-        if self._flight.accepts(ServerEvent.VEHICLE_LOST):
-            self._answer(f"the flight was ended: {reason}")
-            self._flight.handle(ServerEvent.VEHICLE_LOST)
+    def _end(self, event, reason, failure=""):
+        """Land, or end a flight that is over."""
+        if self._flight.accepts(event):
+            text = "takeoff aborted" if event is Request.LAND else "the flight was ended"
+            self._answer(f"{text}: {failure or reason}")
+            self._flight.request(event)
             self._reason = reason
 
     def _tick(self, before):
-        now, position = self._handle.time(), self._checks.position
-        is_fresh = position.value(now, MAX_FEEDBACK_AGE) is not None
-        output = self._flight.tick(now, position.value(now), self._z_dot if is_fresh else None)
+        now, motion = self._handle.time(), self._checks.measured.within(self._handle.time())
+        z_dot = None if motion is None else motion.velocity[2]
+        output = self._flight.tick(now, self._measured_position(), z_dot)
         state = self._flight.flight_state
         if before is FlightState.TAKING_OFF and state is FlightState.LANDING:
             self._reason = "the vehicle has not lifted off"
@@ -351,8 +335,11 @@ class TakeoffServerNode(Node):
         if output.thrust is not None:
             control = from_vector(Control, (0.0, 0.0, 0.0, output.thrust))
             self._control.publish(stamped(ControlStamped, self._handle.stamp(), control=control))
-        if state in (FlightState.ON_GROUND, FlightState.FLYING):
+        if state is FlightState.ON_GROUND:
             self._answer()
+        elif state is FlightState.FLYING and not self._under_way.done():
+            if (failure := self._flight.arrival()) is not None:
+                self._answer(failure)
 
     def _set_pace(self):
         # Not before the state has been published.
@@ -379,9 +366,9 @@ class TakeoffServerNode(Node):
         report, state = self._flight.filter, self._flight.flight_state
         if state is None:
             return
-        if report.event is ServerEvent.FILTER_SINKS:
+        if report.state is FilterState.SINKING:
             evidence = "the filter brings the vehicle down"
-        elif report.event in TAKEOVERS:
+        elif report.takes_over:
             evidence = "the filter has stopped the motors"
         else:
             remembered = "nothing" if report.remembered is None else report.remembered.word
@@ -422,13 +409,13 @@ class TakeoffServerNode(Node):
     def _publish_diagnostics(self):
         if not self._diagnostics.has_subscribers():
             return
-        checks, event = self._checks, self._flight.filter.event
+        checks, filter_state = self._checks, self._flight.filter.state
         text = _text(*self._content())
         level = flight_topics.WARN if ": " in text else flight_topics.OK
-        if event in (ServerEvent.FILTER_SINKS, ServerEvent.FILTER_EMERGENCY):
+        if filter_state in (FilterState.SINKING, FilterState.EMERGENCY):
             level = flight_topics.ERROR
         figures = {
-            "state is fresh": str(checks.position.value(self._handle.time()) is not None),
+            "state is fresh": str(checks.measured.position(self._handle.time()) is not None),
             "controller": str(checks.has_controller),
             "battery (V)": f"{checks.battery.voltage:.2f}",
         }
@@ -438,7 +425,7 @@ class TakeoffServerNode(Node):
         """Return flight state, reason, and why a takeoff is refused."""
         state, report = self._flight.flight_state, self._flight.filter
         if state is not FlightState.ON_GROUND:
-            is_held = report.event is ServerEvent.FILTER_HOLDS and state is not None
+            is_held = report.state is FilterState.HOLDING and state is not None
             reasons = (self._reason, report.reason if is_held else "")
             return state, "; ".join(filter(None, reasons)), REFUSALS[state]
         return state, self._reason, self._takeoff_refusal()

@@ -4,22 +4,17 @@ import math
 from collections.abc import Callable
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_takeoff.limits import Debounce
 
 MAX_FACT_AGE = 3.0  #: Age at which a status of the driver is unknown (s); it repeats each at 1 Hz.
-#: Time after which a flight is over if the vehicle cannot fly (s). The firmware stops the motors as
-#: long after the last setpoint.
-MAX_FAULT_TIME = 2.0
 #: Time in which a vehicle that arms itself has done so again (s): it disarms 3 s after a landing,
 #: and every 30 s on the ground, for 0.2 s.
 REARMING_TIME = 0.5
-_LONGEST_STEP = 0.1  # A process that was stopped has received no status meanwhile (s).
 
 _READY = SupervisorState.ARMED | SupervisorState.CAN_FLY
 
 
 class VehicleFacts:
-    """Facts of the driver about a vehicle, and decisions by them; times are s of one clock.
+    """Facts of the driver about a vehicle; times are s of one clock.
 
     On ``topic`` the driver publishes whether it is connected (None: there is no driver);
     ``resolve(topic)`` returns the absolute name. A fact that has never come, or that the driver
@@ -35,9 +30,7 @@ class VehicleFacts:
         self._status = -math.inf, _READY, False
         self._unready_since = -math.inf
         self._is_flying: bool | None = None  # As the vehicle reports it; None if it does not.
-        self._has_flown = False  # Whether it has reported the present flight.
-        self._time = -math.inf
-        self._debounce = Debounce(MAX_FAULT_TIME)
+        self._reported = -math.inf  # When it has reported a flight last.
 
     def set_connected(self, now: float, is_connected: bool) -> None:
         """Record whether the driver is connected to the vehicle."""
@@ -48,6 +41,8 @@ class VehicleFacts:
     ) -> None:
         """Record the vehicle's state, if it is known, and whether an emergency is latched."""
         self._is_flying = SupervisorState.FLYING in state if is_known else None
+        if self._is_flying:
+            self._reported = now
         if not is_known:
             state |= _READY
         was_ready = _READY in self._status[1]
@@ -68,25 +63,22 @@ class VehicleFacts:
             f"crazyflie_add.launch uri:=ADDRESS tf_prefix:={self._prefix.strip('/')}"
         )
 
-    def flight_end(self, now: float, is_airborne: bool) -> str:
-        """Return why a flight is over; empty if it is not. To be called in each period.
+    def flight_fault(self, now: float, begin: float) -> str:
+        """Return why a flight that has begun at ``begin`` cannot go on; empty if it can.
 
-        ``is_airborne`` is whether the vehicle is to be off the ground. The motors of one that could
-        not fly for `MAX_FAULT_TIME` are off; so are those of one that reports no flight any more,
-        which the firmware does while no motor turns. When it can fly again, somebody may have it in
-        a hand.
+        A vehicle that reports no flight any more has no motor that turns. When it can fly again,
+        somebody may have it in a hand.
         """
-        step, self._time = min(max(now - self._time, 0.0), _LONGEST_STEP), now
         was_connected = math.isfinite(self._connection[0])
-        fault = self._connection_fault(now) if was_connected else ""
-        fault = fault or self._fault(now)
-        if not fault and SupervisorState.ARMED not in self._state(now):
-            fault = "the vehicle is not armed"
-        is_flying = self._is_flying if now - self._status[0] <= MAX_FACT_AGE else None
-        self._has_flown = is_airborne and (self._has_flown or is_flying is True)
-        if not fault and self._has_flown and is_flying is False:
-            fault = "the vehicle does not fly any more: has it restarted?"
-        return self._debounce.advance(step, fault)
+        fault = (self._connection_fault(now) if was_connected else "") or self._fault(now)
+        if fault:
+            return fault
+        if SupervisorState.ARMED not in self._state(now):
+            return "the vehicle is not armed"
+        is_known = now - self._status[0] <= MAX_FACT_AGE
+        if is_known and self._is_flying is False and self._reported >= begin:
+            return "the vehicle does not fly any more: has it restarted?"
+        return ""
 
     def _state(self, now):
         time, state, _ = self._status
@@ -108,12 +100,17 @@ class VehicleFacts:
             return f"the vehicle cannot fly, its state is: {faults.words()}; restart it"
         return ""
 
+    def arms_again(self, now: float) -> bool:
+        """Return whether a vehicle that arms itself has just disarmed: it is ready soon."""
+        state = self._state(now)
+        arms_itself = SupervisorState.AUTO_ARMED in state and _READY not in state
+        return arms_itself and now - self._unready_since < REARMING_TIME
+
     def _unready(self, now):
         state = self._state(now)
-        arms_itself = SupervisorState.AUTO_ARMED in state
-        if _READY in state or (arms_itself and now - self._unready_since < REARMING_TIME):
+        if _READY in state or self.arms_again(now):
             return ""
-        if SupervisorState.ARMED in state or arms_itself:
+        if SupervisorState.ARMED in state or SupervisorState.AUTO_ARMED in state:
             return f"the vehicle cannot fly yet, its state is: {state.words()}"
         how = f"; call {self._prefix}/arm" if self._topic else ""
         return f"the vehicle is not armed{how}"

@@ -1,4 +1,4 @@
-"""The control by which the filter flies the vehicle when no control comes.
+"""The control by which the supervisor flies the vehicle when no control comes.
 
 The thrust is that of hover, as learned in flight, plus a correction by which z_dot follows a
 target. The target returns the vehicle to the height at which the filter took over, or, in a
@@ -102,7 +102,10 @@ class HoverThrust:
         if speed is None:
             self._speed, self._acceleration = None, 0.0
             return
-        mean = speed if self._speed is None else self._speed + share * (speed - self._speed)
+        if self._speed is None:
+            self.skip(speed)
+            return
+        mean = self._speed + share * (speed - self._speed)
         self._speed, self._acceleration = mean, (speed - mean) / self._averaging
 
     def skip(self, speed: float | None) -> None:
@@ -136,7 +139,7 @@ class SafeControl:
         self._place: tuple[float, float, float] | None = None
         self._target = 0.0
         self._pressure = 0.0  # Reduction of the thrust while the vehicle does not sink (m/s^2).
-        self._seen = motion
+        self.begin = self._seen = motion  #: Where the vehicle was at the begin; None if unknown.
         if motion is not None:
             self._reckon(age)
 

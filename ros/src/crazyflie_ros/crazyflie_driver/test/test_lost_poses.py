@@ -1,5 +1,7 @@
 """External poses that stop while a vehicle flies by its own estimate of them."""
 
+import math
+
 import pytest
 from genpy import Duration
 from geometry_msgs.msg import Point, PointStamped
@@ -81,8 +83,9 @@ def test_a_flight_whose_external_poses_stop_is_landed(fed):
 def test_poses_that_stop_for_a_moment_end_no_flight(fed):
     server, vehicle = fed
     for _ in range(3):
-        pass_time(server, 0.4, fed=False)
-        pass_time(server, 0.1)
+        # 0.4 s, in steps of 0.1 s.
+        pass_time(server, 0.35, fed=False)
+        pass_time(server, 0.05)
     assert landings(vehicle) == []
 
 
@@ -96,6 +99,41 @@ def test_poses_that_the_link_refuses_have_stopped(fed):
         stream=lambda server: server.process.publish("/cf1/external_position", point),
     )
     wait_until(lambda: landings(vehicle), "a landing")
+
+
+def test_poses_that_jump_in_flight_are_not_sent_and_have_stopped(fed):
+    """Motion capture has taken another body for the vehicle, which would dart there."""
+    server, vehicle = fed
+    before = len(vehicle.packets(6, 0))
+    far = PointStamped(point=Point(_POINT.point.x + 2.0, _POINT.point.y, _POINT.point.z))
+    pass_time(
+        server,
+        0.8,
+        fed=False,
+        stream=lambda server: server.process.publish("/cf1/external_position", far),
+    )
+    wait_until(lambda: landings(vehicle), "a landing")
+    assert len(vehicle.packets(6, 0)) == before
+    assert any("it jumps by 2.00 m in flight" in text for text in server.process.logged("warn"))
+    # On the ground it may be put anywhere.
+    is_(vehicle, READY)
+    wait_for_words(server, "ready")
+    server.process.publish("/cf1/external_position", far)
+    vehicle.wait_for_packets(6, 0, before + 1)
+
+
+def test_poses_of_a_fast_vehicle_do_not_jump():
+    poses = PoseAgreement()
+    for step in range(50):
+        assert poses.jump(0.1 * step, (0.4 * step, 0.0, 0.0), True) == 0.0
+    # After a pause, or a loss, it may be at most 1.3 m further.
+    assert poses.jump(6.0, (20.8, 0.0, 0.0), True) == 0.0
+    assert poses.jump(6.01, (21.2, 0.0, 0.0), True) == pytest.approx(0.4)
+    assert poses.jump(7.0, (30.0, 0.0, 0.0), True) == pytest.approx(9.2)
+    assert poses.jump(8.0, (math.nan, 0.0, 0.0), True) == 0.0
+    assert poses.jump(8.1, (21.0, 0.0, 0.0), True) == 0.0
+    assert poses.jump(8.2, (30.0, 0.0, 0.0), False) == 0.0
+    assert poses.jump(8.3, (30.1, 0.0, 0.0), True) == 0.0
 
 
 def test_a_flight_on_references_whose_external_poses_stop_is_landed(server, vehicle):

@@ -62,6 +62,11 @@ def estimator_problem(number: float | None) -> str:
     )
 
 
+#: Least distance (m) between poses of a flight that are not of one vehicle, and the speed (m/s) at
+#: which it can have moved in between, for at most some time (s).
+_JUMP, _MAX_SPEED, _MAX_GAP = 0.3, 5.0, 0.2
+
+
 class PoseAgreement:
     """Whether a vehicle's estimate is where the external poses say; times in s of one clock."""
 
@@ -71,6 +76,20 @@ class PoseAgreement:
         self._text = ""
         # Begin and latest pose of the present, or last, stream.
         self._stream_begin = self._latest = -math.inf
+        # Time and place of the latest one that did not jump.
+        self._place: tuple[float, Sequence[float]] | None = None
+
+    def jump(self, now: float, position: Sequence[float], is_flying: bool) -> float:
+        """Return how far a pose in flight is from the one before (m) if it jumps, otherwise 0."""
+        if is_flying and self._place is not None:
+            time, place = self._place
+            distance = math.dist(place, position)
+            if distance > _JUMP + _MAX_SPEED * min(now - time, _MAX_GAP):
+                return distance
+        # The link refuses others.
+        if all(map(math.isfinite, position)):
+            self._place = now, tuple(position)
+        return 0.0
 
     def pose(self, now: float, position: Sequence[float]) -> None:
         """Record a position (m) that the vehicle is sent."""

@@ -291,9 +291,16 @@ class SetpointTopics:
                 f"ignoring {name}: its positioning is {self._log.positioning.source}", 5.0, name
             )
             return
-        now = self._external_time = self._vehicle.handle.time()
+        now, position = self._vehicle.handle.time(), sender.position(message)
+        if jump := self._log.agreement.jump(now, position, self._log.is_flying):
+            self._warn(
+                f"ignoring {name}: it jumps by {jump:.2f} m in flight; is it that of another body?",
+                "jump",
+            )
+            return
+        self._external_time = now
         if self._send(name, sender, message):
-            self._log.agreement.pose(now, sender.position(message))
+            self._log.agreement.pose(now, position)
             if problem := self._log.estimator_problem():
                 self._vehicle.warn(f"{name}: {problem}", _ESTIMATOR_PERIOD, "estimator")
 

@@ -198,19 +198,14 @@ def test_the_plain_floats_are_the_textbook_s_matrices():
     covariance = np.array(subject.covariance)
     for _ in range(200):
         dt, sample = rng.uniform(0.005, 0.03), rng.normal(size=3)
-        rate_variance = rng.uniform(0.0, 0.01)
         f = transition(dt)
         state = f @ state
         covariance = f @ covariance @ f.T + continuous_wiener_covariance(dt, WALK)
-        covariance[1, 1] += rate_variance
         gain = covariance[0] / (covariance[0, 0] + NOISE**2)
         state = state + np.outer(gain, sample - state[0])
         covariance = covariance - np.outer(gain, covariance[0])
-        subject.predict(dt, rate_variance=rate_variance)
-        subject.correct(sample)
-        np.testing.assert_allclose(
-            [subject.value, subject.rate, subject.acceleration], state, rtol=1e-6, atol=1e-9
-        )
+        value, rate = subject.step(dt, sample)
+        np.testing.assert_allclose([value, rate], state[:2], rtol=1e-10, atol=1e-10)
         np.testing.assert_allclose(subject.covariance, covariance, rtol=1e-9, atol=1e-12)
 
 

@@ -128,11 +128,6 @@ class ConstantAccelerationFilter(RateFilter):
         self._walk_density = acceleration_walk**2
 
     @property
-    def innovation_deviation(self) -> float:
-        """Standard deviation of the next sample about `value`, along each axis."""
-        return math.sqrt(self._covariance[0] + self._noise_variance)
-
-    @property
     def covariance(self) -> list[list[float]]:
         """Covariance of (signal, rate, acceleration) of any one axis, 3 rows of 3."""
         p00, p01, p02, p11, p12, p22 = self._covariance
@@ -173,13 +168,8 @@ class ConstantAccelerationFilter(RateFilter):
             ]
         self._known = known
 
-    def predict(
-        self, dt: float, acceleration: Components | None = None, rate_variance: float = 0.0
-    ) -> None:
-        """Predict to ``dt`` (s) later, with the acceleration known since then, n components.
-
-        ``rate_variance`` is that of an error of the rate beside the random walk.
-        """
+    def predict(self, dt: float, acceleration: Components | None = None) -> None:
+        """Predict to ``dt`` (s) later, with the acceleration known since then, n components."""
         self._take_over(acceleration)
         # x = F x, P = F P F' + Q, written out; F = [[1, dt, dt^2 / 2], [0, 1, dt], [0, 0, 1]].
         half, third, walk = dt * dt / 2.0, dt * dt * dt, self._walk_density
@@ -197,7 +187,7 @@ class ConstantAccelerationFilter(RateFilter):
             fp00 + dt * fp01 + half * fp02 + walk * third * dt * dt / 20.0,
             fp01 + dt * fp02 + walk * third * dt / 8.0,
             fp02 + walk * third / 6.0,
-            fp11 + dt * fp12 + walk * third / 3.0 + rate_variance,
+            fp11 + dt * fp12 + walk * third / 3.0,
             fp12 + walk * half,
             p22 + walk * dt,
         )

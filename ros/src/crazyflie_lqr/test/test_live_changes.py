@@ -113,3 +113,28 @@ def test_any_reach_of_references_leaves_them_finite(max_jump, place, vehicle):
     assert math.dist(followed[:3], vehicle) <= max_jump * (1.0 + 1e-9) + 1e-12 or math.dist(
         followed[:3], vehicle
     ) == math.dist(place, vehicle)
+
+
+def test_limits_of_the_control_may_be_narrower_in_flight_and_not_wider():
+    limits = {"control/max_roll": 0.1, "control/max_thrust": 12.0, "control/min_thrust": 9.0}
+    process = lifting(**limits)
+    refer(process)
+    assert answer(process, x=1.5, y=1.5, z=1.5)[0][[0, 1, 3]] == pytest.approx([0.1, -0.2618, 9.0])
+    process.reconfigure("/lqr_controller", **{"control/max_pitch": 0.05})
+    assert answer(process, x=1.5, y=-1.5, z=-1.5)[0][[0, 1, 3]] == pytest.approx(
+        [-0.1, -0.05, 12.0]
+    )
+    for name, value in (("max_roll", 0.3), ("max_thrust", 17.0), ("min_thrust", 9.9)):
+        with pytest.raises(ServiceError, match=f"control/{name}|thrust of u_ref_file"):
+            process.reconfigure("/lqr_controller", **{f"control/{name}": value})
+
+
+def test_an_integral_does_not_grow_into_a_narrower_limit():
+    process = lifting(**{"control/max_thrust": 10.0})
+    publish_flight_state(process, "flying")
+    refer(process, z=1.0)
+    for k in range(80):
+        process.advance(0.1)
+        assert answer(process, z=1.0 if k < 20 else 0.8)[0][3] <= 10.0
+    process.advance(0.1)
+    assert answer(process, z=1.0)[0][3] == pytest.approx(9.81, abs=0.01)

@@ -29,8 +29,10 @@ ROLL, PITCH, YAW_DOT, THRUST = range(4)
 YAW = 6  #: Index of the yaw in states with position, velocity and yaw.
 X_DIM, U_DIM = 7, 4  #: Lengths of these states, and of controls.
 
-#: Smallest and largest value of each control.
-LIMITS = (
+Limits = Sequence[tuple[float, float]]  #: Smallest and largest value of each control.
+
+#: Those within which every controller of a vehicle stays.
+LIMITS: Limits = (
     (-MAX_TILT, MAX_TILT),
     (-MAX_TILT, MAX_TILT),
     (-math.inf, math.inf),
@@ -78,16 +80,18 @@ def integrate(
     linear: Sequence[Number],
     k: Number,
     limit: Number,
+    limits: Limits = LIMITS,
 ) -> Number:
     """Return the integral of the position error along an axis after ``dt`` (s), m s.
 
     Does not grow while it drives the control further into its limit (conditional integration:
     Astrom and Hagglund, Advanced PID Control, 2006, 3.5). The axis is 0, 1 or 2: x, y or z in the
     heading frame; ``error`` is in m, ``linear`` the control of `linear_control`; ``k`` and
-    ``limit`` are gain and largest absolute value of this integral, see `LinearFeedback`.
+    ``limit`` are gain and largest absolute value of this integral, see `LinearFeedback`; ``limits``
+    are those of the control.
     """
     grown = clip(integral + error * dt, -limit, limit)
-    low, high = LIMITS[INTEGRATED[axis]]
+    low, high = limits[INTEGRATED[axis]]
     u = linear[INTEGRATED[axis]] + k * grown
     growth = k * (grown - integral)
     is_into_limit = ((u > high) & (growth > 0.0)) | ((u < low) & (growth < 0.0))
@@ -104,9 +108,9 @@ def with_integrals(
     return u
 
 
-def limited(u: Sequence[Number]) -> Vector[Number]:
-    """Return a control within `LIMITS`."""
-    return [clip(part, low, high) for part, (low, high) in zip(u, LIMITS, strict=True)]
+def limited(u: Sequence[Number], limits: Limits = LIMITS) -> Vector[Number]:
+    """Return a control within limits."""
+    return [clip(part, low, high) for part, (low, high) in zip(u, limits, strict=True)]
 
 
 SPEED = 0.4  #: Speed of the reference (m/s).
@@ -285,8 +289,7 @@ class IntegralStateFeedback(LinearFeedback):
     roll, that of z to the thrust. I is the integral of the position error in the heading frame,
     where a badly trimmed attitude stays the same when the vehicle turns; it stays within +-
     ``integrator_limit``, m s. The gains k are in rad/(m s), rad/(m s) and 1/s^3, with the signs of
-    the position gains in K. Roll and pitch are then limited to `MAX_TILT`, thrust to `MIN_THRUST`
-    ... `MAX_THRUST`.
+    the position gains in K. The control is then limited to ``limits``.
 
     While a control is at its limit, its integral does not grow into the limit. From
     `reset_integrator` to the next flight it is zero. While `foreign` controls are flown, it stays.
@@ -302,10 +305,12 @@ class IntegralStateFeedback(LinearFeedback):
         yaw_index: int,
         integrator_k: Components = (0.0, 0.0, 0.0),
         integrator_limit: Components = (0.0, 0.0, 0.0),
+        limits: Limits = LIMITS,
     ):
         super().__init__(K, u_ref, yaw_index)
         self._integrator_k = [float(each) for each in integrator_k]
         self._integrator_limit = [float(each) for each in integrator_limit]
+        self._limits = limits
         # Axes whose integral acts on the control.
         self._axes = [k for k in range(3) if integrator_k[k] and integrator_limit[k]]
         self._integral = [0.0, 0.0, 0.0]
@@ -344,7 +349,7 @@ class IntegralStateFeedback(LinearFeedback):
                 self._integrate(error[:3], dt, u)
             u = with_integrals(u, self._integral, self._integrator_k)
         u[THRUST] += climb_thrust
-        u = limited(u)
+        u = limited(u, self._limits)
         self._thrust = u[THRUST]
         return np.array(u)
 
@@ -416,7 +421,9 @@ class IntegralStateFeedback(LinearFeedback):
                 continue
             k, limit = self._integrator_k[axis], self._integrator_limit[axis]
             integral = self._integral[axis]
-            self._integral[axis] = integrate(axis, integral, error[axis], dt, linear, k, limit)
+            self._integral[axis] = integrate(
+                axis, integral, error[axis], dt, linear, k, limit, self._limits
+            )
 
 
 def _floats(vector):

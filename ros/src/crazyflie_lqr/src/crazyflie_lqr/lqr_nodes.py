@@ -1,12 +1,16 @@
 """LQR controllers by the state that they take: position, velocity and yaw; lift; the full state."""
 
+import math
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_lqr.gain_file import MatrixFile
-from crazyflie_lqr.linear_feedback import IntegralStateFeedback
+from crazyflie_lqr.linear_feedback import THRUST, IntegralStateFeedback
 from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode, LinearFeedbackParameters
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_msgs.msg import (
     FullStateStamped,
     PositionVelocityStateStamped,
@@ -45,11 +49,35 @@ class IntegratorLimits(Parameters):
     z: float = parameter(_LIMIT, "limit of the integral's magnitude", 0.0, live=True)
 
 
+_TILT = Number("rad", above=0.0, maximum=MAX_TILT)
+_THRUST = Number("m/s^2", minimum=MIN_THRUST, maximum=MAX_THRUST)
+
+
+class ControlLimits(Parameters):
+    """Limits of the control, within those of every controller."""
+
+    max_roll: float = parameter(_TILT, "largest roll to either side", MAX_TILT, live=True)
+    max_pitch: float = parameter(_TILT, "largest pitch to either side", MAX_TILT, live=True)
+    max_thrust: float = parameter(_THRUST, "largest thrust", MAX_THRUST, live=True)
+    min_thrust: float = parameter(_THRUST, "smallest thrust", MIN_THRUST, live=True)
+
+
 class LiftLqrParameters(LinearFeedbackParameters):
     """Parameters of `PositionVelocityYawStateLiftLqrNode`."""
 
     integrator_k: IntegratorGains = group(IntegratorGains, "integrator/k")
     integrator_limit: IntegratorLimits = group(IntegratorLimits, "integrator/thresh")
+    limit: ControlLimits = group(ControlLimits, "control")
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        yield from super().complaints()
+        lowest, hover, highest = self.limit.min_thrust, self.u_ref[THRUST], self.limit.max_thrust
+        if not lowest < hover < highest:
+            yield (
+                f"control/min_thrust ... control/max_thrust is {lowest:g} ... {highest:g} m/s^2; "
+                f"expected {hover:g}, the thrust of u_ref_file, between them"
+            )
 
 
 class PositionVelocityYawStateLiftLqrNode(LinearFeedbackNode):
@@ -64,13 +92,19 @@ class PositionVelocityYawStateLiftLqrNode(LinearFeedbackNode):
 
     @override
     def make_controller(self, parameters: LiftLqrParameters) -> IntegralStateFeedback:
-        k, limit = parameters.integrator_k, parameters.integrator_limit
+        k, limit, control = parameters.integrator_k, parameters.integrator_limit, parameters.limit
         return IntegralStateFeedback(
             parameters.K,
             parameters.u_ref,
             self.yaw_index,
             (k.x, k.y, k.z),
             (limit.x, limit.y, limit.z),
+            (
+                (-control.max_roll, control.max_roll),
+                (-control.max_pitch, control.max_pitch),
+                (-math.inf, math.inf),
+                (control.min_thrust, control.max_thrust),
+            ),
         )
 
 

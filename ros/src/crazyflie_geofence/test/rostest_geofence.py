@@ -10,7 +10,7 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_utils.testing.peer import exchange
 
-REGULAR = Control(roll=0.0, pitch=0.2, yaw_dot=0.3, thrust=9.81)
+REGULAR = Control(roll=0.0, pitch=0.1, yaw_dot=0.3, thrust=9.81)
 
 
 @pytest.mark.parametrize(
@@ -18,7 +18,7 @@ REGULAR = Control(roll=0.0, pitch=0.2, yaw_dot=0.3, thrust=9.81)
     [
         pytest.param(0.0, lambda control: control == REGULAR, id="in the middle"),
         pytest.param(2.0, lambda control: control.pitch < 0.0, id="too far in front"),
-        pytest.param(-2.0, lambda control: control.pitch > 0.2, id="too far behind"),
+        pytest.param(-2.0, lambda control: control.pitch > 0.11, id="too far behind"),
     ],
 )
 def test_a_vehicle_is_left_alone_or_brought_back(x, is_right):

@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospkg
+from diagnostic_msgs.msg import DiagnosticStatus
 
 from crazyflie_control_merger.merger_nodes import RegularControlMergerNode
+from crazyflie_geofence import bounds
 from crazyflie_geofence.geofence import Geofence
 from crazyflie_geofence.geofence_node import GeofenceNode
 from crazyflie_msgs.msg import (
@@ -54,12 +56,20 @@ def test_answers_a_state_with_what_the_fence_says(process):
     publish_regular(process, *REGULAR)
     publish_state(process, *STATE)
     [message] = process.published("/control/geofence")
-    fence = Geofence((-1.0, -2.0, 0.0), (2.0, 1.0, 3.0), 0.5, (1.5, 0.4), (4.0, 0.2), 1.0)
-    x = np.array(STATE)
-    control, priority = fence.control(x[:3], x[3:6], x[6], np.array(REGULAR))
+    axes = bounds.axes(bounds.OF_TYPES, 1.3, 2.5, 0.01, 0.01)
+    fence = Geofence((-1.0, -2.0, 0.0), (2.0, 1.0, 3.0), axes, bounds.max_thrust("cf21"))
+    control, priority = fence.control(0.0, STATE[:3], STATE[3:6], STATE[6], REGULAR)
     np.testing.assert_array_equal(to_vector(message.control.control), control)
-    assert message.control.priority == priority > 0.5
+    assert message.control.priority == priority == 1.0
     assert message.header.stamp.to_sec() == 12.5
+
+
+def test_in_the_middle_the_regular_control_is_untouched(process):
+    publish_regular(process, *REGULAR)
+    publish_state(process, 0.5, -0.5, 1.5, 0.1, -0.1, 0.0, 0.4)
+    [message] = process.published("/control/geofence")
+    assert message.control.control == Control(*REGULAR)
+    assert message.control.priority == 0.0
 
 
 def test_is_silent_without_a_regular_control(process):
@@ -90,16 +100,15 @@ def test_topics_and_box_are_required(name):
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
     [
-        ("box/max/x", -0.5, "at least 0 m, which is box/min/x and twice the margin"),
-        ("box/max/y", -2.0, "at least -1 m"),
-        ("box/max/z", 0.9, "at least 1 m"),
+        ("box/max/x", -0.5, "at least -0.33 m: the proof needs 0.67 m between the walls"),
+        ("box/max/y", -2.0, "at least -1.33 m"),
+        ("box/max/z", 0.3, "at least 0.3536 m: the proof needs 0.35 m"),
         ("box/min/x", math.nan, "a finite number >= -1e+09"),
-        ("margin", 0.0, ">= 0.001"),
-        ("braking/horizontal", 1.9, "<= 1.85"),
-        ("braking/vertical", 6.0, "<= 5.81"),
-        ("reaction_time/horizontal", 0.0, ">= 0.001"),
-        ("reaction_time/vertical", -0.1, ">= 0.001"),
-        ("recovery_rate", 0, "> 0"),
+        ("braking/horizontal", 1.4, "at most 1.338 m/s^2"),
+        ("braking/vertical", 3.5, "at most 3.2"),
+        ("bounds/lag/horizontal", 0.0, ">= 0.001"),
+        ("bounds/delay", -0.1, ">= 0"),
+        ("period", 0, ">= 0.001"),
     ],
 )
 def test_bad_parameters_are_named(name, value, expected):
@@ -110,15 +119,52 @@ def test_bad_parameters_are_named(name, value, expected):
     assert expected in error
 
 
-def test_a_wide_margin_needs_a_wide_box():
+@pytest.mark.parametrize(
+    ("name", "axis", "braking"),
+    [("horizontal", "x", 1.3), ("vertical", "z", 2.5)],
+)
+def test_a_disturbance_that_braking_does_not_exceed_is_refused(name, axis, braking):
     fake = FakeProcess()
-    assert not fake.launch(GeofenceNode(), "/geofence", {**PARAMETERS, "margin": 1.6})
-    assert "box/max/x is 2.0; expected at least 2.2 m" in fake.logged("error")[0]
+    parameters = {**PARAMETERS, f"bounds/disturbance/{name}": braking}
+    assert not fake.launch(GeofenceNode(), "/geofence", parameters)
+    expected = f"the disturbance along {axis} is {braking:g} m/s^2; expected less than the braking"
+    assert expected in fake.logged("error")[0]
+
+
+def test_a_model_file_without_bounds_is_refused(tmp_path):
+    model = tmp_path / "mine.yaml"
+    model.write_text("type: cf21plus\nmass: 0.03\n")
+    fake = FakeProcess()
+    assert not fake.launch(GeofenceNode(), "/geofence", {**PARAMETERS, "model": str(model)})
+    [error] = fake.logged("error")
+    assert "bounds/lag/horizontal is not known" in error
+    assert "has no identified/bounds/lag/horizontal" in error
+
+
+def test_bounds_of_a_model_file_count_and_parameters_before_them(tmp_path):
+    model = tmp_path / "mine.yaml"
+    model.write_text(
+        "type: cf21plus\nidentified:\n  bounds:\n    lag: {horizontal: 0.2, vertical: 0.05}\n"
+        "    delay: 0.03\n    disturbance: {horizontal: 0.3, vertical: 0.4}\n"
+        "    error: {position: 0.001, velocity: 0.02}\n    seconds: 31.0\n"
+    )
+    parameters = {**PARAMETERS, "model": str(model), "bounds/delay": 0.04}
+    node, fake = GeofenceNode(), FakeProcess()
+    assert fake.launch(node, "/geofence", parameters), fake.logged("error")
+    x, _, z = node._parameters.axes
+    assert (x.tau, x.disturbance, x.delay, x.position_error, x.velocity_error) == (
+        0.2,
+        0.3,
+        0.04,
+        0.001,
+        0.02,
+    )
+    assert (z.tau, z.disturbance) == (0.05, 0.4)
 
 
 def test_the_box_may_be_changed_in_flight(process):
     publish_regular(process, *REGULAR)
-    process.reconfigure("/geofence", **{"box/min/x": -9.0, "box/max/x": 9.0, "margin": 0.25})
+    process.reconfigure("/geofence", **{"box/min/x": -9.0, "box/max/x": 9.0})
     publish_state(process, *STATE)
     process.reconfigure("/geofence", **{"box/max/x": 1.5})
     publish_state(process, *STATE)
@@ -126,12 +172,28 @@ def test_the_box_may_be_changed_in_flight(process):
     assert priorities == [0.0, 1.0]
 
 
+def test_diagnostics_say_when_the_box_is_not_certain(process):
+    """A wind of 1 m/s^2 that nothing explains, beyond the bound of 0.5 m/s^2."""
+    publish_regular(process, 0.0, 0.0, 0.0, 9.81)
+    for k in range(105):
+        publish_state(process, 0.5, -0.5, 1.5, 0.0, 0.01 * k - 0.5, 0.0, 0.0)
+        process.advance(0.01)
+    status = process.published("/diagnostics")[-1].status[0]
+    assert status.name == "geofence: certificate"
+    assert status.level == DiagnosticStatus.WARN
+    assert "the box is not certain: disturbance along y 0.8 m/s^2, bound 0.5" in status.message
+    for _ in range(600):
+        publish_state(process, 0.5, -0.5, 1.5, 0.0, 0.5, 0.0, 0.0)
+        process.advance(0.01)
+    assert process.published("/diagnostics")[-1].status[0].level == DiagnosticStatus.OK
+
+
 def test_a_box_that_is_too_small_is_refused(process):
-    with pytest.raises(ServiceError, match="box/max/z is 3.0; expected at least 3.5 m"):
-        process.reconfigure("/geofence", **{"box/min/z": 2.5})
+    with pytest.raises(ServiceError, match="box/max/z is 3.0; expected at least 3.154 m"):
+        process.reconfigure("/geofence", **{"box/min/z": 2.8})
     publish_regular(process, *REGULAR)
     publish_state(process, *STATE)
-    assert process.published("/control/geofence")[0].control.priority > 0.5
+    assert process.published("/control/geofence")[0].control.priority == 1.0
 
 
 def test_stands_between_controller_and_takeoff_filter():

@@ -25,7 +25,7 @@ def test_any_live_change_leaves_the_control_sound(changes, at_rest):
     publish_regular(process, 0.1, -0.1, 0.2, 10.0)
     for change, state in changes:
         for name, value in change.items():
-            # A box without room for its margins is refused.
+            # A box without room for the proof is refused, and so are contrary bounds.
             with contextlib.suppress(ServiceError):
                 process.reconfigure("/geofence", **{name: value})
         before = len(process.published("/control/geofence"))

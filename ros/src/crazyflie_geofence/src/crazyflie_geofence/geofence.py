@@ -1,47 +1,54 @@
-"""A box that a vehicle does not leave: least-restrictive control by stopping distance.
+"""A box that a vehicle does not leave: a control is changed only if it would lead out.
 
-The criterion is the point where a vehicle would come to rest if it began to brake now. For each
-axis, with position x and velocity v, this stopping point is
-
-    X = x + v T + v |v| / (2 b)
-
-for a reaction time T and a deceleration b. As long as X is in the box, x is
-inside and can be kept inside. Its rate is X' = v + (T + |v| / b) a, so that the
-acceleration a acts on it at once.
-
-An inner box lies within the box, smaller by a margin on all sides. With e the
-signed distance of X from the inner box, the fence asks for the acceleration
-
-    a = -(v + r e) / (T + |v| / b),
-
-which gives X' = -r e: the stopping point returns to the inner box exponentially,
-at the rate r. Its weight s is 0 while X is in the inner box and rises smoothly with
-|e| to 1 where X reaches the wall. Mixed with what the regular controller wants,
-
-    X' = (1 - s) (v + (T + |v| / b) a_regular) - s r e,
-
-which points inwards at the wall whatever the regular controller does. A regular
-controller with limited acceleration that steers into the wall is stopped in the margin.
+Each axis has two walls and a `viable_set.Axis`, the bounds within which the vehicle moves. The
+fence predicts position, velocity and acceleration to the time at which the next control is in
+force, from the measured state and the controls that have been sent. While any control leaves the
+vehicle able to stop, the regular control passes. Otherwise each axis is given the nearest one that
+does. What of it the vehicle cannot produce, tilt being limited and under the thrust, is given up on
+the way to accelerations that it always can.
 """
 
 import math
+from collections import deque
+from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
+from crazyflie_geofence.disturbance import DisturbanceWatch
+from crazyflie_geofence.viable_set import Axis, response
 from crazyflie_model.angles import rotate_by_yaw
+from crazyflie_model.dynamics import coupled_acceleration
 from crazyflie_model.elementwise import clip
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 
-#: Largest horizontal acceleration that the fence asks for (m/s^2).
-MAX_HORIZONTAL = GRAVITY * math.tan(MAX_TILT)
-#: The share of an axis when both brake, in a corner of the box (m/s^2).
-MAX_HORIZONTAL_BRAKING = MAX_HORIZONTAL / math.sqrt(2.0)
-#: Acceleration by thrust that is possible upwards as well as downwards (m/s^2).
-MAX_VERTICAL_BRAKING = min(GRAVITY - MIN_THRUST, MAX_THRUST - GRAVITY)
+#: Largest acceleration that a control can ask for, along any horizontal line and along z (m/s^2).
+LARGEST_HORIZONTAL = math.sqrt(2.0) * MAX_THRUST * math.sin(MAX_TILT)
+LARGEST_VERTICAL = MAX_THRUST - GRAVITY
 
-Vector = NDArray[np.float64]
+#: A vehicle outside of the box comes back with this speed at most (m/s), slower on the last metre
+#: (1/s), and changes its speed within this time (s).
+RETURN_SPEED, RETURN_RATE, RETURN_TIME = 0.5, 1.0, 0.4
+
+_HOVER = (0.0, 0.0, 0.0)  #: Accelerations of a vehicle that stands or hovers (m/s^2).
+_MEMORY = 100  #: Controls that are remembered.
+_ROUNDING = 1e-9  #: Of controls that are exactly at a limit.
+_HALVINGS = 20  #: Of the part of a control that the vehicle cannot produce.
+
+Triple = tuple[float, float, float]
+Control = Sequence[float]  #: roll and pitch (rad), yaw_dot (rad/s), thrust (m/s^2).
+
+
+def max_horizontal_braking(vertical: float) -> float:
+    """Return the acceleration along x and y at once, m/s^2, beside one down by ``vertical``.
+
+    At any heading: the square of both tilts contains the square of the axes, turned, if that is
+    smaller by the root of 2.
+    """
+    return (GRAVITY - vertical) * math.sin(MAX_TILT) / math.sqrt(2.0)
+
+
+def max_vertical_braking(max_thrust: float) -> float:
+    """Return the acceleration up and down under full roll and pitch, m/s^2."""
+    return min(GRAVITY - MIN_THRUST, max_thrust * math.cos(MAX_TILT) ** 2 - GRAVITY)
 
 
 class Geofence:
@@ -49,106 +56,211 @@ class Geofence:
 
     Parameters
     ----------
-    lower, upper : array_like, shape (3,)
+    lower, upper : sequence of float, 3
         Corners of the box, m, fixed frame.
-    margin : float
-        From the box to the inner box, m; upper - lower >= 2 margin.
-    horizontal, vertical : tuple of float
-        Reliable deceleration along x and y, and along z, m/s^2: at most `MAX_HORIZONTAL_BRAKING`
-        and `MAX_VERTICAL_BRAKING`; and the time from a state until the vehicle decelerates because
-        of it, s.
-    recovery_rate : float
-        At which the stopping point is brought back to the inner box, 1/s.
+    axes : sequence of Axis, 3
+        Bounds of the vehicle along x, y and z.
+    max_thrust : float
+        Largest thrust over the mass that the vehicle has, m/s^2.
     """
 
     def __init__(
         self,
-        lower: ArrayLike,
-        upper: ArrayLike,
-        margin: float,
-        horizontal: tuple[float, float],
-        vertical: tuple[float, float],
-        recovery_rate: float,
+        lower: Sequence[float],
+        upper: Sequence[float],
+        axes: Sequence[Axis],
+        max_thrust: float = MAX_THRUST,
     ):
-        self._inner_lower = np.asarray(lower, dtype=float) + margin
-        self._inner_upper = np.asarray(upper, dtype=float) - margin
-        self._margin = margin
-        axes = np.array([horizontal, horizontal, vertical])
-        self._deceleration, self._reaction_time = axes.T
-        self._recovery_rate = recovery_rate
+        self._max_thrust = min(max_thrust, MAX_THRUST)
+        self._acceleration = [0.0, 0.0, 0.0]
+        self._in_force: Sequence[float] = _HOVER  # Accelerations that are commanded, m/s^2.
+        self._time: float | None = None  # Of the accelerations.
+        self._new: deque[tuple[float, Control, float]] = deque(maxlen=_MEMORY)
+        self._sent: deque[tuple[float, Sequence[float]]] = deque()
+        self._last: list[float] | None = None  # Accelerations of the fence's last control.
+        self._watch = DisturbanceWatch()
+        self.change(lower, upper, axes)
 
-    def stopping_point(self, position: Vector, velocity: Vector) -> Vector:
-        """Return where the vehicle would come to rest, m, shape (3,)."""
-        braking_time = np.abs(velocity) / self._deceleration
-        return position + velocity * (self._reaction_time + braking_time / 2.0)
+    def change(self, lower: Sequence[float], upper: Sequence[float], axes: Sequence[Axis]) -> None:
+        """Set box and bounds; what has been sent remains known."""
+        self._box, self._axes = (lower, upper), tuple(axes)
+        self._watch.expect([axis.velocity_error for axis in axes])
+        self._set_walls()
 
-    def excess(self, position: Vector, velocity: Vector) -> Vector:
-        """Return the signed distance of the stopping point from the inner box, m, shape (3,)."""
-        stop = self.stopping_point(position, velocity)
-        return stop - np.clip(stop, self._inner_lower, self._inner_upper)
+    def _set_walls(self):
+        axes = [a.disturbed(d) for a, d in zip(self._axes, self._watch.widest, strict=True)]
+        self._walls = tuple(zip(*self._box, axes, strict=True))
 
-    def weight(self, excess: Vector) -> Vector:
-        """Return the weight of the fence's control on each axis, 0 ... 1, shape (3,)."""
-        x = np.minimum(np.abs(excess) / self._margin, 1.0)
-        return x * x * (3.0 - 2.0 * x)
+    def excess(self) -> list[tuple[str, float, float]]:
+        """Return axis, disturbance (m/s^2) and its bound where it is larger than that."""
+        watched = zip("xyz", self._watch.widest, self._axes, strict=True)
+        return [(name, d, axis.disturbance) for name, d, axis in watched if d > axis.disturbance]
 
-    def acceleration(self, velocity: Vector, excess: Vector) -> Vector:
-        """Return the acceleration (3,) that brings the stopping point back, m/s^2, fixed frame.
-
-        Horizontally at most `MAX_HORIZONTAL`, in the right direction.
-        """
-        hold = self._reaction_time + np.abs(velocity) / self._deceleration
-        wanted = -(velocity + self._recovery_rate * excess) / hold
-        size = math.hypot(wanted[0], wanted[1])
-        if size > MAX_HORIZONTAL:
-            wanted[:2] *= MAX_HORIZONTAL / size
-        return wanted
+    def sent(self, time: float, control: Control, yaw: float) -> None:
+        """Take a control that has been sent to the vehicle at ``time`` (s)."""
+        self._new.append((time, control, yaw))
 
     def control(
-        self, position: Vector, velocity: Vector, yaw: float, regular: Vector
-    ) -> tuple[Vector, float]:
-        """Return a control and the priority with which it is to be mixed with the regular one.
+        self, time: float, position: Triple, velocity: Triple, yaw: float, regular: Control
+    ) -> tuple[Control, float]:
+        """Return a control, and the priority with which it is to be mixed with the regular one.
 
-        The priority is the largest weight of the axes. On the others the fence's
-        control is moved towards the regular one, so that the mixture gives each
-        axis its own weight: a wall ahead does not keep the vehicle from moving along
-        it, or from holding its height.
-
-        Position and velocity have shape (3,), m and m/s, fixed frame; the yaw is in rad. Controls
-        have shape (4,): roll and pitch (rad), yaw rate (rad/s), which is the regular one's, and
-        thrust (m/s^2).
+        The priority is 0 while any control of the next period leaves the vehicle able to stop,
+        otherwise 1. Position and velocity, m and m/s, are in the fixed frame, ``time`` (s) is that
+        of their arrival, and the yaw is in rad.
         """
-        excess = self.excess(position, velocity)
-        weight = self.weight(excess)
-        priority = float(weight.max())
-        share = weight / priority if priority > 0.0 else weight
-        fence = self.acceleration(velocity, excess)
-        wanted = acceleration_from_control(regular, yaw)
-        return control_from_acceleration(
-            share * fence + (1.0 - share) * wanted, yaw, regular[2]
-        ), priority
+        self._catch_up(time)
+        if self._watch.is_due(time):
+            self._advance(time)
+            self._watch.compare(time, velocity)
+            self._set_walls()
+        # Far from all walls, a prediction would change nothing.
+        if all(
+            axis.is_far(high - p, v) and axis.is_far(p - low, -v)
+            for (low, high, axis), p, v in zip(self._walls, position, velocity, strict=True)
+        ):
+            self._last = None
+            return regular, 0.0
+        self._advance(time)
+        state = self._predict(time, position, velocity)
+        if all(
+            _is_free(axis, low, high, *each)
+            for (low, high, axis), each in zip(self._walls, state, strict=True)
+        ):
+            self._last = None
+            return regular, 0.0
+        ranges = [
+            _range(axis, low, high, state[i], None if self._last is None else self._last[i])
+            for i, (low, high, axis) in enumerate(self._walls)
+        ]
+        wanted = self._acceleration_of(regular, yaw)
+        safe = [clip(0.0, low, high) for low, high in ranges]
+        nearest = [clip(u, low, high) for u, (low, high) in zip(wanted, ranges, strict=True)]
+        self._last = self._producible(safe, nearest, yaw)
+        roll, pitch, thrust = _control(self._last, yaw)
+        return self._limited((roll, pitch, regular[2], thrust)), 1.0
+
+    def _catch_up(self, time):
+        """Advance the accelerations to the last control that is in force at a time."""
+        while self._new:
+            sent, control, heading = self._new.popleft()
+            # Below the thrust of flights the vehicle stands.
+            flies = control[3] >= MIN_THRUST
+            self._sent.append((sent, self._acceleration_of(control, heading) if flies else _HOVER))
+            if not flies:
+                self._watch.restart()
+        delay = self._axes[0].delay
+        while self._sent and self._sent[0][0] + delay <= time:
+            begin, u = self._sent.popleft()
+            self._advance(begin + delay)
+            self._in_force = u
+
+    def _advance(self, time):
+        # A clock that has stepped back belongs to another run.
+        elapsed = 0.0 if self._time is None else max(time - self._time, 0.0)
+        self._time = time
+        gained, tau = [], None
+        for i, axis in enumerate(self._axes):
+            if axis.tau != tau:
+                tau = axis.tau
+                r = response(elapsed, tau)
+            a, u = self._acceleration[i], self._in_force[i]
+            gained.append(a * r.speed + u * r.held_speed)
+            self._acceleration[i] = a * r.fade + u * (1.0 - r.fade)
+        self._watch.gain(gained)
+
+    def _predict(self, time, position, velocity):
+        """Return position, velocity and acceleration of each axis at the end of the delay."""
+        delay, in_force, start = self._axes[0].delay, self._in_force, time
+        pieces = []
+        for begin, following in self._sent:
+            pieces.append((begin + delay - start, in_force))
+            start, in_force = begin + delay, following
+        pieces.append((time + delay - start, in_force))
+        states, tau = [], None
+        for i, p in enumerate(position):
+            v, a = velocity[i], self._acceleration[i]
+            if self._axes[i].tau != tau:
+                tau = self._axes[i].tau
+                responses = [response(duration, tau) for duration, _ in pieces]
+            for r, (_, controls) in zip(responses, pieces, strict=True):
+                u = controls[i]
+                p += v * r.time + a * r.way + u * r.held_way
+                v += a * r.speed + u * r.held_speed
+                a = a * r.fade + u * (1.0 - r.fade)
+            states.append((p, v, a))
+        return states
+
+    def _acceleration_of(self, control, yaw):
+        return coupled_acceleration(self._limited(control), yaw)
+
+    def _limited(self, control):
+        """Return what the vehicle is given, and has, of a control."""
+        roll, pitch, yaw_dot, thrust = control
+        return (
+            clip(roll, -MAX_TILT, MAX_TILT),
+            clip(pitch, -MAX_TILT, MAX_TILT),
+            yaw_dot,
+            clip(thrust, MIN_THRUST, self._max_thrust),
+        )
+
+    def _producible(self, safe, nearest, yaw):
+        """Return the accelerations of a control nearest to ``nearest``, on the line to ``safe``."""
+        if self._is_producible(nearest, yaw):
+            return nearest
+        low, high = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            share = (low + high) / 2.0
+            between = [a + share * (b - a) for a, b in zip(safe, nearest, strict=True)]
+            if self._is_producible(between, yaw):
+                low = share
+            else:
+                high = share
+        return [a + low * (b - a) for a, b in zip(safe, nearest, strict=True)]
+
+    def _is_producible(self, acceleration, yaw):
+        roll, pitch, thrust = _control(acceleration, yaw)
+        return (
+            max(abs(roll), abs(pitch)) <= MAX_TILT + _ROUNDING
+            and MIN_THRUST - _ROUNDING <= thrust <= self._max_thrust + _ROUNDING
+        )
 
 
-def acceleration_from_control(control: Vector, yaw: float) -> Vector:
-    """Return the acceleration, m/s^2, shape (3,), fixed frame, of a vehicle near hover.
-
-    x'' = g tan(pitch), y'' = -g tan(roll), z'' = thrust cos(roll) cos(pitch) - g in the
-    heading frame, with tilt limited to `MAX_TILT`.
-    """
-    roll, pitch, _, thrust = control
-    roll, pitch = clip(roll, -MAX_TILT, MAX_TILT), clip(pitch, -MAX_TILT, MAX_TILT)
-    x, y = rotate_by_yaw(GRAVITY * math.tan(pitch), -GRAVITY * math.tan(roll), yaw)
-    return np.array([x, y, thrust * math.cos(roll) * math.cos(pitch) - GRAVITY])
+def _is_free(axis, low, high, p, v, a):
+    room, speed = axis.position_margin, axis.velocity_margin
+    return axis.is_free(high - p - room, v + speed, a) and axis.is_free(
+        p - low - room, speed - v, -a
+    )
 
 
-def control_from_acceleration(acceleration: Vector, yaw: float, yaw_dot: float) -> Vector:
-    """Return the control of an acceleration: the inverse of `acceleration_from_control`.
+def _range(axis, low, high, state, last):
+    """Return the smallest and the largest acceleration that both walls allow."""
+    p, v, a = state
+    above, below, most = high - p, p - low, axis.largest
+    before = (-most, most) if last is None else (last, last)
+    if above < -axis.position_margin:
+        return -most, _return(axis, above, v)
+    if below < -axis.position_margin:
+        return -_return(axis, below, -v), most
+    return axis.control_range(above, below, v, a, before)
 
-    Tilt and thrust are limited as those of the regular controller are.
+
+def _return(axis, distance, v):
+    """Return the largest acceleration of a vehicle that is outside."""
+    speed = min(RETURN_SPEED, -distance * RETURN_RATE)
+    return clip((-speed - v) / RETURN_TIME, -axis.braking, axis.braking)
+
+
+def _control(acceleration, yaw):
+    """Return roll, pitch and thrust, the inverse of `coupled_acceleration`.
+
+    With T sin(pitch) = forward, -T sin(roll) = left and T cos(roll) cos(pitch) = up + g, the square
+    of T is the larger root of T^4 - (forward^2 + left^2 + (up + g)^2) T^2 + forward^2 left^2.
     """
     x, y, z = acceleration
     forward, left = rotate_by_yaw(x, y, -yaw)
-    roll = clip(-math.atan(left / GRAVITY), -MAX_TILT, MAX_TILT)
-    pitch = clip(math.atan(forward / GRAVITY), -MAX_TILT, MAX_TILT)
-    thrust = (GRAVITY + z) / (math.cos(roll) * math.cos(pitch))
-    return np.array([roll, pitch, yaw_dot, clip(thrust, MIN_THRUST, MAX_THRUST)])
+    squares = forward**2 + left**2 + (GRAVITY + z) ** 2
+    root = math.sqrt(max(squares**2 - 4.0 * (forward * left) ** 2, 0.0))
+    thrust = max(math.sqrt((squares + root) / 2.0), 1e-9)
+    roll = math.asin(clip(-left / thrust, -1.0, 1.0))
+    return roll, math.asin(clip(forward / thrust, -1.0, 1.0)), thrust

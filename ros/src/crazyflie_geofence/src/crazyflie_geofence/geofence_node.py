@@ -1,31 +1,38 @@
 """ROS interface of the geofence."""
 
 from collections.abc import Iterator
+from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from std_msgs.msg import Header
 from typing_extensions import override
 
-from crazyflie_geofence.geofence import MAX_HORIZONTAL_BRAKING, MAX_VERTICAL_BRAKING, Geofence
-from crazyflie_msgs.msg import (
+from crazyflie_geofence import bounds
+from crazyflie_geofence.bounds import Bounds
+from crazyflie_geofence.geofence import (
     Control,
+    Geofence,
+    max_horizontal_braking,
+    max_vertical_braking,
+)
+from crazyflie_geofence.viable_set import Axis
+from crazyflie_msgs.msg import Control as ControlMessage
+from crazyflie_msgs.msg import (
     ControlStamped,
     PositionVelocityYawStateStamped,
     PrioritizedControl,
     PrioritizedControlStamped,
 )
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter, topic
+from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter, topic
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import Number
-from crazyflie_utils.vectors import from_vector, to_vector
+from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
+from crazyflie_utils.vectors import to_tuple
 
-# Without these bounds the fence's equations overflow or divide by nothing.
 _COORDINATE = Number("m", minimum=-1e9, maximum=1e9)
-_REACTION_TIME = Number("s", minimum=0.001, maximum=100.0)
-_MIN_BRAKING = 0.01  #: m/s^2
-
-
+_BRAKING = Number("m/s^2", minimum=0.01)
 _CORNER_HELP = "lowest and highest corner, in the frame of the state"
+_REPORT_PERIOD = 1.0  #: Of diagnostics (s).
 
 
 class CornerParameters(Parameters):
@@ -46,66 +53,74 @@ class GeofenceParameters(Parameters):
     state_topic: str = topic("state", "where states come from")
     control_topic: str = topic("control", "where regular controls come from")
     prioritized_topic: str = topic("prioritized_control", "where the fence's controls go")
+    final_topic: str | None = topic(
+        "final_control",
+        "controls that the vehicle is sent; by default the fence takes them to be its own, or the "
+        "regular ones",
+        None,
+    )
     lower: CornerParameters = group(CornerParameters, "box/min")
     upper: CornerParameters = group(CornerParameters, "box/max")
-    margin: float = parameter(
-        Number("m", minimum=0.001),
-        "the fence acts when the stopping point is nearer to a wall than this; at most half "
-        "the box's width",
-        0.5,
-        live=True,
-    )
     horizontal_braking: float = parameter(
-        Number("m/s^2", minimum=_MIN_BRAKING, maximum=MAX_HORIZONTAL_BRAKING),
-        "deceleration b along x and y",
-        1.5,
-        "braking/horizontal",
-        live=True,
+        _BRAKING, "A: acceleration along x and y that it counts on", 1.3, "braking/horizontal", True
     )
     vertical_braking: float = parameter(
-        Number("m/s^2", minimum=_MIN_BRAKING, maximum=MAX_VERTICAL_BRAKING),
-        "deceleration b along z; less for a vehicle that is heavy",
-        4.0,
-        "braking/vertical",
-        live=True,
+        _BRAKING, "A along z; what is more leaves less along x and y", 2.5, "braking/vertical", True
     )
-    horizontal_reaction_time: float = parameter(
-        _REACTION_TIME,
-        "reaction time T along x and y: estimator, attitude loop, motors",
-        0.4,
-        "reaction_time/horizontal",
-        live=True,
+    model: str = parameter(
+        VEHICLE_MODEL, "type of the vehicle, or model file with its bounds", "cf21"
     )
-    vertical_reaction_time: float = parameter(
-        _REACTION_TIME, "T along z", 0.2, "reaction_time/vertical", live=True
+    bounds: Bounds = group(Bounds, "bounds")
+    spread: float = parameter(
+        Number("s", minimum=0.0, maximum=0.1),
+        "how much later than after the delay a control may take effect: merger and fence answer "
+        "in any order",
+        0.01,
     )
-    recovery_rate: float = parameter(
-        Number("1/s", above=0.0, maximum=1000.0),
-        "how quickly the stopping point is brought back",
-        1.0,
-        live=True,
+    period: float = parameter(
+        Number("s", minimum=0.001, maximum=0.1), "longest time from one state to the next", 0.01
     )
 
     @override
     def complaints(self) -> Iterator[str]:
-        corners = zip("xyz", self.lower.vector(), self.upper.vector(), strict=True)
-        for axis, low, high in corners:
-            if high - low < 2.0 * self.margin:
+        try:
+            axes = self.axes
+        except ParameterError as error:
+            yield from error.complaints
+            return
+        for name, value, most in (
+            ("vertical", self.vertical_braking, max_vertical_braking(self.max_thrust)),
+            ("horizontal", self.horizontal_braking, max_horizontal_braking(self.vertical_braking)),
+        ):
+            if value > most:
                 yield (
-                    f"box/max/{axis} is {high}; expected at least "
-                    f"{low + 2.0 * self.margin:g} m, which is box/min/{axis} and twice the margin"
+                    f"braking/{name} is {value:g}; expected at most {most:.4g} m/s^2, which the "
+                    "limits of tilt and thrust leave beside the other axes"
+                )
+        corners = zip("xyz", self.lower.vector(), self.upper.vector(), axes, strict=True)
+        for name, low, high, axis in corners:
+            if axis.disturbance >= axis.braking:
+                yield (
+                    f"the disturbance along {name} is {axis.disturbance:g} m/s^2; expected less "
+                    f"than the braking there, {axis.braking:g} m/s^2"
+                )
+            elif high - low < axis.smallest_box:
+                yield (
+                    f"box/max/{name} is {high}; expected at least {low + axis.smallest_box:.4g} m: "
+                    f"the proof needs {axis.smallest_box:.2f} m between the walls"
                 )
 
-    def geofence(self) -> Geofence:
-        """Return the fence."""
-        return Geofence(
-            self.lower.vector(),
-            self.upper.vector(),
-            self.margin,
-            (self.horizontal_braking, self.horizontal_reaction_time),
-            (self.vertical_braking, self.vertical_reaction_time),
-            self.recovery_rate,
-        )
+    @cached_property
+    def axes(self) -> tuple[Axis, Axis, Axis]:
+        """Bounds of x, y and z; `ParameterError` if the model does not have all of them."""
+        known = bounds.complete(self.bounds, self.model)
+        braking = self.horizontal_braking, self.vertical_braking
+        return bounds.axes(known, *braking, self.spread, self.period)
+
+    @cached_property
+    def max_thrust(self) -> float:
+        """Largest thrust over the mass of the vehicle, m/s^2."""
+        return bounds.max_thrust(self.model)
 
 
 class GeofenceNode(Node[GeofenceParameters]):
@@ -117,33 +132,57 @@ class GeofenceNode(Node[GeofenceParameters]):
     needed_in_flight = True
 
     def __init__(self) -> None:
-        self._regular: NDArray[np.float64] | None = None
+        self._regular: Control | None = None
+        self._yaw = 0.0
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        parameters = self._parameters
-        self._fence = parameters.geofence()
-        self._publisher = handle.publisher(parameters.prioritized_topic, PrioritizedControlStamped)
+        own = self._parameters
+        self._fence = Geofence(own.lower.vector(), own.upper.vector(), own.axes, own.max_thrust)
+        self._publisher = handle.publisher(own.prioritized_topic, PrioritizedControlStamped)
+        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
+        handle.subscribe(own.control_topic, ControlStamped, self._on_control, finite="control")
+        if own.final_topic is not None:
+            handle.subscribe(own.final_topic, ControlStamped, self._on_final, finite="control")
         handle.subscribe(
-            parameters.control_topic, ControlStamped, self._on_control, finite="control"
+            own.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
         )
-        handle.subscribe(
-            parameters.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
-        )
+        handle.timer(_REPORT_PERIOD, self._report)
 
     def _reconfigure(self, parameters):
-        self._fence = parameters.geofence()
+        self._fence.change(parameters.lower.vector(), parameters.upper.vector(), parameters.axes)
 
     def _on_control(self, message):
-        self._regular = to_vector(message.control)
+        self._regular = to_tuple(message.control)
+
+    def _on_final(self, message):
+        self._fence.sent(self._handle.time(), to_tuple(message.control), self._yaw)
 
     def _on_state(self, message):
         if self._regular is None:
             return
-        x = to_vector(message.state)
-        u, priority = self._fence.control(x[:3], x[3:6], x[6], self._regular)
+        now = self._handle.time()
+        x, y, z, vx, vy, vz, self._yaw = to_tuple(message.state)
+        u, priority = self._fence.control(now, (x, y, z), (vx, vy, vz), self._yaw, self._regular)
+        if self._parameters.final_topic is None:
+            self._fence.sent(now, u, self._yaw)
         prioritized = PrioritizedControlStamped(
-            control=PrioritizedControl(from_vector(Control, u), priority)
+            control=PrioritizedControl(ControlMessage(*u), priority)
         )
         prioritized.header.stamp = message.header.stamp
         self._publisher.publish(prioritized)
+
+    def _report(self):
+        excess = self._fence.excess()
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.WARN if excess else DiagnosticStatus.OK,
+            name=f"{self._handle.name.lstrip('/')}: certificate",
+            message="the vehicle moves within the bounds of the fence",
+        )
+        if excess:
+            status.message = "the box is not certain: " + ", ".join(
+                f"disturbance along {axis} {seen:.1f} m/s^2, bound {bound:g}"
+                for axis, seen, bound in excess
+            )
+        header = Header(stamp=self._handle.stamp())
+        self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))

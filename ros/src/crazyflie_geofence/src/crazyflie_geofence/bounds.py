@@ -1,0 +1,108 @@
+"""The bounds of a vehicle, on which the fence rests: parameters of the node, or of a model file."""
+
+from dataclasses import fields
+from typing import Any
+
+from crazyflie_geofence.geofence import LARGEST_HORIZONTAL, LARGEST_VERTICAL
+from crazyflie_geofence.viable_set import Axis
+from crazyflie_model.quadrotor import TYPES
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters import vehicle_model, yaml_file
+from crazyflie_utils.parameters.declaration import ParameterError
+from crazyflie_utils.parameters.model_file import RESULT
+from crazyflie_utils.parameters.types import Number
+
+KEY = "bounds"  #: Key of a model file, below that of what identify found, of its bounds.
+
+
+def _bound(name: str, unit: str, minimum: float, maximum: float, help: str) -> Any:  # noqa: A002
+    return parameter(Number(unit, minimum=minimum, maximum=maximum), help, None, name)
+
+
+class Bounds(Parameters):
+    """Within what a vehicle follows its controls; None where nothing is given."""
+
+    horizontal_lag: float | None = _bound(
+        "lag/horizontal", "s", 0.001, 0.5, "tau: first-order lag of the acceleration along x and y"
+    )
+    vertical_lag: float | None = _bound("lag/vertical", "s", 0.001, 0.5, "tau along z")
+    delay: float | None = _bound(
+        "delay", "s", 0.0, 0.3, "from a pose to the motion by the control that answers it"
+    )
+    horizontal_disturbance: float | None = _bound(
+        "disturbance/horizontal", "m/s^2", 0.0, 5.0, "D: largest other acceleration along x and y"
+    )
+    vertical_disturbance: float | None = _bound(
+        "disturbance/vertical", "m/s^2", 0.0, 5.0, "D along z"
+    )
+    position_error: float | None = _bound(
+        "error/position", "m", 0.0, 0.5, "largest error of a measured position"
+    )
+    velocity_error: float | None = _bound(
+        "error/velocity", "m/s", 0.0, 1.0, "largest error of an estimated velocity"
+    )
+
+
+#: Bounds of the types, from flights of their model whose controls jump between their limits.
+OF_TYPES = Bounds(
+    horizontal_lag=0.12,
+    vertical_lag=0.08,
+    delay=0.02,
+    horizontal_disturbance=0.5,
+    vertical_disturbance=1.2,
+    position_error=0.002,
+    velocity_error=0.04,
+)
+
+
+def load(model: str) -> Bounds:
+    """Return the bounds of a type, or of a model file: None where it has none.
+
+    `ParameterError` names errors of the file with their lines.
+    """
+    if model in TYPES:
+        return OF_TYPES
+    found = yaml_file.load(model)
+    if RESULT not in found or KEY not in found[RESULT]:
+        return Bounds()
+    return found[RESULT][KEY].read(Bounds, ("seconds",))
+
+
+def complete(given: Bounds, model: str) -> Bounds:
+    """Return bounds in which what is not given is the model's.
+
+    `ParameterError`: the model does not have it either.
+    """
+    own, names = load(model), [each.name for each in Bounds.declarations()]
+    values = {}
+    for field, name in zip(fields(Bounds), names, strict=True):
+        value = getattr(given, field.name)
+        values[field.name] = getattr(own, field.name) if value is None else value
+        if values[field.name] is None:
+            raise ParameterError(
+                f"bounds/{name} is not known: the model {model} has no {RESULT}/{KEY}/{name}; "
+                "expected a model file that identify has written, or the parameter"
+            )
+    return Bounds(**values)
+
+
+def axes(
+    bounds: Bounds, horizontal: float, vertical: float, spread: float, period: float
+) -> tuple[Axis, Axis, Axis]:
+    """Return the bounds of x, y and z, which brake with ``horizontal`` and ``vertical``, m/s^2.
+
+    ``bounds`` are complete; for spread and period (s) see `Axis`.
+    """
+    of = vars(bounds)
+    rest = (of["position_error"], of["velocity_error"], of["delay"], spread, period)
+    x = Axis(
+        of["horizontal_lag"], horizontal, LARGEST_HORIZONTAL, of["horizontal_disturbance"], *rest
+    )
+    z = Axis(of["vertical_lag"], vertical, LARGEST_VERTICAL, of["vertical_disturbance"], *rest)
+    return x, x, z
+
+
+def max_thrust(model: str) -> float:
+    """Return the largest thrust over the mass that a vehicle of a model has, m/s^2."""
+    figures = vehicle_model.load(model)
+    return min(figures.max_thrust, figures.thrust_limit)

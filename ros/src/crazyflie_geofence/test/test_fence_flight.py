@@ -1,5 +1,6 @@
 """Whole flights in a fence whose box changes: every node in a fake process of its own."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -14,15 +15,17 @@ from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
 
-LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch/sw_geofence.launch"
+LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch"
 FILTER, FENCE = "/takeoff_control_filter", "/geofence"
 
 
 class FencedFlight:
-    """sw_geofence.launch, without a master."""
+    """sw_geofence.launch, or another, without a master."""
 
-    def __init__(self, **arguments):
-        _, parameters = expand(LAUNCH, composed=True, rviz=False, simulator_dt=0.005, **arguments)
+    def __init__(self, file="sw_geofence", **arguments):
+        _, parameters = expand(
+            LAUNCH / f"{file}.launch", composed=True, rviz=False, simulator_dt=0.005, **arguments
+        )
         self.classes = NODE_CLASSES(composed_nodes(parameters))
         self.graph = FakeGraph(parameters)
         self.texts = {}
@@ -37,8 +40,10 @@ class FencedFlight:
         self.graph.advance(2.0)
 
     def _on_tf(self, message):
-        p = message.transforms[0].transform.translation
-        self.position = (p.x, p.y, p.z)
+        for each in message.transforms:
+            if each.child_frame_id == "crazyflie":
+                p = each.transform.translation
+                self.position = (p.x, p.y, p.z)
 
     def _note(self, topic, message):
         self.texts[topic] = message.data
@@ -160,3 +165,20 @@ def test_a_fence_that_is_switched_off_has_no_box():
     flight.graph.advance(12.0)
     assert flight.position[0] == pytest.approx(3.0, abs=0.1)
     assert flight.flies
+
+
+def test_flown_straight_at_a_pillar_it_stops_in_front_of_it():
+    flight = FencedFlight("sw_obstacles")
+    flight.take_off()
+    flight.refer(-1.3, 1.2, 1.0)
+    nearest = math.inf
+    for _ in range(100):
+        flight.graph.advance(0.1)
+        x, y, _ = flight.position
+        nearest = min(nearest, math.hypot(x + 1.3, y - 1.2))
+    # The pillar's radius is 0.15 m, and 0.1 m are kept free.
+    assert 0.25 < nearest < 0.35
+    assert flight.flies
+    flight.refer(0.0, 0.0, 1.0)
+    flight.graph.advance(10.0)
+    assert flight.position == pytest.approx((0.0, 0.0, 1.0), abs=0.1)

@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from crazyflie_geofence.disturbance import DisturbanceWatch
+from crazyflie_geofence.obstacles import Obstacles, Plane
 from crazyflie_geofence.viable_set import Axis, response
 from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.dynamics import coupled_acceleration
@@ -31,6 +32,7 @@ RETURN_SPEED, RETURN_RATE, RETURN_TIME = 0.5, 1.0, 0.4
 _HOVER = (0.0, 0.0, 0.0)  #: Accelerations of a vehicle that stands or hovers (m/s^2).
 _MEMORY = 100  #: Controls that are remembered.
 _ROUNDING = 1e-9  #: Of controls that are exactly at a limit.
+_PROJECTIONS = 8  #: Rounds over walls and obstacles.
 _HALVINGS = 20  #: Of the part of a control that the vehicle cannot produce.
 
 Triple = tuple[float, float, float]
@@ -62,6 +64,8 @@ class Geofence:
         Bounds of the vehicle along x, y and z.
     max_thrust : float
         Largest thrust over the mass that the vehicle has, m/s^2.
+    obstacles : Obstacles
+        What stands in the box.
     """
 
     def __init__(
@@ -70,7 +74,9 @@ class Geofence:
         upper: Sequence[float],
         axes: Sequence[Axis],
         max_thrust: float = MAX_THRUST,
+        obstacles: Obstacles | None = None,
     ):
+        self._obstacles = obstacles or Obstacles((), 0.0)
         self._max_thrust = min(max_thrust, MAX_THRUST)
         self._acceleration = [0.0, 0.0, 0.0]
         self._in_force: Sequence[float] = _HOVER  # Accelerations that are commanded, m/s^2.
@@ -114,18 +120,32 @@ class Geofence:
             self._advance(time)
             self._watch.compare(time, velocity)
             self._set_walls()
+
+        def is_far(plane):
+            distance, speed = plane.distance(position), -plane.along(velocity)
+            return self._axis(plane).is_far(distance, speed)
+
+        planes = self._obstacles.choose(
+            position, is_far, lambda plane: self._room(plane, position, velocity)
+        )
         # Far from all walls, a prediction would change nothing.
         if all(
             axis.is_far(high - p, v) and axis.is_far(p - low, -v)
             for (low, high, axis), p, v in zip(self._walls, position, velocity, strict=True)
-        ):
+        ) and all(map(is_far, planes)):
             self._last = None
             return regular, 0.0
         self._advance(time)
         state = self._predict(time, position, velocity)
+        # Towards each plane: the distance, the velocity and the acceleration.
+        p, v, a = zip(*state, strict=True)
+        towards = [(each.distance(p), -each.along(v), -each.along(a)) for each in planes]
         if all(
             _is_free(axis, low, high, *each)
             for (low, high, axis), each in zip(self._walls, state, strict=True)
+        ) and all(
+            _is_free_of(self._axis(plane), *each)
+            for plane, each in zip(planes, towards, strict=True)
         ):
             self._last = None
             return regular, 0.0
@@ -133,12 +153,32 @@ class Geofence:
             _range(axis, low, high, state[i], None if self._last is None else self._last[i])
             for i, (low, high, axis) in enumerate(self._walls)
         ]
-        wanted = self._acceleration_of(regular, yaw)
-        safe = [clip(0.0, low, high) for low, high in ranges]
-        nearest = [clip(u, low, high) for u, (low, high) in zip(wanted, ranges, strict=True)]
+        limits = [
+            (plane, self._most(plane, *each)) for plane, each in zip(planes, towards, strict=True)
+        ]
+        safe = _allowed(_HOVER, ranges, limits)
+        nearest = _allowed(self._acceleration_of(regular, yaw), ranges, limits)
         self._last = self._producible(safe, nearest, yaw)
         roll, pitch, thrust = _control(self._last, yaw)
         return self._limited((roll, pitch, regular[2], thrust)), 1.0
+
+    def _axis(self, plane: Plane) -> Axis:
+        """Return the bounds along a plane's normal: x has those of every horizontal line."""
+        return self._walls[2 if plane.normal[2] else 0][2]
+
+    def _room(self, plane, position, velocity):
+        """Return the distance between the stopping point and a plane, m, from now on."""
+        distance, speed = plane.distance(position), -plane.along(velocity)
+        acceleration = -plane.along(tuple(self._acceleration))
+        return distance - self._axis(plane).stopping_distance(speed, acceleration)
+
+    def _most(self, plane, distance, v, a):
+        """Return the largest acceleration towards a plane."""
+        axis = self._axis(plane)
+        if distance < -axis.position_margin:
+            return _return(axis, distance, v)
+        last = axis.largest if self._last is None else -plane.along(tuple(self._last))
+        return axis.smooth_control(distance, v, a, last)
 
     def _catch_up(self, time):
         """Advance the accelerations to the last control that is in force at a time."""
@@ -227,10 +267,26 @@ class Geofence:
 
 
 def _is_free(axis, low, high, p, v, a):
-    room, speed = axis.position_margin, axis.velocity_margin
-    return axis.is_free(high - p - room, v + speed, a) and axis.is_free(
-        p - low - room, speed - v, -a
-    )
+    return _is_free_of(axis, high - p, v, a) and _is_free_of(axis, p - low, -v, -a)
+
+
+def _is_free_of(axis, distance, v, a):
+    return axis.is_free(distance - axis.position_margin, v + axis.velocity_margin, a)
+
+
+def _allowed(wanted, ranges, limits):
+    """Return the accelerations nearest to those that are wanted, within ranges and limits.
+
+    Projected in turn (Kaczmarz, 1937). Those of the walls come last: where both cannot be obeyed,
+    the vehicle stays in the box.
+    """
+    u = [clip(w, low, high) for w, (low, high) in zip(wanted, ranges, strict=True)]
+    for _ in range(_PROJECTIONS if limits else 0):
+        for plane, most in limits:
+            excess = max(-plane.along(tuple(u)) - most, 0.0)
+            u = [part + excess * n for part, n in zip(u, plane.normal, strict=True)]
+        u = [clip(w, low, high) for w, (low, high) in zip(u, ranges, strict=True)]
+    return u
 
 
 def _range(axis, low, high, state, last):

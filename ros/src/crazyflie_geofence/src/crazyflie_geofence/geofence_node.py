@@ -15,6 +15,7 @@ from crazyflie_geofence.geofence import (
     max_horizontal_braking,
     max_vertical_braking,
 )
+from crazyflie_geofence.obstacles import Obstacles
 from crazyflie_geofence.viable_set import Axis
 from crazyflie_msgs.msg import Control as ControlMessage
 from crazyflie_msgs.msg import (
@@ -28,6 +29,8 @@ from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import Number
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 from crazyflie_utils.vectors import to_tuple
+from crazyflie_world.world import World
+from crazyflie_world.world_file import WORLD_FILE
 
 _COORDINATE = Number("m", minimum=-1e9, maximum=1e9)
 _BRAKING = Number("m/s^2", minimum=0.01)
@@ -71,6 +74,12 @@ class GeofenceParameters(Parameters):
         VEHICLE_MODEL, "type of the vehicle, or model file with its bounds", "cf21"
     )
     bounds: Bounds = group(Bounds, "bounds")
+    world: World | None = parameter(
+        WORLD_FILE, "obstacles, a YAML file of crazyflie_world: those that do not move", None
+    )
+    clearance: float = parameter(
+        Number("m", minimum=0.0), "from the vehicle's middle to what may touch no obstacle", 0.1
+    )
     spread: float = parameter(
         Number("s", minimum=0.0, maximum=0.1),
         "how much later than after the delay a control may take effect: merger and fence answer "
@@ -138,7 +147,11 @@ class GeofenceNode(Node[GeofenceParameters]):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         own = self._parameters
-        self._fence = Geofence(own.lower.vector(), own.upper.vector(), own.axes, own.max_thrust)
+        solids = () if own.world is None else own.world.objects
+        obstacles = Obstacles([each for each in solids if each.path is None], own.clearance)
+        self._fence = Geofence(
+            own.lower.vector(), own.upper.vector(), own.axes, own.max_thrust, obstacles
+        )
         self._publisher = handle.publisher(own.prioritized_topic, PrioritizedControlStamped)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         handle.subscribe(own.control_topic, ControlStamped, self._on_control, finite="control")

@@ -199,19 +199,22 @@ class Axis:
         the largest control before. Others are as in `largest_control`.
         """
         f = _functions(v)
-        largest = self.largest_control(above, v, a, last[1])
-        smallest = -self.largest_control(below, -v, -a, -last[0])
-        smooth = self._smooth_hold
-        high = f.min(largest, self.largest_control(above, v, a, last[1], smooth))
-        low = f.max(smallest, -self.largest_control(below, -v, -a, -last[0], smooth))
+        high = self.smooth_control(above, v, a, last[1])
+        low = -self.smooth_control(below, -v, -a, -last[0])
         if not np.any(low > high):
             return low, high
         contrary = low > high
-        smallest = where(contrary, smallest, low)
-        largest = where(contrary, largest, high)
+        largest = where(contrary, self.largest_control(above, v, a, last[1]), high)
+        smallest = where(contrary, -self.largest_control(below, -v, -a, -last[0]), low)
         # In a box of the proof, the smallest is at most the largest.
         middle = f.max(f.min((smallest + largest) / 2.0, self.braking), -self.braking)
         return f.min(smallest, f.max(middle, largest)), f.max(largest, f.min(middle, smallest))
+
+    def smooth_control(self, distance: Number, v: Number, a: Number, last: Number) -> Number:
+        """Return the largest control that could also be held for longer; see `largest_control`."""
+        largest = self.largest_control(distance, v, a, last)
+        held = self.largest_control(distance, v, a, last, self._smooth_hold)
+        return _functions(v).min(largest, held)
 
     def largest_control(
         self, distance: Number, v: Number, a: Number, last: Number, hold: Response | None = None

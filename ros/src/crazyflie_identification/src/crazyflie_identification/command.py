@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from crazyflie_identification import fit, page, recording
+from crazyflie_identification import fit, page, recording, residual
 from crazyflie_identification.fit import NAMES, IdentificationError
 from crazyflie_model.quadrotor import TYPES
 from crazyflie_reports.bag_file import BagError
@@ -38,7 +38,13 @@ def _identify(bag: Path, kind: str, vehicle: str, out: Path) -> None:
         raise IdentificationError(f"{bag}: {error}") from None
     print(*found.lines(), sep="\n")
     errors = dict(zip(NAMES, map(float, found.errors), strict=True))
-    result = {"bag": str(bag), "standard_errors": errors}
+    limits = residual.bounds(found)
+    disturbance = limits["disturbance"]
+    print(
+        f"disturbance (99.9 % of {limits['seconds']:g} s): {disturbance['horizontal']:.2f} m/s^2 "
+        f"along x and y, {disturbance['vertical']:.2f} m/s^2 along z"
+    )
+    result = {"bag": str(bag), "standard_errors": errors, "bounds": limits}
     model_file.save(out, kind, found.model, result)
     shown = out.with_suffix(".html")
     shown.write_text(page.page(found, model, f"{bag.name}: {kind}"), encoding="utf-8")

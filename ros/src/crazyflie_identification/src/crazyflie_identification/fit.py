@@ -114,7 +114,7 @@ def fitted(values: Array, kind: QuadrotorParameters, thrust: float, part: Record
     roll_trim, pitch_trim, roll_offset, pitch_offset = angles
     start = part.pose_times[0] - SETTLING
     times = start + STEP * np.arange(math.ceil((part.pose_times[-1] - start) / STEP) + 2)
-    held = _held(part, times - delay)
+    held = mean_commands(part, times - delay)
     roll = _lagged(held[0] - roll_trim, roll_lag)
     pitch = _lagged(held[1] - pitch_trim, pitch_lag)
     turn = _lagged(held[2], yaw_lag)
@@ -146,7 +146,7 @@ def fitted(values: Array, kind: QuadrotorParameters, thrust: float, part: Record
     return np.column_stack([*columns, yaw + beginnings])
 
 
-def _held(part, times):
+def mean_commands(part: Recording, times: Array) -> Array:
     """Return the mean commands of the steps that begin at these times, shape (4, len(times))."""
     ends = np.append(times, times[-1] + STEP)
     edges, held = part.command_times, np.vstack([part.commands[:1], part.commands])

@@ -217,7 +217,8 @@ def test_when_nothing_good_comes_it_is_silent_and_says_why():
 
 
 def tilted(process):
-    return [message.data for message in process.published("/state_tilted")]
+    told = [message.is_tilted for message in process.published("/state_status")]
+    return [new for old, new in zip([None, *told], told, strict=False) if new != old]
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,7 @@ RESERVED_NAMES = frozenset(
     high_level imu in_flight in_flight_filter in_flight_filter_status
     in_flight_flight_status in_flight_hover_thrust in_flight_state in_flight_status land
     magnetic_field packets pose positioning pressure ref ref_descent ref_descent_safe ref_safe rssi
-    state state_status state_tilted status takeoff takeoff_inhibition temperature
+    state state_status status takeoff takeoff_inhibition temperature
     true_pose vehicle_status
     """.split()
 )

@@ -5,7 +5,7 @@ from typing import Any
 
 import genpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from std_msgs.msg import Bool, Header, String
+from std_msgs.msg import Header
 from typing_extensions import override
 
 from crazyflie_model.angles import rpy_from_quaternion
@@ -170,10 +170,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         self._last_success: float | None = None
         self._stamp: int | None = None
         self._last_pose = -math.inf  #: Time at which the last new pose came.
-        self._is_tilted: bool | None = None
-        #: Text that was published last; None at the start, as others may still have one of a
-        #: process before this one.
-        self._tf_error: str | None = None
+        self._is_tilted = False
         self._pose_status: tuple[int, str] = (EstimateStatus.MISSING, "there has been no pose yet")
         self._good_stamp = genpy.Time()
         self._told: tuple[Any, ...] | None = None
@@ -218,8 +215,6 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._publisher = handle.publisher(parameters.state_topic, self.state_type)
-        self._tilted = handle.publisher(f"{parameters.state_topic}_tilted", Bool, latch=True)
-        self._missing = handle.publisher(f"{parameters.state_topic}_missing", String, latch=True)
         self._status = handle.publisher(parameters.status_topic, EstimateStatus, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._lookup = handle.listen_to_poses()
@@ -272,7 +267,6 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
             self._report_no_state(now, "", pose)
             return
         self._last_success = now
-        self._tell_tf_error("")
         state = from_vector(self._inner_type, self.state(motion))
         frame = self._parameters.fixed_frame
         self._publisher.publish(stamped(self.state_type, pose.time, frame, state=state))
@@ -281,7 +275,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         if pose.stamp == self._stamp:
             return None
         self._stamp, self._last_pose = pose.stamp, now
-        self._publish_tilt(pose.rotation)
+        self._watch_tilt(pose.rotation)
         stamp = pose.stamp * 1e-9
         if self._clock_steps.update(stamp, now, self._handle.nanoseconds):
             self._restart()
@@ -312,7 +306,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         return EstimatedMotion(departure.position, departure.velocity, attitude, (0.0, 0.0, 0.0))
 
     def _publish_status(self, now):
-        facts = *self._pose_status, bool(self._is_tilted)
+        facts = *self._pose_status, self._is_tilted
         if facts == self._told and 0.0 <= now - self._told_at < STATUS_PERIOD - 1e-6:
             return
         self._told, self._told_at = facts, now
@@ -328,14 +322,11 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         )
         self._status.publish(status)
 
-    def _publish_tilt(self, rotation):
+    def _watch_tilt(self, rotation):
         is_tilted = self._tilt.update(*rotation[:2])
-        if is_tilted == self._is_tilted:
-            return
-        self._is_tilted = is_tilted
-        self._tilted.publish(Bool(is_tilted))
-        if is_tilted:
+        if is_tilted and not self._is_tilted:
             self._handle.warn("the vehicle has tipped over", throttle=1.0)
+        self._is_tilted = is_tilted
 
     def _rejections(self):
         """Return the numbers of rejected poses by reason."""
@@ -365,7 +356,6 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         silence = self._silence(now)
         if silence < HOLD_LIMIT:
             return
-        self._tell_tf_error(reason)
         if now - self._last_pose >= HOLD_LIMIT:
             frames = f"{self._parameters.fixed_frame} -> {self._parameters.robot_frame}"
             self._pose_status = EstimateStatus.MISSING, reason or f"no new transform {frames}"
@@ -380,12 +370,6 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
             throttle=1.0,
             key="no state",
         )
-
-    def _tell_tf_error(self, reason):
-        # The takeoff server answers with it.
-        if reason != self._tf_error:
-            self._tf_error = reason
-            self._missing.publish(String(reason))
 
 
 class PositionVelocityStateEstimatorParameters(StateEstimatorParameters):

@@ -127,13 +127,12 @@ class SourcesError(JournalError):
 def _to_columns(heads: bytes, data: bytes) -> bytes:
     """Return the content of a chunk; ``data`` are those of the rows, the last one's first."""
     count = len(heads) // _HEAD_SIZE
-    columns = np.frombuffer(heads, np.uint8).reshape(count, _HEAD_SIZE).T
-    parts = [_NUMBER.pack(count), columns.tobytes()]
+    parts = [_NUMBER.pack(count), _turned(np.frombuffer(heads, np.uint8).reshape(-1, _HEAD_SIZE))]
     messages, others = _places(np.frombuffer(heads, _HEADS), len(data))
     source = np.frombuffer(data, np.uint8)
     for size, begins in messages:
         values = sliding_window_view(source, size)[begins]
-        parts.append(np.diff(values, axis=0, prepend=values[:1] * 0).T.tobytes())
+        parts.append(_turned(np.diff(values, axis=0, prepend=values[:1] * 0)))
     return b"".join([*parts, *(data[place] for place in others)])
 
 
@@ -142,7 +141,7 @@ def _from_columns(content: bytes) -> tuple[NDArray[Any], bytes]:
     (count,) = _NUMBER.unpack_from(content)
     at = _NUMBER.size + count * _HEAD_SIZE
     columns = np.frombuffer(content[_NUMBER.size : at], np.uint8).reshape(_HEAD_SIZE, count)
-    heads = np.frombuffer(columns.T.tobytes(), _HEADS)
+    heads = np.frombuffer(_turned(columns), _HEADS)
     left = np.frombuffer(content, np.uint8, offset=at)
     data = np.empty_like(left)
     messages, others = _places(heads, len(data))
@@ -153,6 +152,12 @@ def _from_columns(content: bytes) -> tuple[NDArray[Any], bytes]:
     for place in others:
         data[place], left = np.split(left, [place.stop - place.start])
     return heads, data.tobytes()
+
+
+def _turned(array: NDArray[Any]) -> bytes:
+    """Return the bytes of an array, column by column."""
+    # In a sixth of the time of ``tobytes("F")``.
+    return np.ascontiguousarray(array.T).tobytes()
 
 
 def _places(heads: NDArray[Any], total: int) -> tuple[list[tuple[int, NDArray[Any]]], list[slice]]:

@@ -145,6 +145,37 @@ def test_a_replay_publishes_the_same(path):
     assert not (path.parent / "mean.journal.tail").exists()
 
 
+class PeersNode(Node):
+    """Tells whether somebody publishes."""
+
+    def load_parameters(self, handle):
+        pass
+
+    def register_callbacks(self, handle):
+        self.text = handle.publisher("/text", String)
+        self.handle = handle.child()
+        self.subscriber = self.handle.subscribe("/in", Float64, lambda message: None)
+        handle.timer(0.1, self.on_timer)
+        handle.timer(1.0, self.handle.close)
+
+    def on_timer(self):
+        self.text.publish(String(str(self.subscriber.has_publishers())))
+
+
+def test_publishers_that_come_and_go_are_seen_again(path):
+    recorder = Recorder(JournalWriter(path, HEADER, 1e9, print))
+    process = FakeProcess(recorder=recorder)
+    assert process.launch(PeersNode(), "/peers")
+    process.advance(0.35)
+    process.transport.unpublished.add("/in")
+    process.advance(1.0)
+    recorder.close()
+    told = [message.data for message in process.published("/text")]
+    assert told == ["True"] * 3 + ["False"] * 10
+    again = [message.data for _, message in run_again(path).published]
+    assert again == told
+
+
 def test_other_code_is_found_with_time_and_callback(recorded, monkeypatch):
     monkeypatch.setattr(MeanNode, "factor", 1.001)
     with (

@@ -81,12 +81,15 @@ class Kind(enum.IntEnum):
     #: Wall clock minus machine's clock has changed. 1: as a callback reads it; i64: ns.
     WALL = 21
     COLLECTED = 22  #: A message that waited. Subscription; collections without one; as `MESSAGE`.
-    FLAG = 23  #: Whether somebody listens, or publishes, has changed. Flag; times it was the same.
+    #: Whether somebody listens, or publishes, has changed: as a callback read it, in the format 1.
+    #: Flag; times it was read as the same.
+    FLAG = 23
     VALUE = (
         24  #: A value. JSON: what; then true and the value, or false, type and text of an error.
     )
     NAME = 25  #: A remapped name. JSON: name, remapped.
     CALLER = 26  #: The name of a node that `Origin` may have.
+    PEERS = 28  #: Whether somebody listens, or publishes, has changed. Flag; 0 or 1.
     FILE = 27  #: A file was read (1), or not (0). JSON: path; a line feed; content, or JSON: error.
     # What there is.
     SUBSCRIBED = 30  #: A subscription. Subscription; JSON: topic and type.

@@ -150,7 +150,8 @@ class Recorder:
         #: Returns wall clock minus the process's clock (ns).
         self.wall: Callable[[], int] = lambda: 0
         self.look_period = _LOOK_PERIOD  #: Time between two looks at what is to be written (us).
-        self._next_look = 0
+        self._next_look = self._next_flags = 0
+        self.flags: dict[int, _Flag] = {}  #: Of all topics, by their numbers.
         self._last = int(writer.header["us"])
         self._wall = 0
         self._digest = Digest()
@@ -174,6 +175,9 @@ class Recorder:
         try:
             if now >= self._next_look:
                 self._next_look = now + self.look_period
+                if now >= self._next_flags:
+                    self._next_flags = now + 10 * self.look_period
+                    self._look_at_flags()
                 if len(self._unchecked) >= _CHECKED_TOGETHER or not self.look_period:
                     self._check()
                 self._writer.pause(now * 1e-6)
@@ -190,6 +194,10 @@ class Recorder:
             self._wall = offset
             self.row(_WALL, is_read, 0, _I64.pack(offset))
         return offset
+
+    def _look_at_flags(self):
+        for flag in list(self.flags.values()):
+            flag.look()
 
     def _check(self):
         """Write the checks of the messages that have none yet, and look at the wall clock."""
@@ -261,6 +269,7 @@ class Recorder:
     def end_start(self) -> None:
         """Write that all nodes are initialized."""
         self._check()
+        self._look_at_flags()
         self._writer.end_start()
 
     def close(self) -> None:
@@ -315,22 +324,24 @@ text_file.content = _content
 
 
 class _Flag:
-    """A condition of which only changes are written."""
+    """A condition that callbacks read as it was when the recorder looked; changes are written."""
 
     def __init__(self, recorder: Recorder, number: int, read: Condition):
-        self._recorder, self._number, self._read = recorder, number, read
-        self._executor = recorder.executor
-        self._value, self._same = False, 0
+        self._recorder, self._read = recorder, read
+        self.number = number
+        self._executor, self._value = recorder.executor, False
 
     def __call__(self) -> bool:
-        value = self._read()
         if self._executor._runner == get_ident() or self._executor.is_in_turn:
-            if value is self._value:
-                self._same += 1
-            else:
-                self._recorder.row(Kind.FLAG, self._number, self._same)
-                self._value, self._same = value, 0
-        return value
+            return self._value
+        return self._read()
+
+    def look(self) -> None:
+        """Read the condition."""
+        value = self._read()
+        if value is not self._value:
+            self._value = value
+            self._recorder.row(Kind.PEERS, self.number, value)
 
 
 class _RecordedSubscriber(ExternalSubscriber):
@@ -389,6 +400,7 @@ class _RecordedSubscriber(ExternalSubscriber):
             self._empty = 0 if self._empty == SAME_COLLECTION else self._empty + 1
 
     def close(self) -> None:
+        self._recorder.flags.pop(self.flag.number, None)
         self.external.close()
 
 
@@ -406,7 +418,8 @@ class RecordingTransport(Transport):
 
     def _flag(self, read: Condition) -> _Flag:
         self._flags += 1
-        return _Flag(self._recorder, self._flags, read)
+        flag = self._recorder.flags[self._flags] = _Flag(self._recorder, self._flags, read)
+        return flag
 
     def starting(self) -> AbstractContextManager[None]:
         """See `Transport.starting`."""

@@ -294,6 +294,9 @@ class Replay:
         if row.kind is Kind.WALL:
             (self.process.wall_offset,) = _I64.unpack(self.rows.take().data)
             return True
+        if row.kind is Kind.PEERS and row.number in self.transport.flags:
+            self.transport.flags[row.number].value = bool(self.rows.take().value)
+            return True
         if row.kind not in INPUTS:
             raise DifferenceError(f"now the callback has ended; then {self.rows.describe(row)}")
         self.input = self.rows.take()

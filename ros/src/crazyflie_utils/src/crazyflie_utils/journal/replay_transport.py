@@ -140,8 +140,8 @@ class Rows:
 
 class _Flag:
     def __init__(self, rows: Rows, number: int):
-        self._rows, self._number = rows, number
-        self._value, self._same = False, 0
+        self.value = False
+        self._rows, self._number, self._same = rows, number, 0
 
     def __call__(self) -> bool:
         row = self._rows.next
@@ -152,10 +152,10 @@ class _Flag:
             and row.value == self._same
         ):
             self._rows.take()
-            self._value, self._same = not self._value, 0
+            self.value, self._same = not self.value, 0
         else:
             self._same += 1
-        return self._value
+        return self.value
 
 
 class _Publisher(ExternalPublisher):
@@ -227,14 +227,16 @@ class ReplayTransport(Transport):
         #: subscribers, services: By their numbers in the journal.
         self.subscribers: dict[int, _Subscriber] = {}
         self.services: dict[int, tuple[str, Any, Serve]] = {}
+        self.flags: dict[int, _Flag] = {}  #: Whether topics have subscribers, or publishers.
         #: requests: Number to type, or None, and future of the answer.
         self.requests: dict[int, tuple[Any, Future[Any]]] = {}
         self._names: dict[str, str] = {}
-        self._publishers = self._requests = self._flags = 0
+        self._publishers = self._requests = 0
 
     def _flag(self):
-        self._flags += 1
-        return _Flag(self.rows, self._flags)
+        number = len(self.flags) + 1
+        self.flags[number] = _Flag(self.rows, number)
+        return self.flags[number]
 
     def value(self, what: str, doing: str) -> Any:
         """Return what was read then, or raise it; ``doing`` is what the process does now."""

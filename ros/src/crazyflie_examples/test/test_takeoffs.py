@@ -97,7 +97,7 @@ def test_no_takeoff_overshoots_also_not_after_30_s_on_the_ground(example, mass_e
         assert land.exception(timeout=0) is None
 
 
-@pytest.mark.parametrize("height", [0.3, 1.0])
+@pytest.mark.parametrize("height", [0.15, 0.3, 1.0])
 @pytest.mark.parametrize("hover", [0.65, 30000 / 42000, 36000 / 42000, 1.3])
 def test_no_takeoff_passes_its_hover_point_whatever_thrust_the_vehicle_needs(hover, height):
     """It hovers at this fraction of the assumed thrust: 36,000 PWM in place of 42,000 are usual."""

@@ -180,12 +180,3 @@ def test_the_controller_is_needed_between_takeoff_and_flight_after_half_a_second
     assert facts.remembered is FLYING
     control_filter.flight_state = ON_GROUND
     assert facts.remembered is ON_GROUND
-
-
-@pytest.mark.parametrize("state", [ON_GROUND, LANDING])
-def test_nothing_passes_to_a_vehicle_that_stands_after_its_flight(control_filter, state):
-    """The supervisor has ended the flight, and the server has not said a word since."""
-    control_filter.flight_state = state
-    control_filter.facts.end_flight()
-    assert control_filter.commanded(1.0, "climb") is None
-    assert control_filter.commanded(9.0, "climb") is None

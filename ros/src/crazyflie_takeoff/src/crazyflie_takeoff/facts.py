@@ -111,7 +111,7 @@ class Facts:
         self.has_listened = False
         # Controls.
         self.takeoff = Heard()  #: The last takeoff control.
-        self.kept = Heard()  #: The last one that has passed; nothing after the end of a flight.
+        self.kept = Heard()  #: The last one that counts; nothing after the end of a flight.
         self.commanded = Heard(ran=0.0)  #: A filter that starts in flight is not connected at once.
         self.is_commanded = False  #: Whether a commanded control has ever come.
         # The server is silent in flight: another one at once is a second one.
@@ -335,6 +335,9 @@ class Facts:
         It is treated as if it had come that much earlier.
         """
         self.advance(now)
+        if self.flown is not None:
+            # Those that have passed without a look came from the same node.
+            self.controllers.renew(self.commanded.now)
         self.controllers.note(now, name)
         self.measure_period(now)
         ran = max(self.commanded.ran, self.ran - age)

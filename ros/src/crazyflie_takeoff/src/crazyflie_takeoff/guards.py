@@ -141,9 +141,7 @@ def _descent_is_over(facts, memory):
 
 
 def _lifts_off(facts, memory):
-    takeoff = facts.takeoff
-    is_new = takeoff.ran > memory.since and not facts.contention
-    return is_new and takeoff.setpoint is not None and takeoff.setpoint.thrust > GRAVITY
+    return facts.kept.ran > memory.since and facts.kept_thrust > GRAVITY
 
 
 _P = Phase
@@ -167,7 +165,7 @@ CONTROL_STAYS_AWAY = Guard(
 
 GUARDS: tuple[Guard, ...] = (
     Guard("emergency", _ALL_BUT_EMERGENCY, lambda f, m: f.emergency, _P.EMERGENCY, "{}"),
-    Guard("on the ground", HELD, lambda f, m: f.stands, _P.ON_GROUND),
+    Guard("on the ground", (_P.PASSING,), lambda f, m: f.stands, _P.ON_GROUND),
     Guard("off the ground", (_P.ON_GROUND,), lambda f, m: not f.stands, _P.PASSING),
     Guard("tipped over", AIRBORNE, _tipped, _P.EMERGENCY, "the vehicle has tilted over"),
     Guard("out of bounds", AIRBORNE, _outside, _P.EMERGENCY, "{}", CRASH_DURATION),
@@ -192,7 +190,7 @@ GUARDS: tuple[Guard, ...] = (
     ),
     Guard("began in flight", (_P.LISTENING,), _began_in_flight, _P.PASSING),
     Guard("has listened", (_P.LISTENING,), lambda f, m: f.has_listened, _P.PASSING),
-    Guard("server is there", (_P.LISTENING,), lambda f, m: f.takeoff.ran >= 0.0, _P.PASSING),
+    Guard("server is there", (_P.LISTENING,), lambda f, m: f.kept.ran >= 0.0, _P.PASSING),
     Guard(
         "no control",
         (_P.LISTENING, *FLOWN),

@@ -12,7 +12,7 @@ LIFT_OFF_THRUST = GRAVITY + 0.2  #: Default thrust of the open-loop part of a ta
 LIFT_OFF_SPEED = 0.2
 CLIMB_SPEED = 0.1  #: Largest speed of the climb that follows (m/s).
 CLIMB_GAIN = 2.0  #: That speed over the distance from the hover point (1/s).
-AVERAGING = 0.2  #: Time constant of the means of thrust and speed (s).
+AVERAGING = 0.12  #: Time constant of the means of thrust and speed (s).
 LAG = 0.1  #: Time by which motors and estimator make a speed later than its thrust (s).
 HOVER_RANGE = 0.4  #: Largest deviation of the thrust of hover from g, as a fraction.
 

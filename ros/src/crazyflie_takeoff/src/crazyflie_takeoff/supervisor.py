@@ -192,8 +192,11 @@ def _is_refused(memory, facts):
 
 
 def _keep_takeoff(memory, facts):
-    """Note a takeoff control that passes, or ends a hold."""
-    if (memory.phase.follows or memory.phase is Phase.HOLDING) and not _is_refused(memory, facts):
+    """Note a takeoff control that counts: a refused one never does, not even later."""
+    is_zero = facts.takeoff.setpoint.thrust <= 0.0
+    is_contended = facts.contention and not (is_zero and is_on_ground(memory, facts))
+    is_ended = memory.phase is Phase.SINKING or (memory.phase is Phase.EMERGENCY and not is_zero)
+    if not (is_contended or is_ended):
         facts.kept, facts.flown = replace(facts.takeoff), None
 
 
@@ -202,7 +205,6 @@ def _pass_takeoff(memory, facts):
         return MOTORS_OFF
     if not memory.phase.follows:
         return None
-    _keep_takeoff(memory, facts)
     setpoint = facts.takeoff.setpoint
     memory.takeoff = _limited(facts, setpoint, 0.0, is_ramp=True)
     return facts.takeoff.control if memory.takeoff == setpoint else memory.takeoff
@@ -214,7 +216,7 @@ def _pass_commanded(memory, facts):
     if not facts.in_flight:
         # Thrust above zero comes from a server that takes off without a flight state; the known
         # flight state is outdated then.
-        is_kept_down = facts.flight is not None and facts.stands
+        is_kept_down = facts.flight is FlightState.ON_GROUND and facts.kept_thrust <= 0.0
         if is_kept_down or facts.takeoff_age <= TAKEOFF_CONTROL_LIMIT:
             return _late_takeoff(memory, facts) or facts.kept.control
     late = max(facts.commanded.age, facts.silence)

@@ -381,7 +381,8 @@ class TakeoffServerNode(Node):
         """Publish a new state; log it, with its reason if that is new."""
         self._state = state
         # The filter logs its own reasons.
-        reason = "" if self._reason == self._flight.filter.reason else self._reason
+        report = self._flight.filter
+        reason = "" if self._reason in (report.reason, report.refusal) else self._reason
         if (word := _LOG_WORDS[state]) != self._logged_word:
             is_new = reason and reason != self._logged_reason
             self._handle.info(f"{word}: {reason}" if is_new else word)

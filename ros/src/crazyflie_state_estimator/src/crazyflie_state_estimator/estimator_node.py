@@ -187,6 +187,8 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         knows_control = self._parameters.control_topic is not None
         self._monitor = PoseMonitor(self._parameters.max_speed, knows_control)
         self._tilt = TiltMonitor(self._parameters.max_tilt)
+        robot = self._parameters.robot_frame
+        self._statuses = {key: (pose, text.format(robot)) for key, (pose, text) in _STATUS.items()}
         if self._parameters.filter_type == KALMAN:
             self._estimator = self._load_kalman_filters(handle)
         else:
@@ -278,32 +280,23 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         self._watch_tilt(pose.rotation)
         stamp = pose.stamp * 1e-9
         if self._clock_steps.update(stamp, now, self._handle.nanoseconds):
-            self._restart()
+            self._estimator.reset()
+            self._monitor.restart()
         attitude = rpy_from_quaternion(*pose.rotation)
         acceleration = self._control.acceleration(attitude[2], now)
         verdict = self._monitor.update(stamp, pose.position, pose.rotation, acceleration)
-        status, reason = _STATUS[verdict]
-        self._pose_status = status, reason.format(self._parameters.robot_frame)
+        self._pose_status = status, reason = self._statuses[verdict]
         if verdict is Verdict.IMPOSSIBLE:
             return None
         if status != EstimateStatus.GOOD:
-            self._handle.warn(self._pose_status[1], throttle=1.0, key="frozen")
-            return self._departure(attitude)
+            self._handle.warn(reason, throttle=1.0, key="frozen")
+            # The predicted motion, when the measured one has just turned out to be wrong.
+            departure = self._monitor.departure
+            return departure and EstimatedMotion(*departure, attitude, (0.0, 0.0, 0.0))
         if verdict is Verdict.MOVED:
             self._estimator.reset()
         self._good_stamp = pose.time
         return self._estimator.update(pose.stamp, pose.position, attitude, acceleration)
-
-    def _restart(self):
-        self._estimator.reset()
-        self._monitor.restart()
-
-    def _departure(self, attitude):
-        """Return the predicted motion if the measured one has just turned out to be wrong."""
-        departure = self._monitor.departure
-        if departure is None:
-            return None
-        return EstimatedMotion(departure.position, departure.velocity, attitude, (0.0, 0.0, 0.0))
 
     def _publish_status(self, now):
         facts = *self._pose_status, self._is_tilted

@@ -147,11 +147,12 @@ class PoseMonitor:
 
     def _reach(self, time, position, acceleration):
         pose, last = (time, position), self._last
-        # Nearly all poses follow a good one, and are good.
         if last is None or time < last[0]:
             return self._accept(pose, Verdict.GOOD)
+        # Nearly all poses follow a good one, and are good.
         if self._previous is last and self._is_reachable(last, pose):
-            return self._accept(pose, Verdict.GOOD)
+            self._last = self._previous = pose
+            return Verdict.GOOD
         if not self._is_reachable(self._previous, pose):
             self._since = time
             self._count = 0

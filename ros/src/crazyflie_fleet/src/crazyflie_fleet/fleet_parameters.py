@@ -115,6 +115,9 @@ class FlyParameters(FleetParameters):
         "quadrotor, or a type of vehicle, that has no lags",
         False,
     )
+    fence: bool = parameter(
+        BOOLEAN, "whether each vehicle has a geofence, whose box is in nodes/geofence/box", False
+    )
     common: Mapping[str, Any] = parameter(
         NODE_PARAMETERS, "parameters of every vehicle's nodes, node by node", name="nodes"
     )

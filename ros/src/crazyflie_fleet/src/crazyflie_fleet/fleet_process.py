@@ -123,14 +123,15 @@ class _NodeFactory:
         return f"{name}/{ALL_STATES}"
 
     def _add_vehicle(self, vehicle: VehicleConfig) -> None:
-        classes = node_classes(vehicle, self._config.is_simulated)
+        fence = self._config.fence
+        classes = node_classes(vehicle, self._config.is_simulated, fence)
         if f"{self._handle.name}/{vehicle.dynamics}" in self.nodes:
             for name in ("simulator", "state_estimator", "lqr_controller"):
                 del classes[name]
         self._handle.set_param(f"/{vehicle.name}/{BUFFER}", vehicle.buffer)
         self._handle.set_param(f"/{vehicle.name}/{PLACE}", self._places[vehicle.name])
         frames = {"fixed": self._config.fixed_frame, "robot": vehicle.name}
-        tree = parameters(vehicle, frames, self._common(vehicle.dynamics))
+        tree = parameters(vehicle, frames, self._common(vehicle.dynamics), fence)
         if vehicle.name in self._unplaced:
             tree["takeoff_server"]["topics"]["inhibition"] = INHIBITION
         for name, node_class in (self._config.extra_nodes or {}).items():

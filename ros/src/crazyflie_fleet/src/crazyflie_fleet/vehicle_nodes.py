@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from crazyflie_control_merger.cmd_vel_converter_node import CmdVelConverterNode
+from crazyflie_control_merger.merger_nodes import RegularControlMergerNode
 from crazyflie_fleet.fleet_config import VehicleConfig
+from crazyflie_geofence.geofence_node import GeofenceNode
 from crazyflie_lqr.lqr_nodes import PositionVelocityYawStateLiftLqrNode
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
@@ -22,6 +24,7 @@ Tree = dict[str, Any]  #: Parameters in the structure of the parameter server.
 REFERENCE, SAFE_REFERENCE = "ref", "ref_safe"
 DESCENT, SAFE_DESCENT = f"{REFERENCE}_descent", f"{REFERENCE}_descent_safe"
 STATE, LQR_CONTROL = "state", "control/lqr"
+FENCE_CONTROL, MERGED_CONTROL = "control/geofence", "control/merged"
 TAKEOFF_CONTROL, FINAL_CONTROL = "control/takeoff", "control/final"
 IN_FLIGHT = "in_flight"
 FLIGHT_STATUS = f"{IN_FLIGHT}_flight_status"  #: Topics and services of a vehicle, below its name.
@@ -57,15 +60,27 @@ HOVER_NODES: dict[str, type[Node]] = {
 }
 
 
-def node_classes(vehicle: VehicleConfig, is_simulated: bool) -> dict[str, type[Node]]:
+FENCE_NODES: dict[str, type[Node]] = {
+    "geofence": GeofenceNode,
+    "control_merger": RegularControlMergerNode,
+}
+
+
+def node_classes(
+    vehicle: VehicleConfig, is_simulated: bool, has_fence: bool = False
+) -> dict[str, type[Node]]:
     """Return the classes of a vehicle's nodes, by their names below the vehicle's."""
+    nodes = {**HOVER_NODES, **(FENCE_NODES if has_fence else {})}
     if is_simulated:
-        return {"simulator": SIMULATORS[vehicle.dynamics], **HOVER_NODES}
-    return {"cmd_vel_converter": CmdVelConverterNode, **HOVER_NODES}
+        return {"simulator": SIMULATORS[vehicle.dynamics], **nodes}
+    return {"cmd_vel_converter": CmdVelConverterNode, **nodes}
 
 
 def parameters(
-    vehicle: VehicleConfig, frames: Mapping[str, str], common: Mapping[str, Any]
+    vehicle: VehicleConfig,
+    frames: Mapping[str, str],
+    common: Mapping[str, Any],
+    has_fence: bool = False,
 ) -> Tree:
     """Return the parameters of a vehicle's nodes, node by node.
 
@@ -126,6 +141,27 @@ def parameters(
     }
     if model != "cf21":
         own["lqr_controller"]["K_file"] = model
+    if has_fence:
+        own["geofence"] = {
+            "topics": {
+                "state": STATE,
+                "control": LQR_CONTROL,
+                "prioritized_control": FENCE_CONTROL,
+                "final_control": FINAL_CONTROL,
+            },
+            "model": model,
+        }
+        own["control_merger"] = {
+            "topics": {
+                "control": LQR_CONTROL,
+                "prioritized_control": FENCE_CONTROL,
+                "merged": MERGED_CONTROL,
+            },
+            "mode": "MERGE",
+        }
+        own["takeoff_control_filter"]["topics"]["commanded_control"] = MERGED_CONTROL
+        for name in ("takeoff_server", "takeoff_control_filter"):
+            own[name]["topics"]["box"] = "geofence/parameter_updates"
     return merged(common, own)
 
 

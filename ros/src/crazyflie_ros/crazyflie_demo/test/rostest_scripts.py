@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+import rosnode
 from flights import LIMIT, node, observed_vehicle
 
 from crazyflie_demo.trajectory_file import save
@@ -141,16 +142,22 @@ while not rospy.is_shutdown():
 """
 
 
+def kill_node(_):
+    """Ask the script's node to shut down, in a thread of rospy, as rosnode kill does."""
+    assert rosnode.kill_nodes(["/script"]) == (["/script"], [])
+
+
 @pytest.mark.parametrize(
-    ("ending", "number", "status"),
+    ("ending", "end", "status"),
     [
-        ("", 0, 0),
-        ("1 / 0", 0, 1),
-        ("rospy.spin()", signal.SIGINT, 0),
-        (STREAM, signal.SIGTERM, 0),
+        ("", None, 0),
+        ("1 / 0", None, 1),
+        ("rospy.spin()", lambda flight: flight.send_signal(signal.SIGINT), 0),
+        (STREAM, lambda flight: flight.send_signal(signal.SIGTERM), 0),
+        ("while True: cf.goTo([0.0, 0.0, 0.5], 0.0, 1.0)", kill_node, 1),
     ],
 )
-def test_a_vehicle_is_landed_at_the_end_of_a_script(observer, tmp_path, ending, number, status):
+def test_a_vehicle_is_landed_at_the_end_of_a_script(observer, tmp_path, ending, end, status):
     # A landing that ends a stream takes 2 s, in which the firmware refuses a takeoff.
     at_rest(observer)
     landed = observer.track_until(lambda truth: True)[-1].time
@@ -161,8 +168,8 @@ def test_a_vehicle_is_landed_at_the_end_of_a_script(observer, tmp_path, ending, 
         try:
             observer.track_until(lambda truth: flies.exists() or flight.poll() is not None)
             assert flies.exists()
-            if number:
-                flight.send_signal(number)
+            if end is not None:
+                end(flight)
             track = observer.track_until(lambda truth: truth.position[2] < 0.02)
             assert flight.wait(LIMIT) == status
         finally:

@@ -7,8 +7,10 @@ methods block.
 # The names of methods and arguments are those that existing scripts use.
 # ruff: noqa: N802, N803
 
+import atexit
 import contextlib
 import math
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -90,29 +92,47 @@ class Crazyflie:
         # overwritten.
         self._call("update_params", [])
         self._may_fly = False  # Whether the script has made it fly.
+        self._has_ended = False
+        # Reentrant: a signal may end the script within a command, in the same thread.
+        self._commands = threading.RLock()
         # Services still answer then, also after `rospy.spin()`.
         rospy.on_shutdown(self._land_at_end)
+        atexit.register(self._land_at_end)
 
     def _call(self, service, *arguments):
         self._services[service](*arguments)
 
+    @contextlib.contextmanager
+    def _commanding(self):
+        # Another thread may go on after the landing has begun.
+        with self._commands:
+            if self._has_ended:
+                raise rospy.ROSInterruptException(f"{self.prefix} lands, since the script ends")
+            # Also a command that is refused may have been obeyed.
+            self._may_fly = True
+            yield
+
     def _fly(self, service, *arguments):
-        # Also one that is refused may have been obeyed.
-        self._may_fly = True
-        self._call(service, *arguments)
+        with self._commanding():
+            self._call(service, *arguments)
 
     def _come_down(self, service, *arguments):
         self._call(service, *arguments)
         self._may_fly = False
 
     def _land_at_end(self):
-        if not self._may_fly:
-            return
-        rospy.logwarn("landing %s, since the script ends", self.prefix)
-        try:
-            self.land(0.0, _LANDING)
-        except rospy.ServiceException as error:
-            rospy.logerr("MAY STILL FLY: %s: %s", self.prefix, error)
+        self._has_ended = True
+        # A command that is being sent is sent before the landing. Who comes second waits for it:
+        # the process would end within.
+        with self._commands:
+            if not self._may_fly:
+                return
+            rospy.logwarn("landing %s, since the script ends", self.prefix)
+            try:
+                self.land(0.0, _LANDING)
+            except rospy.ServiceException as error:
+                rospy.logerr("MAY STILL FLY: %s: %s", self.prefix, error)
+            self._may_fly = False
 
     def setGroupMask(self, groupMask: int) -> None:
         """Make the vehicle a member of groups, one for each bit."""
@@ -248,8 +268,8 @@ class Crazyflie:
     def _send(self, name, message):
         message.header.stamp = rospy.Time.now()
         message.header.frame_id = self._world
-        self._may_fly = True
-        self._setpoints[name].publish(message)
+        with self._commanding():
+            self._setpoints[name].publish(message)
 
     def getParam(self, name: str) -> Any:
         """Return a firmware parameter GROUP/NAME."""

@@ -245,6 +245,23 @@ def test_vehicles_turn_and_fly_on_at_any_heading(together):
     assert heading() == pytest.approx(2.5, abs=0.05)
 
 
+@pytest.mark.parametrize("together", [True, False])
+def test_a_reference_far_away_is_travelled_to_no_faster_than_the_live_limit(together):
+    swarm = Swarm(fleet={"n": 1}, together=together)
+    swarm.call("/all/takeoff")
+    swarm.process.advance(1.0)
+    vectorized = [n for n, node in swarm.nodes.items() if isinstance(node, VectorizedSimulatorNode)]
+    node, prefix = (*vectorized, "lqr_controller/") if together else ("/cf1/lqr_controller", "")
+    swarm.process.reconfigure(node, **{f"{prefix}reference/max_speed": 0.5})
+    x, y, _ = swarm.position("cf1")
+    state = PositionVelocityState(x=x + 5.0, y=y, z=1.0)
+    swarm.process.publish("/cf1/ref", PositionVelocityStateStamped(state=state))
+    swarm.process.advance(4.0)
+    assert 1.0 < swarm.position("cf1")[0] - x < 2.0
+    swarm.process.advance(10.0)
+    assert swarm.position("cf1") == pytest.approx((x + 5.0, y, 1.0), abs=0.05)
+
+
 def test_a_model_without_a_heading_refuses_one(tmp_path):
     file = tmp_path / "fleet.yaml"
     file.write_text("robots: {a: {initial_position: [0, 0, 0], model: near_hover}}\n")

@@ -133,13 +133,17 @@ class VectorizedSimulatorNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(VectorizedSimulatorParameters)
+        self._parameters = handle.load(VectorizedSimulatorParameters, self._change)
         self._K, self._u_ref = np.array(self._parameters.K), np.array(self._parameters.u_ref)
         if IntegralStateFeedback(self._K, self._u_ref, YAW).height_overshoots:
             raise ParameterError(
                 f"{handle.name}: the gains' height loop overshoots, so that each vehicle needs a "
                 "controller of its own; fly it with together:=false"
             )
+
+    def _change(self, parameters):
+        for references in self._references:
+            references.change(parameters.limits)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

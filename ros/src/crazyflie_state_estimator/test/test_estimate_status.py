@@ -37,17 +37,17 @@ def test_before_the_first_pose_it_is_missing():
 
 
 @pytest.mark.parametrize("acts_on_arrival", [False, True])
-def test_it_is_published_ten_times_a_second_with_the_stamp_of_the_last_good_pose(acts_on_arrival):
+def test_it_is_published_twice_a_second_with_the_stamp_of_the_last_good_pose(acts_on_arrival):
     process = launch(act_on_arrival=acts_on_arrival)
     fly(process, lambda _: ((0.0, 0.0, 1.0), LEVEL), 0.5)
     before = len(process.published("/state_status"))
     fly(process, lambda _: ((0.0, 0.0, 1.0), LEVEL), 2.0)
-    assert len(process.published("/state_status")) - before == pytest.approx(20, abs=1)
+    assert len(process.published("/state_status")) - before == pytest.approx(4, abs=1)
     status = last(process)
     assert (status.pose, status.reason, status.is_tilted) == (EstimateStatus.GOOD, "", False)
     assert status.header.frame_id == "world"
     last_pose = process.published("/state")[-1].header.stamp
-    assert 0.0 <= (last_pose - status.header.stamp).to_sec() < 0.11
+    assert 0.0 <= (last_pose - status.header.stamp).to_sec() < 0.51
 
 
 @pytest.mark.parametrize("acts_on_arrival", [False, True])

@@ -137,8 +137,8 @@ class KalmanWithControlParameters(KalmanParameters):
 
 
 REPORT_PERIOD = 1.0  #: Period of the diagnostics, as REP 107 recommends (s).
-#: Period of the status; an estimator that acts on arrival checks for silence as often (s).
-STATUS_PERIOD = 0.1
+STATUS_PERIOD = 0.5  #: Period of the status while it does not change (s).
+SILENCE_PERIOD = 0.1  #: Period at which an estimator that acts on arrival checks for silence (s).
 UNKNOWN = (math.nan,) * 3  #: A disturbance, while it is not known.
 
 _STATUS = {
@@ -226,7 +226,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
             )
         if parameters.acts_on_arrival:
             handle.on_pose(parameters.robot_frame, parameters.time_step, self._estimate)
-            handle.timer(max(parameters.time_step, STATUS_PERIOD), self._watch)
+            handle.timer(max(parameters.time_step, SILENCE_PERIOD), self._watch)
         else:
             handle.timer(parameters.time_step, self._estimate)
         handle.timer(REPORT_PERIOD, self._report, stagger=True)

@@ -43,8 +43,8 @@ class Bounds(Parameters):
     )
 
 
-#: Bounds of the types: with these, flights of the Crazyflie 2.1's rigid body stayed in the box. Its
-#: residuals are larger for moments, so that the proof does not cover it: see docs/geofence_proof.md.
+#: Bounds of the types: with these, flights of the Crazyflie 2.1's rigid body stayed in the box. For
+#: moments its residuals are larger, so that the proof does not cover it: docs/geofence_proof.md.
 OF_TYPES = Bounds(
     horizontal_lag=0.12,
     vertical_lag=0.08,

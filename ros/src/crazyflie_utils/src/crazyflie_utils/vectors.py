@@ -45,7 +45,7 @@ def _getter(message_type: Any) -> Callable[[genpy.Message], tuple[float, ...]]:
 def to_vector(message: genpy.Message) -> NDArray[np.float64]:
     """Return the fields of a flat message, shape (number of fields,), units as there.
 
-    TypeError if a field is not a number, for example a header.
+    TypeError or ValueError if a field is not a number, for example a header or a list.
     """
     return np.array([getattr(message, field) for field in message.__slots__], dtype=float)
 

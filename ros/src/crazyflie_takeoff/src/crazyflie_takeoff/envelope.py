@@ -51,6 +51,17 @@ class Box:
 NO_BOX = Box((-math.inf,) * 3, (math.inf,) * 3)
 
 
+def hover_complaint(hover: tuple[float, float, float], box: Box) -> str:
+    """Return in words what is wrong with a hover point (m) in a box; empty if nothing is."""
+    excess = box.excess(hover)
+    if excess <= 0.0:
+        return ""
+    return (
+        f"hover/x, y, z is {hover}, {excess:.2f} m outside the geofence; expected a point in the "
+        "box"
+    )
+
+
 @dataclass(frozen=True)
 class Limits:
     """Limits of a vehicle in flight."""

@@ -3,12 +3,12 @@
 import enum
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-from crazyflie_takeoff.envelope import Box
+from crazyflie_takeoff.envelope import Box, hover_complaint
 from crazyflie_takeoff.guards import MAX_FAULT_TIME, Guard
 from crazyflie_takeoff.motion import Measured
 from crazyflie_takeoff.phases import FilterState
+from crazyflie_takeoff.server_parameters import TakeoffServerParameters
 from crazyflie_takeoff.server_table import (
     AIRBORNE,
     FLYING,
@@ -16,9 +16,6 @@ from crazyflie_takeoff.server_table import (
     Request,
 )
 from crazyflie_takeoff.vehicle_facts import VehicleFacts
-
-if TYPE_CHECKING:
-    from crazyflie_takeoff.server_parameters import TakeoffServerParameters
 
 POSITIONING_PATIENCE = (
     0.3  #: Time for which the vehicle's positioning is wrong before a landing (s).
@@ -71,17 +68,6 @@ class BatteryCheck:
         return Charge.LOW if low else Charge.GOOD
 
 
-def hover_complaint(hover: tuple[float, float, float], box: Box) -> str:
-    """Return in words what is wrong with a hover point (m) in a box; empty if nothing is."""
-    excess = box.excess(hover)
-    if excess <= 0.0:
-        return ""
-    return (
-        f"hover/x, y, z is {hover}, {excess:.2f} m outside the geofence; expected a point in the "
-        "box"
-    )
-
-
 class TakeoffChecks:
     """Facts about estimator, controller, driver, battery and geofence, and refusals by them.
 
@@ -89,7 +75,7 @@ class TakeoffChecks:
     others of the same topics.
     """
 
-    def __init__(self, parameters: "TakeoffServerParameters", resolve: Callable[[str], str]):
+    def __init__(self, parameters: TakeoffServerParameters, resolve: Callable[[str], str]):
         self.parameters = parameters
         self.box = parameters.box
         self.measured = Measured()

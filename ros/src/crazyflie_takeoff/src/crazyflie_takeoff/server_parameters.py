@@ -6,9 +6,9 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_model.limits import MAX_THRUST
+from crazyflie_takeoff.envelope import hover_complaint
 from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic, named_after
 from crazyflie_takeoff.profiles import RAMP_DURATION, TakeoffPlan
-from crazyflie_takeoff.refusals import hover_complaint
 from crazyflie_utils import parameter, topic
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, Number
 

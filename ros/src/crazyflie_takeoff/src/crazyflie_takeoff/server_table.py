@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from crazyflie_takeoff.guards import Guard, first_firing
 from crazyflie_takeoff.lift_off import LIFT_OFF_THRUST, LiftOff, has_lifted_off
-from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Position
+from crazyflie_takeoff.motion import PROGRESS, TOUCHDOWN_HEIGHT, Position
 from crazyflie_takeoff.phases import FilterState, FlightState
 from crazyflie_takeoff.profiles import Descent, TakeoffPlan
 from crazyflie_utils.refusal import RefusalError
@@ -29,7 +29,7 @@ ROUNDING = 1e-6  #: Tolerance of comparisons between times (s).
 SHORTEST_DESCENT = 1.0  #: Least duration of a descent with a time limit (s).
 
 ARRIVED = 0.3  #: Distance from the hover point of a vehicle that has reached it (m).
-ARRIVAL_LIMIT = 10.0  #: Longest wait for that after a takeoff (s).
+ARRIVAL_TIME = 1.0  #: Time after which one that comes no nearer is not waited for (s).
 
 #: Reason for which a takeoff or a landing is refused in a flight state.
 REFUSALS = {
@@ -136,6 +136,8 @@ class FlightStateMachine:
         self.zero_sent = -math.inf  # When zero thrust was sent last (s).
         self.lift_off = LiftOff(self.plan.thrust or LIFT_OFF_THRUST)
         self.hover_thrust: float | None = None  # See `Output`.
+        # Least distance from the hover point since the takeoff was over (m), and when (s).
+        self._nearest = math.inf, -math.inf
 
     @property
     def flight_state(self) -> FlightState | None:
@@ -240,19 +242,18 @@ class FlightStateMachine:
         toggle = self._in_flight != was_in_flight
         return Output(self._thrust(), self.reference, self.hover_thrust, toggle)
 
-    def arrival(self) -> str | None:
-        """Return whether a takeoff has succeeded: an empty text, or why not; None if it may yet."""
-        if self.measured is None:
-            return ""
-        distance = math.dist(self.measured, self.plan.hover)
-        if distance < ARRIVED:
-            return ""
-        if self.elapsed < self.plan.open_loop + self.plan.settle + ARRIVAL_LIMIT:
-            return None
-        return (
-            f"the vehicle flies, but it is {distance:.2f} m away from the hover point "
-            f"{self.plan.hover}: it has not come there within {self.elapsed:.0f} s"
-        )
+    def arrival(self) -> float | None:
+        """Return the distance from the hover point, m, once a takeoff is over; None before that.
+
+        It is over when the vehicle is there, or comes no nearer: its controller may have another
+        reference by now.
+        """
+        distance = 0.0 if self.measured is None else math.dist(self.measured, self.plan.hover)
+        nearest, since = self._nearest
+        if distance < nearest - PROGRESS:
+            self._nearest = distance, self.time
+            return distance if distance < ARRIVED else None
+        return distance if distance < ARRIVED or self.time - since > ARRIVAL_TIME else None
 
     def _is_in_flight(self):
         return self.flight_state is not None and self.flight_state.in_flight

@@ -18,12 +18,14 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_takeoff import flight_topics
+from crazyflie_takeoff.envelope import hover_complaint
 from crazyflie_takeoff.guards import first_firing
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.phases import FilterState, FlightState, flight_state
-from crazyflie_takeoff.refusals import WATCH, TakeoffChecks, hover_complaint
+from crazyflie_takeoff.refusals import WATCH, TakeoffChecks
 from crazyflie_takeoff.server_parameters import TakeoffServerParameters
 from crazyflie_takeoff.server_table import (
+    ARRIVED,
     NO_FILTER,
     REFUSALS,
     FilterReport,
@@ -338,8 +340,13 @@ class TakeoffServerNode(Node):
         if state is FlightState.ON_GROUND:
             self._answer()
         elif state is FlightState.FLYING and not self._under_way.done():
-            if (failure := self._flight.arrival()) is not None:
-                self._answer(failure)
+            if (distance := self._flight.arrival()) is not None:
+                self._answer()
+                if distance > ARRIVED:
+                    self._handle.warn(
+                        f"the vehicle is in flight, {distance:.2f} m away from the hover point "
+                        f"{self._flight.plan.hover}; has its controller another reference?"
+                    )
 
     def _set_pace(self):
         # Not before the state has been published.

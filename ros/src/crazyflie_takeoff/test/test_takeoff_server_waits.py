@@ -10,7 +10,7 @@ from takeoff_helpers import SERVER, filter_status, state
 
 from crazyflie_msgs.msg import FilterStatus, VehicleStatus
 from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
-from crazyflie_takeoff.vehicle_facts import MAX_FACT_AGE
+from crazyflie_takeoff.vehicle_facts import CONNECTION_TIME, MAX_FACT_AGE
 from crazyflie_utils.refusal import ServiceError
 
 
@@ -210,9 +210,11 @@ def test_takeoff_waits_for_the_driver():
     process.publish("/cf1/connected", Bool(False))
     process.advance(2.0)
     assert (states(process), answer.done()) == (["on_ground"], False)
-    process.publish("/state", state(0.0))
     process.publish("/cf1/connected", Bool(True))
-    process.advance(0.02)
+    process.publish("/state", state(0.0))
+    process.advance(CONNECTION_TIME - 0.02)
+    process.publish("/state", state(0.0))
+    process.advance(0.05)
     assert states(process)[-1] == "taking_off"
 
 
@@ -263,6 +265,8 @@ def test_takeoff_of_a_vehicle_that_cannot_fly_is_refused_at_once(status, reason)
     process.publish("/state", state(0.0))
     with pytest.raises(ServiceError, match=reason):
         call(process, "/takeoff")
+    process.advance(CONNECTION_TIME)
+    process.publish("/state", state(0.0))
     process.publish("/cf1/vehicle_status", VehicleStatus(supervisor=VehicleStatus.CAN_FLY))
     call(process, "/takeoff")
     process.advance(0.02)
@@ -361,6 +365,7 @@ def test_a_takeoff_waits_for_a_vehicle_that_arms_itself_again(is_armed_again):
     process.advance(0.2)
     assert not takeoff.done()
     assert states(process)[-1] == "on_ground"
+    process.publish("/state", state(0.0))
     if is_armed_again:
         publish(auto | ready)
     process.advance(0.32)
@@ -368,3 +373,17 @@ def test_a_takeoff_waits_for_a_vehicle_that_arms_itself_again(is_armed_again):
     if not is_armed_again:
         with pytest.raises(ServiceError, match="the vehicle cannot fly yet"):
             takeoff.result(0)
+
+
+def test_a_takeoff_waits_for_zero_thrust_to_reach_a_new_driver():
+    """Before it, the driver passes no thrust."""
+    process = on_ground(DRIVEN)
+    process.publish("/cf1/connected", Bool(True))
+    process.publish("/state", state(0.0))
+    call(process, "/takeoff")
+    process.advance(CONNECTION_TIME - 0.02)
+    assert states(process)[-1] == "on_ground"
+    assert set(thrusts(process)) == {0.0}
+    process.publish("/state", state(0.0))
+    process.advance(0.05)
+    assert states(process)[-1] == "taking_off"

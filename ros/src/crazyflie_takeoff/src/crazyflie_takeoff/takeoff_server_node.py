@@ -181,7 +181,7 @@ class TakeoffServerNode(Node):
             return
         now, checks = self._handle.time(), self._checks
         may_wait = self._is_starting and checks.may_become_complete(now)
-        may_wait = may_wait or checks.vehicle.arms_again(now)
+        may_wait = may_wait or checks.vehicle.is_soon_ready(now)
         waiting, self._waiting = self._waiting, []
         for event, future in waiting:
             if event is Request.TAKEOFF and may_wait:

@@ -9,6 +9,9 @@ MAX_FACT_AGE = 3.0  #: Age at which a status of the driver is unknown (s); it re
 #: Time in which a vehicle that arms itself has done so again (s): it disarms 3 s after a landing,
 #: and every 30 s on the ground, for 0.2 s.
 REARMING_TIME = 0.5
+#: Time from the connection of the vehicle until zero thrust has reached its driver, which passes no
+#: other thrust before that (s).
+CONNECTION_TIME = 0.5
 
 _READY = SupervisorState.ARMED | SupervisorState.CAN_FLY
 
@@ -31,9 +34,12 @@ class VehicleFacts:
         self._unready_since = -math.inf
         self._is_flying: bool | None = None  # As the vehicle reports it; None if it does not.
         self._reported = -math.inf  # When it has reported a flight last.
+        self._connected_since = -math.inf
 
     def set_connected(self, now: float, is_connected: bool) -> None:
         """Record whether the driver is connected to the vehicle."""
+        if is_connected and not self._connection[1]:
+            self._connected_since = now
         self._connection = now, is_connected
 
     def set_status(
@@ -100,15 +106,20 @@ class VehicleFacts:
             return f"the vehicle cannot fly, its state is: {faults.words()}; restart it"
         return ""
 
-    def arms_again(self, now: float) -> bool:
-        """Return whether a vehicle that arms itself has just disarmed: it is ready soon."""
+    def is_soon_ready(self, now: float) -> bool:
+        """Return whether one that may take off soon was connected, or has disarmed, just now."""
+        is_new = now - self._connected_since < CONNECTION_TIME
+        return self._arms_again(now) or (is_new and not self.takeoff_refusal(now))
+
+    def _arms_again(self, now):
+        """Return whether a vehicle that arms itself has just disarmed."""
         state = self._state(now)
         arms_itself = SupervisorState.AUTO_ARMED in state and _READY not in state
         return arms_itself and now - self._unready_since < REARMING_TIME
 
     def _unready(self, now):
         state = self._state(now)
-        if _READY in state or self.arms_again(now):
+        if _READY in state or self._arms_again(now):
             return ""
         if SupervisorState.ARMED in state or SupervisorState.AUTO_ARMED in state:
             return f"the vehicle cannot fly yet, its state is: {state.words()}"

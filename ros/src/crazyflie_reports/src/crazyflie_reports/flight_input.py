@@ -194,6 +194,16 @@ def of_journals(paths: list[Path]) -> FlightInput:
                 "expected one with another clock, or a bag"
             )
         sent = _published_again(Journal(path), found)
+        for topic, datatype in given.outdated.items():
+            found.remarks.append(
+                f"{path.name}: messages on {topic} are left out: they are of another version of "
+                f"{datatype} than today's"
+            )
+        if given.unnamed:
+            found.remarks.append(
+                f"{path.name}: {given.unnamed} messages and calls are left out: their topics were "
+                "registered by a thread, and are not known"
+            )
         if journal.damage:
             found.remarks.append(f"{path.name} is read to where {journal.damage}")
         found.parameters = {**dict(given.parameters), **found.parameters}
@@ -223,6 +233,11 @@ class _JournalInput:
         self.launched: dict[str, str] = {}
         self.remappings: dict[str, str] = {}
         self.calls: list[tuple[float, str, genpy.Message]] = []
+        #: Messages and calls of topics and services without a name: they were registered by a
+        #: thread, as a driver's are when a vehicle is added.
+        self.unnamed = 0
+        #: Topics whose messages are of another version of their type than today's, and the type.
+        self.outdated: dict[str, str] = {}
         self._messages: dict[int, list[Given]] = {}
         self._names: dict[tuple[Kind, int], list[str]] = {}
         self._path, self._clock = journal.path, header["clock"]
@@ -273,6 +288,8 @@ class _JournalInput:
         elif row.kind is Kind.LAUNCH:
             name, path = json.loads(row.data)
             self.launched[name] = path
+        elif row.kind is Kind.CALL and (Kind.OFFERED, row.number) not in self._names:
+            self.unnamed += 1
         elif row.kind is Kind.CALL:
             name, kind = self._names[Kind.OFFERED, row.number]
             service_type = roslib.message.get_service_class(kind)
@@ -280,6 +297,9 @@ class _JournalInput:
             self.calls.append((self._time + self._wall, name, request))
 
     def _add(self, row):
+        if (Kind.SUBSCRIBED, row.number) not in self._names:
+            self.unnamed += 1
+            return
         topic, datatype = self._names[Kind.SUBSCRIBED, row.number]
         message_type = roslib.message.get_message_class(datatype)
         if message_type is None:
@@ -288,6 +308,12 @@ class _JournalInput:
         data, number = row.data[ORIGIN.size :], origin & ~PLAIN
         if topic == "/clock" and self._clock == "simulated":
             self._time = message_type().deserialize(data).clock.to_sec()
+        if row.number not in self._messages:
+            try:
+                message_type().deserialize(data)
+            except genpy.DeserializationError:
+                self.outdated[topic] = datatype
+                return
         caller = self._names.get((Kind.CALLER, number), [""])[0]
         time = self._time + self._wall
         given = Given(time, topic, message_type, data, caller, self._inputs)

@@ -19,6 +19,7 @@ from safety_helpers import (
     wait_for_words,
 )
 from std_msgs.msg import String
+from std_srvs.srv import EmptyRequest
 
 from crazyflie_driver.srv import NotifySetpointsStopRequest
 from crazyflie_utils import ServiceError
@@ -114,6 +115,15 @@ def test_a_vehicle_that_flies_on_thrust_is_not_removed(on_thrust, is_fed):
     assert commands(vehicle) == []
     thrust(server, 0.0)
     server.remove(vehicle.uri)
+
+
+def test_after_an_emergency_it_is_removed_although_its_controls_still_come(on_thrust):
+    server, vehicle = on_thrust
+    server.call("/cf1/emergency", EmptyRequest())
+    thrust(server)
+    # The log still says that it flies.
+    with pytest.raises(ServiceError, match="is removed, but the emergency stop is not confirmed"):
+        server.remove(vehicle.uri)
 
 
 def test_whoever_flies_a_vehicle_is_asked_to_land_before_the_driver_ends(on_thrust):

@@ -188,6 +188,7 @@ class SetpointTopics:
         """Whether the vehicle may fly, on a stream of thrust, which only its sender can land."""
         state = self._log.supervisor
         may_fly = state is None or SupervisorState.FLYING in state
+        may_fly = may_fly and not self._vehicle.gate.is_emergency
         is_streamed = self._vehicle.handle.time() - self.last_time < LEVEL_AGE
         return may_fly and is_streamed and self.control is Control.THRUST
 

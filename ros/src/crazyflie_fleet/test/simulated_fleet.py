@@ -34,7 +34,7 @@ class Swarm:
             assert self.process.launch(node, name), self.process.logged("error")
         self.process.advance(0.6)
 
-    def call(self, service, request=None, seconds=4.1):
+    def call(self, service, request=None, seconds=4.6):
         """Return the answer, which comes within some seconds."""
         answer = self.process.call(service, request or EmptyRequest())
         if isinstance(answer, Future):

@@ -34,7 +34,7 @@ def vehicle(monkeypatch):
     """Return the vehicle of a process that scripts find."""
     process = fake_process(monkeypatch)
     monkeypatch.setattr(fleet, "begin_script", lambda *_: (process, lambda: None))
-    monkeypatch.setattr(fleet, "catch_signals", lambda: None)
+    monkeypatch.setattr(fleet, "catch_signals", lambda _: None)
     monkeypatch.setattr(observer, "of_process", MissionObserver())
     monkeypatch.setattr("sys.argv", [])
     monkeypatch.setattr("sys.path", ["", *sys.path])

@@ -30,7 +30,7 @@ def test_a_vehicle_that_another_reference_has_is_not_waited_for():
     network.advance_until(answer.done)
     assert answer.exception() is None
     assert network.last("/in_flight_state") == "flying"
-    assert "m away from the hover point" in network.process("server").logged("warn")[-1]
+    assert "m away from the hover point" in network.process("server").logged("info")[-1]
 
 
 def test_thrust_and_duration_of_a_fork():

@@ -29,7 +29,8 @@ ROUNDING = 1e-6  #: Tolerance of comparisons between times (s).
 SHORTEST_DESCENT = 1.0  #: Least duration of a descent with a time limit (s).
 
 ARRIVED = 0.3  #: Distance from the hover point of a vehicle that has reached it (m).
-ARRIVAL_TIME = 1.0  #: Time after which one that comes no nearer is not waited for (s).
+#: Time after which one that comes no nearer, by `PROGRESS`, is not waited for (s).
+ARRIVAL_TIME = 0.25
 
 #: Reason for which a takeoff or a landing is refused in a flight state.
 REFUSALS = {

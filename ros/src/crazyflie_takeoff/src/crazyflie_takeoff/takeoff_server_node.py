@@ -343,7 +343,7 @@ class TakeoffServerNode(Node):
             if (distance := self._flight.arrival()) is not None:
                 self._answer()
                 if distance > ARRIVED:
-                    self._handle.warn(
+                    self._handle.info(
                         f"the vehicle is in flight, {distance:.2f} m away from the hover point "
                         f"{self._flight.plan.hover}; has its controller another reference?"
                     )

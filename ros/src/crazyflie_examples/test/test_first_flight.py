@@ -15,7 +15,7 @@ import rospkg
 from first_flight_rig import FastRig
 from genpy import Time
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped
-from std_msgs.msg import Bool, Header
+from std_msgs.msg import Header
 from std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolRequest, SetBoolResponse
 from tf2_msgs.msg import TFMessage
 
@@ -23,6 +23,7 @@ from crazyflie_driver.msg import GenericLogData
 from crazyflie_examples.first_flight import HEIGHT, STEP, STEPS, Stop, fly, report
 from crazyflie_examples.first_flight_program import FirstFlightParameters, LiveRig, main
 from crazyflie_model.units import GRAVITY
+from crazyflie_msgs.msg import FilterStatus
 from crazyflie_utils.parameters.vehicle_model import load
 from crazyflie_utils.testing.launch_files import expand
 
@@ -179,7 +180,7 @@ def test_a_takeoff_waits_for_the_controller(live, monkeypatch):
 
     def check():
         called.append("check")
-        live.rig._on_controller(Bool(True))
+        live.rig._on_filter_status(FilterStatus(has_controller=True))
 
     monkeypatch.setattr(live.rig, "_launch", lambda *_: called.append("launch"))
     monkeypatch.setattr(live.rig, "_call", lambda name, *_: called.append(name))

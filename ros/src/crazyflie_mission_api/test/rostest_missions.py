@@ -103,13 +103,14 @@ def test_ctrl_c_lands_and_what_is_wrong_is_known_before(tmp_path):
         assert landed(tracks)
 
 
+# The file is made by a thread: a signal must not come before the script's last line.
 SHUT_DOWN = """
-import pathlib, sys, rospy
+import pathlib, sys, threading, rospy
 from crazyflie_mission_api import Fleet
 
 with Fleet(["cf1", "cf2"]) as fleet:
     fleet.takeoff(0.8)
-    pathlib.Path(sys.argv[1]).touch()
+    threading.Thread(target=pathlib.Path(sys.argv[1]).touch).start()
     {ending}
 """
 NODE = "/flier"

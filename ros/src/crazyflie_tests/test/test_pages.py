@@ -170,7 +170,9 @@ def test_every_picture_is_on_a_page():
 @named(PAGES)
 def test_comments_are_understood(path):
     page = Page(path)
-    known = f"{RUN.pattern}|prints$|end$|apply$|every shell: |from: |arguments of: |states: |guards: "
+    known = (
+        f"{RUN.pattern}|prints$|end$|apply$|every shell: |from: |arguments of: |states: |guards: "
+    )
     for part in page.parts:
         assert not isinstance(part, str) or re.match(known, part), part
     for comment, follower in zip(page.parts, page.parts[1:], strict=False):

@@ -87,3 +87,18 @@ def test_no_measurement_leads_beyond_the_range():
     for speed in (0.2, 5.0, 50.0, -50.0, None, 3.0):
         lift.measure(0.01, speed)
         assert abs(lift.hover / GRAVITY - 1.0) < HOVER_RANGE + 1e-9
+
+
+@pytest.mark.parametrize("hover", [0.65, 0.8])
+def test_a_landing_lifts_no_vehicle_that_hovers_at_less(hover):
+    """Its ramp began at g: a vehicle that hovers at 0.65 g leapt to 1.1 m from the ground."""
+    network = scaled(hover)
+    answer = network.call("/takeoff")
+    network.advance_until(answer.done)
+    landed = network.call("/land")
+    network.advance_until(lambda: states(network)[-1] == "landing")
+    highest = 0.0
+    while not landed.done():
+        network.advance(0.01)
+        highest = max(highest, network.vehicle.z)
+    assert highest < 0.1

@@ -72,8 +72,11 @@ class TakeoffPlan:
     ramp: float = RAMP_DURATION  # Duration of the thrust ramp of a landing (s).
     thrust: float | None = None  # In place of `LIFT_OFF_THRUST`, and of g in the ramp (m/s^2).
 
-    def ramp_thrust(self, time: float) -> float:
-        """Return the thrust of a landing ``time`` s after the begin of its ramp, m/s^2."""
-        begin = GRAVITY if self.thrust is None else self.thrust
+    def ramp_thrust(self, time: float, hover: float = GRAVITY) -> float:
+        """Return the thrust of a landing ``time`` s after the begin of its ramp, m/s^2.
+
+        ``hover`` is the thrust of hover as it was measured: more of it would lift the vehicle.
+        """
+        begin = min(hover, GRAVITY) if self.thrust is None else self.thrust
         end = begin - RAMP_DEPTH if self.thrust is None else min(begin, RAMP_END)
         return begin - (begin - end) * min(time / self.ramp, 1.0)

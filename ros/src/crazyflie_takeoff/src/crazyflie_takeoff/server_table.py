@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.guards import Guard, first_firing
 from crazyflie_takeoff.lift_off import LIFT_OFF_THRUST, LiftOff, has_lifted_off
 from crazyflie_takeoff.motion import PROGRESS, TOUCHDOWN_HEIGHT, Position
@@ -120,6 +121,7 @@ class FlightStateMachine:
         self.ground_is_known = True  # False where the vehicle has sunk further.
         self.time = -math.inf  # Time of the last tick (s).
         self.left_ground = -math.inf  # When the flight began (s).
+        self.measured_hover = GRAVITY  # The thrust of hover of the last liftoff, or g (m/s^2).
         self.measured: Position | None = None  # Present position (m); None if it is not known.
         self.z_dot: float | None = None  # Present vertical speed (m/s); None if it is not known.
         self.reference: tuple[float, ...] | None = None  # See `Output`.
@@ -189,7 +191,7 @@ class FlightStateMachine:
         if self.state is ServerState.CLIMBING:
             self.reference = (*self.plan.hover, 0.0, 0.0, 0.0)
             if before is ServerState.LIFTED:
-                self.hover_thrust = self.lift_off.hover
+                self.hover_thrust = self.measured_hover = self.lift_off.hover
         elif before is ServerState.RAMPING_DOWN and self.state is ServerState.DESCENDING:
             # It has sunk in the ramp: the ground is lower than where it took off.
             self.ground_is_known = False
@@ -291,7 +293,7 @@ class FlightStateMachine:
             # The filter repeats it until the controller has the vehicle.
             return self.hover_thrust
         if self.state is ServerState.RAMPING_DOWN and self.begun is not None:
-            return self.plan.ramp_thrust(self.elapsed)
+            return self.plan.ramp_thrust(self.elapsed, self.measured_hover)
         if self.state not in (ServerState.ON_GROUND, ServerState.TOUCHING_DOWN):
             return None
         if self.time - self.zero_sent < ZERO_THRUST_PERIOD - ROUNDING:

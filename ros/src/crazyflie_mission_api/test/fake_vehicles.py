@@ -17,15 +17,16 @@ from crazyflie_utils.tf.frame_tree import StampedPose
 
 
 class ControllerVehicle:
-    """A vehicle that is at once where its reference is."""
+    """A vehicle that is at once where its reference is; ``in_flight`` is its server's topic."""
 
-    def __init__(self, process, name, position):
+    def __init__(self, process, name, position, in_flight="in_flight"):
         self.position = list(position)
         self.yaw = 0.0
         self.refusal = ""
         handle = process.handle(f"/{name}/controller")
         self._state = handle.publisher("state", PositionVelocityYawStateStamped)
-        self._flight_state = handle.publisher("in_flight_flight_status", FlightStatus, latch=True)
+        self._flight_state = handle.publisher(f"{in_flight}_flight_status", FlightStatus, latch=True)
+        handle.set_param("~topics/in_flight", in_flight)
         handle.advertise_service("takeoff", Empty, self._on_takeoff)
         handle.advertise_service("land", Empty, self._on_land)
         handle.advertise_service("emergency", Empty, self._on_land)

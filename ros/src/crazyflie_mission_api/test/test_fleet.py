@@ -63,6 +63,18 @@ def test_one_script_for_both(fleet, controlled, driven):
     ]
 
 
+@pytest.mark.parametrize("in_flight", ["/in_flightHY4", "aloft"])
+def test_a_vehicle_whose_in_flight_has_another_name(process, in_flight):
+    vehicle = ControllerVehicle(process, "cf1", (0.0, 0.0, 0.0), in_flight)
+    with Fleet(["cf1"], process=process, startup_timeout=0.5) as fleet:
+        fleet.takeoff(1.0)
+        vehicle.be("descending")
+        with pytest.raises(MissionError, match="cf1: it does not fly any more: descending"):
+            fleet.wait(1.0)
+        fleet.land()
+        assert fleet.flying == []
+
+
 def test_a_trajectory_is_left_before_the_next_one_is_uploaded(fleet, driven):
     """The firmware holds the end of a trajectory as long as it is in its memory."""
     path = plan([(0, 0, 1), (0.2, 0, 1)])

@@ -323,6 +323,39 @@ def test_other_topics_and_other_names(run):
     assert values(flights[0])["state rate"] is None
 
 
+class NamesAtTheEnd:
+    """A bag whose vehicles are told apart by their names at the end of topics."""
+
+    def __init__(self, bag):
+        self._bag = bag
+
+    def write(self, topic, message, time):
+        _, name, own = topic.split("/", 2)
+        stem = re.match("in_flight|.*", own)[0]
+        self._bag.write(f"/{stem}{name}{own.removeprefix(stem)}", message, time)
+
+
+@pytest.mark.parametrize("is_typed", [True, False])
+def test_vehicles_by_remapped_topics(run, is_typed):
+    with bags.written(run.folder / "a.bag") as bag:
+        for name in ("HY4", "HY5"):
+            bags.write_flight(NamesAtTheEnd(bag), name, is_typed=is_typed)
+    _, _, flights = run(run.folder / "a.bag")
+    assert [each["vehicle"] for each in flights] == ["HY4", "HY5"]
+    for flight in flights:
+        assert [name for name, _, _ in flight["phases"]] == ["taking off", "flying", "landing"]
+        assert values(flight)["overshoot"] == pytest.approx(1e3 * bags.OFFSET)
+
+
+def test_other_states_and_references_are_no_vehicles(run):
+    with bags.written(run.folder / "a.bag") as bag:
+        bags.write_flight(bag)
+        for topic in ("/state2", "/state_smooth"):
+            bag.write(topic, bags.PositionVelocityYawStateStamped(), bags.stamp(5.0))
+        bag.write("/ref_descent", bags.PositionVelocityStateStamped(), bags.stamp(5.0))
+    assert [each["vehicle"] for each in run(run.folder / "a.bag")[2]] == ["vehicle"]
+
+
 def test_recordings_side_by_side_of_which_one_is_bad(run):
     good = bags.flight_bag(run.folder / "good.bag")
     folder = run.folder / "split"

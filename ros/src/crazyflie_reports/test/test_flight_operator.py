@@ -30,6 +30,9 @@ class LateVehicle:
     def start(self):
         pass
 
+    def get_param(self, name, type, default):
+        return default
+
     def subscribe(self, topic, message_type, callback):
         self.callbacks[topic] = callback
 
@@ -55,7 +58,7 @@ class LateVehicle:
     def announce(self, time, state):
         status = FlightStatus(state=state)
         status.header.stamp = genpy.Time.from_sec(time)
-        self.callbacks["in_flight_flight_status"](status)
+        self.callbacks["/in_flight_flight_status"](status)
 
 
 @pytest.fixture

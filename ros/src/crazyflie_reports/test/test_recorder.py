@@ -22,6 +22,21 @@ def test_topics():
     assert not any(re.fullmatch(recorder.TOPICS, topic) for topic in LEFT_OUT)
 
 
+def test_topics_that_a_launch_file_has_renamed():
+    tree = {
+        "HY4": {
+            "takeoff_server": {"topics": {"in_flight": "/in_flightHY4", "control": "up"}},
+            "camera": {"topics": {"image": "/photo"}},
+        },
+        "lqr_controller": {"topics": {"state": "/estimate"}},
+    }
+    topics = recorder.topics_of(tree)
+    for renamed in ("/in_flightHY4", "/in_flightHY4_flight_status", "/HY4/up", "/estimate"):
+        assert re.fullmatch(topics, renamed)
+    assert not any(re.fullmatch(topics, other) for other in (*LEFT_OUT, "/photo", "/up"))
+    assert all(re.fullmatch(topics, topic) for topic in RECORDED)
+
+
 @pytest.fixture
 def run(tmp_path, monkeypatch, capsys):
     """Return a function that records with a program in the place of rosbag's."""
@@ -33,6 +48,7 @@ def run(tmp_path, monkeypatch, capsys):
         monkeypatch.setattr(recorder.roslib.packages, "find_node", lambda *names: [str(path)])
         monkeypatch.setattr(recorder, "master_answers", lambda: True)
         monkeypatch.setattr(rosparam, "dump_params", lambda path, name: open(path, "w").close())
+        monkeypatch.setattr(rosparam, "get_param", lambda name: {})
         arguments = ["record_flight", f"--folder={tmp_path / folder}", "--topics=/x", "__name:=a"]
         monkeypatch.setattr("sys.argv", arguments)
         return recorder.main(), "".join(capsys.readouterr())

@@ -37,7 +37,7 @@ from crazyflie_model.trajectory import Pieces
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped, VehicleStatus
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import NodeHandle, ServiceError, TransformError
-from crazyflie_utils.flight_status import WORDS
+from crazyflie_utils.flight_status import WORDS, in_flight_of
 from crazyflie_utils.parameters.types import FINITE
 from crazyflie_utils.steps import follow
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP_SIMULATED
@@ -140,7 +140,7 @@ class RosVehicleState:
         if frames is None:
             state = PositionVelocityYawStateStamped
             handle.subscribe(f"{top}/state", state, self._on_state, finite="state")
-        topic = f"{top}/in_flight_flight_status"
+        topic = f"{in_flight_of(handle, top)}_flight_status"
         handle.subscribe(topic, FlightStatus, self._on_flight_status)
 
     def position(self) -> Triple | None:

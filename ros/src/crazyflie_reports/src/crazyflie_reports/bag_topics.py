@@ -25,7 +25,8 @@ class Role:
     """A series of numbers of a vehicle, from topics of certain names and types."""
 
     name: str
-    topics: str  #: Regular expression of the name below the vehicle's namespace.
+    #: Regular expression of the name below the vehicle's namespace, or before its name.
+    topics: str
     fields: tuple[str, ...]  #: Fields of a row.
     rows: dict[str, Callable[[Any], Row]]  #: Type -> function that returns the row of a message.
 
@@ -116,10 +117,14 @@ ROLES = (
     Role("toggle", "in_flight", (), {"std_msgs/Empty": lambda message: ()}),
 )
 
+#: Name of a vehicle at the end of a topic's, by which launch files tell vehicles apart: /refHY4. It
+#: has a digit, unlike /ref_descent, and a letter, unlike /state2.
+_VEHICLE = r"(?:_?(?P<vehicle>[A-Za-z]+\d\w*?))?"
+
 #: Types that are not series, with the names of their topics below a namespace.
 EVENT_TYPES = {
-    "crazyflie_msgs/FlightStatus": r".*flight_status",
-    "crazyflie_msgs/FilterStatus": r".*filter_status",
+    "crazyflie_msgs/FlightStatus": rf"in_flight{_VEHICLE}_flight_status|.*flight_status",
+    "crazyflie_msgs/FilterStatus": rf"in_flight{_VEHICLE}_filter_status|.*filter_status",
     "crazyflie_msgs/VehicleStatus": r"vehicle_status",
     "dynamic_reconfigure/Config": r".+/parameter_updates",
     "rosgraph_msgs/Log": r"rosout",
@@ -160,7 +165,8 @@ def topic_of(connection: Connection, names: dict[str, str]) -> Topic | None:
 def role_of(topic: str, datatype: str, names: dict[str, str]) -> tuple[str, Role] | None:
     """Return the namespace and the series of a topic of a type; None if it has no role."""
     for role in ROLES:
-        namespace = _namespace(topic, names.get(role.name, role.topics))
+        own = names.get(role.name, role.topics).strip("/")
+        namespace = _namespace(topic, f"(?:{own}){_VEHICLE}")
         if namespace is not None and datatype in role.rows:
             return namespace, role
     return None
@@ -184,8 +190,11 @@ def expected() -> str:
 
 
 def _namespace(topic, names):
-    match = re.fullmatch(rf"/?(?:(.*)/)?(?:{names.strip('/')})", topic)
-    return match and (match[1] or "").strip("/")
+    match = re.fullmatch(rf"/?(?:(?P<above>.*)/)?(?:{names})", topic)
+    if match is None:
+        return None
+    found = match.groupdict()
+    return "/".join(filter(None, ((found["above"] or "").strip("/"), found.get("vehicle"))))
 
 
 def seconds(stamp: Any) -> float:

@@ -20,6 +20,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_reports.flight_record import FlightRecord
+from crazyflie_utils.flight_status import in_flight_of
 from crazyflie_utils.main import ros_process
 from crazyflie_utils.node import Process
 from crazyflie_utils.refusal import ServiceError
@@ -56,8 +57,9 @@ class FlightOperator:
             ("control/final", ControlStamped, record.final_control),
         ):
             handle.subscribe(topic, message_type, partial(self._on_message, series))
-        handle.subscribe("in_flight", EmptyMessage, self._on_toggle)
-        handle.subscribe("in_flight_flight_status", FlightStatus, self._on_status)
+        in_flight = in_flight_of(handle, namespace.rstrip("/"))
+        handle.subscribe(in_flight, EmptyMessage, self._on_toggle)
+        handle.subscribe(f"{in_flight}_flight_status", FlightStatus, self._on_status)
         self._reference = handle.publisher("ref", PositionVelocityStateStamped)
         if start:
             process.start()

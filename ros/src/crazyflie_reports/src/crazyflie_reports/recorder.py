@@ -6,11 +6,14 @@ affect the flight.
 
 import argparse
 import os
+import re
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import rosgraph
 import roslib.packages
@@ -28,9 +31,31 @@ TOPICS = (
     r"|parameter_updates)"
 )
 
+#: Parameters below "topics" of the nodes that fly a vehicle.
+_RENAMED = "state reference control takeoff_control commanded_control final_control merged in_flight"
+
 MAX_SIZE = 1024  #: Size of a bag, after which the next one begins (MB).
 
 PARAMETERS = "parameters.yaml"
+
+
+def topics_of(parameters: Mapping[str, Any]) -> str:
+    """Return the regular expression of the documented topics, and of those that nodes have renamed.
+
+    ``parameters`` is the tree of all parameters.
+    """
+    return "|".join([TOPICS, *sorted(set(_renamed(parameters, "/")))])
+
+
+def _renamed(tree, node):
+    for name, value in tree.items():
+        if name == "topics" and isinstance(value, dict):
+            for key in value.keys() & _RENAMED.split():
+                # The names of its other topics begin with that of in_flight.
+                end = "(_.*)?" if key == "in_flight" else ""
+                yield re.escape(rosgraph.names.resolve_name(str(value[key]), node)) + end
+        elif isinstance(value, dict):
+            yield from _renamed(value, f"{node.rstrip('/')}/{name}")
 
 
 def record(folder: Path, topics: str, ros_arguments: list[str]) -> int:
@@ -66,10 +91,12 @@ def main() -> int:
     options, ros_arguments = parser.parse_known_args()
     top = Path(options.folder or Path(rospkg.get_ros_home()) / "flights").expanduser()
     folder = top / f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
-    topics = f"{TOPICS}|{options.topics}" if options.topics else TOPICS
     if not master_answers():
         print(f"nothing is recorded: no ROS master at {rosgraph.get_master_uri()}", file=sys.stderr)
         return 1
+    topics = topics_of(rosparam.get_param("/"))
+    if options.topics:
+        topics += f"|{options.topics}"
     try:
         return record(folder, topics, ros_arguments)
     except OSError as error:

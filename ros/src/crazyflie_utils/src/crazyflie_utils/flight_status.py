@@ -45,7 +45,7 @@ class FlightTopics(Parameters):
 
     def derived(self, handle: NodeHandle, suffix: str) -> str:
         """Return a topic of the takeoff server; asks the master."""
-        return (self.in_flight or _launched(handle) or "in_flight") + suffix
+        return (self.in_flight or in_flight_of(handle, _namespace(handle))) + suffix
 
     def subscribe(self, handle: NodeHandle, callback: Callable[[FlightStatus], None]) -> None:
         """Call ``callback(status)`` for each flight status."""
@@ -55,13 +55,19 @@ class FlightTopics(Parameters):
             handle.subscribe(self.state, String, lambda message: callback(_from_text(message.data)))
 
 
-def _launched(handle):
-    """Return the one topic in_flight of the nodes in the same namespace, or None."""
-    namespace = handle.resolve("in").rpartition("/")[0] or "/"
-    nodes = handle.get_param(namespace, _TREE, {}).values()
+def in_flight_of(handle: NodeHandle, namespace: str) -> str:
+    """Return topics/in_flight of the nodes in a namespace; ``in_flight`` below it if there are none
+    or several. Asks the master.
+    """
+    nodes = handle.get_param(namespace or "/", _TREE, {}).values()
     groups = [each.get("topics") for each in nodes if isinstance(each, dict)]
     found = {each.get("in_flight") for each in groups if isinstance(each, dict)} - {None}
-    return found.pop() if len(found) == 1 else None
+    name = found.pop() if len(found) == 1 else "in_flight"
+    return name if name.startswith("/") else f"{namespace}/{name}"
+
+
+def _namespace(handle):
+    return handle.resolve("in").rpartition("/")[0]
 
 
 def _from_text(text):

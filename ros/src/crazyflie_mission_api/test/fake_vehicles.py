@@ -91,6 +91,7 @@ class DriverVehicle:
             ("stop", srv.Stop),
             ("update_params", srv.UpdateParams),
             ("emergency", Empty),
+            ("set_led_color", srv.SetLedColor),
         ):
             handle.advertise_service(service, service_type, self._answer(service, service_type))
         handle.subscribe("cmd_full_state", FullState, self._on_setpoint)

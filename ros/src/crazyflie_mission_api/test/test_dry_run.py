@@ -154,6 +154,15 @@ def test_an_error_in_flight_ends_with_a_landing(group):
     assert group.position("cf1")[2] == pytest.approx(0.0)
 
 
+def test_colors_are_checked(flying):
+    before = flying.time()
+    flying.set_led_color(0, 0.5, 1)
+    assert flying.time() == before
+    for wrong in (1.5, -0.1, math.nan, "1"):
+        with pytest.raises(MissionError, match=f"set_led_color: blue is {wrong!r}; expected .*1"):
+            flying["cf1"].set_led_color(0.0, 0.0, wrong)
+
+
 def test_an_emergency_is_no_landing(flying):
     flying["cf1"].emergency()
     assert flying.flying == ["cf2"]

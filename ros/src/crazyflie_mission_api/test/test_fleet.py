@@ -6,7 +6,7 @@ import pytest
 from fake_fleet import fake_process
 from fake_vehicles import ControllerVehicle, DriverVehicle
 from geometry_msgs.msg import Point, Quaternion, Transform, TransformStamped, Vector3
-from std_msgs.msg import Header, String
+from std_msgs.msg import ColorRGBA, Header, String
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_driver.srv import StartTrajectory, StartTrajectoryResponse
@@ -61,6 +61,16 @@ def test_one_script_for_both(fleet, controlled, driven):
         "land",
         "stop",
     ]
+
+
+def test_colors_are_those_of_vehicles_with_a_driver(fleet, driven):
+    """The other vehicle, of a simulator, has no lamps."""
+    with fleet:
+        fleet.set_led_color(1.0, 0.5, 0.0)
+        assert driven.requests[-1][1].color == ColorRGBA(1.0, 0.5, 0.0, 0.0)
+        driven.refusals["set_led_color"] = "cf2 carries no lamps"
+        with pytest.raises(MissionError, match="cf2: set_led_color: .*cf2 carries no lamps"):
+            fleet["cf2"].set_led_color(0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("in_flight", ["/in_flightHY4", "aloft"])

@@ -194,6 +194,10 @@ class IdealVehicle(MissionVehicle):
         return done(None)
 
     @override
+    def set_led_color(self, red: float, green: float, blue: float) -> "Future[Any]":
+        return done(None)
+
+    @override
     def send(self, setpoint: Setpoint) -> None:
         # The firmware's commander makes the planner forget its plan (commander.c).
         self._forget_plan()

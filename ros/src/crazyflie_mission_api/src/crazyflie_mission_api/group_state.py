@@ -132,6 +132,17 @@ class GroupState:
             )
 
     @command
+    def set_led_color(self, red: float, green: float, blue: float) -> None:
+        """Light LED rings and Color LED decks, 0 to 1 each; simulated vehicles have none."""
+        parts = {"red": red, "green": green, "blue": blue}
+        color = [
+            number(value, f"set_led_color: {name}", minimum=0.0, maximum=1.0)
+            for name, value in parts.items()
+        ]
+        calls = {name: each.set_led_color(*color) for name, each in self._vehicles.items()}
+        raise_failures("set_led_color", self._answers(calls))
+
+    @command
     def emergency(self) -> None:
         """Stop all motors at once, wherever the vehicles are: they fall."""
         failures = self._answers({name: v.emergency() for name, v in self._vehicles.items()})

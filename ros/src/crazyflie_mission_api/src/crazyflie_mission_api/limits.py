@@ -116,14 +116,20 @@ def point(value: Sequence[float], what: str) -> Array:
     return array
 
 
-def number(value: float, what: str, minimum: float = -math.inf, above: float = -math.inf) -> float:
-    """Return a finite number that is ``minimum`` at least, and more than ``above``.
+def number(
+    value: float,
+    what: str,
+    minimum: float = -math.inf,
+    above: float = -math.inf,
+    maximum: float = math.inf,
+) -> float:
+    """Return a finite number, ``minimum`` to ``maximum``, that is more than ``above``.
 
     Raises
     ------
     MissionError
     """
-    kind = Number(above=above, minimum=minimum)
+    kind = Number(above=above, minimum=minimum, maximum=maximum)
     try:
         # A text may be a number in a file, and not here.
         if isinstance(value, str):

@@ -170,6 +170,9 @@ class MissionVehicle(Commands, Protocol):
     def arm(self, arm: bool) -> "Future[Any]":
         """Arm or disarm."""
 
+    def set_led_color(self, red: float, green: float, blue: float) -> "Future[Any]":
+        """Light the lamps in a color, 0 to 1 each; without effect on a vehicle that has none."""
+
     def send(self, setpoint: Setpoint) -> None:
         """Send a low-level setpoint once; ValueError for one that the vehicle cannot follow."""
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import genpy
 from geometry_msgs.msg import Point, PoseStamped
+from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Empty, EmptyRequest, SetBool
 from typing_extensions import override
 
@@ -403,6 +404,15 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
     @override
     def arm(self, arm: bool) -> "Future[Any]":
         return self.call("arm", SetBool, arm) if self.uses_driver else done(None)
+
+    @override
+    def set_led_color(self, red: float, green: float, blue: float) -> "Future[Any]":
+        # The driver's service, also of a vehicle that a controller flies.
+        service = f"{prefix(self.name)}/set_led_color"
+        if service not in self._handle.service_nodes():
+            return done(None)
+        request = srv.SetLedColorRequest(ColorRGBA(red, green, blue, 0.0))
+        return self._handle.call_service(service, srv.SetLedColor, request, CALL_TIMEOUT)
 
     @override
     def send(self, setpoint: Setpoint) -> None:

@@ -25,7 +25,9 @@ class ControllerVehicle:
         self.refusal = ""
         handle = process.handle(f"/{name}/controller")
         self._state = handle.publisher("state", PositionVelocityYawStateStamped)
-        self._flight_state = handle.publisher(f"{in_flight}_flight_status", FlightStatus, latch=True)
+        self._flight_state = handle.publisher(
+            f"{in_flight}_flight_status", FlightStatus, latch=True
+        )
         handle.set_param("~topics/in_flight", in_flight)
         handle.advertise_service("takeoff", Empty, self._on_takeoff)
         handle.advertise_service("land", Empty, self._on_land)

@@ -30,7 +30,7 @@ class LateVehicle:
     def start(self):
         pass
 
-    def get_param(self, name, type, default):
+    def get_param(self, name, kind, default):
         return default
 
     def subscribe(self, topic, message_type, callback):

@@ -1,5 +1,6 @@
 """Launch files that users have, or include, expand and mean what is documented."""
 
+import contextlib
 import functools
 import os
 import re
@@ -10,10 +11,13 @@ from xml.etree import ElementTree
 import pytest
 import rospkg
 import yaml
+from pages import PACKAGE_PAGES, PAGES
+from roslaunch.core import RLException
 from roslaunch.rlutil import resolve_launch_arguments
 from roslib.packages import find_node
 from workspaces import TOP
 
+from crazyflie_utils.launch_file import unknown_arguments
 from crazyflie_utils.testing import launch_files
 
 TEST = Path(__file__).parent
@@ -156,6 +160,52 @@ def test_files_that_roslaunch_loads_are_found_from_home(
     for file in ("~/mine.yaml", tmp_path / "mine.yaml"):
         _, parameters = launch_files.expand(path_of(entry), **{argument: file, **needed, **others})
         assert [value for name, value in parameters.items() if name.endswith("/mine")] == [3]
+
+
+def test_the_page_beside_a_flight_takes_its_own_arguments():
+    for path in RECORDABLE:
+        arguments = ElementTree.parse(path).getroot().findall("arg")
+        names = {argument.get("name") for argument in arguments}
+        if "dashboard" in names:
+            needed = {a.get("name"): "x" for a in arguments if {*a.keys()} == {"name", "doc"}}
+            given = {**needed, "dashboard": "true", "folders": "/x", "port": "9"}
+            _, parameters = launch_files.expand(path, **given)
+            assert parameters["/dashboard/folders"] == "/x", path
+            # A port of its own is that of a VRPN server, or of a virtual vehicle.
+            assert parameters["/dashboard/port"] == (8642 if "port" in names else 9), path
+
+
+#: roslaunch with what is given to it, in a page.
+COMMAND = re.compile(r"roslaunch (?:-\S+ )*([a-z]\w*) (\w+\.launch)([^\n`|]*)")
+
+
+@functools.cache
+def unknown(*words):
+    return unknown_arguments(words)
+
+
+@pytest.mark.parametrize("page", [*PAGES, *PACKAGE_PAGES], ids=str)
+def test_every_argument_in_a_page_reaches_its_launch_file(page, monkeypatch):
+    """Also by includes that pass all arguments: roslaunch ignores any other without a word."""
+    monkeypatch.setenv("COURSE", str(TOP / "docs" / "course"))
+    monkeypatch.setenv("HOME", str(TOP))
+    problems = []
+    text = page.read_text().replace("\\\n", " ")
+    added = re.findall(r'^\+ *<arg name="(\w+)"', text, re.MULTILINE)  # By a recipe.
+    for package, file, rest in COMMAND.findall(text):
+        given = dict(re.findall(r"(\w+):=([\w.]+)", rest))
+        words = [f"{name}:={value}" for name, value in given.items() if name not in added]
+        # Packages of a lesson are made there.
+        with contextlib.suppress(RLException):
+            problems += unknown(package, file, *words)
+    assert problems == []
+
+
+def test_what_a_user_gives_to_the_first_launch_file_reaches_the_last():
+    file = path_of("crazyflie_examples/virtual_hw_hover.launch")
+    _, parameters = launch_files.expand(file, takeoff_hover_z=0.15, estimator="kalman")
+    assert parameters["/takeoff_server/hover/z"] == 0.15
+    assert parameters["/crazyflie/crazyflie_add/estimator"] == "kalman"
 
 
 def test_arguments_without_a_meaning_are_told():

@@ -32,7 +32,9 @@ TOPICS = (
 )
 
 #: Parameters below "topics" of the nodes that fly a vehicle.
-_RENAMED = "state reference control takeoff_control commanded_control final_control merged in_flight"
+_RENAMED = (
+    "state reference control takeoff_control commanded_control final_control merged in_flight"
+)
 
 MAX_SIZE = 1024  #: Size of a bag, after which the next one begins (MB).
 

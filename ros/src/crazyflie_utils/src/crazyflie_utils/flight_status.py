@@ -56,8 +56,9 @@ class FlightTopics(Parameters):
 
 
 def in_flight_of(handle: NodeHandle, namespace: str) -> str:
-    """Return topics/in_flight of the nodes in a namespace; ``in_flight`` below it if there are none
-    or several. Asks the master.
+    """Return topics/in_flight of the nodes in a namespace; asks the master.
+
+    It is ``in_flight`` below the namespace if they name none, or several.
     """
     nodes = handle.get_param(namespace or "/", _TREE, {}).values()
     groups = [each.get("topics") for each in nodes if isinstance(each, dict)]

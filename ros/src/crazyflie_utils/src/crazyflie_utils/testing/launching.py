@@ -10,7 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import rosgraph
+from roslaunch.core import RLException
+from roslaunch.xmlloader import XmlParseException
 
+from crazyflie_utils.launch_file import unknown_arguments
 from crazyflie_utils.testing.programs import free_port, running
 
 _START_LIMIT = 60.0  #: Longest time until roslaunch's master answers (s).
@@ -20,7 +23,7 @@ _COMPLAINT = re.compile(r"\[(ERROR|FATAL)\]|RLException|process has died")
 
 
 class LaunchError(Exception):
-    """roslaunch ended before any node ran; the text has its errors."""
+    """roslaunch has started no node; the text says why."""
 
 
 def complaints(log: Path) -> list[str]:
@@ -35,8 +38,15 @@ def roslaunch(
     """Run roslaunch on a master of its own for the time of a with block.
 
     The arguments are package, launch file and its arguments; the log receives what roslaunch and
-    the nodes print. `LaunchError` if roslaunch ends before there is a master.
+    the nodes print. `LaunchError` if roslaunch ends before there is a master, or would ignore an
+    argument.
     """
+    try:
+        problems = unknown_arguments(arguments)
+    except (RLException, XmlParseException) as error:
+        problems = [f"{arguments[0]}: {error}"]
+    if problems:
+        raise LaunchError("\n".join(problems))
     return _with_master(log, "roslaunch", *arguments)
 
 

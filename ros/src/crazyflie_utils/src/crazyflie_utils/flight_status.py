@@ -62,7 +62,9 @@ def in_flight_of(handle: NodeHandle, namespace: str) -> str:
     """
     nodes = handle.get_param(namespace or "/", _TREE, {}).values()
     groups = [each.get("topics") for each in nodes if isinstance(each, dict)]
-    found = {each.get("in_flight") for each in groups if isinstance(each, dict)} - {None}
+    found = {
+        str(each["in_flight"]) for each in groups if isinstance(each, dict) and "in_flight" in each
+    }
     name = found.pop() if len(found) == 1 else "in_flight"
     return name if name.startswith("/") else f"{namespace}/{name}"
 

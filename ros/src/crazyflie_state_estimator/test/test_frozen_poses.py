@@ -208,7 +208,7 @@ def test_a_frozen_camera_gives_no_states_and_the_node_says_so(filter_type):
     for _ in range(100):
         command(process, 9.81)
         fly(process, lambda _: ((0.0, 0.0, 0.396), STILL), 0.01)
-    assert len(process.published("/state")) == before
+    assert len(process.published("/state")) == before + 1  # The predicted one.
     assert any("is motion capture frozen?" in text for text in process.logged("warn"))
     (status,) = process.published("/diagnostics")[-1].status
     counted = {pair.key: int(pair.value) for pair in status.values}
@@ -240,6 +240,28 @@ def test_the_last_state_before_the_silence_is_the_predicted_one():
     assert last.header.stamp.to_sec() < process.clock.stamp().to_sec() - 1.0
     assert last.state.z_dot > 0.4
     assert last.state.z > 1.05
+
+
+@pytest.mark.parametrize("filter_type", ["finite_difference", "kalman"])
+@pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
+def test_a_camera_that_freezes_between_two_estimates_leaves_the_right_speed(filter_type, share):
+    """The last pose was older than its stamp: the speed was half of the vehicle's."""
+    process = launch(**{"topics/control": "/control/final", "filter/type": filter_type})
+    fly(process, lambda _: (STILL, STILL), 0.5)
+
+    def show(elapsed):
+        command(process, 12.81)
+        fly(process, lambda _: ((0.0, 0.0, 1.5 * elapsed**2), STILL), PERIOD)
+
+    for tick in range(50):
+        show(tick * PERIOD)
+    for _ in range(5):
+        show((49 + share) * PERIOD)
+    last = process.published("/state")[-1]
+    elapsed = last.header.stamp.to_sec() - process.clock.stamp().to_sec() + 0.55
+    assert elapsed == pytest.approx(0.51, abs=1e-6)
+    assert last.state.z_dot == pytest.approx(3.0 * elapsed, abs=0.06)
+    assert last.state.z == pytest.approx(1.5 * elapsed**2, abs=0.01)
 
 
 def test_a_camera_that_goes_on_shows_the_vehicle_elsewhere_three_times_in_a_row():

@@ -4,7 +4,8 @@ import pytest
 from flight_words import states, thrusts
 from takeoff_helpers import GRAVITY, SERVER, HoverNetwork
 
-from crazyflie_takeoff.lift_off import CLIMB_SPEED, HOVER_RANGE, LIFT_OFF_THRUST, LiftOff
+from crazyflie_takeoff.hover_thrust import HOVER_RANGE
+from crazyflie_takeoff.lift_off import CLIMB_SPEED, LIFT_OFF_THRUST, LiftOff
 
 
 def scaled(hover, server=SERVER):
@@ -102,3 +103,22 @@ def test_a_landing_lifts_no_vehicle_that_hovers_at_less(hover):
         network.advance(0.01)
         highest = max(highest, network.vehicle.z)
     assert highest < 0.1
+
+
+@pytest.mark.parametrize("hover", [0.65, 0.8, 1.0])
+@pytest.mark.parametrize("camera", [True, False])
+def test_a_vehicle_that_is_lost_early_in_its_climb_is_kept_by_its_own_thrust_of_hover(
+    hover, camera
+):
+    """Of a vehicle that hovers at less, the filter believed g: it climbed without a control."""
+    network = scaled(hover)
+    network.call("/takeoff")
+    network.advance_until(lambda: network.process("filter").node._facts.flown is not None)
+    network.advance(0.1)
+    network.vehicle_node.sees = camera
+    network.kill("controller")
+    begin = highest = network.vehicle.z
+    while network.last_of("filter", "/control/final").control.thrust > 0.0:
+        network.advance(0.01)
+        highest = max(highest, network.vehicle.z)
+    assert highest < begin + 0.3

@@ -44,12 +44,26 @@ def test_a_position_is_known_for_half_a_second():
 
 def test_the_reason_is_the_longest_gap_of_the_last_seconds_or_the_age():
     measured = Measured()
-    for time, age in [(10.0, 0.25), (10.875, 0.125), (11.0, 0.375)]:
+    for time, age in [(10.0, 0.25), (10.875, 0.125), (11.0, 0.25)]:
         measured.update(time, at(3.0), age)
-    explanation = measured.explanation(11.125, "/state")
-    assert "states on /state get 1.2 s old before the next one comes; expected less" in explanation
+    explanation = measured.explanation(11.25, "/state")
+    assert "states on /state get 1.1 s old before the next one comes; expected less" in explanation
     measured.update(17.0, at(3.0), 0.5)
     assert "states on /state are 0.5 s old when they come" in measured.explanation(17.0, "/state")
+
+
+def test_a_state_that_is_older_than_the_known_one_does_not_replace_it():
+    measured = Measured()
+    measured.update(10.0, at(1.0), 0.0)
+    measured.update(10.125, at(2.0), 3.0)
+    assert measured.within(10.125) == at(1.0)
+    measured.update(10.25, at(3.0), 0.25)
+    assert measured.age(10.25) == 0.25
+    assert measured.within(10.25, 0.3) == at(3.0)
+    measured.update(13.0, at(4.0), 2.5)
+    assert measured.within(13.0, 2.6) == at(4.0)
+    measured.update(13.0, at(5.0), 0.0)
+    assert measured.within(13.0) == at(5.0)
 
 
 def test_the_usual_age_grows_by_a_tenth():

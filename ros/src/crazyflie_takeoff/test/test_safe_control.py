@@ -6,25 +6,39 @@ import pytest
 from filter_flight import G
 
 from crazyflie_takeoff.fallback import (
+    AVERAGING,
     LAST_DIFFERENCE,
     MAX_BRAKING,
-    HoverThrust,
     SafeControl,
     SafeSetpoint,
     braking_time,
     descent_time,
 )
+from crazyflie_takeoff.hover_thrust import HOVER_RANGE, LAG, HoverThrust
 from crazyflie_takeoff.motion import Motion
 
 
-def test_learns_the_thrust_of_hover_also_from_a_climb():
-    hover = HoverThrust()
-    for k in range(1000):
-        hover.update(0.01, 10.8 + (0.5 if k >= 900 else 0.0), max(0.0, (k - 900) * 0.005))
-    assert hover.value == pytest.approx(10.8, abs=0.03)
-    for _ in range(1000):
+@pytest.mark.parametrize("weight", [0.65, 1.0, 1.2])
+@pytest.mark.parametrize("duration", [0.2, 0.8])
+def test_learns_the_thrust_of_hover_also_within_a_climb(weight, duration):
+    """Thrust that the motors follow late was taken for weight: 2 % too much without a state."""
+    hover = HoverThrust(AVERAGING, weight * G)
+    acceleration = climb = z_dot = 0.0
+    for k in range(300):
+        target = 1.0 if 0.01 * k < duration else 0.0
+        lift = weight * (G + 4.0 * (target - z_dot))
+        acceleration += 0.01 / 0.07 * (lift / weight - G - acceleration)
+        climb += 0.01 * acceleration
+        z_dot += 0.01 / 0.04 * (climb - z_dot)  # The estimator's.
+        hover.update(0.01, lift, z_dot)
+        assert hover.value == pytest.approx(weight * G, rel=0.004)
+
+
+def test_the_thrust_of_hover_is_within_its_range():
+    hover = HoverThrust(AVERAGING)
+    for _ in range(2000):
         hover.update(0.01, 16.0, None)
-    assert hover.value == 1.25 * G
+    assert hover.value == (1.0 + HOVER_RANGE) * G
 
 
 @pytest.mark.parametrize(
@@ -32,7 +46,7 @@ def test_learns_the_thrust_of_hover_also_from_a_climb():
     [(0.2, 0.0, 0.9800666), (0.0, 0.2, 0.9800666), (0.2, -0.1, 0.9751703)],
 )
 def test_learns_the_vertical_part_of_a_tilted_thrust(roll, pitch, vertical):
-    tilted = HoverThrust()
+    tilted = HoverThrust(AVERAGING)
     for _ in range(2000):
         tilted.update(0.01, SafeSetpoint(roll, pitch, 0.0, G / vertical).lift, 0.0)
     assert tilted.value == pytest.approx(G, rel=1e-6)
@@ -182,16 +196,24 @@ def test_how_long_braking_and_a_descent_take():
 
 
 def test_the_mean_of_hover_by_its_time_constant():
-    hover = HoverThrust()
-    hover.update(2.0, G + 2.0, None)
-    assert hover.value == pytest.approx(G + 1.0)
-    hover.update(2.0, G + 1.0, 1.0)
-    assert hover.value == pytest.approx(G + 1.0)
+    hover = HoverThrust(2.0)
+    hover.skip(1.0)  # A mean that is not known begins with the speed.
+    hover.update(2.0 * LAG, G, 1.0)
+    assert hover.value == pytest.approx(G)
+    hover.update(2.0, G, 2.0)
     # The mean of the speed is 1.5 m/s; (2 - 1.5) / 2 s is the acceleration.
-    hover.update(2.0, G + 1.0, 2.0)
-    assert hover.value == pytest.approx(G + 0.75)
-    hover.update(2.0, G + 1.0, None)
-    assert hover.value == pytest.approx(G + 1.0)
+    assert hover.value == pytest.approx(G * G / (G + 0.25))
+    hover.update(2.0, G, None)
+    assert hover.value == pytest.approx(G)
+
+
+def test_thrust_counts_when_the_motors_have_followed():
+    hover = HoverThrust(2.0)
+    hover.update(LAG, G + 1.0, None)
+    share = LAG / (2.0 + LAG)
+    assert hover.value == pytest.approx(G + 0.5 * share)
+    hover.update(LAG, G + 1.0, None)
+    assert hover.value == pytest.approx(G + 0.5 * share + share * (0.75 - 0.5 * share))
 
 
 def test_a_mixture_of_controls():

@@ -285,12 +285,15 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         attitude = rpy_from_quaternion(*pose.rotation)
         acceleration = self._control.acceleration(attitude[2], now)
         verdict = self._monitor.update(stamp, pose.position, pose.rotation, acceleration)
+        was_good = self._pose_status[0] == EstimateStatus.GOOD
         self._pose_status = status, reason = self._statuses[verdict]
         if verdict is Verdict.IMPOSSIBLE:
             return None
         if status != EstimateStatus.GOOD:
             self._handle.warn(reason, throttle=1.0, key="frozen")
             # The predicted motion, when the measured one has just turned out to be wrong.
+            if verdict is Verdict.REPEATED and was_good and acceleration is not None:
+                return self._estimator.without_last(pose.stamp, acceleration)
             departure = self._monitor.departure
             return departure and EstimatedMotion(*departure, attitude, (0.0, 0.0, 0.0))
         if verdict is Verdict.MOVED:

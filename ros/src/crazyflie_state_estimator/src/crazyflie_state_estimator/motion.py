@@ -269,12 +269,15 @@ class MotionEstimator:
     def __init__(self, position_filter: RateFilter, angle_filter: RateFilter):
         self._position_filter = position_filter
         self._angle_filter = angle_filter
-        self._stamp: int | None = None
         self._angles: Components = (0.0, 0.0, 0.0)
+        self.reset()
 
     def reset(self) -> None:
         """Delete the estimate: the next pose is the first."""
-        self._stamp = None
+        self._stamp: int | None = None
+        # The last motion and the one before it, with their stamps (ns).
+        self._last: tuple[int, EstimatedMotion] | None = None
+        self._before: tuple[int, EstimatedMotion] | None = None
 
     def update(
         self,
@@ -301,7 +304,24 @@ class MotionEstimator:
         if not math.isfinite(sum(map(sum, motion))):
             self.reset()
             return None
+        self._before, self._last = self._last, (stamp, motion)
         return motion
+
+    def without_last(self, stamp: int, acceleration: Components) -> EstimatedMotion | None:
+        """Return the motion at ``stamp`` (ns) as it follows from the last pose but one, or None.
+
+        For a source of poses that has frozen: its last pose is older than its stamp says, and made
+        the vehicle slower. The ``acceleration`` was commanded since then, m/s^2.
+        """
+        if self._before is None:
+            return None
+        begin, motion = self._before
+        dt = 1e-9 * (stamp - begin)
+        axes = list(zip(motion.position, motion.velocity, acceleration, strict=True))
+        return motion._replace(
+            position=[p + dt * v + 0.5 * dt * dt * a for p, v, a in axes],
+            velocity=[v + dt * a for _, v, a in axes],
+        )
 
     def _step(self, dt, position, attitude, acceleration):
         self._angles = [
@@ -315,6 +335,7 @@ class MotionEstimator:
         )
 
     def _start(self, stamp, position, attitude):
+        self.reset()
         self._stamp = stamp
         self._angles = attitude
         self._position_filter.start(position)

@@ -8,13 +8,8 @@ from dataclasses import dataclass
 
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.fallback import (
-    HOVER_RANGE,
-    MAX_BRAKING,
-    MAX_SUBSTITUTE,
-    SafeSetpoint,
-    limited,
-)
+from crazyflie_takeoff.fallback import MAX_BRAKING, MAX_SUBSTITUTE, SafeSetpoint, limited
+from crazyflie_takeoff.hover_thrust import HOVER_RANGE
 from crazyflie_takeoff.motion import Motion
 
 CLIMB_RESPONSE = 0.1  #: Time constant with which a climb approaches its limit (s).

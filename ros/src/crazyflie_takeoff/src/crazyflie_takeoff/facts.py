@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.envelope import (
     Box,
     Limits,
@@ -17,12 +18,13 @@ from crazyflie_takeoff.envelope import (
     is_any_within_pause,
 )
 from crazyflie_takeoff.fallback import (
+    AVERAGING,
     LAST_AVERAGING,
     LAST_DIFFERENCE,
     LONGEST_STEP,
-    HoverThrust,
     SafeSetpoint,
 )
+from crazyflie_takeoff.hover_thrust import HoverThrust
 from crazyflie_takeoff.motion import (
     PROGRESS,
     TOUCHDOWN_HEIGHT,
@@ -99,7 +101,7 @@ class Facts:
         self.outside = ""  #: What is wrong with the position; empty if nothing is.
         self.ground = Ground()
         self.is_near_limit = False  #: Whether controls in their ranges may climb too far.
-        self.hover_mean, self.last_hover_mean = HoverThrust(), HoverThrust(LAST_AVERAGING)
+        self.set_hover(GRAVITY)
         #: The commanded control that flies the vehicle; None while another one does.
         self.flown: Any = None
         self._learned = math.nan
@@ -181,13 +183,18 @@ class Facts:
         """Set the box of the geofence."""
         self.walls.change(box.without_floor())
 
+    def set_hover(self, thrust: float) -> None:
+        """Begin with a thrust of hover, m/s^2: that of the server's liftoff."""
+        self.hover_mean = HoverThrust(AVERAGING, thrust)
+        self.last_hover_mean = HoverThrust(LAST_AVERAGING, thrust)
+
     def learn(self) -> None:
         """Learn the thrust of hover from the control that has flown the vehicle until now."""
         step, self._learned = self.now - self._learned, self.now
         motion = self.seen
         speed = None if motion is None else motion.velocity[2]
-        # A late control has faded.
-        is_late = self.silence > self.hold
+        # A late control fades.
+        is_late = self.silence > 0.5 * self.hold
         if self.flown is None or is_late or not 0.0 < step < LEARNING_STEP:
             if step != 0.0:
                 self.hover_mean.skip(speed)

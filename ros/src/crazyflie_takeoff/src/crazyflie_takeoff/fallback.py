@@ -19,12 +19,11 @@ from crazyflie_takeoff.motion import Motion
 #: a while, a silence is not as long as it seems.
 LONGEST_STEP = 0.05
 
-HOVER_RANGE = 0.25  #: Largest deviation of the thrust of hover from g, as a fraction.
-AVERAGING = 2.0  #: Time constant of the mean of the commanded thrust (s).
+AVERAGING = 2.0  #: Time constant of the thrust of hover (s).
 #: The same for the thrust of hover while no state comes: a load may just have been dropped (s).
-LAST_AVERAGING = 0.2
+LAST_AVERAGING = 0.16
 #: The latter counts if it is smaller by more than this fraction, three times its noise with a
-#: speed that is known to within 0.02 m/s.
+#: speed that is known to within 0.015 m/s.
 LAST_DIFFERENCE = 0.03
 
 #: Decrease of the target of z_dot in a descent, and from the start while no state comes (m/s^2).
@@ -48,7 +47,7 @@ MAX_SAFE_TILT = 0.15  #: Largest roll and pitch (rad).
 STOPPING_TIME = 0.5  #: Time in which the vehicle is to stop horizontally (s).
 HEIGHT_GAIN = 1.0  #: Target of z_dot over height error (1/s).
 MAX_HEIGHT_SPEED = 0.3  #: Largest such target (m/s).
-MAX_SUBSTITUTE = (1.0 + HOVER_RANGE) * GRAVITY  #: Largest thrust of the filter's own (m/s^2).
+MAX_SUBSTITUTE = 1.25 * GRAVITY  #: Largest thrust of the filter's own (m/s^2).
 RETURN_TIME = 0.2  #: Time in which the control changes over from the filter's own (s).
 
 
@@ -71,50 +70,6 @@ class SafeSetpoint(NamedTuple):
 
 
 MOTORS_OFF = SafeSetpoint(0.0, 0.0, 0.0, 0.0)
-
-
-class HoverThrust:
-    """The thrust at which a vehicle hovers: a running mean of the thrust commanded in flight.
-
-    Both the vertical part of the thrust and the vertical speed v are filtered with the time
-    constant T (``averaging``, s). As (v - mean v) / T is the filtered acceleration, subtracting it
-    leaves the thrust that carries the weight, also while the vehicle climbs or has just stopped.
-    """
-
-    def __init__(self, averaging: float = AVERAGING) -> None:
-        self._averaging = averaging
-        self._thrust = GRAVITY
-        self._speed: float | None = None
-        self._acceleration = 0.0
-
-    @property
-    def value(self) -> float:
-        """The thrust, m/s^2, within `HOVER_RANGE` of g."""
-        return limited(self._thrust - self._acceleration, HOVER_RANGE * GRAVITY, GRAVITY)
-
-    def update(self, step: float, lift: float, speed: float | None) -> None:
-        """Process the vertical thrust (m/s^2) that has flown the vehicle for ``step`` (s).
-
-        ``speed`` is the measured z_dot, m/s, or None.
-        """
-        share = step / (self._averaging + step)
-        self._thrust += share * (lift - self._thrust)
-        if speed is None:
-            self._speed, self._acceleration = None, 0.0
-            return
-        if self._speed is None:
-            self.skip(speed)
-            return
-        mean = self._speed + share * (speed - self._speed)
-        self._speed, self._acceleration = mean, (speed - mean) / self._averaging
-
-    def skip(self, speed: float | None) -> None:
-        """Skip a time in which it is not known which thrust has flown the vehicle.
-
-        ``speed`` is the z_dot measured after it, m/s, or None.
-        """
-        # What has changed the speed meanwhile is not in the mean of the thrust.
-        self._speed = None if speed is None else speed - self._averaging * self._acceleration
 
 
 class SafeControl:

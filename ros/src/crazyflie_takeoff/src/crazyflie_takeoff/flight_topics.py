@@ -55,6 +55,7 @@ class FlightTopicParameters(Parameters):
     own_filter_state_topic: str | None = named_after("in_flight", "_filter", "filter_state")
     own_flight_status_topic: str | None = named_after("in_flight", "_flight_status")
     own_filter_status_topic: str | None = named_after("in_flight", "_filter_status")
+    own_hover_thrust_topic: str | None = named_after("in_flight", "_hover_thrust")
 
     state_topic: str | None = topic(
         "state",
@@ -104,6 +105,7 @@ class FlightTopicParameters(Parameters):
     filter_state_topic = derived_topic("filter_state", "in_flight", "_filter")
     flight_status_topic = derived_topic("flight_status", "in_flight", "_flight_status")
     filter_status_topic = derived_topic("filter_status", "in_flight", "_filter_status")
+    hover_thrust_topic = derived_topic("hover_thrust", "in_flight", "_hover_thrust")
 
 
 def follow_box(handle: NodeHandle, topic: str, callback: Callable[[Box], None]) -> None:

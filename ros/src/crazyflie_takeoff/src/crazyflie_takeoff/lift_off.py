@@ -5,6 +5,7 @@ Speeds are in m/s, z up; thrusts in m/s^2, mass-normalised for a vehicle that ho
 
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.fallback import MAX_BRAKING, MAX_CORRECTION, SETTLING, limited
+from crazyflie_takeoff.hover_thrust import HoverThrust
 
 LIFT_OFF_THRUST = GRAVITY + 0.2  #: Default thrust of the open-loop part of a takeoff (m/s^2).
 #: Speed of a vehicle that has lifted off (m/s). One that hovers at g reaches it after 1 s of
@@ -12,42 +13,27 @@ LIFT_OFF_THRUST = GRAVITY + 0.2  #: Default thrust of the open-loop part of a ta
 LIFT_OFF_SPEED = 0.2
 CLIMB_SPEED = 0.1  #: Largest speed of the climb that follows (m/s).
 CLIMB_GAIN = 2.0  #: That speed over the distance from the hover point (1/s).
-AVERAGING = 0.12  #: Time constant of the means of thrust and speed (s).
-LAG = 0.1  #: Time by which motors and estimator make a speed later than its thrust (s).
-HOVER_RANGE = 0.4  #: Largest deviation of the thrust of hover from g, as a fraction.
+AVERAGING = 0.12  #: Time constant of the thrust of hover (s).
 
 
 class LiftOff:
     """Thrust of a takeoff until the controller has the vehicle, and the thrust of hover.
 
     It begins with ``thrust`` (m/s^2).
-
-    A vehicle that hovers at the thrust h accelerates with (thrust / h - 1) g. So h is g times the
-    mean thrust over g plus the mean acceleration, both filtered with the same time constant.
     """
 
     def __init__(self, thrust: float = LIFT_OFF_THRUST) -> None:
         self.thrust = thrust  #: The thrust to send, m/s^2.
-        self._delayed = self._mean = thrust
-        self._speed: float | None = None
-        self._acceleration = 0.0
+        self._hover = HoverThrust(AVERAGING, thrust)
 
     @property
     def hover(self) -> float:
-        """The thrust of hover, m/s^2, within `HOVER_RANGE` of g."""
-        weight = max(GRAVITY + self._acceleration, 0.5 * GRAVITY)
-        return limited(GRAVITY * self._mean / weight, HOVER_RANGE * GRAVITY, GRAVITY)
+        """The thrust of hover, m/s^2."""
+        return self._hover.value
 
     def measure(self, step: float, z_dot: float | None) -> None:
         """Process the vertical speed after ``step`` s with `thrust`; None if it is not known."""
-        self._delayed += step / (LAG + step) * (self.thrust - self._delayed)
-        share = step / (AVERAGING + step)
-        self._mean += share * (self._delayed - self._mean)
-        if z_dot is None:
-            self._speed, self._acceleration = None, 0.0
-            return
-        speed = z_dot if self._speed is None else self._speed + share * (z_dot - self._speed)
-        self._speed, self._acceleration = speed, (z_dot - speed) / AVERAGING
+        self._hover.update(step, self.thrust, z_dot)
 
     def climb(self, distance: float, z_dot: float | None) -> None:
         """Choose the thrust of a vehicle below the hover point (``distance``, m).

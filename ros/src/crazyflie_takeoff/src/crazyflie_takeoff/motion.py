@@ -33,7 +33,7 @@ class Motion(NamedTuple):
 
 
 class Measured:
-    """The last measured motion; times are s of any clock.
+    """The latest measured motion; times are s of any clock.
 
     If the clock is reset, the age goes on from there.
     """
@@ -41,26 +41,37 @@ class Measured:
     def __init__(self) -> None:
         self.motion: Motion | None = None
         self.missing_reason = ""  #: Why the estimator has no state; empty if it has one.
-        self._age = 0.0  # At the receipt (s).
-        self._received = 0.0
+        self._time = 0.0  # Of the measurement (s).
+        # When the last state came, and its age then (s).
+        self._received = self._age = 0.0
         self._gap, self._gap_end = 0.0, -math.inf
 
     def update(self, now: float, motion: Motion, age: float) -> None:
-        """Record a motion that is received ``age`` s after it was measured."""
+        """Record a motion that is received ``age`` s after it was measured.
+
+        One that is older than the known one does not replace it.
+        """
         gap = now - self._received
         if self.motion is not None and (
             gap > self._gap or not 0.0 <= now - self._gap_end < GAP_MEMORY
         ):
             self._gap, self._gap_end = gap, now
-        self.motion, self._received, self._age = motion, now, age
+        if age <= self.age(now):
+            self.motion, self._time = motion, now - age
+        self._received, self._age = now, age
 
     def age(self, now: float) -> float:
         """Return the age of the motion, s; infinite before the first one."""
-        return math.inf if self.motion is None else self._silence(now) + self._age
+        if self.motion is None:
+            return math.inf
+        self._follow_clock(now)
+        return now - self._time
 
     def within(self, now: float, age: float = MAX_FEEDBACK_AGE) -> Motion | None:
         """Return the motion if it is younger than ``age`` (s)."""
-        return self.motion if self._silence(now) + self._age < age else None
+        if now < self._received:
+            self._follow_clock(now)
+        return self.motion if now - self._time < age else None
 
     def position(self, now: float) -> Position | None:
         """Return the position, m; None when it is older than `MAX_POSITION_AGE`."""
@@ -71,7 +82,7 @@ class Measured:
         """Return why the position, from states on ``topic``, is not known; empty if it is."""
         if self.position(now) is not None:
             return ""
-        silence = self._silence(now)
+        silence = now - self._received
         if self.motion is not None and silence < MAX_POSITION_AGE:
             if self._age < MAX_POSITION_AGE:
                 oldest = max(silence, self._gap) + self._age
@@ -86,10 +97,10 @@ class Measured:
         why = self.missing_reason or "are the estimator and the source of /tf running?"
         return f"no state has come on {topic} for {MAX_POSITION_AGE:g} s; {why}"
 
-    def _silence(self, now):
-        if now < self._received:
-            self._received = now
-        return now - self._received
+    def _follow_clock(self, now):
+        reset = min(now - self._received, 0.0)
+        self._received += reset
+        self._time += reset
 
 
 class Delay:

@@ -49,7 +49,6 @@ class TakeoffServerParameters(FlightTopicParameters):
         None,
     )
     own_flight_state_topic: str | None = named_after("in_flight", "_state", "flight_state")
-    own_hover_thrust_topic: str | None = named_after("in_flight", "_hover_thrust")
     own_status_topic: str | None = named_after("in_flight", "_status")
     battery_topic: str | None = topic(
         "battery", "voltage of the battery; without it the battery is not monitored", None
@@ -114,7 +113,6 @@ class TakeoffServerParameters(FlightTopicParameters):
     )
 
     descent_topic = derived_topic("descent", "reference", "_descent")
-    hover_thrust_topic = derived_topic("hover_thrust", "in_flight", "_hover_thrust")
     flight_state_topic = derived_topic("flight_state", "in_flight", "_state")
     status_topic = derived_topic("status", "in_flight", "_status")
 

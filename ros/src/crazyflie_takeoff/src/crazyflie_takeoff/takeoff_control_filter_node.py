@@ -4,10 +4,11 @@ import math
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from std_msgs.msg import Empty, Header, String
+from std_msgs.msg import Empty, Float64, Header, String
 from std_srvs.srv import Empty as EmptyService
 from typing_extensions import override
 
+from crazyflie_model.limits import MAX_THRUST, MIN_THRUST
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
@@ -158,6 +159,7 @@ class TakeoffControlFilterNode(Node):
             parameters.flight_status_topic, FlightStatus, self._on_flight_status
         )
         handle.subscribe(parameters.in_flight_topic, Empty, self._on_toggle)
+        handle.subscribe(parameters.hover_thrust_topic, Float64, self._on_hover_thrust)
         if parameters.state_topic is not None:
             handle.subscribe(
                 parameters.state_topic,
@@ -230,6 +232,10 @@ class TakeoffControlFilterNode(Node):
         if self._memory.phase.follows or self._memory.phase is Phase.HOLDING:
             self._facts.toggled = not self._facts.toggled
             self._notice()
+
+    def _on_hover_thrust(self, message):
+        if MIN_THRUST <= message.data <= MAX_THRUST:
+            self._facts.set_hover(message.data)
 
     def _notice(self):
         """Have the next control, or the timer, look at what has come."""

@@ -40,7 +40,7 @@ def test_it_integrates_what_is_flown():
 
 @pytest.mark.parametrize(
     "replace",
-    [lambda u: LEVEL, lambda u: None, lambda u: u + [0.1, 0.0, 0.0, 0.0]],
+    [lambda u: LEVEL, lambda u: None, lambda u: u + [0.0, 0.0, 0.0, 1.0]],
     ids=["hold", "silence", "fence"],
 )
 def test_it_rests_while_something_else_is_flown_and_goes_on(replace):
@@ -49,6 +49,11 @@ def test_it_rests_while_something_else_is_flown_and_goes_on(replace):
     growth(process, replace, count=60)
     assert thrust(process) - before < 0.06
     assert growth(process, lambda u: u) == pytest.approx(0.2, abs=0.02)
+
+
+def test_it_integrates_along_an_axis_while_a_wall_holds_the_vehicle_along_another():
+    process = hovering()
+    assert growth(process, lambda u: u + [0.1, -0.1, 0.0, 0.0]) == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize("replace", [lambda u: LEVEL, lambda u: None], ids=["others", "nobody"])

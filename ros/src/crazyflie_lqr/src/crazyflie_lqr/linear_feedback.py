@@ -218,8 +218,8 @@ class LinearFeedback:
     """
 
     def __init__(self, K: Iterable[Iterable[float]], u_ref: Iterable[float], yaw_index: int):
-        #: The control that is flown in place of this controller's; None if its own is flown.
-        self.foreign: Components | None = None
+        #: What is flown in place of this controller's control: of each number, or None.
+        self.foreign: Sequence[float | None] | None = None
         self._hover_thrust: float | None = None
         self.K = K
         self.u_ref = u_ref
@@ -292,7 +292,7 @@ class IntegralStateFeedback(LinearFeedback):
     the position gains in K. The control is then limited to ``limits``.
 
     While a control is at its limit, its integral does not grow into the limit. From
-    `reset_integrator` to the next flight it is zero. While `foreign` controls are flown, it stays.
+    `reset_integrator` to the next flight it is zero. While its control is `foreign`, it stays.
     After `take_off`, height reference and height integral are those of a `Climb`, which learns from
     the thrust that is flown, until the vehicle has arrived; but not where a step of the reference
     does no harm, with a height loop that is well damped and has no integrator.
@@ -345,7 +345,7 @@ class IntegralStateFeedback(LinearFeedback):
         error = self._error(x, reference)
         u = linear_control(self._rows, self._u_hover, error)
         if self._axes:
-            if self._integrates and self.foreign is None:
+            if self._integrates:
                 self._integrate(error[:3], dt, u)
             u = with_integrals(u, self._integral, self._integrator_k)
         u[THRUST] += climb_thrust
@@ -398,7 +398,9 @@ class IntegralStateFeedback(LinearFeedback):
         climb = self._climb
         if climb is None:
             return x_ref, 0.0
-        thrust = self._thrust if self.foreign is None else self.foreign[THRUST]
+        thrust = self._thrust
+        if self.foreign is not None and self.foreign[THRUST] is not None:
+            thrust = self.foreign[THRUST]
         z, z_dot, goal = float(x[2]), float(x[5]), float(x_ref[2])
         climb.advance(dt, z, z_dot, goal, thrust - self._u_hover[THRUST])
         k, limit = self._integrator_k[2], self._integrator_limit[2]
@@ -418,6 +420,8 @@ class IntegralStateFeedback(LinearFeedback):
         for axis in self._axes:
             # The climb has an integral of its own for the height.
             if axis == 2 and self._climb is not None:
+                continue
+            if self.foreign is not None and self.foreign[INTEGRATED[axis]] is not None:
                 continue
             k, limit = self._integrator_k[axis], self._integrator_limit[axis]
             integral = self._integral[axis]

@@ -17,6 +17,7 @@ from crazyflie_dashboard.page_data import (
     ParameterInfo,
     Series,
 )
+from crazyflie_dashboard.progress import Commands
 from crazyflie_dashboard.snapshot import (
     Action,
     LogLine,
@@ -81,6 +82,8 @@ class FakeDashboard:
         self.typed = []
         self.picture = self.report_file = None
         self.refusals = {}
+        self.is_slow = False  #: Whether vehicles stay where they are when they are commanded.
+        self.tracked = Commands(time.monotonic)
         self.gain = ParameterInfo(
             "cf1/controller", "K/gain", "float", 0.5, "1/s", "gain of the height", 0.0, 2.0
         )
@@ -136,7 +139,17 @@ class FakeDashboard:
     def remove_field(self, page, path):
         self.fields.remove(path)
 
+    def progress(self):
+        return self.tracked.update(self._scene.vehicles)
+
     def command(self, page, command):
+        places = {name: each.position for name, each in self._scene.vehicles.items()}
+        number = self.tracked.begin(page, command.title, command.vehicles, places, command)
+        answer = self._answer(page, command)
+        self.tracked.answered(number, answer)
+        return answer
+
+    def _answer(self, page, command):
         age = time.monotonic() - command.clicked
         try:
             self.pages.expect_control(page)
@@ -147,7 +160,7 @@ class FakeDashboard:
         self.commands.append(command)
         outcomes = {name: self.refusals.get(name, "") for name in command.vehicles}
         for name, text in outcomes.items():
-            if not text:
+            if not (text or self.is_slow):
                 self._carry_out(name, command)
         return done(outcomes)
 
@@ -213,7 +226,12 @@ class FakeDashboard:
 
     def fly(self, page, mission, vehicles, clicked):
         self.flown.append(str(mission))
-        return done("landed")
+        number = self.tracked.begin(
+            page, f"fly {mission.name} with {', '.join(vehicles)}", vehicles, {}
+        )
+        self.tracked.follow(number)
+        self.tracked.ended(number, done(""))
+        return done("")
 
     def stop_mission(self, page, clicked):
         return done(None)

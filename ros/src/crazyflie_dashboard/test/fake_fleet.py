@@ -121,6 +121,14 @@ class FakeFleet:
 
         return answer
 
+    def offer(self, service, kind):
+        """Offer one more service of the fleet, and let the dashboard find it."""
+        node = self.process.handle("/fleet")
+        node.advertise_service(service, kind, self._answer(service, kind))
+        services = {**self.graph.services, service: "/fleet"}
+        self.graph = Graph(self.graph.topics, self.graph.topics, services)
+        self.process.advance(2.1)
+
     @property
     def vehicles(self):
         return self.dashboard.scene().vehicles

@@ -102,8 +102,13 @@ class Browser:
         return self.driver.find_element(By.XPATH, path)
 
     def press(self, text):
-        """Click a button by its text."""
-        wait_for(lambda: self.button(text).click() or True, f"button {text}")
+        """Click a button by its text, once it can be pressed."""
+
+        def click():
+            button = self.button(text)
+            return button.is_enabled() and (button.click() or True)
+
+        wait_for(click, f"button {text}")
 
     def command(self, text, is_done, what):
         """Click a button until its command is carried out: one that has become old does nothing."""

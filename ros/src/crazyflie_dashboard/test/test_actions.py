@@ -9,6 +9,9 @@ import pytest
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.msg import Config
 from fake_fleet import FakeFleet, FakeLane
+from geometry_msgs.msg import Point, Quaternion, Vector3
+from std_srvs.srv import Empty
+from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.discovery import Graph
@@ -45,8 +48,85 @@ def test_a_takeoff_of_some_calls_their_services(fleet):
 
 def test_each_vehicle_has_its_own_outcome_in_the_words_of_its_service(fleet):
     fleet.refusals["/cf2/high_level/takeoff"] = "the battery is at 2.9 V; expected 3.2 V"
-    outcome = fleet.command(Action.TAKEOFF)
-    assert outcome == {"cf1": "", "cf2": "the battery is at 2.9 V; expected 3.2 V", "cf3": ""}
+    assert fleet.command(Action.TAKEOFF) == {
+        "cf1": "is landed: not all of them can take off",
+        "cf2": "the battery is at 2.9 V; expected 3.2 V",
+        "cf3": "is landed: not all of them can take off",
+    }
+    assert {"/cf1/high_level/land", "/cf3/high_level/land"} <= {*called(fleet)}
+
+
+def test_some_take_off_as_a_whole_or_not_at_all(fleet):
+    reason = "the battery is at 2.9 V; expected 3.2 V"
+    fleet.report("cf2", FlightStatus.ON_GROUND, takeoff_refusal=reason)
+    assert fleet.command(Action.TAKEOFF) == {
+        "cf1": "not all of them can take off",
+        "cf2": reason,
+        "cf3": "not all of them can take off",
+    }
+    assert fleet.calls == []
+
+
+def test_a_fleet_is_commanded_by_one_call(fleet):
+    for service, kind in (
+        ("high_level/takeoff", srv.Takeoff),
+        ("high_level/go_to", srv.GoTo),
+        ("land", Empty),
+    ):
+        fleet.offer(f"/all/{service}", kind)
+    assert fleet.command(Action.TAKEOFF, height=0.8) == dict.fromkeys(fleet.names, "")
+    assert [(name, r.height) for name, r in fleet.calls] == [("/all/high_level/takeoff", 0.8)]
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 0.0, 1.0))
+    fleet.calls.clear()
+    outcomes = fleet.command(Action.GO_TO, goal=(1.5, 1.0, 1.0))
+    assert outcomes == dict.fromkeys(fleet.names, "")
+    ((name, request),) = fleet.calls
+    assert (name, request.relative) == ("/all/high_level/go_to", True)
+    assert (request.goal.x, request.goal.y, request.goal.z) == pytest.approx((0.5, 1.0, 0.0))
+    fleet.calls.clear()
+    fleet.command(Action.HOLD)
+    fleet.command(Action.LAND)
+    assert called(fleet) == ["/all/high_level/go_to", "/all/land"]
+    fleet.calls.clear()
+    fleet.command(Action.HOLD, ["cf1", "cf2"])
+    assert called(fleet) == ["/cf1/high_level/go_to", "/cf2/high_level/go_to"]
+
+
+def test_a_fleet_of_which_one_refuses_to_go_is_held(fleet):
+    fleet.offer("/all/high_level/go_to", srv.GoTo)
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 0.0, 1.0))
+    fleet.refusals["/all/high_level/go_to"] = "1 of 3 vehicles: cf2: the vehicle is landing"
+    assert set(fleet.command(Action.GO_TO, goal=(1.5, 1.0, 1.0)).values()) == {
+        "1 of 3 vehicles: cf2: the vehicle is landing"
+    }
+    assert [(s, r.goal.y) for s, r in fleet.calls[1:]] == [("/all/high_level/go_to", 0.0)]
+
+
+@pytest.mark.parametrize("goal", [(500.0, 0.0, 1.0), (0.0, -10.5, 1.0), (0.0, 0.0, 60.0)])
+def test_a_goal_far_away_is_refused_where_there_is_no_fence(fleet, goal):
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 2.0, 1.0))
+    with pytest.raises(RefusalError, match=r"cf1 would leave the limits of goals \(~goal_limit"):
+        fleet.command(Action.GO_TO, ["cf1"], goal=goal)
+    assert fleet.calls == []
+    fleet.fly(cf1=(14.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 2.0, 1.0))
+    assert fleet.command(Action.GO_TO, ["cf1"], goal=(13.0, 0.0, 1.0)) == {"cf1": ""}
+
+
+def test_a_goal_outside_of_the_room_of_the_world_file_is_refused(fleet):
+    topics = {**fleet.graph.topics, "/world/markers": MarkerArray._type}
+    fleet.graph = Graph(topics, topics, fleet.graph.services)
+    fleet.process.advance(2.1)
+    turn = math.sqrt(0.5)
+    walls = [Marker(type=Marker.CUBE, scale=Vector3(4.0, 0.1, 2.5)) for _ in range(3)]
+    for wall, (x, y) in zip(walls, ((0.0, 2.0), (0.0, -2.0), (3.0, 0.0)), strict=True):
+        wall.pose.position = Point(x, y, 1.25)
+    walls[2].pose.orientation = Quaternion(0.0, 0.0, turn, turn)
+    fleet.process.publish("/world/markers", MarkerArray(walls))
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 2.0, 1.0))
+    with pytest.raises(RefusalError, match="the room of the world file: x is 3.10 m; .* 3.05 m"):
+        fleet.command(Action.GO_TO, ["cf1"], goal=(3.1, -1.0, 1.0))
+    with pytest.raises(RefusalError, match="the room of the world file: z is 2.60 m; .* 2.5 m"):
+        fleet.command(Action.GO_TO, ["cf1"], goal=(0.0, -1.0, 2.6))
 
 
 def test_going_somewhere_takes_as_long_as_the_speed_says(fleet):
@@ -90,10 +170,10 @@ def test_a_service_that_has_gone_is_not_called_when_it_comes_back(fleet):
     gone = services.pop("/cf1/high_level/takeoff")
     outcome = fleet.command(Action.TAKEOFF, ["cf1", "cf2"])
     assert "/cf1/high_level/takeoff" in outcome["cf1"]
-    assert outcome["cf2"] == ""
+    assert outcome["cf2"] == "is landed: not all of them can take off"
     services["/cf1/high_level/takeoff"] = gone
     fleet.process.advance(120.0)
-    assert called(fleet) == ["/cf2/high_level/takeoff"]
+    assert "/cf1/high_level/takeoff" not in called(fleet)
 
 
 def goals(fleet):

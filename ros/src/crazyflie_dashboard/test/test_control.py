@@ -2,20 +2,21 @@
 
 import pytest
 
-from crazyflie_dashboard.control import PageControl
+from crazyflie_dashboard.control import RECLAIM_TIME, PageControl
 from crazyflie_utils.refusal import RefusalError
 
 
 class Told:
-    """Pages and what they were told."""
+    """Pages and what they were told, at a time that is set."""
 
     def __init__(self):
-        self.control = PageControl()
+        self.now = 0.0
+        self.control = PageControl(lambda: self.now)
         self.texts = {}
 
-    def open(self):
+    def open(self, tab=""):
         texts = []
-        page = self.control.open(texts.append)
+        page = self.control.open(texts.append, tab)
         self.texts[page] = texts
         return page
 
@@ -63,6 +64,21 @@ def test_a_page_that_is_lost_has_no_control_when_it_comes_back(told):
         told.control.expect_control(again)
     with pytest.raises(RefusalError, match="is closed"):
         told.control.take(page)
+
+
+@pytest.mark.parametrize("what", ["soon", "late", "another tab", "taken", "released"])
+def test_a_page_that_is_loaded_again_has_its_control_back_if_no_page_took_it(told, what):
+    page, other = told.open("a"), told.open("b")
+    told.control.take(page)
+    if what == "released":
+        told.control.release(page)
+    told.control.close(page)
+    if what == "taken":
+        told.control.take(other)
+        told.control.release(other)
+    told.now = RECLAIM_TIME + (0.1 if what == "late" else -0.1)
+    again = told.open("c" if what == "another tab" else "a")
+    assert (told.control.controller == again) == (what == "soon")
 
 
 def test_pages_that_open_and_close_are_noticed(told):

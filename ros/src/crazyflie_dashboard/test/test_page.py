@@ -121,7 +121,7 @@ def acts(browser, name):
 
 def test_cards_offer_what_can_be_done_now_and_say_what_comes_next(browser, server):
     browser.has("3 vehicles")
-    assert acts(browser, "cf1") == ["take off", "land", "emergency"]
+    assert acts(browser, "cf1") == ["take off", "emergency"]
     server.dashboard.change("cf1", is_in_flight=True, state="hovering")
     browser.has("hovering", browser.card("cf1"))
     assert acts(browser, "cf1") == ["land", "hold", "emergency"]
@@ -147,16 +147,25 @@ def test_the_goal_goes_when_it_is_reached(browser, server):
     wait_for(lambda: not browser.in_scene("goal.visible"), "no goal")
 
 
-def test_what_is_reported_again_and_again_is_one_line(browser, server):
-    log = tuple(
-        LogLine(k, 12.0 + k, "warn", "/fleet", f"cf1 and cf2 are 0.{30 + k} m apart")
-        for k in range(1, 41)
-    )
+def test_identical_texts_are_one_line_and_commands_are_not(browser, server, driver):
+    texts = [
+        *40 * ["cf1 and cf2 are 0.30 m apart"],
+        *2 * ["page 1: go to cf1 to (0.51, -0.49, 1.00) m"],
+        "page 1: go to cf1 to (0.52, -0.49, 1.00) m",
+    ]
+    log = tuple(LogLine(k, 12.0 + k, "warn", "/fleet", text) for k, text in enumerate(texts))
     server.dashboard.set_vehicles(vehicle("cf1", 0.0), log=log, sentences=())
     browser.tab("Messages")
-    browser.has("cf1 and cf2 are 0.70 m apart")
-    browser.has("warn 52.0 s /fleet, 40 times since 13.0 s")
-    assert browser.count(".line") == 1
+    browser.has("warn 51.0 s /fleet, 40 times since 12.0 s")
+    assert browser.count(".line") == 4
+    driver.execute_script(
+        "window.kept = null; const make = URL.createObjectURL;"
+        "URL.createObjectURL = (blob) => { blob.text().then((t) => kept = t); return make(blob); }"
+    )
+    browser.press("Export")
+    kept = wait_for(lambda: driver.execute_script("return window.kept"), "the history")
+    assert kept.splitlines()[0] == "time, s\tlevel\tnode\ttext"
+    assert len(kept.splitlines()) == 1 + len(texts)
 
 
 def test_all_vehicles_are_in_a_window_that_is_small(browser, driver, server):
@@ -181,9 +190,9 @@ def test_all_vehicles_are_in_a_window_that_is_small(browser, driver, server):
 
 
 def test_a_vehicle_that_is_clicked_in_the_scene_is_chosen(browser):
-    browser.has("0 of 3 chosen")
+    browser.has("0 of 3 selected")
     browser.click_scene(-1.0, 0.0, 0.01)
-    browser.has("1 of 3 chosen")
+    browser.has("1 of 3 selected")
     assert browser.find(f"{browser.card('cf1')}.chosen")
 
 
@@ -233,12 +242,12 @@ def test_one_escape_is_no_emergency(browser, server):
 
 
 def test_boxes_show_what_is_chosen(browser):
-    browser.has("0 of 3 chosen")
+    browser.has("0 of 3 selected")
     browser.press("All")
-    browser.has("3 of 3 chosen")
+    browser.has("3 of 3 selected")
     browser.press("None")
     browser.choose("cf2")
-    browser.has("1 of 3 chosen")
+    browser.has("1 of 3 selected")
     boxes = [browser.find(f"{browser.card(name)} input") for name in ("cf1", "cf2", "cf3")]
     wait_for(lambda: [each.is_selected() for each in boxes] == [False, True, False], "boxes")
 
@@ -310,7 +319,7 @@ def test_a_mission_flies_after_its_dry_run_has_passed(browser, server):
     browser.has("The dry run has passed: 12.0 s, all land")
     wait_for(lambda: browser.button("Fly").is_enabled(), "Fly can be pressed")
     browser.press("Fly")
-    browser.has("square.py: landed")
+    browser.has("fly square.py with cf1", ".strip.done")
     assert server.dashboard.flown == ["/missions/square.py"]
 
 
@@ -495,7 +504,7 @@ def test_more_than_twenty_vehicles_are_a_table_that_sorts(browser, server):
     browser.press("battery ▲")
     wait_for(lambda: names() == [f"cf{k}" for k in reversed(lowest)], "the highest first")
     browser.find('tr[data-vehicle="cf7"] input').click()
-    browser.has("1 of 25 chosen")
+    browser.has("1 of 25 selected")
     browser.press("Show cards")
     assert browser.find(f"{browser.card('cf7')}.chosen")
 
@@ -538,11 +547,64 @@ def test_a_hundred_failures_are_one_message(browser, server):
     server.dashboard.refusals["cf1"] = "it has no pose"
     browser.take_control()
     browser.press("All")
-    browser.has("100 of 100 chosen")
+    browser.has("100 of 100 selected")
     browser.press("Take off")
     browser.has("cf1: it has no pose")
     browser.has("99 vehicles: the battery is low")
-    assert browser.count(".q-notification") == 2
+    assert (browser.count(".q-notification"), browser.count(".strip")) == (0, 1)
+    # What is refused stays, with a button that sends the same again.
+    server.dashboard.refusals.clear()
+    browser.press("Retry")
+    browser.has("done", ".strip.done")
+    assert server.actions() == 2 * [(Action.TAKEOFF, tuple(names))]
+
+
+def test_a_command_is_a_strip_and_a_line_on_the_card_until_it_is_done(browser, server):
+    server.dashboard.change("cf1", is_in_flight=True, state="flying", position=(-1.0, 0.0, 1.0))
+    browser.take_control()
+    browser.choose("cf1")
+    server.dashboard.is_slow = True
+    for axis, value in (("x", 1.0), ("y", 0.0), ("z", 1.0)):
+        browser.enter(f'input[aria-label="{axis}, m"]', str(value))
+    browser.press("Go")
+    browser.has("1/1 accepted, 2.0 m and 4 s left", ".strip.under_way")
+    browser.has("go to: 2.0 m left", browser.card("cf1"))
+    server.dashboard.change("cf1", position=(1.0, 0.0, 1.0))
+    browser.has("done", ".strip.done")
+    wait_for(lambda: "go to:" not in browser.text(browser.card("cf1")), "nothing is left")
+
+
+def test_what_cannot_be_done_is_grey_and_says_why(browser, server):
+    browser.has("3 vehicles")
+
+    def why(text):
+        button = browser.button(text)
+        return "" if button.is_enabled() else button.get_attribute("title")
+
+    wait_for(lambda: why("Take off") == why("Go") == "take control first", "a watcher")
+    watched = browser.find(f"{browser.card('cf1')} .acts button")
+    assert not watched.is_enabled()
+    assert browser.find(f"{browser.card('cf1')} button.emergency").is_enabled()
+    browser.take_control()
+    wait_for(lambda: why("Land") == "select vehicles first", "none is selected")
+    browser.choose("cf1")
+    down = "the selected vehicles are on the ground"
+    for text, action in (("Land", "land"), ("Hold", "hold"), ("Go", "go to")):
+        wait_for(lambda t=text, a=action: why(t) == f"{a}: {down}", text)
+    assert why("Take off") == ""
+    # Where the state is not known, a vehicle may be in the air.
+    server.dashboard.change("cf1", state="not known")
+    wait_for(lambda: why("Land") == "", "Land")
+
+
+def test_all_are_reset_after_an_emergency(browser, server):
+    browser.take_control()
+    browser.press("All")
+    browser.press("Emergency")
+    browser.has("To fly again: Reset", ".emergency-report")
+    browser.press("Reset")
+    wait_for(lambda: server.dashboard.commands, "a command")
+    assert server.actions() == [(Action.RESET, ("cf1", "cf2", "cf3"))]
 
 
 def test_the_emergency_is_in_a_window_of_any_size(browser, driver):
@@ -586,6 +648,7 @@ def test_each_control_has_a_label(browser, driver):
 def test_a_recording_is_ended_with_a_link_to_its_report(browser, server, tmp_path):
     server.dashboard.report_file = tmp_path / "report.html"
     server.dashboard.report_file.write_text("<title>the flight</title>")
+    browser.take_control()
     browser.press("Record")
     browser.press("Stop recording")
     link = wait_for(lambda: browser.find("a.report"), "the link")

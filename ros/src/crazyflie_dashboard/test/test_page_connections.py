@@ -23,9 +23,7 @@ def test_two_pages_and_control(browser, server, driver):
         second = Browser(driver, server.url)
         second.open()
         second.choose("cf1")
-        second.press("Take off")
-        second.has("this page can only watch")
-        assert server.dashboard.commands == []
+        assert not second.button("Take off").is_enabled()
         second.press("Take control")
         second.has("Take over")
         second.press("Take over")
@@ -43,18 +41,35 @@ def test_two_pages_and_control(browser, server, driver):
         driver.switch_to.window(first)
 
 
-def test_a_page_that_is_loaded_again_in_flight_moves_nothing_and_has_no_control(browser, server):
+def test_a_page_that_is_loaded_again_in_flight_moves_nothing_and_goes_on(browser, server):
     browser.take_control()
-    browser.choose("cf1")
+    browser.choose("cf1", "cf2")
     browser.press("Take off")
     browser.has("hovering", browser.card("cf1"))
+    browser.tab("Missions")
+    browser.select("mission or trajectory", "square.py")
+    browser.press("Dry run")
+    browser.has("The dry run has passed")
     browser.open()
-    browser.has("hovering", browser.card("cf1"))
-    browser.has("no page has control", ".control")
+    browser.has("you have control", ".control")
+    browser.has("For cf1, cf2")
+    browser.press("Fly")
+    wait_for(lambda: server.dashboard.flown == ["/missions/square.py"], "the mission")
+    browser.has("fly square.py with cf1, cf2", ".strip")
+    assert server.actions() == [(Action.TAKEOFF, ("cf1", "cf2"))]
+
+
+def test_a_page_that_is_loaded_again_has_no_control_if_another_one_took_it(browser, server, driver):
+    browser.take_control()
     browser.choose("cf1")
-    browser.press("Land")
-    browser.has("this page can only watch")
-    assert server.actions() == [(Action.TAKEOFF, ("cf1",))]
+    driver.get("about:blank")
+    wait_for(lambda: not server.dashboard.pages.pages, "no page")
+    server.dashboard.pages.take(server.dashboard.pages.open(str))
+    browser.open()
+    browser.has("has control", ".control")
+    browser.has("1 of 3 selected")
+    assert not browser.button("Take off").is_enabled()
+    server.dashboard.pages.close(server.dashboard.pages.controller)
 
 
 def test_the_emergency_is_reached_while_a_dialog_is_open(browser, server, driver):
@@ -62,7 +77,7 @@ def test_the_emergency_is_reached_while_a_dialog_is_open(browser, server, driver
     try:
         server.dashboard.pages.take(other)
         browser.press("Take control")
-        browser.has("Only look")
+        browser.has("Watch only")
         # Selenium refuses to click what is covered.
         browser.find(".emergency-all").click()
         wait_for(lambda: server.dashboard.emergencies == [None], "the emergency by its button")
@@ -102,7 +117,6 @@ def test_a_connection_that_is_lost_and_comes_back_moves_nothing_and_has_no_contr
         window.socket.io.engine.close();
     """
     driver.execute_script(script, browser.button("Land"))
-    browser.has("this page can only watch: no page has control")
     browser.has("no page has control", ".control")
     assert browser.text(".control").split()[1] != before
     assert server.actions() == [(Action.TAKEOFF, ("cf1",))]
@@ -118,7 +132,7 @@ def test_a_browser_that_was_busy_for_seconds_keeps_its_page(browser, server, dri
     before = server.dashboard.pages.pages
     driver.execute_script("const end = performance.now() + 3000; while (performance.now() < end);")
     browser.press("All")
-    browser.has("3 of 3 chosen")
+    browser.has("3 of 3 selected")
     assert server.dashboard.pages.pages == before
     assert "you have control" in browser.text(".control")
 

@@ -153,6 +153,12 @@ def test_emergency_stops_all():
     swarm.call("/all/emergency")
     swarm.process.advance(1.0)
     assert swarm.position("cf1")[2] == swarm.position("cf2")[2] == 0.0
+    with pytest.raises(ServiceError, match="2 of 2 vehicles: cf1.*stopped less than"):
+        swarm.call("/all/emergency_reset", seconds=0.1)
+    swarm.process.advance(10.0)
+    swarm.call("/all/emergency_reset")
+    swarm.call("/all/takeoff")
+    assert swarm.position("cf2")[2] > 0.5
 
 
 def test_models_are_mixed(tmp_path):

@@ -2,6 +2,7 @@
 
 import math
 import subprocess
+from functools import partial
 from typing import Any, NamedTuple
 
 import genpy
@@ -30,6 +31,19 @@ _MIN_DURATION = 1.0  #: Shortest duration of a move (s).
 _MAX_SPEED = 2.0  #: Highest speed of a go-to command (m/s).
 HEIGHTS = 0.1, 5.0  #: Lowest and highest takeoff (m).
 
+#: Services that carry out an action for all vehicles of a fleet: the name below /all, and the last
+#: names of those of each vehicle.
+_GROUPS = {
+    Action.TAKEOFF: ("high_level/takeoff", srv.Takeoff, "/high_level/takeoff"),
+    Action.LAND: ("land", Empty, "/high_level/land"),
+    Action.HOLD: ("high_level/go_to", srv.GoTo, "/high_level/go_to"),
+    Action.GO_TO: ("high_level/go_to", srv.GoTo, "/high_level/go_to"),
+    Action.RESET: ("emergency_reset", Empty, "/emergency_reset"),
+}
+#: Speed above which vehicles are sent to their own goals: "relative" is where they are then (m/s).
+_AT_REST = 0.2
+_DIGITS = 6  #: Decimal places in which the ways of a formation agree (m).
+
 _HOLD_DURATION = 1.0  #: Duration of a move to a vehicle's own position (s).
 #: The firmware's parameter for lights, its value for all lights, and how long they are on (s).
 _LIGHTS, _ALL_LIGHTS, _LIGHT_TIME = "led/bitmask", 255, 5.0
@@ -39,6 +53,7 @@ _COLOR_LEDS = {k.replace(".", "/"): v.replace(".", "/") for k, v in COLOR_LED_DE
 _GROUND_ONLY = (Action.DISARM, Action.REBOOT)
 
 _STAYS = "not all of them can go"
+_WAITS = "not all of them can take off"
 
 #: Parameters of the nodes that carry out a go-to command: whether headings can change; the frame of
 #: goals.
@@ -54,6 +69,17 @@ class Target(NamedTuple):
     now: VehicleSnapshot
 
 
+class Bounds(NamedTuple):
+    """The box of a vehicle's goals (m), what it is in words, and whether it is a geofence's.
+
+    A geofence is in the frame in which its vehicle is commanded; others are in the fixed frame.
+    """
+
+    box: Box
+    what: str
+    is_fence: bool = False
+
+
 class Actions:
     """Calls services for commands.
 
@@ -61,10 +87,13 @@ class Actions:
     ----------
     model : GraphModel
         The vehicles that are commanded; the handle, and who may wait for the master.
+    reach : float
+        Where there is no room and no geofence, the largest height of a goal, and its distance from
+        the origin along x and y (m).
     """
 
-    def __init__(self, model: GraphModel):
-        self._model = model
+    def __init__(self, model: GraphModel, reach: float = 10.0):
+        self._model, self._reach = model, reach
         self._handle, self._time = model.handle, model.clock
         self._moves: dict[str, Move] = {}
         self._commanders: dict[str, subprocess.Popen[bytes]] = {}
@@ -87,11 +116,24 @@ class Actions:
         }
         if command.action == Action.GO_TO:
             return (yield from self._go_to(command, targets, scene.fixed_frame))
-        answers = self._land_all(command, targets)
-        for name in command.vehicles:
-            if name not in answers:
-                answers[name] = self._begin(self._command(command, targets.get(name), name))
-        return (yield from gathered(answers))
+        if command.action == Action.TAKEOFF:
+            is_alone = len(command.vehicles) == 1 or bool(self._group(command, targets))
+            reasons = {
+                name: self._why_it_stays_down(command.height, targets.get(name), is_alone)
+                for name in command.vehicles
+            }
+            if any(reasons.values()):
+                return _with_others(reasons, _WAITS)
+        answers = self._all(command, targets)
+        alone = [name for name in command.vehicles if name not in answers]
+        answers |= {n: self._begin(self._command(command, targets.get(n), n)) for n in alone}
+        if command.action == Action.TAKEOFF and len(alone) > 1:
+            own = {name: answers[name] for name in alone}
+            self._land_if_one_refuses(command, targets, own)
+        outcomes = yield from gathered(answers)
+        if command.action == Action.TAKEOFF and any(outcomes.values()):
+            outcomes = _with_others(outcomes, f"is landed: {_WAITS}")
+        return outcomes
 
     def close(self) -> None:
         """End the commanders that were started here; each lives until its vehicle has landed."""
@@ -101,21 +143,78 @@ class Actions:
     def _begin(self, steps):
         return follow(steps, self._handle.submit)
 
-    def _land_all(self, command, targets):
-        """Return the answer of the fleet for its vehicles: it lands them in rounds."""
+    def _group(self, command, targets):
+        """Return the vehicles of a fleet that are all commanded, and are so by one service."""
+        if command.action not in _GROUPS:
+            return []
+        name, _, last = _GROUPS[command.action]
         nodes = self._model.graph.services
-        node = nodes.get("/all/land")
-        if command.action != Action.LAND or set(command.vehicles) < set(targets) or node is None:
-            return {}
-        own = [
-            name
-            for name, target in targets.items()
-            if (service := _service(target, Action.LAND)) and nodes.get(service.name) == node
-        ]
+        node = nodes.get(f"/all/{name}")
+        # Others of the fleet, which the page does not show, would be commanded, too.
+        members = {
+            service.removesuffix(last)
+            for service, each in nodes.items()
+            if each == node and service.endswith(last) and not service.startswith("/all/")
+        }
+        chosen = {targets[n].vehicle.namespace: n for n in command.vehicles if n in targets}
+        return [chosen[each] for each in members] if members <= chosen.keys() else []
+
+    def _all(self, command, targets):
+        """Command a fleet as a whole: return its answer, which is that of each of its vehicles."""
+        own = self._group(command, targets)
         if len(own) < 2:
             return {}
-        answer = self._begin(self._call(command, Service("/all/land", Empty), EmptyRequest()))
-        return dict.fromkeys(own, answer)
+        name, kind, _ = _GROUPS[command.action]
+        for each in own:
+            self._moves.pop(each, None)
+        service = Service(f"/all/{name}", kind)
+        request = _request(command, service, targets[own[0]])
+        return dict.fromkeys(own, self._begin(self._call(command, service, request)))
+
+    def _why_it_stays_down(self, height, target, is_asked):
+        """Return why a vehicle cannot take off, or ""; one that is asked says so itself."""
+        if _service(target, Action.TAKEOFF) is None:
+            return _why_no_service(Action.TAKEOFF, target)
+        box, what, _ = self._bounds(target)
+        if height > box.upper[2]:
+            return (
+                f"take off: the height is {height:g} m; expected at most {box.upper[2]:g} m, where "
+                f"{what} ends"
+            )
+        return "" if is_asked or target.now.is_in_flight else target.now.takeoff_refusal
+
+    def _land_if_one_refuses(self, command, targets, answers):
+        """Land the others as soon as one of several vehicles refuses to take off."""
+        refused: list[str] = []
+
+        def land(name):
+            service = _service(targets[name], Action.LAND)
+            if service is not None and not targets[name].now.is_in_flight:
+                request = _request(command, service, targets[name])
+                self._handle.call_service(service.name, service.kind, request, _FLIGHT_TIMEOUT)
+
+        def check(name, done):
+            is_first, has_failed = not refused, done.exception() is not None
+            refused.extend([name] * has_failed)
+            if refused and not has_failed:
+                land(name)
+            elif refused and is_first:
+                for other, answer in answers.items():
+                    if not (answer.done() and answer.exception()):
+                        land(other)
+
+        for name, answer in answers.items():
+            answer.add_done_callback(partial(check, name))
+
+    def _bounds(self, target):
+        """Return where the goals of a vehicle may be."""
+        if (fence := self._model.fence(target.vehicle)) is not None:
+            return Bounds(fence, "its geofence", True)
+        if (room := self._model.room()) is not None:
+            return Bounds(room, "the room of the world file")
+        reach = self._reach
+        box = Box((-reach, -reach, 0.0), (reach, reach, reach))
+        return Bounds(box, "the limits of goals (~goal_limit)")
 
     def _command(self, command, target, name):
         service = _service(target, command.action)
@@ -125,13 +224,6 @@ class Actions:
             raise RefusalError(
                 f"{command.action.value}: the vehicle is {target.now.state}; expected it to be on "
                 "the ground"
-            )
-        fence = self._model.fence(target.vehicle)
-        top = math.inf if fence is None else fence.upper[2]
-        if command.action == Action.TAKEOFF and command.height > top:
-            raise RefusalError(
-                f"take off: the height is {command.height:g} m; expected at most {top:g} m, "
-                "where the geofence ends"
             )
         if command.action == Action.IDENTIFY:
             yield from self._light(service.name.rpartition("/")[0], command)
@@ -184,22 +276,27 @@ class Actions:
         """Send vehicles so that their centre comes to the goal: all of them, or none."""
         reasons = {n: self._why_it_stays(targets.get(n)) for n in command.vehicles}
         if any(reasons.values()):
-            return {name: text or _STAYS for name, text in reasons.items()}
-        fences = {name: self._model.fence(targets[name].vehicle) for name in command.vehicles}
+            return _with_others(reasons, _STAYS)
+        bounds = {name: self._bounds(targets[name]) for name in command.vehicles}
         moving = {name: move for name, move in self._moves.items() if name in targets}
         moves, requests = yield self._model.workers.submit(
-            self._prepared, command, targets, fences, moving, fixed, self._time()
+            self._prepared, command, targets, bounds, moving, fixed, self._time()
         )
-        calls = {name: self._call(command, *each) for name, each in requests.items()}
-        answers = {name: self._begin(call) for name, call in calls.items()}
+        services = {service.name: (service, request) for service, request in requests.values()}
+        calls = {name: self._begin(self._call(command, *each)) for name, each in services.items()}
+        answers = {name: calls[service.name] for name, (service, _) in requests.items()}
         self._moves = {**moving, **moves}
         outcomes = yield from gathered(answers)
         gone = [targets[name] for name, text in outcomes.items() if not text]
-        if 0 < len(gone) < len(outcomes):
+        is_one = len(calls) == 1 < len(outcomes)
+        if is_one and not gone:
+            # Those that have not refused are on their way.
+            (service,) = calls
+            self._handle.call_service(service, srv.GoTo, _hold_request(), _TIMEOUT)
+        elif 0 < len(gone) < len(outcomes):
             # The paths were checked for all vehicles together.
             self._hold(gone)
-            held = f"is held: {_STAYS}"
-            outcomes = {name: text or held for name, text in outcomes.items()}
+            outcomes = _with_others(outcomes, f"is held: {_STAYS}")
         return outcomes
 
     def _why_it_stays(self, target):
@@ -215,7 +312,7 @@ class Actions:
             return f"the vehicle is {target.now.state}; expected it to fly"
         return ""
 
-    def _prepared(self, command, targets, fences, moving, fixed, now):
+    def _prepared(self, command, targets, bounds, moving, fixed, now):
         """Return moves, and services with requests, of the vehicles; waits for the master."""
         services = {n: targets[n].vehicle.services[Action.GO_TO] for n in command.vehicles}
         graph, frames = self._model.graph, self._model.frames
@@ -232,7 +329,7 @@ class Actions:
         distance = max(math.dist(places[name], goal) for name, goal in goals.items())
         duration = max(_MIN_DURATION, distance / command.speed)
         moves = {n: Move(places[n], goal, now, duration) for n, goal in goals.items()}
-        requests = {}
+        requests, shifts = {}, set()
         for name, space in spaces.items():
             target = targets[name]
             has_yaw = known.get(f"{space}/{_YAW}", target.vehicle.has_driver)
@@ -240,13 +337,27 @@ class Actions:
             yaw = rpy_from_quaternion(*target.now.rotation)[2]
             yaw = yaw if command.yaw is None else command.yaw
             goal, yaw = self._in_own_frame(name, goals[name], yaw, own.strip("/"), fixed)
-            _expect_inside(name, goal, fences[name])
+            start, _ = self._in_own_frame(name, places[name], 0.0, own.strip("/"), fixed)
+            shifts.add(tuple(round(b - a, _DIGITS) for a, b in zip(start, goal, strict=True)))
+            _expect_inside(name, places[name], goals[name], goal, bounds[name])
             request = srv.GoToRequest(goal=Point(*goal), yaw=yaw if has_yaw else 0.0)
             request.duration = genpy.Duration.from_sec(duration)
             requests[name] = services[name], request
         buffers = {name: float(known[key]) for name, key in wanted.items() if key in known}
         expect_apart(moves, places, moving, buffers, now)
+        if command.yaw is None and len(shifts) == 1 and self._move_as_one(command, targets):
+            # One call: a hundred of them take longer than a command may be old.
+            request = srv.GoToRequest(relative=True, goal=Point(*shifts.pop()))
+            request.duration = genpy.Duration.from_sec(duration)
+            name, kind, _ = _GROUPS[Action.GO_TO]
+            requests = dict.fromkeys(requests, (Service(f"/all/{name}", kind), request))
         return moves, requests
+
+    def _move_as_one(self, command, targets):
+        """Return whether one service moves all, and no others, each from where it is at rest."""
+        chosen = [targets[name] for name in command.vehicles]
+        are_slow = all(math.hypot(*(each.now.velocity or (0.0,))) < _AT_REST for each in chosen)
+        return are_slow and len(self._group(command, targets)) == len(chosen) > 1
 
     def _in_own_frame(self, name, goal, yaw, own, fixed):
         if own == fixed:
@@ -288,6 +399,12 @@ def expect_fresh(what: str, age: float) -> None:
         )
 
 
+def _with_others(outcomes: Outcomes, remark: str) -> Outcomes:
+    """Return refusals, and after them a remark for each of the other vehicles."""
+    refused = {name: text for name, text in outcomes.items() if text}
+    return refused | {name: remark for name, text in outcomes.items() if not text}
+
+
 def _check(command: Command) -> None:
     numbers = [command.height, command.speed, *(command.goal or ()), command.yaw or 0.0]
     if not all(map(math.isfinite, numbers)):
@@ -327,16 +444,22 @@ def _namespace(service: Service, graph: Graph) -> str:
     return space if space.endswith("/high_level") else graph.services.get(service.name, space)
 
 
-def _expect_inside(name: str, goal: Triple, fence: Box | None) -> None:
-    if goal[2] < 0.0:
-        raise RefusalError(f"go to: {name} would go to z = {goal[2]:.2f} m; expected 0 or more")
-    if fence is None or fence.excess(goal) <= 0.0:
-        return
-    for axis, low, x, high in zip("xyz", fence.lower, goal, fence.upper, strict=True):
-        if not low <= x <= high:
+def _expect_inside(name: str, place: Triple, goal: Triple, own: Triple, bounds: Bounds) -> None:
+    """Refuse a goal out of bounds; ``own`` is the goal in the vehicle's frame (m).
+
+    Where there is no geofence, a vehicle that is out of bounds may go back.
+    """
+    if own[2] < 0.0:
+        raise RefusalError(f"go to: {name} would go to z = {own[2]:.2f} m; expected 0 or more")
+    box, what, is_fence = bounds
+    x = own if is_fence else goal
+    for k, axis in enumerate("xyz"):
+        low, high = box.lower[k], box.upper[k]
+        is_back = not is_fence and min(place[k], low) <= x[k] <= max(place[k], high)
+        if not (low <= x[k] <= high or is_back):
             raise RefusalError(
-                f"go to: {name} would leave its geofence: {axis} is {x:.2f} m; expected "
-                f"{low:g} to {high:g} m"
+                f"go to: {name} would leave {what}: {axis} is {x[k]:.2f} m; expected {low:g} to "
+                f"{high:g} m"
             )
 
 

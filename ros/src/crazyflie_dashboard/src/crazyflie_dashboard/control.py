@@ -1,20 +1,31 @@
 """Control of the vehicles, which one open page has at a time."""
 
 import itertools
+import math
 import threading
+import time
 from collections.abc import Callable
 
 from crazyflie_utils.refusal import RefusalError
+
+#: Time within which a page that is loaded again has its control back (s).
+RECLAIM_TIME = 30.0
 
 
 class PageControl:
     """Pages that are open, and the one that has control. For any thread.
 
-    A page that is loaded again, or has lost its connection, is a new page and has no control until
-    it takes it. Nothing else changes when a page closes.
+    A page that is loaded again, or has lost its connection, is a new page. It has the control that
+    the former one of its tab had, if no page has taken it and `RECLAIM_TIME` is not over. Nothing
+    else changes when a page closes.
+
+    Parameters
+    ----------
+    clock : callable
+        s.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         #: Called when a page has opened or closed.
         self.on_change: Callable[[], None] = lambda: None
         #: Called with a text when another page has control.
@@ -23,22 +34,33 @@ class PageControl:
         self._numbers = itertools.count(1)
         self._tell: dict[int, Callable[[str], None]] = {}
         self._controller: int | None = None
+        self._clock = clock
+        self._tabs: dict[int, str] = {}
+        self._left = ("", -math.inf)  # Tab of the page that has closed with control, and when (s).
 
-    def open(self, tell: Callable[[str], None]) -> int:
-        """Add a page; return its number.
+    def open(self, tell: Callable[[str], None], tab: str = "") -> int:
+        """Add a page of a tab, if that is known; return its number.
 
         ``tell(text)`` is called, from any thread, when another page takes or gives up control.
         """
         with self._lock:
             page = next(self._numbers)
-            self._tell[page] = tell
+            self._tell[page], self._tabs[page] = tell, tab
+            left, at = self._left
+            is_back = tab and tab == left and self._clock() - at <= RECLAIM_TIME
+            if is_back and self._controller is None:
+                self.take(page)
         self.on_change()
         return page
 
     def close(self, page: int) -> None:
         """Remove a page, and its control with it."""
         with self._lock:
+            has_control = self._controller == page
             self.release(page)
+            tab = self._tabs.pop(page, "")
+            if has_control:
+                self._left = (tab, self._clock())
             if self._tell.pop(page, None) is None:
                 return
         self.on_change()
@@ -58,7 +80,7 @@ class PageControl:
                 raise RefusalError(
                     f"page {before} has control; you can take it over, and both pages will say so"
                 )
-            self._controller = page
+            self._controller, self._left = page, ("", -math.inf)
         if before == page:
             return
         if before is not None:

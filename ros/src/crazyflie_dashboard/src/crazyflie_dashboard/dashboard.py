@@ -26,6 +26,7 @@ from crazyflie_dashboard.page_data import (
 )
 from crazyflie_dashboard.page_state import PageState
 from crazyflie_dashboard.parameters import LiveParameters
+from crazyflie_dashboard.progress import Commands, Progress
 from crazyflie_dashboard.recording import Recording
 from crazyflie_dashboard.snapshot import Scene
 from crazyflie_utils import NodeHandle, ServiceError
@@ -52,6 +53,8 @@ class Dashboard:
         time.monotonic, for the age of commands.
     workers : concurrent.futures.Executor, optional
         Its threads may wait.
+    reach : float
+        Of goals, see `Actions`.
     """
 
     def __init__(
@@ -62,6 +65,7 @@ class Dashboard:
         folders: list[str],
         clock: Callable[[], float] = time.monotonic,
         workers: Executor | None = None,
+        reach: float = 10.0,
     ):
         #: Opens and closes every page; a method's ``page`` is its number.
         self.pages = PageControl()
@@ -71,7 +75,9 @@ class Dashboard:
         # so, not the one that serves all pages.
         self._turns = workers or ThreadPoolExecutor(1, "dashboard_turns")
         self._model = GraphModel(handle, self._workers, master, clock)
-        self._actions = Actions(self._model)
+        self._actions = Actions(self._model, reach)
+        self._commands = Commands(clock)
+        self._model.on_scene = lambda scene: self._commands.update(scene.vehicles)
         self._lane = lane
         self._parameters = LiveParameters(self._model)
         self._missions = missions.Missions()
@@ -125,7 +131,14 @@ class Dashboard:
 
         An emergency is none: it has a way of its own, `emergency`.
         """
-        return self._control(page, command.words, self._actions.carry_out, command)
+        number = self._begin_progress(page, command.title, command.vehicles, command)
+        outcome = self._control(page, command.words, self._actions.carry_out, command)
+        outcome.add_done_callback(lambda done: self._commands.answered(number, done))
+        return outcome
+
+    def progress(self) -> tuple[Progress, ...]:
+        """Return the last commands and missions of all pages, and what has become of them."""
+        return self._commands.rows
 
     def emergency(self, vehicles: tuple[str, ...] | None, age: float) -> "Future[Outcomes]":
         """Stop motors, of all vehicles if ``vehicles`` is None; the page does not need control.
@@ -187,12 +200,18 @@ class Dashboard:
         self, page: int, mission: Path, vehicles: tuple[str, ...], clicked: float
     ) -> "Future[str]":
         """Fly a mission after its dry run has passed; the future is done when it has ended."""
+        title = f"fly {mission.name} with {listed(vehicles)}"
+        number = self._begin_progress(page, title, vehicles)
 
         def do():
             expect_fresh(mission.name, self._clock() - clicked)
-            return self._missions.fly(mission, vehicles, self._places(vehicles))
+            end = self._missions.fly(mission, vehicles, self._places(vehicles))
+            self._commands.follow(number)
+            return end
 
-        return self._control(page, f"fly {mission} for {listed(vehicles)}", do)
+        outcome = self._control(page, f"fly {mission} for {listed(vehicles)}", do)
+        outcome.add_done_callback(lambda done: self._commands.ended(number, done))
+        return outcome
 
     def stop_mission(self, page: int, clicked: float) -> "Future[None]":
         """End the mission that flies; its vehicles land."""
@@ -277,6 +296,9 @@ class Dashboard:
         outcome = self._do(do)
         outcome.add_done_callback(log)
         return outcome
+
+    def _begin_progress(self, page, title, vehicles, command=None):
+        return self._commands.begin(page, title, vehicles, self._places(vehicles), command)
 
     # Called in the node's turn.
 

@@ -12,7 +12,7 @@ from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.master import Master
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
-from crazyflie_utils.parameters.types import PORT, Text
+from crazyflie_utils.parameters.types import PORT, Number, Text
 
 _NOT_INSTALLED = "NiceGUI, which the page is made with, is not installed: ./run install dashboard"
 
@@ -34,6 +34,12 @@ class DashboardParameters(Parameters):
         Text(may_be_empty=True),
         "folders with missions and trajectories (CSV), separated by colons; empty for the examples",
         "",
+    )
+    goal_limit: float = parameter(
+        Number("m", above=0.0),
+        "where there is neither a room (crazyflie_world) nor a geofence: largest height of goals, "
+        "and distance from the origin along x and y",
+        10.0,
     )
 
 
@@ -66,7 +72,8 @@ class DashboardNode(Node):
         folders = folders or example_folders()
         master = Master(handle.name)
         lane = EmergencyLane(master, handle.warn)
-        dashboard = Dashboard(handle, master, lane, folders)
+        reach = self._parameters.goal_limit
+        dashboard = Dashboard(handle, master, lane, folders, reach=reach)
         self._open.callback(dashboard.close)
         # NiceGUI takes a second to import, which programs that only read the parameters'
         # declaration do not need.

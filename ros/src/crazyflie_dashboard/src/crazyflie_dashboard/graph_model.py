@@ -79,6 +79,8 @@ class GraphModel:
         self.sentences: tuple[Sentence, ...] = ()
         self.missions: Callable[[], tuple[str, ...]] = tuple
         self.recording: Callable[[], str] = str
+        #: Called with each new scene.
+        self.on_scene: Callable[[Scene], object] = lambda scene: None
         #: handle, workers, master, clock: Also of those that command what is here.
         self.handle, self.workers, self.master, self.clock = handle, workers, master, clock
         self._subscriptions: NodeHandle | None = None
@@ -130,6 +132,10 @@ class GraphModel:
         """Return the geofence of a vehicle, in the frame of its states; None if it has none."""
         return self._surroundings.box(vehicle.namespace)
 
+    def room(self) -> Box | None:
+        """Return the room of the world file, in the fixed frame; None without one."""
+        return self._surroundings.room(self.scene.fixed_frame)
+
     def _receive(self):
         """Subscribe to the topics that are shown for each vehicle."""
         is_few = len(self.models) <= _FEW
@@ -151,6 +157,7 @@ class GraphModel:
             self._known_frames = len(self.frames.poses)
             self._receive()
         self.scene = self._make_scene()
+        self.on_scene(self.scene)
 
     def _on_graph(self, done: "Future[Graph]", began: float) -> None:
         now = self.clock()

@@ -32,7 +32,15 @@ class Command:
     @property
     def words(self) -> str:
         """The command as a text for the log."""
-        text = f"{self.action.value} {', '.join(self.vehicles)}"
+        return self._text(", ".join(self.vehicles))
+
+    @property
+    def title(self) -> str:
+        """The command as a text for the page, which has no room for many names."""
+        return self._text(listed(self.vehicles))
+
+    def _text(self, names):
+        text = f"{self.action.value} {names}"
         if self.action == Action.TAKEOFF:
             text += f" to {self.height:g} m"
         if self.goal is not None:

@@ -1,8 +1,10 @@
 """Solids, planned paths and geofences of the graph, drawn around the vehicles."""
 
+import itertools
 import math
 from collections import defaultdict
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import roslib.message
@@ -19,6 +21,8 @@ from crazyflie_takeoff.flight_topics import follow_box
 from crazyflie_utils import NodeHandle
 
 _MARKERS = ("world/markers", "sweep/markers", "plan/markers")  #: Last names of topics with markers.
+_WORLD = "world/markers"  #: Last name of the topic with the objects of a world file.
+_LOWEST_ROOM = 1.0  #: Height of objects below which they are no walls of a room (m).
 _FENCES = "geofence/parameter_updates"  #: Last name of a geofence's live parameters.
 _PATH = "nav_msgs/Path"
 _HELD = "fleet/waiting"  #: Last name of the topic with vehicles that a fleet holds apart.
@@ -119,6 +123,30 @@ class Surroundings:
         """Return the box of a vehicle's geofence, or None."""
         found = (box for topic, box in self._fences.items() if topic.startswith(f"{namespace}/"))
         return next(found, None)
+
+    def room(self, fixed: str) -> Box | None:
+        """Return the box around the objects of a world file (m); None if none of them is high."""
+        solids = [
+            each
+            for topic, (found, _) in self._markers.items()
+            for frame, each in found
+            if topic.endswith(_WORLD) and frame in ("", fixed) and each.shape in _SHAPES.values()
+        ]
+        if not solids:
+            return None
+        rows = np.vstack([each.rows for each in solids]).astype(float)
+        turns: Any = rows[:, 3:7].T
+        sizes = rows[:, 7:10].T
+        corners = np.vstack(
+            [
+                rows[:, :3] + np.stack(rotate(turns, (x * sizes[0], y * sizes[1], z * sizes[2])), 1)
+                for x, y, z in itertools.product((-0.5, 0.5), repeat=3)
+            ]
+        )
+        lower, upper = corners.min(axis=0), corners.max(axis=0)
+        if upper[2] < _LOWEST_ROOM:
+            return None
+        return Box((*map(float, lower[:2]), 0.0), tuple(map(float, upper)))
 
     def _subscribe(self, topic, kind):
         if topic.endswith(_MARKERS) and kind == MarkerArray._type:

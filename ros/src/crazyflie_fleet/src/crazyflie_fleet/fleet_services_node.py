@@ -56,6 +56,7 @@ class FleetServicesNode(Node):
             ("takeoff", Empty, self._take_off, "/takeoff_all"),
             ("land", Empty, self._land, "/land_all"),
             ("go_to", srv.GoTo, self._go_to),
+            ("emergency_reset", Empty, self._command),
             (f"{HIGH_LEVEL}/takeoff", srv.Takeoff, self._take_off),
             (f"{HIGH_LEVEL}/land", srv.Land, self._command),
             (f"{HIGH_LEVEL}/stop", srv.Stop, self._command),

@@ -1,5 +1,6 @@
 """The exceptions by which a command is refused, with the reason; refusals of several vehicles."""
 
+import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 
@@ -16,11 +17,19 @@ class ServiceError(Exception):
 
 
 def by_reason(refusals: Mapping[str, str], listed: Callable[..., str] = ", ".join) -> list[str]:
-    """Return refusals (vehicle to reason) as texts: each reason once, after its vehicles."""
+    """Return refusals (vehicle to reason) as texts: each reason once, after its vehicles.
+
+    Reasons that differ in numbers only are one, with the numbers of the first vehicle.
+    """
     names = defaultdict(list)
     for name, reason in refusals.items():
-        names[reason].append(name)
-    return [f"{listed(each)}: {reason}" for reason, each in names.items()]
+        names[re.sub(r"\d+(\.\d+)?", "#", reason)].append(name)
+    texts = []
+    for each in names.values():
+        differ = len({refusals[name] for name in each}) > 1
+        of = f" (numbers of {each[0]})" if differ else ""
+        texts.append(f"{listed(each)}: {refusals[each[0]]}{of}")
+    return texts
 
 
 def refusals_text(refusals: Mapping[str, str], count: int) -> str:

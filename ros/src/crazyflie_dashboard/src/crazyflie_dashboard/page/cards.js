@@ -33,7 +33,8 @@ export default {
         <dt>{{ what }}</dt><dd>{{ value }}</dd></div></dl>
       <div class="acts">
         <button v-for="action in v.actions" :key="action" :class="[action, { pressed: pressed === v.name + action }]"
-                :aria-label="action + ' ' + v.name" :title="confirmed.includes(action) ? 'press for a second' : null"
+                :aria-label="action + ' ' + v.name" :disabled="v.locked && action !== 'emergency'"
+                :title="title(v, action)"
                 @pointerdown="press(v, action, $event)" @pointerup="release" @pointerleave="release"
                 @click.stop="act(v, action, $event)">{{ action }}</button>
       </div>
@@ -43,7 +44,7 @@ export default {
   </div>`,
 
   props: { vehicles: Array },
-  data: () => ({ isTable: true, column: "name", sign: 1, pressed: "", many: MANY, columns: COLUMNS, confirmed: CONFIRMED }),
+  data: () => ({ isTable: true, column: "name", sign: 1, pressed: "", many: MANY, columns: COLUMNS }),
 
   computed: {
     sorted() {
@@ -56,6 +57,10 @@ export default {
     fact(vehicle, what) { return vehicle.facts.find(([each]) => each === what) ?? [what, vehicle[what] ?? "", ""]; },
     value(vehicle, what) { return this.fact(vehicle, what)[1]; },
     look(vehicle, what) { return this.fact(vehicle, what)[2]; },
+    title(vehicle, action) {
+      if (vehicle.locked && action !== "emergency") return "take control first";
+      return CONFIRMED.includes(action) ? "press for a second" : null;
+    },
     sort(column) {
       this.sign = this.column === column ? -this.sign : 1;
       this.column = column;

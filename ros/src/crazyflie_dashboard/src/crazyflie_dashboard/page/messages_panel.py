@@ -10,6 +10,7 @@ from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.snapshot import LogLine, Scene
 
 LEVELS = ("debug", "info", "warn", "error", "fatal")
+_COMMAND = re.compile(r"page \d+: ")  #: Begin of the dashboard's lines about commands.
 MAX_LINES = 200  #: Lines of the log that are shown, the newest first.
 
 
@@ -37,6 +38,7 @@ class MessagesPanel:
             self._level = ui.select(list(LEVELS), value="info", label="level")
             self._level.props("dense outlined options-dense").classes("level")
             self._filter = ui.input("contains").props("dense outlined clearable").classes("number")
+            ui.button("Export", on_click=self._export).props("outline dense")
         self._log = Lines("No message of this level yet.")
 
     def refresh(self, scene: Scene) -> None:
@@ -47,13 +49,21 @@ class MessagesPanel:
         ]
         shown = LEVELS[LEVELS.index(self._level.value) :]
         part = (self._filter.value or "").lower()
-        lines: dict[tuple[str, str, str], list[LogLine]] = {}
+        lines: dict[tuple[str, str, object], list[LogLine]] = {}
         for line in reversed(scene.log):
             if line.level in shown and part in f"{line.node} {line.text}".lower():
-                # Repeated messages differ only in their numbers.
-                same = re.sub(r"[0-9.]+", "#", line.text)
+                # A command is a line of its own, also if it was given twice.
+                same = line.number if _COMMAND.match(line.text) else line.text
                 lines.setdefault((line.level, line.node, same), []).append(line)
         self._log.value = [_shown(each) for each in [*lines.values()][:MAX_LINES]]
+
+    def _export(self) -> None:
+        """Let the browser keep the whole log, oldest first."""
+        rows = (
+            f"{line.time:.3f}\t{line.level}\t{line.node}\t{' '.join(line.text.split())}\n"
+            for line in self._session.dashboard.scene().log
+        )
+        ui.download.content("time, s\tlevel\tnode\ttext\n" + "".join(rows), "messages.tsv")
 
     async def _ask(self) -> None:
         self._examine.disable()

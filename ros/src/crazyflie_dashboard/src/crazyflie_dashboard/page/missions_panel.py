@@ -1,12 +1,17 @@
 """Missions and trajectories: a dry run first, then the flight."""
 
+import asyncio
+import contextlib
 from pathlib import Path
+from typing import Any
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from crazyflie_dashboard.page.session import CLICKED, Session
+from crazyflie_dashboard.page.session import CLICKED, Session, allow
+from crazyflie_dashboard.page_data import listed
 from crazyflie_dashboard.snapshot import Scene
+from crazyflie_utils.refusal import RefusalError
 
 
 class MissionsPanel:
@@ -32,6 +37,13 @@ class MissionsPanel:
         self._result = ui.label().classes("result")
         self._running = ui.label().classes("hint")
         self.list_files()
+        session.on_restore.append(self._restore)
+
+    def _restore(self, kept: dict[str, Any]) -> None:
+        mission, names = kept.get("mission", ""), tuple(kept.get("passed", ()))
+        if mission in self._file.options:
+            self._file.value = mission
+            self._passed = (mission, names) if names else None
 
     def list_files(self) -> None:
         """Show the missions and trajectories that there are now."""
@@ -41,12 +53,17 @@ class MissionsPanel:
     def refresh(self, scene: Scene) -> None:
         """Show the vehicles of the mission, and whether it may fly."""
         names = self._session.chosen_names
-        self._choice.text = f"For {', '.join(names)}" if names else "For vehicles that are chosen"
-        self._fly.set_enabled(self._passed == (self._file.value, names) and bool(names))
+        self._choice.text = f"For {listed(names)}" if names else "No vehicle is selected"
+        why = _why_not(self._session, names)
+        allow(self._dry_run, why or ("" if self._file.value else "choose a mission first"))
+        passed = self._passed == (self._file.value, names)
+        why = why or ("a mission is flying" if scene.missions else "")
+        allow(self._fly, why or ("" if passed else "a dry run has to pass first"))
         self._running.text = " · ".join(scene.missions)
 
     def _forget(self) -> None:
         self._passed = None
+        self._session.keep(mission=self._file.value, passed=())
         self._session.dashboard.forget_paths(self._session.page)
         self._tell("", "")
 
@@ -75,12 +92,19 @@ class MissionsPanel:
             "good" if result.passed else "bad",
         )
         self._passed = (chosen, names) if result.passed else None
+        self._session.keep(passed=names if result.passed else ())
 
     async def _start(self, event: GenericEventArguments) -> None:
         if self._passed is None:
             return
         mission, names = Path(self._passed[0]), self._passed[1]
         future = self._session.dashboard.fly(self._session.page, mission, names, event.args)
-        text = await self._session.result(future)
-        if text is not None:
-            self._session.say(f"{mission.name}: {text}", "positive")
+        # What becomes of it is on its strip.
+        with contextlib.suppress(RefusalError):
+            await asyncio.wrap_future(future)
+
+
+def _why_not(session, names):
+    if not session.has_control:
+        return "take control first"
+    return "" if names else "select vehicles first"

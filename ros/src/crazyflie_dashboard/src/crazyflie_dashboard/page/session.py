@@ -1,14 +1,14 @@
 """One open page: its number, its chosen vehicles, and its requests."""
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, MutableMapping
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
-from nicegui import Client, ui
+from nicegui import Client, app, ui
 
 from crazyflie_dashboard.dashboard import Dashboard
-from crazyflie_dashboard.page_data import Command, summary
+from crazyflie_dashboard.page_data import Command
 from crazyflie_dashboard.snapshot import Action, VehicleSnapshot
 from crazyflie_utils.refusal import RefusalError
 
@@ -17,6 +17,13 @@ CLICKED = "(event) => emit(clickTime(event))"
 REFUSAL_TIME = 12000  #: Time for which a refusal is shown, ms.
 
 Result = TypeVar("Result")
+
+
+def allow(button: ui.button, why: str) -> None:
+    """Enable a button, or say why it cannot be pressed."""
+    button.set_enabled(not why)
+    if button.props.get("title", "") != why:
+        button.props["title"] = why
 
 
 class Session:
@@ -28,6 +35,8 @@ class Session:
         self.page = 0
         self.chosen: set[str] = set()  #: Names of the vehicles that its buttons command.
         self.watched: str | None = None  #: The vehicle that was chosen last: its plots are shown.
+        #: Called once, when the page is connected, with what it had before it was loaded again.
+        self.on_restore: list[Callable[[dict[str, Any]], None]] = []
         self._client = client
         client.on_connect(self._connect)
         client.on_disconnect(self._disconnect)
@@ -40,8 +49,25 @@ class Session:
         def tell(text: str) -> None:
             loop.call_soon_threadsafe(self.say, text, "warning")
 
-        self.page = self.dashboard.pages.open(tell)
+        restore, self.on_restore = self.on_restore, []
+        # A connection that comes back may bring clicks that have waited: it has no control.
+        tab = self._client.tab_id if restore else None
+        self.page = self.dashboard.pages.open(tell, tab or "")
+        if restore:
+            kept = dict(self._kept())
+            self.chosen, self.watched = set(kept.get("chosen", ())), kept.get("watched")
+            for each in restore:
+                each(kept)
         self.dashboard.watch(self.page, self.watched)
+
+    def keep(self, **values: Any) -> None:
+        """Keep values, by name, until the page is loaded again in its tab."""
+        if self._client.has_socket_connection:
+            self._kept().update(values)
+
+    def _kept(self) -> MutableMapping[str, Any]:
+        with self._client:
+            return app.storage.tab
 
     def _disconnect(self) -> None:
         page, self.page = self.page, 0
@@ -81,6 +107,7 @@ class Session:
         if names:
             self.watched = names[-1]
             self.dashboard.watch(self.page, self.watched)
+        self.keep(chosen=sorted(self.chosen), watched=self.watched)
 
     async def result(self, future: "Future[Result]") -> Result | None:
         """Wait for a result; return None after showing the reason of a refusal."""
@@ -95,20 +122,24 @@ class Session:
             return False
         return True
 
+    @property
+    def has_control(self) -> bool:
+        """Whether this page may command vehicles."""
+        return self.page != 0 and self.dashboard.pages.controller == self.page
+
     async def command(
         self, action: Action, names: Iterable[str], clicked: float, **details: Any
     ) -> bool:
-        """Command vehicles, and show each refusal; return whether all have accepted."""
-        names = tuple(names)
-        if not names:
-            self.say(f"{action.value}: choose a vehicle first", "warning")
+        """Command vehicles; return whether all have accepted. Its strip shows what becomes of it."""
+        return await self.send(Command(action, tuple(names), clicked, **details))
+
+    async def send(self, command: Command) -> bool:
+        """Send a command as `command`."""
+        try:
+            outcomes = await asyncio.wrap_future(self.dashboard.command(self.page, command))
+        except RefusalError:
             return False
-        future = self.dashboard.command(self.page, Command(action, names, clicked, **details))
-        outcomes = await self.result(future)
-        refusals = summary(outcomes or {})
-        for text in refusals:
-            self.say(text, "negative")
-        return bool(outcomes) and not refusals
+        return not any(outcomes.values())
 
     async def take_control(self) -> None:
         """Take control; ask whether to take it over if another page has it."""
@@ -120,7 +151,7 @@ class Session:
                 ui.label(f"{str(error)[0].upper()}{str(error)[1:]}.")
                 with ui.row():
                     ui.button("Take over", color="warning", on_click=lambda: dialog.submit(True))
-                    ui.button("Only look", on_click=lambda: dialog.submit(False)).props("flat")
+                    ui.button("Watch only", on_click=lambda: dialog.submit(False)).props("flat")
             if await dialog and self.page:
                 pages.take(self.page, is_confirmed=True)
             dialog.delete()

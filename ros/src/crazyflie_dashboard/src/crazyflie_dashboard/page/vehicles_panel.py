@@ -1,7 +1,7 @@
 """Cards of the vehicles, and commands for the chosen ones."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from nicegui import ui
@@ -10,8 +10,11 @@ from nicegui.events import GenericEventArguments
 
 from crazyflie_dashboard.actions import HEIGHTS
 from crazyflie_dashboard.page.scene_view import SceneView, condition
-from crazyflie_dashboard.page.session import CLICKED, Session
+from crazyflie_dashboard.page.session import CLICKED, Session, allow
+from crazyflie_dashboard.progress import REACHED
 from crazyflie_dashboard.snapshot import Action, Scene, VehicleSnapshot
+from crazyflie_msgs.msg import FlightStatus
+from crazyflie_utils.flight_status import WORDS
 
 #: Names of the rates that are shown, by the topics' roles.
 RATES = {
@@ -22,7 +25,6 @@ RATES = {
     "cmd_vel": "control",
 }
 CHARGE_RANGE = 3.0, 4.2  #: Voltages of an empty and of a full battery (V).
-REACHED = 0.15  #: Distance from a goal at which it disappears (m).
 LOOKS = ("ground", "flight", "stale", "emergency")
 
 
@@ -48,12 +50,15 @@ class VehiclesPanel:
             self._up = self._button("Take off", self._take_off)
             self._up.props("icon=flight_takeoff color=positive")
             self._height = _number("height, m", 1.0, *HEIGHTS)
-            self._button("Land", self._land).props("icon=flight_land color=primary")
-            self._button("Hold", self._hold).props("icon=pause color=secondary")
+            self._down = self._button("Land", self._land).props("icon=flight_land color=primary")
+            self._stay = self._button("Hold", self._hold).props("icon=pause color=secondary")
+            self._reset = self._button("Reset", self._end_emergency)
+            self._reset.props("icon=restart_alt color=warning")
+            self._reset.set_visibility(False)
         with ui.element("div").classes("tools goal"):
             self._goal = [_number(f"{axis}, m") for axis in "xyz"]
             self._yaw = _number("yaw, °")
-            self._button("Go", self._go).props("icon=near_me color=accent")
+            self._near = self._button("Go", self._go).props("icon=near_me color=accent")
         for field in (*self._goal, self._yaw):
             field.on_value_change(self._draw_goal)
         ui.label(
@@ -72,14 +77,31 @@ class VehiclesPanel:
         return ui.button(text).props("unelevated").on("click", handler, js_handler=CLICKED)
 
     def refresh(self, scene: Scene) -> None:
-        """Show the present state of the vehicles."""
+        """Show the present state of the vehicles, and what can be done with them."""
         names = self._session.chosen_names
-        self._choice.text = f"{len(names)} of {len(scene.vehicles)} chosen"
-        # No vehicle is chosen at first: the message after a press is the hint.
+        self._choice.text = f"{len(names)} of {len(scene.vehicles)} selected"
         chosen = [scene.vehicles[name] for name in names if name in scene.vehicles]
-        self._up.set_enabled(not chosen or any(Action.TAKEOFF in offered(v) for v in chosen))
+        may = self._session.has_control
+        for button, action in (
+            (self._up, Action.TAKEOFF),
+            (self._down, Action.LAND),
+            (self._stay, Action.HOLD),
+            (self._near, Action.GO_TO),
+            (self._reset, Action.RESET),
+        ):
+            allow(button, why_not(action, chosen, may))
+        self._reset.set_visibility(any(each.is_emergency for each in chosen))
         self._hide_goal_that_is_reached(chosen)
-        self._cards.value = [card(each, each.name in names) for each in scene.vehicles.values()]
+        left = {
+            name: text
+            for row in self._session.dashboard.progress()
+            if row.is_open
+            for name, text in row.left.items()
+        }
+        self._cards.value = [
+            card(each, each.name in names, may, left.get(each.name, ""))
+            for each in scene.vehicles.values()
+        ]
 
     def _choose(self, event: GenericEventArguments) -> None:
         self._session.choose([event.args["name"]], event.args["add"])
@@ -111,6 +133,11 @@ class VehiclesPanel:
     async def _hold(self, event: GenericEventArguments) -> None:
         self._sent = None
         await self._session.command(Action.HOLD, self._session.chosen_names, event.args)
+
+    async def _end_emergency(self, event: GenericEventArguments) -> None:
+        vehicles = self._session.vehicles
+        names = [name for name in self._session.chosen_names if vehicles[name].is_emergency]
+        await self._session.command(Action.RESET, names, event.args)
 
     def _set_goal(self, event: GenericEventArguments) -> None:
         x, y, z = self._goal
@@ -146,8 +173,25 @@ class VehiclesPanel:
             self._sent = tuple(goal)
 
 
-def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
-    """Return the data that cards.js shows of a vehicle; a fact is name, value, style."""
+def why_not(action: Action, vehicles: Sequence[VehicleSnapshot], has_control: bool) -> str:
+    """Return why the selected vehicles cannot be commanded so, or "": one of them is enough."""
+    if not has_control:
+        return "take control first"
+    if not vehicles:
+        return "select vehicles first"
+    if any(action in offered(each, with_moves=True) for each in vehicles):
+        return ""
+    states = sorted({each.state for each in vehicles})
+    return f"{action.value}: the selected vehicles are {', '.join(states)}"
+
+
+def card(
+    vehicle: VehicleSnapshot, is_chosen: bool, has_control: bool = True, left: str = ""
+) -> dict[str, Any]:
+    """Return the data that cards.js shows of a vehicle; a fact is name, value, style.
+
+    ``left`` is what is left of the command that it carries out.
+    """
     battery = "" if vehicle.battery is None else f"{vehicle.battery:.2f} V"
     link = "" if vehicle.link_quality is None else f"{vehicle.link_quality:.0%}"
     is_weak = vehicle.link_quality is not None and vehicle.link_quality < 0.5
@@ -163,6 +207,8 @@ def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
     if vehicle.position is not None:
         place = "  ".join(f"{each:z.2f}" for each in vehicle.position)
         facts.insert(0, ["position", f"{place} m", "wide"])
+    if left:
+        facts.insert(0, ["command", left, "wide"])
     # In the order of the enum, the ordinary ones first; the emergency stands apart.
     shown = [each for each in Action if each in offered(vehicle)]
     actions = [each.value for each in sorted(shown, key=lambda each: each is Action.EMERGENCY)]
@@ -176,18 +222,21 @@ def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
         "actions": actions,
         "charge": None if vehicle.battery is None else _charge(vehicle.battery),
         "chosen": is_chosen,
+        "locked": not has_control,
     }
 
 
-def offered(vehicle: VehicleSnapshot) -> set[Action]:
-    """Return the commands on its card: those that it accepts in its present state."""
-    shown = set(vehicle.actions) - {Action.GO_TO}
+def offered(vehicle: VehicleSnapshot, with_moves: bool = False) -> set[Action]:
+    """Return the commands that it accepts in its present state; its card has no goals."""
+    shown = set(vehicle.actions) - (set() if with_moves else {Action.GO_TO})
     if vehicle.is_emergency:
-        return shown - {Action.TAKEOFF, Action.LAND, Action.ARM, Action.HOLD}
+        return shown - {Action.TAKEOFF, Action.LAND, Action.ARM, Action.HOLD, Action.GO_TO}
     shown.discard(Action.RESET)
     if vehicle.is_in_flight:
         return shown - {Action.TAKEOFF, Action.ARM, Action.DISARM, Action.REBOOT}
-    return shown - {Action.HOLD}
+    # Whether one flies whose state is not known is not known, either.
+    is_down = vehicle.state == WORDS[FlightStatus.ON_GROUND]
+    return shown - {Action.HOLD, Action.GO_TO, *([Action.LAND] if is_down else [])}
 
 
 def _charge(voltage: float) -> float:

@@ -18,7 +18,8 @@ from crazyflie_dashboard.page.missions_panel import MissionsPanel
 from crazyflie_dashboard.page.parameters_panel import ParametersPanel
 from crazyflie_dashboard.page.plots_panel import PlotsPanel
 from crazyflie_dashboard.page.scene_view import SceneView
-from crazyflie_dashboard.page.session import CLICKED, Session
+from crazyflie_dashboard.page.session import CLICKED, Session, allow
+from crazyflie_dashboard.page.strips import Strips
 from crazyflie_dashboard.page.vehicles_panel import VehiclesPanel
 from crazyflie_dashboard.snapshot import Scene, Sentence, VehicleSnapshot
 
@@ -43,6 +44,7 @@ class View:
                 with ui.element("div").classes("stage"):
                     self._scene_view = SceneView()
                     self._build_views()
+                    self._strips = Strips(self._session)
                 with ui.element("div").classes("side"):
                     self._build_panels()
         ui.timer(SCENE_PERIOD, self._draw)
@@ -99,6 +101,8 @@ class View:
                 with ui.tab_panel(name):
                     self._panels[name] = build(self._session)
         tabs.on_value_change(self._refresh)
+        tabs.on_value_change(lambda event: self._session.keep(tab=event.value))
+        self._session.on_restore.append(lambda kept: tabs.set_value(kept.get("tab", tabs.value)))
 
     def _watched(self) -> str | None:
         return self._session.watched or next(iter(self._session.vehicles), None)
@@ -137,10 +141,14 @@ class View:
             ui.run_javascript(f"alarm({json.dumps(new)})")
         self._alarms = alarms
         self._missions.text = " · ".join(scene.missions)
+        why = "" if self._session.has_control else "take control first"
         self._stop.set_visibility(bool(scene.missions))
+        allow(self._stop, why)
         self._record.text = "Stop recording" if scene.recording == "recording" else "Record"
-        self._record.set_enabled(scene.recording in ("", "recording"))
+        is_busy = scene.recording not in ("", "recording")
+        allow(self._record, why or (scene.recording if is_busy else ""))
         self._show_control()
+        self._strips.refresh(time.monotonic(), self._session.has_control)
         self._panels[self._tabs.value].refresh(scene)
 
     def _show_control(self) -> None:
@@ -153,14 +161,14 @@ class View:
         look = "mine" if has else "none" if controller is None else "other"
         # In one call: two calls would change the label, and send it, even if nothing is new.
         self._control.classes(look, remove="mine other none")
-        self._take.text = "Give up" if has else "Take control"
+        self._take.text = "Release control" if has else "Take control"
 
     async def _take_or_release(self) -> None:
         if self._dashboard.pages.controller == self._session.page:
             self._dashboard.pages.release(self._session.page)
         else:
             await self._session.take_control()
-        self._show_control()
+        self._refresh()
 
     async def _turn_recording(self) -> None:
         is_on = not self._dashboard.scene().recording

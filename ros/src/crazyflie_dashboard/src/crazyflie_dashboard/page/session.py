@@ -130,7 +130,7 @@ class Session:
     async def command(
         self, action: Action, names: Iterable[str], clicked: float, **details: Any
     ) -> bool:
-        """Command vehicles; return whether all have accepted. Its strip shows what becomes of it."""
+        """Command vehicles; return whether all have accepted. A strip shows the outcome."""
         return await self.send(Command(action, tuple(names), clicked, **details))
 
     async def send(self, command: Command) -> bool:

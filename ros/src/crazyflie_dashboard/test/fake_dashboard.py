@@ -11,6 +11,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 from crazyflie_dashboard.control import PageControl
+from crazyflie_dashboard.history import History
 from crazyflie_dashboard.moves import formation
 from crazyflie_dashboard.page_data import (
     DryRunResult,
@@ -78,7 +79,9 @@ class FakeDashboard:
         self.commands = []
         self.emergencies = []
         self.flown = []
-        self.fields = []
+        self.fields_shown = []
+        self.watched = ()
+        self.history = History()
         self.typed = []
         self.picture = self.report_file = None
         self.refusals = {}
@@ -115,29 +118,42 @@ class FakeDashboard:
 
     def scene(self):
         is_new = self._scene.made == math.inf
-        return replace(self._scene, made=time.monotonic()) if is_new else self._scene
+        scene = replace(self._scene, made=time.monotonic()) if is_new else self._scene
+        self.history.add(scene)
+        return scene
 
-    def watch(self, page, vehicle):
-        self.watched = vehicle
+    def scene_at(self, moment):
+        return self.history.at(moment)
 
-    def plots(self, page):
+    def events(self):
+        return self.history.events
+
+    def begin(self):
+        return self.history.begin
+
+    def watch(self, page, vehicles):
+        self.watched = tuple(vehicles)
+
+    def plots(self, page, until=None):
         times = tuple(-60 + 0.1 * k for k in range(600))
-        return (
-            Series("height", "m", times, tuple(1 + 0.001 * k for k in range(600))),
+        own = (
+            Series("position z", "m", times, tuple(1 + 0.001 * k for k in range(600))),
             Series("error", "m", times, tuple(0.1 for _ in range(600))),
-            Series("roll", "rad", times, tuple(0.0 for _ in range(600))),
+            Series("roll", "deg", times, tuple(0.0 for _ in range(600))),
             Series("battery", "V", times, tuple(4.0 - 0.0005 * k for k in range(600))),
-            *(Series(path, "", (-1.0, 0.0), (1.0, 2.0)) for path in self.fields),
         )
+        fields = tuple(Series(path, "", (-1.0, 0.0), (1.0, 2.0)) for path in self.fields_shown)
+        return {"": fields, **dict.fromkeys(self.watched, own)}
+
+    def fields(self, vehicle):
+        return {f"/{vehicle}/imu": ["x", "y"], f"/{vehicle}/state": ["state/x"]}
 
     def add_field(self, page, path):
-        if not path.startswith("/"):
-            return failed(RefusalError(f"{path!r} is no topic; expected /topic/field"))
-        self.fields.append(path)
+        self.fields_shown.append(path)
         return done(None)
 
     def remove_field(self, page, path):
-        self.fields.remove(path)
+        self.fields_shown.remove(path)
 
     def progress(self):
         return self.tracked.update(self._scene.vehicles)

@@ -130,6 +130,12 @@ class Browser:
         tab = f"//*[contains(@class,'q-tab__label') and text()='{name}']"
         wait_for(lambda: self.driver.find_element(By.XPATH, tab).click() or True, f"tab {name}")
 
+    def choose_tab(self, tab, *names):
+        """Choose vehicles, then a panel."""
+        self.tab("Vehicles")
+        self.choose(*names)
+        self.tab(tab)
+
     def card(self, name):
         """Return the selector of a vehicle's card."""
         return f'.card[data-vehicle="{name}"]'

@@ -94,7 +94,7 @@ def test_refusals_are_the_words_of_the_service(dashboard, operator):
 
 
 def test_vehicles_fly_and_land(dashboard, operator):
-    dashboard.watch(operator, "cf1")
+    dashboard.watch(operator, ["cf1"])
     assert command(dashboard, operator, Action.TAKEOFF) == dict.fromkeys(NAMES, "")
     wait_until(lambda: all(height(dashboard, n) > 0.9 for n in NAMES), "all up", LIMIT)
     x, y, _ = dashboard.scene().vehicles["cf1"].position
@@ -105,7 +105,7 @@ def test_vehicles_fly_and_land(dashboard, operator):
         "cf1 at its goal",
         LIMIT,
     )
-    shown = {series.name: series for series in dashboard.plots(operator)}
+    shown = {series.name: series for series in dashboard.plots(operator)["cf1"]}
     assert max(shown["position z"].values) > 1.1
     assert {"error", "velocity x", "roll", "thrust", "reference position z"} <= shown.keys()
     assert shown["thrust"].values[-1] == pytest.approx(9.81, abs=3.0)
@@ -128,9 +128,11 @@ def test_a_trajectory_is_rehearsed_flown_and_stopped(dashboard, operator):
 
 def test_fields_of_topics_are_plotted(dashboard, page):
     dashboard.add_field(page, "/cf2/state/state/z").result(LIMIT)
-    wait_until(lambda: any(s.times for s in dashboard.plots(page) if "cf2" in s.name), limit=LIMIT)
+    wait_until(
+        lambda: any(s.times for s in dashboard.plots(page)[""] if "cf2" in s.name), limit=LIMIT
+    )
     # Where it is seen: before those of the vehicle.
-    assert dashboard.plots(page)[0].name == "/cf2/state/state/z"
+    assert dashboard.plots(page)[""][0].name == "/cf2/state/state/z"
     with pytest.raises(RefusalError, match="there is no 'zz' in crazyflie_msgs"):
         dashboard.add_field(page, "/cf2/state/state/zz").result(LIMIT)
 

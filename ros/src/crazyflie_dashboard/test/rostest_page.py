@@ -103,7 +103,7 @@ def test_the_key_of_the_emergency_counts_right_after_loading_with_a_stopped_mast
     browser.has("on the ground", browser.card("cf1"))
     fly(browser, "Take off", "1 in flight")
     # Plotted topics are received for one page only: the subscription begins and ends with the page.
-    wait_for(lambda: dashboard.plots(dashboard.pages.pages[-1]), "plots")
+    wait_for(lambda: "cf1" in dashboard.plots(dashboard.pages.pages[-1]), "plots")
     with stopped(rosgraph.Master("/dashboard").getPid()):
         browser.driver.get(browser.url)
         browser.type(Keys.ESCAPE, Keys.ESCAPE)

@@ -361,7 +361,7 @@ def test_what_a_page_asks_for_does_not_wait_for_callbacks_of_the_node(fleet):
     threading.Thread(target=handle.submit, args=(callback,), daemon=True).start()
     assert is_busy.wait(LIMIT)
     page = dashboard.pages.open(str)
-    dashboard.watch(page, "cf1")
+    dashboard.watch(page, ["cf1"])
     answer = dashboard.command(page, Command(Action.LAND, ("cf1",), 0.0))
     assert not goes_on.is_set() and not answer.done()
     goes_on.set()

@@ -103,9 +103,9 @@ def test_states_are_received_of_watched_vehicles_only(fleet):
         return [name for name in fleet.names if subscribers.get(f"/{name}/state")]
 
     assert states() == []
-    fleet.dashboard.watch(fleet.page, "cf2")
+    fleet.dashboard.watch(fleet.page, ["cf2"])
     assert states() == ["cf2"]
-    fleet.dashboard.watch(fleet.page, "cf1")
+    fleet.dashboard.watch(fleet.page, ["cf1"])
     assert states() == ["cf1"]
     fleet.dashboard.pages.close(fleet.page)
     assert states() == []
@@ -117,7 +117,7 @@ def test_the_age_of_the_control_is_that_of_few_vehicles_and_of_watched_ones(coun
     topics = {f"/{name}/control/final": ControlStamped._type for name in fleet.names}
     fleet.graph = Graph({**fleet.graph.topics, **topics}, services=fleet.graph.services)
     fleet.find()
-    fleet.dashboard.watch(fleet.page, "cf2")
+    fleet.dashboard.watch(fleet.page, ["cf2"])
     for topic in topics.keys() & fleet.process.transport.subscribers.keys():
         fleet.process.publish(topic, ControlStamped())
     fleet.process.advance(0.4)

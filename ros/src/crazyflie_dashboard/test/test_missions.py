@@ -127,7 +127,7 @@ def test_one_mission_flies_at_a_time_until_it_is_stopped(missions, script):
     missions.dry_run(mission, ("cf1",), {}).result(LIMIT)
     end = missions.fly(mission, ("cf1",), {})
     assert missions.running[0].startswith("waits.py")
-    wait_until(lambda: missions.running == ("waits.py takeoff: cf1",))
+    wait_until(lambda: "waits.py · takeoff: cf1" in missions.running[0])
     with pytest.raises(RefusalError, match=r"waits.py is still flying; wait for its end"):
         missions.fly(mission, ("cf1",), {})
     missions.stop()
@@ -142,7 +142,7 @@ def test_a_second_stop_does_not_interrupt_the_landing(missions, script):
     mission = script("waits.py")
     missions.dry_run(mission, ("cf1",), {}).result(LIMIT)
     end = missions.fly(mission, ("cf1",), {})
-    wait_until(lambda: missions.running == ("waits.py takeoff: cf1",))
+    wait_until(lambda: "waits.py · takeoff: cf1" in missions.running[0])
     missions.stop()
     with pytest.raises(
         RefusalError,
@@ -176,7 +176,7 @@ def test_a_mission_outlives_its_dashboard_and_the_next_one_stops_it(script, miss
         assert first.stdout.readline() == b"flies\n"
         first.kill()
     second = Missions(*map(Path, arguments[:2]))
-    wait_until(lambda: second.running == ("waits.py takeoff: cf1",), limit=LIMIT)
+    wait_until(lambda: "waits.py · takeoff: cf1" in second.running[0], limit=LIMIT)
     with pytest.raises(RefusalError, match=r"waits.py is still flying"):
         second.fly(mission, ("cf1",), {})
     second.stop()

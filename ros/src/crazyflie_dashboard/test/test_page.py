@@ -364,16 +364,74 @@ def test_messages_and_plots(browser):
     browser.has("cf2 has a weak link")
     browser.has("move the antenna")
     browser.has("<b>link</b> at 40 %")
-    browser.tab("Plots")
+    browser.choose_tab("Plots", "cf1")
     wait_for(lambda: browser.find(".chart canvas"), "plots")
-    browser.enter("input[aria-label^='another field']", "/cf1/imu/x")
-    browser.press("Add")
-    browser.has("/cf1/imu/x", ".q-chip")
-    browser.find(".q-chip__icon--remove").click()
-    wait_for(lambda: "/cf1/imu" not in browser.text(".panels"), "the field is gone")
     browser.press("Stop")
-    browser.has("height, m", ".q-table")
+    browser.has("position z, m", ".q-table")
     browser.has("0.599", ".q-table")  # The height has risen by so much.
+
+
+def tick(browser, label):
+    node = f"//*[contains(@class,'q-tree__node-header')][.//*[text()='{label}']]"
+    box = f"{node}//*[contains(@class,'q-checkbox')]"
+    wait_for(lambda: browser.driver.find_element("xpath", box).click() or True, label)
+
+
+def test_fields_of_topics_are_plotted_by_a_tree_and_kept_in_the_address(browser, server, driver):
+    browser.choose_tab("Plots", "cf1", "cf2")
+    browser.has("cf1, cf2", ".panels")
+    wait_for(lambda: browser.find(".fields").click() or True, "the tree")
+    tick(browser, "imu")
+    expected = {f"/{name}/imu/{axis}" for name in ("cf1", "cf2") for axis in "xy"}
+    wait_for(lambda: {*server.dashboard.fields_shown} == expected, "fields of both")
+    wait_for(lambda: "imu%2Fx" in driver.current_url, "the layout in the address")
+    driver.get(driver.current_url)
+    wait_for(lambda: {*server.dashboard.fields_shown} >= expected, "fields of the layout")
+    chart = "getElement(document.querySelector('.chart').id.slice(1))"
+    titles = f"return {chart}.options.title.map((each) => each.text)"
+    wait_for(lambda: any("imu/x" in each for each in driver.execute_script(titles)), "its plot")
+
+
+def test_plots_are_kept_as_pictures_and_numbers(browser, driver):
+    browser.choose_tab("Plots", "cf1")
+    wait_for(lambda: browser.find(".chart canvas"), "plots")
+    driver.execute_script(
+        "window.kept = []; const make = URL.createObjectURL;"
+        "URL.createObjectURL = (b) => { b.text().then((t) => kept.push(t)); return make(b); };"
+        "HTMLAnchorElement.prototype.click = function () {"
+        " kept.push(this.download + this.href.slice(0, 22)); }"
+    )
+    for text, sign in (
+        ("SVG", "<svg"),
+        ("PNG", "plots.pngdata:image/png;base64"),
+        ("CSV", "name,unit"),
+    ):
+        browser.press(text)
+        some = f"return kept.some((each) => each.startsWith({sign!r}))"
+        wait_for(lambda some=some: driver.execute_script(some), text)
+
+
+def test_an_earlier_moment_is_shown_and_nothing_is_commanded_then(browser, server, driver):
+    browser.take_control()
+    browser.choose("cf1")
+    server.dashboard.change("cf1", position=(-1.0, 0.0, 0.5), state="before")
+    browser.has("before", browser.card("cf1"))
+    time.sleep(0.5)  # For as long as there are scenes of it.
+    server.dashboard.change("cf1", position=(-1.0, 0.0, 2.0), is_emergency=True, state="after")
+    browser.has("after", browser.card("cf1"))
+    wait_for(lambda: browser.count(".timebar i.error"), "the emergency on the bar")
+    driver.execute_script(
+        "const r = document.querySelector('.timebar input'); r.value = arguments[0];"
+        "r.dispatchEvent(new Event('input'))",
+        -1.2,
+    )
+    browser.has("s ago", ".timebar.past")
+    browser.has("before", browser.card("cf1"))
+    wait_for(lambda: browser.in_scene("vehicles.poses[0][2]") == 0.5, "its place then")
+    assert "past" in browser.button("Take off").get_attribute("title")
+    browser.press("Now")
+    browser.has("after", browser.card("cf1"))
+    wait_for(lambda: browser.in_scene("vehicles.poses[0][2]") == 2.0, "its place now")
 
 
 def test_a_lost_link_is_marked(browser, server):

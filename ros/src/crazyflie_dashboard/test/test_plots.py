@@ -8,9 +8,16 @@ import pytest
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import Imu
 
-from crazyflie_dashboard.page.plots_panel import chart
+from crazyflie_dashboard.page.plots_panel import AXES, chart, lines
 from crazyflie_dashboard.page_data import Series
-from crazyflie_dashboard.plots import Ring, VehiclePlots, expect_field, number_in, split_path
+from crazyflie_dashboard.plots import (
+    Ring,
+    VehiclePlots,
+    expect_field,
+    fields_of,
+    number_in,
+    split_path,
+)
 from crazyflie_dashboard.snapshot import VehicleSnapshot
 from crazyflie_driver.msg import GenericLogData
 from crazyflie_utils.refusal import RefusalError
@@ -40,7 +47,7 @@ def test_the_error_is_the_distance_from_the_reference():
     assert [series.unit for series in plots.series()] == [*"mmmmm", *["m/s"] * 3, "m/s^2", "", ""]
     values = {series.name: (series.values[-1], series.unit) for series in plots.series()}
     assert values["error"] == (pytest.approx(0.5), "m")
-    assert values["thrust"] == (9.81, "m/s^2")
+    assert values["thrust"] == (pytest.approx(9.81), "m/s^2")
     assert values["pm[1]"] == (0.5, "")
 
 
@@ -117,6 +124,32 @@ def test_plots_are_read_while_numbers_come():
 
 
 def test_a_field_without_a_message_says_so():
-    (title,) = chart(SERIES, can_be_measured=False)["title"]
-    assert "/cf1/ref/state/z: no message yet" in title["text"]
-    assert "/cf1/state/state/z}" in title["text"]
+    found = {"": SERIES, "cf1": ()}
+    rows = lines(["cf1"], found, ["ref/state/z", "state/state/z"])
+    empty, _ = chart(rows, can_be_measured=False)["title"]
+    assert "ref/state/z: no message yet" in empty["text"]
+    assert [row.color for row in rows] == [AXES["z"], AXES["z"]]
+
+
+def test_several_vehicles_are_laid_over_each_other_by_field():
+    def of(name):
+        return tuple(Series(f"position {axis}", "m", (-1.0, 0.0), (0.5, 0.6)) for axis in "xz")
+
+    ticked = ["position z", "position x", "roll"]
+    rows = lines(["cf1", "cf2"], {name: of(name) for name in ("cf1", "cf2")}, ticked)
+    assert [(row.plot, row.series.name) for row in rows] == [
+        (("position z",), "cf1"),
+        (("position z",), "cf2"),
+        (("position x",), "cf1"),
+        (("position x",), "cf2"),
+    ]
+    assert rows[0].color == rows[2].color != rows[1].color == rows[3].color
+    (row,) = lines(["cf1"], {"cf1": of("cf1")}, ["position x"])
+    assert (row.plot, row.color) == (("m",), AXES["x"])
+
+
+def test_numbers_of_a_type_are_offered_as_paths():
+    assert "pose/orientation/w" in fields_of("geometry_msgs/PoseStamped")
+    assert "header/stamp" in fields_of("sensor_msgs/Imu")
+    assert not any("covariance" in each for each in fields_of("sensor_msgs/Imu"))
+    assert fields_of("unknown_msgs/Unknown") == []

@@ -2,7 +2,7 @@
 
 import contextlib
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from crazyflie_dashboard.actions import Actions, expect_fresh
 from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.graph_model import GraphModel
+from crazyflie_dashboard.history import Event
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.messages import examine
 from crazyflie_dashboard.page_data import (
@@ -26,6 +27,7 @@ from crazyflie_dashboard.page_data import (
 )
 from crazyflie_dashboard.page_state import PageState
 from crazyflie_dashboard.parameters import LiveParameters
+from crazyflie_dashboard.plots import fields_of
 from crazyflie_dashboard.progress import Commands, Progress
 from crazyflie_dashboard.recording import Recording
 from crazyflie_dashboard.snapshot import Scene
@@ -100,23 +102,50 @@ class Dashboard:
         """Return the newest scene, made 20 times a second while a page is open."""
         return self._model.scene
 
-    def watch(self, page: int, vehicle: str | None) -> None:
-        """Choose the vehicle whose plots a page shows."""
+    def scene_at(self, time: float) -> Scene | None:
+        """Return the scene of a time (s) within the last `history.SPAN`; None without one."""
+        return self._model.history.at(time)
+
+    def events(self) -> tuple[Event, ...]:
+        """Return what has happened in that time: of vehicles, missions and the recording."""
+        return self._model.history.events
+
+    def begin(self) -> float | None:
+        """Return the time of the oldest scene (s)."""
+        return self._model.history.begin
+
+    def watch(self, page: int, vehicles: Iterable[str]) -> None:
+        """Choose the vehicles whose plots a page shows."""
 
         def do():
-            self._page(page).vehicle = vehicle
+            self._page(page).vehicles = tuple(vehicles)
             self._update_watched()
 
         self._submit(do)
 
-    def plots(self, page: int) -> tuple[Series, ...]:
-        """Return the last minute of the page's own fields, and of the chosen vehicle."""
-        state = self._open.get(page)
+    def plots(self, page: int, until: float | None = None) -> dict[str, tuple[Series, ...]]:
+        """Return the minute until a time (s), now by default, of each vehicle that a page watches.
+
+        The page's own fields are those of "".
+        """
+        state, now = self._open.get(page), self._clock() if until is None else until
         if state is None:
-            return ()
-        model = self._model.models.get(state.vehicle or "")
-        plots = model and model.plots
-        return state.series() + (plots.series() if plots else ())
+            return {}
+        found = {"": state.series(now)}
+        for name in state.vehicles:
+            model = self._model.models.get(name)
+            if model is not None and model.plots is not None:
+                found[name] = model.plots.series(now)
+        return found
+
+    def fields(self, vehicle: str) -> dict[str, list[str]]:
+        """Return the topics of a vehicle, each with its fields that are numbers."""
+        model, topics = self._model.models.get(vehicle), self._model.graph.topics
+        if model is None:
+            return {}
+        space = f"{model.vehicle.namespace}/"
+        own = {topic: kind for topic, kind in sorted(topics.items()) if topic.startswith(space)}
+        return {topic: found for topic, kind in own.items() if (found := fields_of(kind))}
 
     def add_field(self, page: int, path: str) -> "Future[None]":
         """Plot a number of any topic, as in /topic/field/other[0], too."""
@@ -318,4 +347,4 @@ class Dashboard:
         (self._model.begin if pages else self._model.end)()
 
     def _update_watched(self):
-        self._model.watch({page.vehicle for page in self._open.values() if page.vehicle})
+        self._model.watch({name for page in self._open.values() for name in page.vehicles})

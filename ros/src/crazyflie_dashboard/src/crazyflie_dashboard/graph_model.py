@@ -17,6 +17,7 @@ from tf2_msgs.msg import TFMessage
 
 from crazyflie_dashboard.discovery import FoundVehicle, Graph, vehicles
 from crazyflie_dashboard.frames import Frames
+from crazyflie_dashboard.history import History
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.messages import Diagnostics, log_line
 from crazyflie_dashboard.page_data import listed
@@ -91,6 +92,7 @@ class GraphModel:
         self._log: deque[LogLine] = deque(maxlen=_MAX_LINES)
         self._numbers = itertools.count(1)
         self._watched: set[str] = set()
+        self.history = History()
         self._poll_at = 0.0  # Infinite while the master is asked.
         self._end_at = math.inf
         self._known_frames = 0
@@ -141,7 +143,10 @@ class GraphModel:
         is_few = len(self.models) <= _FEW
         for name, model in self.models.items():
             model.frame = frame_of(model.vehicle, self.frames, len(self.models) == 1)
+            was_plotted = model.plots is not None
             model.receive(name in self._watched, is_few, self.graph.topics)
+            if model.plots is not None and not was_plotted:
+                model.plots.fill(self.history.of(name))
 
     def _on_timer(self):
         if self.clock() >= self._end_at:
@@ -157,6 +162,7 @@ class GraphModel:
             self._known_frames = len(self.frames.poses)
             self._receive()
         self.scene = self._make_scene()
+        self.history.add(self.scene)
         self.on_scene(self.scene)
 
     def _on_graph(self, done: "Future[Graph]", began: float) -> None:

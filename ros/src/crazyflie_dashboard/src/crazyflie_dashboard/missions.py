@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from pathlib import Path
@@ -79,9 +80,13 @@ class MissionFlight:
 
     @staticmethod
     def begin(
-        folder: Path, title: str, command: list[str], environment: Mapping[str, str]
+        folder: Path,
+        title: str,
+        command: list[str],
+        environment: Mapping[str, str],
+        ends: float | None = None,
     ) -> "MissionFlight":
-        """Start a mission, with its files in a folder."""
+        """Start a mission, with its files in a folder, that ends at a time.time() (s) if known."""
         folder.mkdir(parents=True, exist_ok=True)
         for old in folder.glob("*.out"):
             if not old.with_suffix(".json").exists():
@@ -91,11 +96,18 @@ class MissionFlight:
             process = _start(command, environment, output)
         record = folder / f"{process.pid}.json"
         started.rename(record.with_suffix(".out"))
-        known = {"title": title, "pid": process.pid, "began": _began(process.pid)}
+        known = {"title": title, "pid": process.pid, "began": _began(process.pid), "ends": ends}
         record.write_text(json.dumps({**known, "master": _master(), "is_stopped": False}))
         flight = MissionFlight(record)
         flight.child = process
         return flight
+
+    @property
+    def text(self) -> str:
+        """Its title with its last command, and the time that is left, as far as they are known."""
+        ends = self._known.get("ends")
+        left = "" if ends is None else f"{max(0.0, ends - time.time()):.0f} s left"
+        return " · ".join(filter(None, (self.title, self.command, left)))
 
     def wait(self) -> int:
         """Wait for its end; return its exit status, or 0 if another process started it."""
@@ -163,7 +175,7 @@ class Missions:
         self._folder = folder or Path(rospkg.get_ros_home()) / "crazyflie_missions"
         self._lock = threading.Lock()
         self._flights: list[MissionFlight] = []
-        self._passed: dict[tuple[Any, ...], Mapping[str, Triple]] = {}
+        self._passed: dict[tuple[Any, ...], tuple[Mapping[str, Triple], float | None]] = {}
         for record in self._folder.glob("*.json"):
             try:
                 flight = MissionFlight(record)
@@ -175,9 +187,9 @@ class Missions:
 
     @property
     def running(self) -> tuple[str, ...]:
-        """Titles of running missions, each with its last command if that is known."""
+        """Running missions as texts, see `MissionFlight.text`."""
         with self._lock:
-            return tuple(f"{each.title} {each.command}".strip() for each in self._flights)
+            return tuple(each.text for each in self._flights)
 
     def dry_run(
         self, mission: Path, vehicles: tuple[str, ...], places: Mapping[str, Triple]
@@ -196,7 +208,7 @@ class Missions:
                 return
             if done.passed:
                 with self._lock:
-                    self._passed[key] = dict(places)
+                    self._passed[key] = dict(places), done.duration
             result.set_result(done)
 
         threading.Thread(target=work, daemon=True).start()
@@ -219,7 +231,7 @@ class Missions:
             if self._flights:
                 title = self._flights[0].title
                 raise RefusalError(f"{title} is still flying; wait for its end, or stop it")
-            before = self._passed.get(_key(mission, vehicles))
+            before, duration = self._passed.get(_key(mission, vehicles), (None, None))
             if before is None:
                 raise RefusalError(f"{mission.name}: expected a dry run of it that has passed")
             for name, place in before.items():
@@ -229,7 +241,8 @@ class Missions:
                         "another one"
                     )
         environment = _environment(vehicles)
-        flight = MissionFlight.begin(self._folder, mission.name, command, environment)
+        ends = None if duration is None else time.time() + duration
+        flight = MissionFlight.begin(self._folder, mission.name, command, environment, ends)
 
         def finish(status):
             # Stopped while Python itself was starting: nothing has flown.
@@ -299,7 +312,7 @@ def _run(command: list[str], environment: Mapping[str, str], limit: float) -> Dr
             except ValueError:
                 return DryRunResult(False, f"its result is damaged: {line[:_MAX_OUTPUT]}")
             paths = {name: tuple(map(tuple, path)) for name, path in found["paths"].items()}
-            return DryRunResult(found["passed"], found["text"], paths)
+            return DryRunResult(found["passed"], found["text"], paths, found.get("duration"))
     if process.returncode == 0 and "--sim" in command:
         return DryRunResult(True, "flown by ideal vehicles")
     return DryRunResult(False, _last(output, process.returncode))

@@ -74,6 +74,7 @@ class DryRunResult:
     passed: bool
     text: str
     paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)
+    duration: float | None = None  #: s.
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ class PageState:
     """The vehicle, the fields and the camera that a page shows in addition to the scene."""
 
     def __init__(self, handle: NodeHandle, workers: Executor, clock: Callable[[], float]) -> None:
-        self.vehicle: str | None = None  #: The vehicle whose plots the page shows.
+        self.vehicles: tuple[str, ...] = ()  #: The vehicles whose plots the page shows.
         #: The camera's newest picture, or the reason why it cannot be shown.
         self.image: bytes | str | None = None
         self._handle, self._workers, self._clock = handle, workers, clock
@@ -33,9 +33,8 @@ class PageState:
         self._is_encoding = False
         self._waiting: Any = None  # The newest message that came during a conversion.
 
-    def series(self) -> tuple[Series, ...]:
-        """Return the plots of fields."""
-        now = self._clock()
+    def series(self, now: float) -> tuple[Series, ...]:
+        """Return the plots of fields until ``now`` (s)."""
         return tuple(ring.series(path, now) for path, (_, ring) in list(self._fields.items()))
 
     def add_field(self, path: str, topics: Mapping[str, str]) -> None:

@@ -1,20 +1,23 @@
-"""Numbers of the last minute, to be plotted."""
+"""Numbers of the last minutes, to be plotted."""
 
 import math
 import re
-from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Any
 
+import numpy as np
 import roslib.message
 
+from crazyflie_dashboard.history import SPAN
 from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.snapshot import VehicleSnapshot
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils.refusal import RefusalError
 
-DURATION = 60.0  #: Time that is kept (s).
+WINDOW = 60.0  #: Time that a plot shows (s).
 _PERIOD = 0.05  #: Period of the numbers that are kept (s).
+_SIZE = round(SPAN / _PERIOD)  #: Largest number of them.
 
 #: Types of fields that can be plotted.
 _NUMBERS = {"bool", "byte", "char", "time", "duration", "float32", "float64"} | {
@@ -32,22 +35,30 @@ _MAX_SERIES = 100
 
 
 class Ring:
-    """One plot: (time in s, value), oldest first."""
+    """One plot: the numbers of the last `SPAN`. One thread adds, any reads."""
 
     def __init__(self, unit: str):
         self.unit = unit
-        self._points: deque[tuple[float, float]] = deque(maxlen=round(DURATION / _PERIOD))
+        self._times = np.empty(_SIZE)
+        self._values = np.empty(_SIZE, np.float32)
+        self._count = 0
 
     def add(self, time: float, value: float) -> None:
-        """Store a number, unless the last one is recent enough."""
-        if not self._points or time - self._points[-1][0] >= 0.9 * _PERIOD:
-            self._points.append((time, value))
+        """Store a number at a time (s), unless the last one is recent enough."""
+        last = self._times[(self._count - 1) % _SIZE] if self._count else -math.inf
+        if time - last >= 0.9 * _PERIOD:
+            self._times[self._count % _SIZE] = time
+            self._values[self._count % _SIZE] = value
+            self._count += 1
 
     def series(self, name: str, now: float) -> Series:
-        """Return the last minute before ``now``."""
-        points = [(t - now, value) for t, value in tuple(self._points) if now - t <= DURATION]
-        times, values = zip(*points, strict=True) if points else ((), ())
-        return Series(name, self.unit, times, values)
+        """Return the last `WINDOW` before ``now``."""
+        count = self._count
+        rows = np.arange(max(0, count - _SIZE), count) % _SIZE
+        times = self._times[rows] - now
+        begin, end = np.searchsorted(times, (-WINDOW, 1e-9))
+        values = self._values[rows[begin:end]].astype(float)
+        return Series(name, self.unit, tuple(times[begin:end].tolist()), tuple(values.tolist()))
 
 
 class VehiclePlots:
@@ -83,6 +94,18 @@ class VehiclePlots:
             for index, value in enumerate(row):
                 self._add(f"{name}[{index}]" if len(row) > 1 else name, "", value)
 
+    def fill(self, past: Iterable[tuple[float, VehicleSnapshot]]) -> None:
+        """Store what is known of a vehicle that was not watched: times (s) and snapshots."""
+        time = self._time
+        for at, now in past:
+            self._time = partial(float, at)
+            if now.reference is not None:
+                self.take("reference", now.reference)
+            self.take_pose(now, has_state=False)
+            if now.battery is not None:
+                self.take("battery", (now.battery,))
+        self._time, self._reference = time, None
+
     def take_pose(self, now: VehicleSnapshot, has_state: bool) -> None:
         """Store a snapshot's attitude; without a topic of states also position and velocity."""
         if now.position is None:
@@ -93,9 +116,9 @@ class VehiclePlots:
         if not has_state:
             self.take("state", (*now.position, *(now.velocity or ())))
 
-    def series(self) -> tuple[Series, ...]:
-        """Return all plots, those of a unit together."""
-        now = self._time()
+    def series(self, now: float | None = None) -> tuple[Series, ...]:
+        """Return all plots until ``now`` (s), the present by default, those of a unit together."""
+        now = self._time() if now is None else now
         found = (ring.series(name, now) for name, ring in list(self._rings.items()))
         return tuple(sorted(found, key=lambda each: (*_UNITS, each.unit).index(each.unit)))
 
@@ -105,6 +128,20 @@ class VehiclePlots:
                 return
             self._rings[name] = Ring(unit)
         self._rings[name].add(self._time(), value)
+
+
+def fields_of(kind: str, depth: int = 4) -> list[str]:
+    """Return the numbers of a type of messages, as in pose/position/x; none of lists."""
+    found = roslib.message.get_message_class(kind) if "/" in kind and depth else None
+    if found is None:
+        return []
+    names = []
+    for name, each in zip(found.__slots__, found._slot_types, strict=True):
+        if each in _NUMBERS:
+            names.append(name)
+        elif not each.endswith("]"):
+            names += [f"{name}/{rest}" for rest in fields_of(each, depth - 1)]
+    return names
 
 
 def split_path(path: str, topics: Mapping[str, str]) -> tuple[str, list[str | int]]:

@@ -45,7 +45,7 @@ class Action(Enum):
     IDENTIFY = "which one?"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class VehicleSnapshot:
     """A vehicle."""
 

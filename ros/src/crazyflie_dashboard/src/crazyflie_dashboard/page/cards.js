@@ -8,7 +8,7 @@ const COLUMNS = ["name", "state", "battery", "link", "pose", "position"];
 
 export default {
   template: `<div class="cards">
-    <button v-if="vehicles.length > many" class="view" @click="isTable = !isTable">
+    <button v-if="vehicles.length > many" class="kind-of-view" @click="isTable = !isTable">
       {{ isTable ? "Show cards" : "Show a table" }}</button>
     <table v-if="isTable && vehicles.length > many">
       <thead><tr><th v-for="c in columns" :key="c" :aria-sort="column !== c ? 'none' : sign > 0 ? 'ascending' : 'descending'">
@@ -33,7 +33,7 @@ export default {
         <dt>{{ what }}</dt><dd>{{ value }}</dd></div></dl>
       <div class="acts">
         <button v-for="action in v.actions" :key="action" :class="[action, { pressed: pressed === v.name + action }]"
-                :aria-label="action + ' ' + v.name" :disabled="v.locked && action !== 'emergency'"
+                :aria-label="action + ' ' + v.name" :disabled="Boolean(v.locked) && action !== 'emergency'"
                 :title="title(v, action)"
                 @pointerdown="press(v, action, $event)" @pointerup="release" @pointerleave="release"
                 @click.stop="act(v, action, $event)">{{ action }}</button>
@@ -58,7 +58,7 @@ export default {
     value(vehicle, what) { return this.fact(vehicle, what)[1]; },
     look(vehicle, what) { return this.fact(vehicle, what)[2]; },
     title(vehicle, action) {
-      if (vehicle.locked && action !== "emergency") return "take control first";
+      if (vehicle.locked && action !== "emergency") return vehicle.locked;
       return CONFIRMED.includes(action) ? "press for a second" : null;
     },
     sort(column) {

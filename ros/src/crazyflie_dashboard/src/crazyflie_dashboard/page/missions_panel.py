@@ -105,6 +105,4 @@ class MissionsPanel:
 
 
 def _why_not(session, names):
-    if not session.has_control:
-        return "take control first"
-    return "" if names else "select vehicles first"
+    return session.obstacle or ("" if names else "select vehicles first")

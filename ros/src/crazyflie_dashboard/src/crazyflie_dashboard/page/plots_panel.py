@@ -1,13 +1,15 @@
-"""Plots of the last minute of one vehicle, that can be stopped and measured."""
+"""Plots of a minute of the vehicles that are chosen, that can be stopped, measured and kept."""
 
+import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from nicegui import ui
-from nicegui.events import GenericEventArguments
+from nicegui import context, ui
+from nicegui.events import GenericEventArguments, ValueChangeEventArguments
 
 from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.page_data import Series
@@ -17,29 +19,67 @@ SPAN = 60.0  #: Time that is shown (s).
 MAX_POINTS = 300  #: Largest number of points of a line: the plot has no pixels for more.
 HEIGHT, GAP, TOP = 105, 34, 26  #: Height of a plot, space between two and above the first (px).
 
-COLORS = ["#4ea1ff", "#35c98a", "#ffb545", "#ff6b6b", "#b58cff", "#5fd3e0"]
+#: Colors of lines; those of x, y and z are those of the scene's axes.
+COLORS = ["#4ea1ff", "#ffb545", "#b58cff", "#5fd3e0", "#f178b6", "#b3d465", "#93a0b2", "#e0c9a6"]
+AXES = {"x": "#ff6b6b", "y": "#35c98a", "z": "#4ea1ff"}
+#: What is plotted before anything else is chosen: names of `VehiclePlots`.
+FIRST = (
+    "position x",
+    "position y",
+    "position z",
+    "error",
+    "roll",
+    "pitch",
+    "yaw",
+    "thrust",
+    "battery",
+)
+#: What a vehicle has plots of, if it is received.
+KNOWN = {
+    "position": ("position x", "position y", "position z", "reference position z", "error"),
+    "velocity": ("velocity x", "velocity y", "velocity z"),
+    "attitude": ("roll", "pitch", "yaw"),
+    "other": ("thrust", "battery"),
+}
 
 DIM = {"color": "#93a0b2"}  #: Style of texts in the plots.
+TOOLTIP = {
+    "backgroundColor": "#1a2029",
+    "borderColor": "#2a323e",
+    "textStyle": {"color": "#e4e9f0"},
+}
 SPLIT_LINE = {"lineStyle": {"color": "#2a323e"}}
-NAME_STYLES = {f"c{i}": {"color": color, "fontSize": 11} for i, color in enumerate(COLORS)}
+
+
+class Line(NamedTuple):
+    """A line of a plot: its series, by the name that the plot shows, and its color."""
+
+    plot: tuple[str, ...]  #: Key of the plot.
+    series: Series
+    color: str
 
 
 class PlotsPanel:
-    """One plot for each unit, one below the other, with a common time axis."""
+    """One plot for each unit, or for each field if there are several vehicles, on one time axis."""
 
     def __init__(self, session: Session):
         self._session = session
-        self._series: tuple[Series, ...] = ()
+        self._lines: list[Line] = []
         self._window = (-SPAN, 0.0)
+        self._fields: set[str] = set()  # Paths of fields that are received for this page.
+        self._page = 0  # Its number then.
+        asked = context.client.request.query_params.get("plots", "")
+        self._ticked = [each for each in asked.split(",") if each] or list(FIRST)
         with ui.element("div").classes("tools"):
             self._name = ui.label().classes("choice")
             self._run = ui.button("Stop", on_click=self._turn).props("outline dense icon=pause")
-        with ui.element("div").classes("tools"):
-            self._field = ui.input("another field, as /cf1/pose/pose/position/x")
-            self._field.props("dense outlined").classes("number")
-            ui.button("Add", on_click=self._add).props("outline")
-        self._fields: list[str] = []
-        self._chips = ui.element("div")
+            for text, act in (("PNG", "png"), ("SVG", "svg")):
+                ui.button(text, on_click=lambda act=act: self._picture(act)).props("flat dense")
+            ui.button("CSV", on_click=self._table).props("flat dense")
+        with ui.expansion("Fields").props("dense").classes("fields"):
+            self._tree = ui.tree([], tick_strategy="leaf", on_tick=self._tick)
+            self._tree.props("dense no-transition")
+        self._nodes: list[dict[str, Any]] = []
         self._chart = ui.echart({"series": []}, theme=None).classes("chart")
         self._chart.on("chart:datazoom", self._zoom, ["batch", "start", "end"])
         self._figures = ui.table(
@@ -58,30 +98,78 @@ class PlotsPanel:
         return self._figures.visible
 
     def refresh(self, scene: Scene) -> None:
-        """Draw the newest numbers, unless stopped."""
+        """Draw the newest numbers, or those before the moment that is shown, unless stopped."""
         if self.is_stopped:
             return
-        self._name.text = self._session.watched or "Choose a vehicle to see its plots"
-        self._series = self._session.dashboard.plots(self._session.page)
+        names = self._session.plotted
+        self._name.text = ", ".join(names) or "Select a vehicle to see its plots"
+        self._receive(names)
+        found = self._session.dashboard.plots(self._session.page, self._session.past)
+        self._build_tree(names, found)
+        self._lines = lines(names, found, self._ticked)
         self._draw()
-        # Only fields have the path of a topic as name; a page that reconnects has none.
-        fields = [each.name for each in self._series if each.name.startswith("/")]
-        if fields != self._fields:
-            self._fields = fields
-            self._build_chips()
 
-    def _build_chips(self) -> None:
-        self._chips.clear()
-        with self._chips:
-            for path in self._fields:
-                chip = ui.chip(path, removable=True).props("dense outline")
-                chip.on_value_change(lambda path=path: self._remove(path))
+    def _receive(self, names: Sequence[str]) -> None:
+        """Receive the fields of topics that are ticked, of these vehicles."""
+        paths = [each for each in self._ticked if "/" in each]
+        wanted = {f"{space(name)}{path}" for name in names for path in paths}
+        dashboard, page = self._session.dashboard, self._session.page
+        if page != self._page:
+            self._page, self._fields = page, set()
+        for path in self._fields - wanted:
+            dashboard.remove_field(page, path)
+        for path in wanted - self._fields:
+            # A vehicle without the topic has no line.
+            dashboard.add_field(page, path)
+        self._fields = wanted
 
-    def _remove(self, path: str) -> None:
-        self._session.dashboard.remove_field(self._session.page, path)
+    def _build_tree(self, names, found):
+        known = {series.name for name in names for series in found.get(name, ())}
+        nodes = [
+            _node(group, [each for each in fields if each in known])
+            for group, fields in KNOWN.items()
+        ]
+        nodes.append(
+            _node("log", sorted(known - {each for group in KNOWN.values() for each in group}))
+        )
+        for topic, fields in self._session.dashboard.fields(names[0]).items() if names else ():
+            path = topic.removeprefix(space(names[0]))
+            nodes.append(_node(path, [f"{path}/{field}" for field in fields], f"{path}/"))
+        nodes = [node for node in nodes if node["children"]]
+        if nodes != self._nodes:
+            self._nodes = nodes
+            self._tree.props["nodes"] = nodes
+            self._tree.props["ticked"] = self._ticked
+
+    def _tick(self, event: ValueChangeEventArguments) -> None:
+        self._ticked = list(event.value)
+        # The address has the layout: it can be kept and sent.
+        text = json.dumps(",".join(self._ticked))
+        ui.run_javascript(
+            "const u = new URL(location); u.searchParams.set('plots', "
+            f"{text}); history.replaceState(null, '', u)"
+        )
+        self.refresh(self._session.scene())
+
+    def _picture(self, kind: str) -> None:
+        """Let the browser keep a picture of what is seen."""
+        self._chart.client.run_javascript(PICTURE % (self._chart.id, json.dumps(kind)))
+
+    def _table(self) -> None:
+        """Let the browser keep the numbers that are seen."""
+        rows = (
+            f"{name},{line.series.unit},{time:.3f},{value:.9g}\n"
+            for line in self._lines
+            for name in [f"{' '.join(line.plot)} {line.series.name}".strip()]
+            for time, value in zip(line.series.times, line.series.values, strict=True)
+            if self._window[0] <= time <= self._window[1]
+        )
+        ui.download.content(
+            'name,unit,"time before what is shown, s",value\n' + "".join(rows), "plots.csv"
+        )
 
     def _draw(self) -> None:
-        options = chart(self._series, self.is_stopped)
+        options = chart(self._lines, self.is_stopped)
         self._chart.style(f"height: {options.pop('height')}px")
         if self._chart.options == options:
             return
@@ -104,15 +192,9 @@ class PlotsPanel:
 
     def _measure(self) -> None:
         self._figures.rows = [
-            row for each in self._series if (row := figures(each, *self._window)) is not None
+            row for line in self._lines if (row := figures(line.series, *self._window)) is not None
         ]
         self._figures.update()
-
-    async def _add(self) -> None:
-        path = (self._field.value or "").strip()
-        done = self._session.dashboard.add_field(self._session.page, path)
-        if await self._session.succeeds(done):
-            self._field.value = ""
 
 
 def figures(series: Series, start: float, end: float) -> dict[str, str] | None:
@@ -144,9 +226,46 @@ def points(series: Series) -> list[tuple[float, float | None]]:
     ]
 
 
-def chart(series: Iterable[Series], can_be_measured: bool) -> dict[str, Any]:
+def space(vehicle: str) -> str:
+    """Return the namespace of a vehicle's topics, with a slash at its end."""
+    return f"/{vehicle}/".replace("///", "/")
+
+
+def lines(
+    names: Sequence[str], found: Mapping[str, tuple[Series, ...]], ticked: Sequence[str]
+) -> list[Line]:
+    """Return the lines of what is ticked: those of a unit, or of several vehicles' field, together.
+
+    ``found`` has the series by vehicle, and those of fields, by their whole path, for "".
+    """
+    paths = {series.name: series for series in found.get("", ())}
+    rows = []
+    for k, name in enumerate(names):
+        own = {series.name: series for series in found.get(name, ())}
+        own |= {each: paths[path] for each in ticked if (path := space(name) + each) in paths}
+        for field in ticked:
+            if (series := own.get(field)) is None:
+                continue
+            if len(names) > 1:
+                row = Line((field,), replace(series, name=name), COLORS[k % len(COLORS)])
+            else:
+                is_own = series.unit == "deg" or "/" in field
+                color = AXES.get(field[-1:] if " " in field or "/" in field else "", "")
+                row = Line(
+                    (series.unit, *([field] if is_own else [])), replace(series, name=field), color
+                )
+            rows.append(row)
+    order = list(dict.fromkeys(row.plot for row in rows))
+    rows.sort(key=lambda row: order.index(row.plot))
+    return [
+        row if row.color else row._replace(color=COLORS[k % len(COLORS)])
+        for k, row in enumerate(rows)
+    ]
+
+
+def chart(shown: Iterable[Line], can_be_measured: bool) -> dict[str, Any]:
     """Return the options of ECharts, and the height (px) of all plots: one for each unit."""
-    groups = [list(group) for _, group in groupby(series, key=_plot)]
+    groups = [list(group) for _, group in groupby(shown, key=lambda line: line.plot)]
     count = len(groups)
     tops = [TOP + k * (HEIGHT + GAP) for k in range(count)]
     zoom = {"type": "inside", "xAxisIndex": list(range(count))}
@@ -155,7 +274,7 @@ def chart(series: Iterable[Series], can_be_measured: bool) -> dict[str, Any]:
         "animation": False,
         "textStyle": DIM,
         "title": [_title(group, top) for group, top in zip(groups, tops, strict=True)],
-        "tooltip": {"trigger": "axis", "confine": True, "appendToBody": False},
+        "tooltip": {"trigger": "axis", "confine": True, "appendToBody": False, **TOOLTIP},
         "axisPointer": {"link": [{"xAxisIndex": "all"}]},
         "grid": [{"left": 44, "right": 10, "top": top, "height": HEIGHT} for top in tops],
         "xAxis": [
@@ -164,27 +283,21 @@ def chart(series: Iterable[Series], can_be_measured: bool) -> dict[str, Any]:
         ],
         "yAxis": [_axis(k, {"fontSize": 10}, scale=True, splitNumber=3) for k in range(count)],
         "dataZoom": [zoom] if can_be_measured else [],
-        "series": [
-            _line(each, k, COLORS[i % len(COLORS)])
-            for k, group in enumerate(groups)
-            for i, each in enumerate(group)
-        ],
+        "series": [_line(each, k) for k, group in enumerate(groups) for each in group],
     }
 
 
-def _plot(series: Series) -> tuple[str, str]:
-    """Return the key of a line's plot: its unit, or for an angle its name."""
-    return series.unit, series.name if series.unit == "deg" else ""
-
-
-def _title(group: list[Series], top: int) -> dict[str, Any]:
-    """Return the names of a plot's lines, each in the color of its line, and their unit."""
+def _title(group: list[Line], top: int) -> dict[str, Any]:
+    """Return the names of a plot's lines, each in the color of its line, their field and unit."""
     names = (
-        f"{{c{i % len(COLORS)}|{each.name}{'' if len(each.times) else ': no message yet'}}}"
-        for i, each in enumerate(group)
+        f"{{c{i}|{line.series.name}{'' if len(line.series.times) else ': no message yet'}}}"
+        for i, line in enumerate(group)
     )
-    style = {**DIM, "fontSize": 11, "fontWeight": "normal", "rich": NAME_STYLES}
-    text = f"{'  '.join(names)}   {group[0].unit}"
+    rich = {f"c{i}": {"color": line.color, "fontSize": 11} for i, line in enumerate(group)}
+    style = {**DIM, "fontSize": 11, "fontWeight": "normal", "rich": rich}
+    unit, field = group[0].series.unit, group[0].plot[0]
+    what = "" if field in (unit, group[0].series.name) else f"{field}:  "
+    text = f"{what}{'  '.join(names)}   {unit}"
     return {"text": text, "top": top - 20, "left": 40, "textStyle": style}
 
 
@@ -198,14 +311,34 @@ def _axis(plot: int, label: dict[str, Any], **options: Any) -> dict[str, Any]:
     }
 
 
-def _line(series: Series, plot: int, color: str) -> dict[str, Any]:
+def _line(line: Line, plot: int) -> dict[str, Any]:
     return {
-        "name": series.name,
+        "name": line.series.name,
         "type": "line",
         "xAxisIndex": plot,
         "yAxisIndex": plot,
-        "data": points(series),
+        "data": points(line.series),
         "showSymbol": False,
         "lineStyle": {"width": 1.5},
-        "color": color,
+        "color": line.color,
     }
+
+
+def _node(label, fields, prefix=""):
+    children = [{"id": each, "label": each.removeprefix(prefix)} for each in fields]
+    return {"id": f"{label}:", "label": label, "children": children}
+
+
+#: Keeps the picture of the chart with an id, of a kind: "png" or "svg".
+PICTURE = """
+const chart = getElement(%s).chart, kind = %s, link = document.createElement("a");
+const size = { width: chart.getWidth(), height: chart.getHeight() };
+const { echarts } = await import("nicegui-echart");
+const copy = echarts.init(null, null, { renderer: "svg", ssr: true, ...size });
+copy.setOption({ ...chart.getOption(), backgroundColor: "#12161d" });
+const svg = () => new Blob([copy.renderToSVGString()], { type: "image/svg+xml" });
+link.href = kind === "svg" ? URL.createObjectURL(svg())
+  : chart.getDataURL({ type: "png", pixelRatio: 2, backgroundColor: "#12161d" });
+link.download = "plots." + kind;
+link.click();
+"""

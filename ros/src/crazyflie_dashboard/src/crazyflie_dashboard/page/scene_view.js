@@ -135,6 +135,8 @@ export default {
       this.count = count;
       this.look("all");
     },
+    // While an earlier moment is shown, there are no trails.
+    setPast(isPast) { this.change(() => this.vehicles.setPast(isPast)); },
     setNames(names) {
       this.change(() => this.setVehicles(names));
       if (this.poses) this.update(this.poses);

@@ -1,6 +1,7 @@
 """One open page: its number, its chosen vehicles, and its requests."""
 
 import asyncio
+import time
 from collections.abc import Callable, Iterable, MutableMapping
 from concurrent.futures import Future
 from typing import Any, TypeVar
@@ -9,11 +10,12 @@ from nicegui import Client, app, ui
 
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.page_data import Command
-from crazyflie_dashboard.snapshot import Action, VehicleSnapshot
+from crazyflie_dashboard.snapshot import Action, Scene, VehicleSnapshot
 from crazyflie_utils.refusal import RefusalError
 
 #: Handler in the browser that sends the time of a click; see head.html.
 CLICKED = "(event) => emit(clickTime(event))"
+MAX_PLOTTED = 8  #: Largest number of vehicles whose plots are shown.
 REFUSAL_TIME = 12000  #: Time for which a refusal is shown, ms.
 
 Result = TypeVar("Result")
@@ -34,7 +36,10 @@ class Session:
         #: Its number; 0 while it has no connection. A page that connects again is a new one.
         self.page = 0
         self.chosen: set[str] = set()  #: Names of the vehicles that its buttons command.
-        self.watched: str | None = None  #: The vehicle that was chosen last: its plots are shown.
+        self.watched: str | None = None  #: The vehicle that was chosen last.
+        #: The moment that the page shows, by time.monotonic() (s); None for the present.
+        self.past: float | None = None
+        self.on_seek: Callable[[], None] = lambda: None  #: Called when it has changed.
         #: Called once, when the page is connected, with what it had before it was loaded again.
         self.on_restore: list[Callable[[dict[str, Any]], None]] = []
         self._client = client
@@ -58,7 +63,22 @@ class Session:
             self.chosen, self.watched = set(kept.get("chosen", ())), kept.get("watched")
             for each in restore:
                 each(kept)
-        self.dashboard.watch(self.page, self.watched)
+        self.dashboard.watch(self.page, self.plotted)
+
+    def look_back(self, ago: float | None) -> None:
+        """Show the moment some time ago (s), or the present."""
+        self.past = None if ago is None else time.monotonic() - ago
+        self.on_seek()
+
+    def scene(self) -> Scene:
+        """Return the scene of the moment that is shown."""
+        past = None if self.past is None else self.dashboard.scene_at(self.past)
+        return self.dashboard.scene() if past is None else past
+
+    @property
+    def plotted(self) -> tuple[str, ...]:
+        """The vehicles whose plots are shown: those that are chosen, or the last one that was."""
+        return self.chosen_names[:MAX_PLOTTED] or ((self.watched,) if self.watched else ())
 
     def keep(self, **values: Any) -> None:
         """Keep values, by name, until the page is loaded again in its tab."""
@@ -106,7 +126,7 @@ class Session:
         self.chosen = self.chosen ^ set(names) if is_added else set(names)
         if names:
             self.watched = names[-1]
-            self.dashboard.watch(self.page, self.watched)
+        self.dashboard.watch(self.page, self.plotted)
         self.keep(chosen=sorted(self.chosen), watched=self.watched)
 
     async def result(self, future: "Future[Result]") -> Result | None:
@@ -123,9 +143,11 @@ class Session:
         return True
 
     @property
-    def has_control(self) -> bool:
-        """Whether this page may command vehicles."""
-        return self.page != 0 and self.dashboard.pages.controller == self.page
+    def obstacle(self) -> str:
+        """Why this page cannot command vehicles now; "" if it can."""
+        if self.page == 0 or self.dashboard.pages.controller != self.page:
+            return "take control first"
+        return "" if self.past is None else "what is shown is past: press Now first"
 
     async def command(
         self, action: Action, names: Iterable[str], clicked: float, **details: Any

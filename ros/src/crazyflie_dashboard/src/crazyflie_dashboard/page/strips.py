@@ -27,12 +27,12 @@ class Strips(ValueElement, component="strips.js"):  # type: ignore[call-arg]
         self.on("retry", self._retry)
         self.on("dismiss", self._dismiss)
 
-    def refresh(self, now: float, may_command: bool) -> None:
+    def refresh(self, now: float, obstacle: str) -> None:
         """Show the present state of the commands; ``now`` is time.monotonic() (s)."""
         rows = self._session.dashboard.progress()
         last = rows[-1].number if rows else 0
         shown = [row for row in rows if self._is_shown(row, now, last)][-MOST:]
-        self.value = [strip(row, may_command) for row in shown]
+        self.value = [strip(row, obstacle) for row in shown]
 
     def _is_shown(self, row: Progress, now: float, last: int) -> bool:
         if row.is_open:
@@ -54,7 +54,7 @@ class Strips(ValueElement, component="strips.js"):  # type: ignore[call-arg]
                 await self._session.send(again)
 
 
-def strip(row: Progress, may_command: bool) -> dict[str, Any]:
+def strip(row: Progress, obstacle: str) -> dict[str, Any]:
     """Return the data that strips.js shows of a command."""
     is_failed = row.stage in (Stage.REFUSED, Stage.ENDED)
     return {
@@ -64,6 +64,6 @@ def strip(row: Progress, may_command: bool) -> dict[str, Any]:
         "text": row.text,
         "detail": row.detail,
         "reasons": list(row.reasons),
-        "retry": is_failed and may_command and row.command is not None,
+        "retry": is_failed and not obstacle and row.command is not None,
         "closes": not row.is_open,
     }

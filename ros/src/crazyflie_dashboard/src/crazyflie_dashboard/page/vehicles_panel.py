@@ -81,7 +81,7 @@ class VehiclesPanel:
         names = self._session.chosen_names
         self._choice.text = f"{len(names)} of {len(scene.vehicles)} selected"
         chosen = [scene.vehicles[name] for name in names if name in scene.vehicles]
-        may = self._session.has_control
+        obstacle = self._session.obstacle
         for button, action in (
             (self._up, Action.TAKEOFF),
             (self._down, Action.LAND),
@@ -89,27 +89,27 @@ class VehiclesPanel:
             (self._near, Action.GO_TO),
             (self._reset, Action.RESET),
         ):
-            allow(button, why_not(action, chosen, may))
+            allow(button, obstacle or why_not(action, chosen))
         self._reset.set_visibility(any(each.is_emergency for each in chosen))
         self._hide_goal_that_is_reached(chosen)
         left = {
             name: text
             for row in self._session.dashboard.progress()
-            if row.is_open
+            if row.is_open and self._session.past is None
             for name, text in row.left.items()
         }
         self._cards.value = [
-            card(each, each.name in names, may, left.get(each.name, ""))
+            card(each, each.name in names, obstacle, left.get(each.name, ""))
             for each in scene.vehicles.values()
         ]
 
     def _choose(self, event: GenericEventArguments) -> None:
         self._session.choose([event.args["name"]], event.args["add"])
-        self.refresh(self._session.dashboard.scene())
+        self.refresh(self._session.scene())
 
     def _choose_only(self, names: Iterable[str]) -> None:
         self._session.choose(names)
-        self.refresh(self._session.dashboard.scene())
+        self.refresh(self._session.scene())
 
     async def _act(self, event: GenericEventArguments) -> None:
         names, clicked = [event.args["name"]], event.args["clicked"]
@@ -173,10 +173,8 @@ class VehiclesPanel:
             self._sent = tuple(goal)
 
 
-def why_not(action: Action, vehicles: Sequence[VehicleSnapshot], has_control: bool) -> str:
+def why_not(action: Action, vehicles: Sequence[VehicleSnapshot]) -> str:
     """Return why the selected vehicles cannot be commanded so, or "": one of them is enough."""
-    if not has_control:
-        return "take control first"
     if not vehicles:
         return "select vehicles first"
     if any(action in offered(each, with_moves=True) for each in vehicles):
@@ -186,11 +184,12 @@ def why_not(action: Action, vehicles: Sequence[VehicleSnapshot], has_control: bo
 
 
 def card(
-    vehicle: VehicleSnapshot, is_chosen: bool, has_control: bool = True, left: str = ""
+    vehicle: VehicleSnapshot, is_chosen: bool, obstacle: str = "", left: str = ""
 ) -> dict[str, Any]:
     """Return the data that cards.js shows of a vehicle; a fact is name, value, style.
 
-    ``left`` is what is left of the command that it carries out.
+    ``obstacle`` is why it cannot be commanded, and ``left`` what is left of the command that it
+    carries out.
     """
     battery = "" if vehicle.battery is None else f"{vehicle.battery:.2f} V"
     link = "" if vehicle.link_quality is None else f"{vehicle.link_quality:.0%}"
@@ -222,7 +221,7 @@ def card(
         "actions": actions,
         "charge": None if vehicle.battery is None else _charge(vehicle.battery),
         "chosen": is_chosen,
-        "locked": not has_control,
+        "locked": obstacle,
     }
 
 

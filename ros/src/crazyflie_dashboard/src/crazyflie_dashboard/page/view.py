@@ -20,6 +20,7 @@ from crazyflie_dashboard.page.plots_panel import PlotsPanel
 from crazyflie_dashboard.page.scene_view import SceneView
 from crazyflie_dashboard.page.session import CLICKED, Session, allow
 from crazyflie_dashboard.page.strips import Strips
+from crazyflie_dashboard.page.timebar import TimeBar
 from crazyflie_dashboard.page.vehicles_panel import VehiclesPanel
 from crazyflie_dashboard.snapshot import Scene, Sentence, VehicleSnapshot
 
@@ -42,11 +43,14 @@ class View:
                 self._build_bar()
             with ui.element("div").classes("main"):
                 with ui.element("div").classes("stage"):
-                    self._scene_view = SceneView()
-                    self._build_views()
-                    self._strips = Strips(self._session)
+                    with ui.element("div").classes("view"):
+                        self._scene_view = SceneView()
+                        self._build_views()
+                        self._strips = Strips(self._session)
+                    self._timebar = TimeBar(self._session)
                 with ui.element("div").classes("side"):
                     self._build_panels()
+        self._session.on_seek = self._seek
         ui.timer(SCENE_PERIOD, self._draw)
         ui.timer(PANEL_PERIOD, self._refresh)
 
@@ -123,7 +127,12 @@ class View:
         return replace(scene, vehicles=vehicles, sentences=(held_up, *scene.sentences))
 
     async def _draw(self) -> None:
-        await self._scene_view.show(self._scene(), self._session.chosen)
+        scene = self._scene() if self._session.past is None else self._session.scene()
+        await self._scene_view.show(scene, self._session.chosen)
+
+    def _seek(self) -> None:
+        self._scene_view.run_method("setPast", self._session.past is not None)
+        self._refresh()
 
     def _refresh(self) -> None:
         ui.run_javascript(f"setBeat({time.monotonic()})")
@@ -141,15 +150,17 @@ class View:
             ui.run_javascript(f"alarm({json.dumps(new)})")
         self._alarms = alarms
         self._missions.text = " · ".join(scene.missions)
-        why = "" if self._session.has_control else "take control first"
+        why = self._session.obstacle
         self._stop.set_visibility(bool(scene.missions))
         allow(self._stop, why)
         self._record.text = "Stop recording" if scene.recording == "recording" else "Record"
         is_busy = scene.recording not in ("", "recording")
         allow(self._record, why or (scene.recording if is_busy else ""))
         self._show_control()
-        self._strips.refresh(time.monotonic(), self._session.has_control)
-        self._panels[self._tabs.value].refresh(scene)
+        self._strips.refresh(time.monotonic(), self._session.obstacle)
+        self._timebar.refresh(time.monotonic(), scene)
+        is_now = self._session.past is None
+        self._panels[self._tabs.value].refresh(scene if is_now else self._session.scene())
 
     def _show_control(self) -> None:
         page, controller = self._session.page, self._dashboard.pages.controller

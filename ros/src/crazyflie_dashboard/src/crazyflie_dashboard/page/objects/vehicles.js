@@ -151,7 +151,11 @@ export class Vehicles extends THREE.Group {
     });
     for (const mesh of [this.rings, this.body, ...this.propellers])
       if (mesh.instanceColor) mesh.instanceColor.needsUpdate = true;
-    this.trails.extend(poses);
+    if (this.trails.visible) this.trails.extend(poses);
+  }
+
+  setPast(isPast) {
+    this.trails.visible = !isPast;
   }
 
   // Put the instances where the poses say; a far vehicle is drawn larger, to be seen at all.

@@ -19,6 +19,7 @@ from crazyflie_dashboard.page_data import (
     Series,
 )
 from crazyflie_dashboard.progress import Commands
+from crazyflie_dashboard.recording import Recorded
 from crazyflie_dashboard.snapshot import (
     Action,
     LogLine,
@@ -81,6 +82,7 @@ class FakeDashboard:
         self.flown = []
         self.fields_shown = []
         self.watched = ()
+        self.made = []
         self.history = History()
         self.typed = []
         self.picture = self.report_file = None
@@ -256,8 +258,18 @@ class FakeDashboard:
         self._scene = replace(self._scene, recording="recording" if is_on else "")
         return done(None if is_on else "report.html")
 
-    def report(self):
-        return self.report_file
+    def report(self, names=()):
+        return self.report_file if len(names) < 2 or names in self.made else None
+
+    def recordings(self):
+        return (
+            Recorded("2026-11-29_20-01-02", 75.4, 3_400_000, ("cf1", "cf2"), True),
+            Recorded("2026-11-29_19-00-00", 12.0, 1_000_000, (), False),
+        )
+
+    def make_report(self, names):
+        self.made.append(names)
+        return done("report.html")
 
     def watch_image(self, page, topic):
         return done(None)

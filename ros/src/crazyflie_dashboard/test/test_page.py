@@ -698,7 +698,7 @@ return [...document.querySelectorAll("button, input, select, [role=tab], [role=s
 
 def test_each_control_has_a_label(browser, driver):
     browser.has("3 vehicles")
-    for tab in ("Vehicles", "Plots", "Parameters", "Missions", "Messages", "Cameras"):
+    for tab in ("Vehicles", "Plots", "Parameters", "Missions", "Recordings", "Messages", "Cameras"):
         browser.tab(tab)
         assert driver.execute_script(NAMELESS) == []
 
@@ -716,3 +716,23 @@ def test_a_recording_is_ended_with_a_link_to_its_report(browser, server, tmp_pat
     browser.command("Close", lambda: not browser.count("a.report"), "closed")
     browser.press("Record")
     browser.press("Stop recording")
+
+
+def test_two_recordings_are_compared_on_one_page(browser, server, tmp_path):
+    server.dashboard.report_file = tmp_path / "report.html"
+    server.dashboard.report_file.write_text("<title>two flights</title>")
+    browser.tab("Recordings")
+    browser.has("2 recordings")
+    browser.has("1:15", ".q-table")
+    browser.has("cf1, cf2", ".q-table")
+    boxes = browser.driver.find_elements("css selector", "tbody .q-checkbox")
+    for box in boxes:
+        box.click()
+    browser.press("Compare")
+    link = wait_for(lambda: browser.find("a.report"), "the link")
+    names = ("2026-11-29_20-01-02", "2026-11-29_19-00-00")
+    assert server.dashboard.made == [names]
+    address = link.get_attribute("href")
+    assert address.endswith("/report?" + "&".join(f"of={name}" for name in names))
+    with urllib.request.urlopen(address) as answer:
+        assert answer.read() == b"<title>two flights</title>"

@@ -1,11 +1,12 @@
 """Recordings: begun, ended, and made into a report."""
 
+import os
 import subprocess
 import sys
 
 import pytest
 
-from crazyflie_dashboard.recording import Recording
+from crazyflie_dashboard.recording import Recorded, Recording
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.testing.programs import wait_until
 
@@ -22,10 +23,11 @@ except KeyboardInterrupt:
 """
 REPORT = """
 import pathlib, sys
-folder, _, out = sys.argv[1:]
-assert pathlib.Path(folder, "flight.bag").exists()
-pathlib.Path(out).mkdir()
-pathlib.Path(out, "report.html").write_text("the report")
+*folders, _, out = map(pathlib.Path, sys.argv[1:])
+assert all((each / "flight.bag").exists() for each in folders)
+out.mkdir(parents=True)
+names = ", ".join(each.name for each in folders)
+(out / "report.html").write_text("the report on " + names)
 """
 
 
@@ -80,3 +82,27 @@ def test_a_recording_whose_report_cannot_be_made_is_ended_and_says_so(recording,
     with pytest.raises(RefusalError, match="recording: no flight_report; build the workspace"):
         recording.stop().result(LIMIT)
     assert recording.text == ""
+
+
+def test_recordings_are_listed_and_two_become_one_report(recording, tmp_path):
+    assert recording.known() == ()
+    for name in ("2026-11-24", "2026-11-25"):
+        folder = tmp_path / "flights" / name
+        folder.mkdir(parents=True)
+        text = "cf1:\n  buffer: 0.1\n  place_in_fleet: 0\nfleet:\n  n: 1\n"
+        (folder / "parameters.yaml").write_text(text)
+        (folder / "flight.bag").write_bytes(b"bag")
+        os.utime(folder / "parameters.yaml", (1000.0, 1000.0))
+        os.utime(folder / "flight.bag", (1012.0, 1012.0))
+    newest, _ = recording.known()
+    assert newest == Recorded("2026-11-25", 12.0, 3, ("cf1",), False)
+    assert recording.report_on(["2026-11-25"]) is None
+    assert recording.make_report(["2026-11-25"]).endswith("2026-11-25/report/report.html")
+    assert recording.known()[0].has_report
+    for names in ([], ["../flights"], ["2026-11-25", "2026-11-26"]):
+        assert recording.report_on(names) is None
+        with pytest.raises(RefusalError, match="expected one or two of: 2026-11-25, 2026-11-24"):
+            recording.make_report(names)
+    both = ["2026-11-24", "2026-11-25"]
+    recording.make_report(both)
+    assert recording.report_on(both).read_text() == "the report on 2026-11-24, 2026-11-25"

@@ -29,7 +29,7 @@ from crazyflie_dashboard.page_state import PageState
 from crazyflie_dashboard.parameters import LiveParameters
 from crazyflie_dashboard.plots import fields_of
 from crazyflie_dashboard.progress import Commands, Progress
-from crazyflie_dashboard.recording import Recording
+from crazyflie_dashboard.recording import Recorded, Recording
 from crazyflie_dashboard.snapshot import Scene
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
@@ -85,7 +85,7 @@ class Dashboard:
         self._missions = missions.Missions()
         self._model.missions = lambda: self._missions.running
         self._recording = Recording()
-        self._model.recording = lambda: self._recording.text
+        self._model.recording = lambda: (self._recording.text, self._recording.length)
         self._open: dict[int, PageState] = {}
         self.pages.log = handle.info
         self.pages.on_change = lambda: self._submit(self._follow_pages)
@@ -257,9 +257,17 @@ class Dashboard:
             return self._control(page, "record", self._recording.start)
         return self._control(page, "stop recording", self._recording.stop)
 
-    def report(self) -> Path | None:
-        """Return the report on the last recording that was ended here."""
-        return self._recording.report
+    def recordings(self) -> tuple[Recorded, ...]:
+        """Return the recordings in the folder of recordings, the newest first."""
+        return self._recording.known()
+
+    def report(self, names: tuple[str, ...] = ()) -> Path | None:
+        """Return the report on one recording or two; by default on the last one ended here."""
+        return self._recording.report_on(names) if names else self._recording.report
+
+    def make_report(self, names: tuple[str, ...]) -> "Future[str]":
+        """Make a report on a recording, or on two side by side."""
+        return self._do(lambda: self._workers.submit(self._recording.make_report, names))
 
     def examine(self) -> "Future[None]":
         """Run the doctor on the graph: its findings are in the scene 10 s later."""

@@ -79,7 +79,7 @@ class GraphModel:
         self.paths: Mapping[str, tuple[Triple, ...]] = {}
         self.sentences: tuple[Sentence, ...] = ()
         self.missions: Callable[[], tuple[str, ...]] = tuple
-        self.recording: Callable[[], str] = str
+        self.recording: Callable[[], tuple[str, str]] = lambda: ("", "")
         #: Called with each new scene.
         self.on_scene: Callable[[Scene], object] = lambda scene: None
         #: handle, workers, master, clock: Also of those that command what is here.
@@ -217,6 +217,7 @@ class GraphModel:
             model.now = self._snapshot(name, fixed)
             if model.plots is not None:
                 model.plots.take_pose(model.now, "state" in model.vehicle.topics)
+        recording, recorded = self.recording()
         others = []
         for name in frames.poses.keys() - own:
             pose = frames.in_fixed(name, fixed)
@@ -236,7 +237,8 @@ class GraphModel:
             log=tuple(self._log),
             images=tuple(sorted(t for t, kind in self.graph.topics.items() if kind in IMAGES)),
             missions=self.missions(),
-            recording=self.recording(),
+            recording=recording,
+            recorded=recorded,
         )
 
     def _snapshot(self, name, fixed):

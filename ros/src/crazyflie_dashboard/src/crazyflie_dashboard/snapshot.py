@@ -150,3 +150,4 @@ class Scene:
     images: tuple[str, ...] = ()  #: Topics of cameras.
     missions: tuple[str, ...] = ()  #: Running missions, as `Missions.running`.
     recording: str = ""  #: State of a recording that was begun here.
+    recorded: str = ""  #: Its time and size.

@@ -54,10 +54,11 @@ async def _camera(dashboard: Dashboard, request: Request) -> Response:
 
 
 async def _report(dashboard: Dashboard, request: Request) -> Response:
-    """Answer with the report on the last recording."""
-    report = dashboard.report()
+    """Answer with the report on the last recording, or on one or two that are named."""
+    names = tuple(request.query_params.getlist("of"))
+    report = dashboard.report(names)
     if report is None:
-        return PlainTextResponse("This dashboard has not completed a recording.\n", 404)
+        return PlainTextResponse("There is no such report.\n", 404)
     return FileResponse(report, media_type="text/html")
 
 

@@ -102,11 +102,11 @@ class Session:
                 text, type=kind, position="bottom-left", timeout=timeout, close_button="close"
             )
 
-    def show_report(self) -> None:
-        """Offer the report on the last recording."""
+    def show_report(self, query: str = "") -> None:
+        """Offer a report; by default that on the last recording."""
         with self._client, ui.dialog() as dialog, ui.card():
-            ui.label("The recording has ended, and its report is made.")
-            ui.link("Open the report", "/report", new_tab=True).classes("report")
+            ui.label("The report is ready.")
+            ui.link("Open the report", f"/report?{query}", new_tab=True).classes("report")
             ui.button("Close", on_click=dialog.close).props("flat")
         dialog.open()
 

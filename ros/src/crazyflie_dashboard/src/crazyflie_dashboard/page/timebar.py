@@ -36,7 +36,9 @@ class TimeBar(ValueElement, component="timebar.js"):  # type: ignore[call-arg]
         # Rounded: a mark that moves all the time would be sent all the time.
         events = [[STEP * round((now - at) / STEP), level, text] for at, level, text in marks]
         ago = None if past is None else round(now - past, 1)
-        self.value = _bar(kept, ago, events, " · ".join(live.missions), live.recording)
+        self.value = _bar(
+            kept, ago, events, " · ".join(live.missions), live.recorded or live.recording
+        )
 
     def _seek(self, event: GenericEventArguments) -> None:
         self._session.look_back(event.args)

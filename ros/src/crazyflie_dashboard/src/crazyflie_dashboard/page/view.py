@@ -17,6 +17,7 @@ from crazyflie_dashboard.page.messages_panel import MessagesPanel
 from crazyflie_dashboard.page.missions_panel import MissionsPanel
 from crazyflie_dashboard.page.parameters_panel import ParametersPanel
 from crazyflie_dashboard.page.plots_panel import PlotsPanel
+from crazyflie_dashboard.page.recordings_panel import RecordingsPanel
 from crazyflie_dashboard.page.scene_view import SceneView
 from crazyflie_dashboard.page.session import CLICKED, Session, allow
 from crazyflie_dashboard.page.strips import Strips
@@ -92,6 +93,7 @@ class View:
             "Plots": PlotsPanel,
             "Parameters": ParametersPanel,
             "Missions": MissionsPanel,
+            "Recordings": RecordingsPanel,
             "Messages": MessagesPanel,
             "Cameras": CamerasPanel,
         }
@@ -153,7 +155,9 @@ class View:
         why = self._session.obstacle
         self._stop.set_visibility(bool(scene.missions))
         allow(self._stop, why)
-        self._record.text = "Stop recording" if scene.recording == "recording" else "Record"
+        is_on = scene.recording == "recording"
+        self._record.text = f"Stop recording {scene.recorded}".strip() if is_on else "Record"
+        self._record.classes(add="recording" if is_on else "", remove="" if is_on else "recording")
         is_busy = scene.recording not in ("", "recording")
         allow(self._record, why or (scene.recording if is_busy else ""))
         self._show_control()

@@ -83,6 +83,7 @@ class FakeDashboard:
         self.fields_shown = []
         self.watched = ()
         self.made = []
+        self.saved = {}
         self.history = History()
         self.typed = []
         self.picture = self.report_file = None
@@ -230,7 +231,12 @@ class FakeDashboard:
         return (
             Path("/missions/square.py"),
             Path("/trajectories/eight.csv"),
+            *map(Path, self.saved),
         )
+
+    def save_waypoints(self, name, points):
+        self.saved[f"/waypoints/{name}.py"] = points
+        return done(Path(f"/waypoints/{name}.py"))
 
     def dry_run(self, page, mission, vehicles):
         if mission.suffix == ".csv":

@@ -155,9 +155,10 @@ class Browser:
         """Click on the floor, m."""
         self.click_scene(x, y, 0.0)
 
-    def click_scene(self, x, y, z):
-        """Click on what is at a point of the scene, m."""
-        self._pointer_at((x, y, z)).click().perform()
+    def click_scene(self, x, y, z, key=""):
+        """Click on what is at a point of the scene, m, while a key is down."""
+        chain = self._pointer_at((x, y, z))
+        (chain.key_down(key).click().key_up(key) if key else chain.click()).perform()
 
     def drag_scene(self, start, end):
         """Drag what is at a point of the scene, m, to another one."""

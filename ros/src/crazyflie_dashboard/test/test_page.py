@@ -7,6 +7,7 @@ import threading
 import time
 import urllib.request
 from concurrent.futures import Future
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ from selenium.webdriver.common.keys import Keys
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
+from crazyflie_dashboard.history import History
 from crazyflie_dashboard.snapshot import Action, LogLine, Placed, Sentence
 from crazyflie_dashboard.surroundings import grouped
 from crazyflie_takeoff.envelope import Box
@@ -415,15 +417,15 @@ def test_an_earlier_moment_is_shown_and_nothing_is_commanded_then(browser, serve
     browser.take_control()
     browser.choose("cf1")
     server.dashboard.change("cf1", position=(-1.0, 0.0, 0.5), state="before")
-    browser.has("before", browser.card("cf1"))
-    time.sleep(0.5)  # For as long as there are scenes of it.
+    before = replace(server.dashboard.scene(), made=time.monotonic() - 50.0)
     server.dashboard.change("cf1", position=(-1.0, 0.0, 2.0), is_emergency=True, state="after")
+    server.dashboard.history = History()
+    server.dashboard.history.add(before)
     browser.has("after", browser.card("cf1"))
     wait_for(lambda: browser.count(".timebar i.error"), "the emergency on the bar")
     driver.execute_script(
-        "const r = document.querySelector('.timebar input'); r.value = arguments[0];"
-        "r.dispatchEvent(new Event('input'))",
-        -1.2,
+        "const r = document.querySelector('.timebar input'); r.value = -30;"
+        "r.dispatchEvent(new Event('input'))"
     )
     browser.has("s ago", ".timebar.past")
     browser.has("before", browser.card("cf1"))
@@ -736,3 +738,45 @@ def test_two_recordings_are_compared_on_one_page(browser, server, tmp_path):
     assert address.endswith("/report?" + "&".join(f"of={name}" for name in names))
     with urllib.request.urlopen(address) as answer:
         assert answer.read() == b"<title>two flights</title>"
+
+
+def test_waypoints_are_set_dragged_inserted_undone_and_saved(browser, server):
+    def points():
+        return [
+            [round(v, 1) for v in p]
+            for p in browser.in_scene("waypoints.points.map((p) => p.toArray())")
+        ]
+
+    browser.take_control()
+    browser.choose_tab("Missions", "cf1")
+    wait_for(lambda: browser.find(".q-tab-panel .q-toggle").click() or True, "the switch")
+    wait_for(lambda: browser.in_scene("isWaypointing"), "waypoints")
+    for x, y in ((0.5, -1.0), (-0.7, -1.0)):
+        count = len(points())
+        browser.click_floor(x, y)
+        wait_for(lambda count=count: len(points()) == count + 1, "one more")
+    assert points() == [[0.5, -1.0, 1.0], [-0.7, -1.0, 1.0]]
+    browser.drag_scene((0.5, -1.0, 1.0), (0.8, -0.8, 1.0))
+    wait_for(lambda: points()[0] == [0.8, -0.8, 1.0], "the first one is moved")
+    browser.click_scene(0.05, -0.9, 1.0)
+    wait_for(lambda: len(points()) == 3, "one between them")
+    assert points()[0] == [0.8, -0.8, 1.0] and points()[2] == [-0.7, -1.0, 1.0]
+    browser.press("Undo")
+    wait_for(lambda: len(points()) == 2, "as before")
+    browser.press("Save")
+    wait_for(lambda: server.dashboard.saved, "the mission")
+    browser.press("Dry run")
+    browser.has("The dry run has passed")
+    ((path, saved),) = server.dashboard.saved.items()
+    assert path == "/waypoints/waypoints.py"
+    assert saved[1] == pytest.approx((-0.7, -1.0, 1.0), abs=0.03)
+
+
+def test_the_distance_of_two_points_is_shown(browser, driver):
+    browser.has("3 vehicles")
+    for point in ((-0.5, -1.0, 0.0), (0.5, -1.0, 0.0)):
+        browser.click_scene(*point, key=Keys.SHIFT)
+    wait_for(lambda: browser.in_scene("measure.points.length") == 2, "two points")
+    browser.has(" m", ".tag.measure")
+    assert float(browser.text(".tag.measure").split()[0]) == pytest.approx(1.0, abs=0.03)
+    browser.has("0 of 3 selected")

@@ -7,7 +7,9 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from crazyflie_dashboard import missions
+import rospkg
+
+from crazyflie_dashboard import missions, waypoints
 from crazyflie_dashboard.actions import Actions, expect_fresh
 from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.emergency import EmergencyLane
@@ -71,7 +73,10 @@ class Dashboard:
     ):
         #: Opens and closes every page; a method's ``page`` is its number.
         self.pages = PageControl()
-        self._handle, self._folders, self._clock = handle, folders, clock
+        #: Folder of missions that are made of waypoints.
+        self._waypoints = Path(rospkg.get_ros_home(), "crazyflie_waypoints")
+        self._handle, self._clock = handle, clock
+        self._folders = [*folders, str(self._waypoints)]
         self._workers = workers or ThreadPoolExecutor(8, "dashboard")
         # A thread that submits work to an idle node also carries out the queue: this thread does
         # so, not the one that serves all pages.
@@ -202,6 +207,10 @@ class Dashboard:
     def mission_files(self) -> tuple[Path, ...]:
         """Return the missions and trajectories that can be flown."""
         return missions.listed(self._folders)
+
+    def save_waypoints(self, name: str, points: waypoints.Points) -> "Future[Path]":
+        """Save waypoints (m) as a mission of a name; return its file."""
+        return self._do(waypoints.save, self._waypoints, name, points)
 
     def dry_run(
         self, page: int, mission: Path, vehicles: tuple[str, ...]

@@ -29,6 +29,9 @@ export default {
       <div v-if="v.reason" class="reason">{{ v.reason }}</div>
       <div v-if="v.charge !== null" class="charge" role="meter" aria-label="charge of the battery" aria-valuemin="0"
         aria-valuemax="100" :aria-valuenow="Math.round(100 * v.charge)"><i :style="{ width: 100 * v.charge + '%' }"></i></div>
+      <svg v-if="v.attitude" class="horizon" viewBox="-20 -20 40 40" role="img" :aria-label="'roll ' + v.attitude[0] + ' deg, pitch ' + v.attitude[1] + ' deg'">
+        <g :transform="'rotate(' + -v.attitude[0] + ') translate(0 ' + v.attitude[1] / 2 + ')'"><rect class="sky" x="-40" y="-60" width="80" height="60"/>
+          <rect class="earth" x="-40" y="0" width="80" height="60"/></g><path d="M-14 0H-5M5 0H14M0 0V1"/></svg>
       <dl><div v-for="[what, value, look] in v.facts" :key="what" :class="look">
         <dt>{{ what }}</dt><dd>{{ value }}</dd></div></dl>
       <div class="acts">

@@ -8,7 +8,9 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from crazyflie_dashboard.page.scene_view import SceneView
 from crazyflie_dashboard.page.session import CLICKED, Session, allow
+from crazyflie_dashboard.page.waypoints_bar import WaypointsBar
 from crazyflie_dashboard.page_data import listed
 from crazyflie_dashboard.snapshot import Scene
 from crazyflie_utils.refusal import RefusalError
@@ -17,7 +19,7 @@ from crazyflie_utils.refusal import RefusalError
 class MissionsPanel:
     """A list of what can be flown; it flies after its dry run has passed."""
 
-    def __init__(self, session: Session):
+    def __init__(self, session: Session, scene_view: SceneView):
         self._session = session
         #: The mission and the vehicles whose dry run has passed.
         self._passed: tuple[str, tuple[str, ...]] | None = None
@@ -34,6 +36,7 @@ class MissionsPanel:
             "checks speeds, distances and fences; nothing moves. When it has passed, Fly flies it. "
             "For missions of your own: dashboard.launch folders:=DIRECTORY."
         ).classes("hint apart")
+        WaypointsBar(session, scene_view, self._choose)
         self._result = ui.label().classes("result")
         self._running = ui.label().classes("hint")
         self.list_files()
@@ -44,6 +47,12 @@ class MissionsPanel:
         if mission in self._file.options:
             self._file.value = mission
             self._passed = (mission, names) if names else None
+
+    def _choose(self, path: Path) -> None:
+        """Choose a mission that was saved; a file of this name may have been another one."""
+        self.list_files()
+        self._forget()
+        self._file.value = str(path)
 
     def list_files(self) -> None:
         """Show the missions and trajectories that there are now."""

@@ -1,7 +1,7 @@
 // The vehicles and what is around them in three dimensions.
 
 import { CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
-import { FEW, Goal, Surroundings, Vehicles } from "dashboard-objects";
+import { FEW, Goal, Measure, Surroundings, Vehicles, Waypoints } from "dashboard-objects";
 
 const LABEL_PERIOD = 0.2;  // Between two layouts of more names than FEW, s: they cost more than all else.
 const FLOOR = "void main() { gl_FragColor = vec4(0.106, 0.133, 0.173, 1.0); }";  // It is most of the picture.
@@ -39,8 +39,10 @@ export default {
     const grid = new THREE.GridHelper(20, 20, "#56657a", "#2f3947").rotateX(Math.PI / 2);
     this.surroundings = new Surroundings();
     this.goal = new Goal();
+    this.waypoints = new Waypoints();
+    this.measure = new Measure();
     this.scene.add(new THREE.HemisphereLight("#ffffff", "#30343c", 2.2), sun, floor, grid,
-      new THREE.AxesHelper(0.3), this.surroundings, this.goal);
+      new THREE.AxesHelper(0.3), this.surroundings, this.goal, this.waypoints, this.measure);
     this.setVehicles([]);
     this.listen();
     this.observer = new ResizeObserver(() => this.resize());
@@ -146,6 +148,8 @@ export default {
     setFences(fences) { this.change(() => this.surroundings.setFences(fences)); },
     setPaths(paths) { this.change(() => this.surroundings.setPaths(paths)); },
     setFrames(frames) { this.change(() => this.surroundings.setFrames(frames)); },
+    setWaypoints(points) { this.change(() => this.waypoints.show(points)); },
+    setWaypointing(isOn) { this.isWaypointing = isOn; },
     setGoal(goal) { this.change(() => this.goal.show(goal)); },
 
     // Look from above, at all, or follow the vehicle of a name until another view is chosen.
@@ -183,7 +187,7 @@ export default {
 
     // A click on a vehicle chooses it, one on the floor sets the goal, whose handle can be dragged.
     listen() {
-      let start = null, isDragging = false;
+      let start = null, isDragging = false, dragged = null;
       const on = (name, act) => this.$el.addEventListener(name, act, { capture: true });
       const tell = ({ x, y }) => this.$emit("goal", { x, y });
       on("wheel", () => { this.isTouched = true; });
@@ -191,25 +195,38 @@ export default {
         this.isTouched = true;  // All vehicles that come are in the view until then.
         start = [event.clientX, event.clientY];
         isDragging = this.goal.visible && this.ray(event).intersectObject(this.goal.handle).length > 0;
-        if (isDragging) event.stopPropagation();  // The view is not to turn.
+        dragged = this.isWaypointing ? this.waypoints.hit(this.ray(event)) : null;
+        if (isDragging || dragged) event.stopPropagation();  // The view is not to turn.
       });
       on("pointermove", (event) => {
         const place = isDragging && this.pointAt(event, this.goal.height);
         if (place) this.change(() => this.goal.moveTo(place.x, place.y));
+        const there = dragged && this.pointAt(event, dragged.z);
+        if (there) this.change(() => this.waypoints.moveTo(dragged.number, there));
       });
       on("pointerup", (event) => {
         if (start === null || event.button !== 0) return;
         const isClick = Math.hypot(event.clientX - start[0], event.clientY - start[1]) < CLICK;
         start = null;
+        const tellWaypoint = (number, { x, y }, z, moves) => this.$emit("waypoint", { number, x, y, z, moves });
         if (isDragging) {
           isDragging = false;
           tell(this.goal.position);
+        } else if (dragged) {
+          tellWaypoint(dragged.number, this.waypoints.points[dragged.number], null, true);
+          dragged = null;
         } else if (isClick) {
           const hit = this.ray(event).intersectObject(this.vehicles.body)[0];
           const place = this.pointAt(event, 0);
-          if (hit) {
+          const on = this.isWaypointing && this.waypoints.hitLine(this.ray(event));
+          if (event.shiftKey) {
+            const point = hit ? this.vehicles.positionOf(this.vehicles.names[hit.instanceId]) : place;
+            if (point) this.change(() => this.measure.mark(point));
+          } else if (on) tellWaypoint(on.number, on.point, on.point.z, false);
+          else if (this.isWaypointing && place) tellWaypoint(this.waypoints.points.length, place, null, false);
+          else if (hit) {
             this.$emit("choose", { name: this.vehicles.names[hit.instanceId],
-              add: event.ctrlKey || event.shiftKey });
+              add: event.ctrlKey });
           } else if (place) tell(place);
         }
       });

@@ -125,6 +125,10 @@ class SceneView(
         """Draw the goal of a go-to command: x, y, z (m) and yaw (rad, or None)."""
         self._send("setGoal", [goal])
 
+    def show_waypoints(self, points: Iterable[Triple]) -> None:
+        """Draw waypoints (m) and the line through them."""
+        self._send("setWaypoints", [[*points]])
+
     def look(self, view: str, name: str | None = None) -> None:
         """Set the view: from "above", on "all", or "follow" a vehicle."""
         self.run_method("look", view, name)

@@ -13,6 +13,7 @@ from crazyflie_dashboard.page.scene_view import SceneView, condition
 from crazyflie_dashboard.page.session import CLICKED, Session, allow
 from crazyflie_dashboard.progress import REACHED
 from crazyflie_dashboard.snapshot import Action, Scene, VehicleSnapshot
+from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.flight_status import WORDS
 
@@ -173,6 +174,12 @@ class VehiclesPanel:
             self._sent = tuple(goal)
 
 
+def attitude(vehicle: VehicleSnapshot) -> list[int]:
+    """Return roll and pitch, in steps of 2 deg: a card that trembles would be sent all the time."""
+    roll, pitch, _ = rpy_from_quaternion(*vehicle.rotation)
+    return [2 * round(math.degrees(angle) / 2.0) for angle in (roll, pitch)]
+
+
 def why_not(action: Action, vehicles: Sequence[VehicleSnapshot]) -> str:
     """Return why the selected vehicles cannot be commanded so, or "": one of them is enough."""
     if not vehicles:
@@ -217,6 +224,7 @@ def card(
         "state": "no pose" if vehicle.pose_age is None and vehicle.is_stale else vehicle.state,
         "reason": _reason(vehicle),
         "look": LOOKS[condition(vehicle)],
+        "attitude": None if vehicle.position is None else attitude(vehicle),
         "facts": [fact for fact in facts if fact[1]],
         "actions": actions,
         "charge": None if vehicle.battery is None else _charge(vehicle.battery),

@@ -92,7 +92,7 @@ class View:
             "Vehicles": partial(VehiclesPanel, scene_view=self._scene_view),
             "Plots": PlotsPanel,
             "Parameters": ParametersPanel,
-            "Missions": MissionsPanel,
+            "Missions": partial(MissionsPanel, scene_view=self._scene_view),
             "Recordings": RecordingsPanel,
             "Messages": MessagesPanel,
             "Cameras": CamerasPanel,

@@ -103,6 +103,7 @@ def test_no_control_of_a_ramp_fades_and_none_in_flight_or_on_the_ground(state, t
 )
 def test_hover_is_learned_between_states_that_follow_each_other_in_flight(step, is_flown, learned):
     facts = Facts(TIMEOUTS, LIMITS)
+    facts.set_hover(G)
     facts.measure(1.0, at(1.0))
     facts.flown = level(G + 1.0) if is_flown else None
     facts.measure(1.0 + step, at(1.0))
@@ -111,6 +112,7 @@ def test_hover_is_learned_between_states_that_follow_each_other_in_flight(step, 
 
 def test_what_a_vehicle_accelerates_by_is_not_learned():
     facts = Facts(TIMEOUTS, LIMITS)
+    facts.set_hover(G)
     facts.flown = level(G + 1.0)
     for tick in range(200):
         climb = 0.01 * max(tick - LAG / 0.01, 0.0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.fallback import MAX_BRAKING, MAX_SUBSTITUTE, SafeSetpoint, limited
-from crazyflie_takeoff.hover_thrust import HOVER_RANGE
+from crazyflie_takeoff.hover_thrust import LEAST_HOVER
 from crazyflie_takeoff.motion import Motion
 
 CLIMB_RESPONSE = 0.1  #: Time constant with which a climb approaches its limit (s).
@@ -22,7 +22,7 @@ MAX_SPEED_CHANGE = 0.5  #: Change of the speed by a control while the filter doe
 LONG_PAUSE = 0.2
 
 #: Largest difference between the thrust of a control and that of hover (m/s^2).
-_MAX_EXCESS = MAX_THRUST - (1.0 - HOVER_RANGE) * GRAVITY
+_MAX_EXCESS = MAX_THRUST - LEAST_HOVER
 
 
 @dataclass(frozen=True)

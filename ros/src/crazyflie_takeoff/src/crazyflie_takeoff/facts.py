@@ -9,7 +9,6 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.envelope import (
     Box,
     Limits,
@@ -101,9 +100,11 @@ class Facts:
         self.outside = ""  #: What is wrong with the position; empty if nothing is.
         self.ground = Ground()
         self.is_near_limit = False  #: Whether controls in their ranges may climb too far.
-        self.set_hover(GRAVITY)
+        self.set_hover(None)
         #: The commanded control that flies the vehicle; None while another one does.
         self.flown: Any = None
+        #: The last control that was sent in place of a commanded one.
+        self.sent: SafeSetpoint | None = None
         self._learned = math.nan
         self.vehicle = vehicle
         # The flight, as the server says: its state, or the toggles of in_flight before that.
@@ -183,37 +184,40 @@ class Facts:
         """Set the box of the geofence."""
         self.walls.change(box.without_floor())
 
-    def set_hover(self, thrust: float) -> None:
-        """Begin with a thrust of hover, m/s^2: that of the server's liftoff."""
-        self.hover_mean = HoverThrust(AVERAGING, thrust)
-        self.last_hover_mean = HoverThrust(LAST_AVERAGING, thrust)
+    def set_hover(self, thrust: float | None) -> None:
+        """Begin with a thrust of hover, m/s^2, such as that of the server's liftoff."""
+        self._hover_mean = HoverThrust(AVERAGING, thrust)
+        self._last_hover = HoverThrust(LAST_AVERAGING, thrust)
 
     def learn(self) -> None:
         """Learn the thrust of hover from the control that has flown the vehicle until now."""
         step, self._learned = self.now - self._learned, self.now
         motion = self.seen
         speed = None if motion is None else motion.velocity[2]
-        # A late control fades.
-        is_late = self.silence > 0.5 * self.hold
-        if self.flown is None or is_late or not 0.0 < step < LEARNING_STEP:
+        flown = self.flown
+        if flown is not None and self.silence > 0.5 * self.hold:
+            flown = None  # A late control fades.
+        elif flown is None and self._is_lifted(motion):
+            flown = self.sent
+        if flown is None or not 0.0 < step < LEARNING_STEP:
             if step != 0.0:
-                self.hover_mean.skip(speed)
-                self.last_hover_mean.skip(speed)
+                self._hover_mean.skip(speed)
+                self._last_hover.skip(speed)
             return
-        lift = lift_of(self.flown)
-        self.hover_mean.update(step, lift, speed)
-        self.last_hover_mean.update(step, lift, speed)
+        lift = lift_of(flown)
+        self._hover_mean.update(step, lift, speed)
+        self._last_hover.update(step, lift, speed)
+
+    def _is_lifted(self, motion):
+        """Return whether the vehicle climbs by another control than the controller's."""
+        is_seen = self.flight is FlightState.TAKING_OFF and motion is not None
+        return is_seen and self.ground.height(motion) > TOUCHDOWN_HEIGHT
 
     @property
     def hover(self) -> float:
-        """Thrust of hover that was learned in flight, m/s^2."""
-        return self.hover_mean.value
-
-    @property
-    def blind_hover(self) -> float:
-        """The same for a vehicle without a state: by its last motion, if that is less, m/s^2."""
-        hover, last = self.hover, self.last_hover_mean.value
-        return last if last < (1.0 - LAST_DIFFERENCE) * hover else hover
+        """Thrust of hover that was learned in flight, m/s^2; by the last motion if it is less."""
+        mean, last = self._hover_mean.value, self._last_hover.value
+        return last if last < (1.0 - LAST_DIFFERENCE) * mean else mean
 
     @property
     def stays_up(self) -> bool:

@@ -19,9 +19,8 @@ from crazyflie_takeoff.motion import Motion
 #: a while, a silence is not as long as it seems.
 LONGEST_STEP = 0.05
 
-AVERAGING = 2.0  #: Time constant of the thrust of hover (s).
-#: The same for the thrust of hover while no state comes: a load may just have been dropped (s).
-LAST_AVERAGING = 0.16
+AVERAGING = 2.0  #: Time over which the thrust of hover is averaged (s).
+LAST_AVERAGING = 0.16  #: The same for the last motion: a load may just have been dropped (s).
 #: The latter counts if it is smaller by more than this fraction, three times its noise with a
 #: speed that is known to within 0.015 m/s.
 LAST_DIFFERENCE = 0.03
@@ -75,8 +74,8 @@ MOTORS_OFF = SafeSetpoint(0.0, 0.0, 0.0, 0.0)
 class SafeControl:
     """Hover at a position, and descent, without a controller.
 
-    ``hover`` is the thrust of hover, m/s^2, and ``blind_hover`` that while no state comes;
-    ``motion``, if it is known, was measured ``age`` s ago, and ``control`` has been flown since.
+    ``hover`` is the thrust of hover, m/s^2; ``motion``, if it is known, was measured ``age`` s ago,
+    and ``control`` has been flown since.
     """
 
     def __init__(
@@ -85,10 +84,8 @@ class SafeControl:
         motion: Motion | None,
         age: float = 0.0,
         control: SafeSetpoint = MOTORS_OFF,
-        blind_hover: float | None = None,
     ):
-        self._hover, self._blind_hover = hover, hover if blind_hover is None else blind_hover
-        self._control = control
+        self._hover, self._control = hover, control
         self._velocity = (0.0, 0.0, 0.0) if motion is None else motion.velocity
         self._yaw = 0.0 if motion is None else motion.yaw
         self._place: tuple[float, float, float] | None = None
@@ -110,8 +107,6 @@ class SafeControl:
         whether the vehicle is to come down.
         """
         self._reckon(step)
-        if measured is None:
-            self._hover = self._blind_hover
         offset = self._offset(measured)
         if sinks or measured is None:
             lowest = -math.inf if measured is None else -SINK_SPEED

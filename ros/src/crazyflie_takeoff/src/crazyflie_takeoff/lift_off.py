@@ -13,7 +13,7 @@ LIFT_OFF_THRUST = GRAVITY + 0.2  #: Default thrust of the open-loop part of a ta
 LIFT_OFF_SPEED = 0.2
 CLIMB_SPEED = 0.1  #: Largest speed of the climb that follows (m/s).
 CLIMB_GAIN = 2.0  #: That speed over the distance from the hover point (1/s).
-AVERAGING = 0.12  #: Time constant of the thrust of hover (s).
+AVERAGING = 0.12  #: Time over which the thrust of hover is averaged (s).
 
 
 class LiftOff:
@@ -35,15 +35,10 @@ class LiftOff:
         """Process the vertical speed after ``step`` s with `thrust`; None if it is not known."""
         self._hover.update(step, self.thrust, z_dot)
 
-    def climb(self, distance: float, z_dot: float | None) -> None:
-        """Choose the thrust of a vehicle below the hover point (``distance``, m).
-
-        While its speed is not known, that is the thrust of hover.
-        """
-        self.thrust = self.hover
-        if z_dot is not None:
-            correction = (limited(CLIMB_GAIN * distance, CLIMB_SPEED) - z_dot) / SETTLING
-            self.thrust += min(max(correction, -MAX_BRAKING), MAX_CORRECTION)
+    def climb(self, distance: float, z_dot: float) -> None:
+        """Choose the thrust of a vehicle below the hover point (``distance``, m)."""
+        correction = (limited(CLIMB_GAIN * distance, CLIMB_SPEED) - z_dot) / SETTLING
+        self.thrust = self.hover + min(max(correction, -MAX_BRAKING), MAX_CORRECTION)
 
 
 def has_lifted_off(distance: float, z_dot: float) -> bool:

@@ -12,6 +12,7 @@ from crazyflie_takeoff.server_parameters import TakeoffServerParameters
 from crazyflie_takeoff.server_table import (
     AIRBORNE,
     FLYING,
+    OPEN_LOOP,
     FilterReport,
     Request,
 )
@@ -126,6 +127,14 @@ class TakeoffChecks:
             or self.battery_complaint(now)
         )
 
+    def state_complaint(self, now: float) -> str:
+        """Return that the state is not known any more, and why; empty if it is, or never was."""
+        topic, measured = self.parameters.state_topic, self.measured
+        if topic is None or measured.motion is None or measured.position(now) is not None:
+            return ""
+        text = f"the state on {self._resolve(topic)} was lost in the liftoff"
+        return ": ".join(filter(None, (text, measured.missing_reason)))
+
     def battery_complaint(self, now: float) -> str:
         """Return that the battery is low or critical; empty if it is not."""
         if self.battery.charge(now) in (Charge.LOW, Charge.CRITICAL):
@@ -147,6 +156,14 @@ WATCH: tuple[Guard, ...] = (
         Request.END,
         "{}",
         MAX_FAULT_TIME,
+    ),
+    # Whether it has lifted off, and how fast it is, is not seen then.
+    Guard(
+        "state is lost in the liftoff",
+        OPEN_LOOP,
+        lambda checks, flight: checks.state_complaint(flight.time),
+        Request.END,
+        "{}",
     ),
     Guard("battery is critical", FLYING, _battery_fault, Request.LAND, "{}"),
     # Before the driver stops to publish poses, so that a landing begins while there are some.

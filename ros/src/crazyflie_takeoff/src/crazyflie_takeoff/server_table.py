@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.guards import Guard, first_firing
+from crazyflie_takeoff.hover_thrust import LEAST_HOVER
 from crazyflie_takeoff.lift_off import LIFT_OFF_THRUST, LiftOff, has_lifted_off
 from crazyflie_takeoff.motion import PROGRESS, TOUCHDOWN_HEIGHT, Position
 from crazyflie_takeoff.phases import FilterState, FlightState
@@ -227,7 +228,7 @@ class FlightStateMachine:
         is_seen_again = position is not None and self.measured is None
         self.measured, self.z_dot, self.reference = position, z_dot, None
         self.hover_thrust = None
-        if self.state in (ServerState.LIFTING_OFF, ServerState.LIFTED):
+        if self.state in OPEN_LOOP:
             self.lift_off.measure(step, self.z_dot)
         if position is not None:
             self._measure(position)
@@ -235,7 +236,7 @@ class FlightStateMachine:
             self._plan_descent(is_seen_again)
         while self._judge(FOLLOWS, ticks=True) or self._judge(PROFILE, ticks=True):
             pass
-        if self.state is ServerState.LIFTED:
+        if self.state is ServerState.LIFTED and self.z_dot is not None:
             self.lift_off.climb(self._distance() or 0.0, self.z_dot)
         if self.descent is not None:
             self.reference = self.descent.reference(self.elapsed)
@@ -287,8 +288,10 @@ class FlightStateMachine:
         self.descent = Descent(elapsed, position, self.ground, speed)
 
     def _thrust(self):
-        if self.state in (ServerState.LIFTING_OFF, ServerState.LIFTED):
-            return self.lift_off.thrust
+        if self.state in OPEN_LOOP:
+            # Nothing lifts a vehicle that is not seen any more: it is hardly above the ground.
+            is_lost = self._position is not None and self.z_dot is None
+            return LEAST_HOVER if is_lost else self.lift_off.thrust
         if self.hover_thrust is not None:
             # The filter repeats it until the controller has the vehicle.
             return self.hover_thrust
@@ -385,7 +388,8 @@ def _filter(*states):
 
 
 _S, _F, _M = ServerState, FilterState, FlightStateMachine
-_TAKEOFF = (_S.LIFTING_OFF, _S.LIFTED, _S.CLIMBING)
+OPEN_LOOP = (_S.LIFTING_OFF, _S.LIFTED)  #: The parts of a takeoff without the controller.
+_TAKEOFF = (*OPEN_LOOP, _S.CLIMBING)
 _ALOFT = (_S.FLYING, _S.DESCENDING, _S.RAMPING_DOWN, _S.TOUCHING_DOWN)
 FLYING = (*_TAKEOFF, _S.FLYING)  #: The states that a landing ends.
 AIRBORNE = (*_TAKEOFF, *_ALOFT, _S.YIELDED)
@@ -430,7 +434,7 @@ FOLLOWS: tuple[Guard, ...] = (
 )
 
 PROFILE: tuple[Guard, ...] = (
-    Guard("open loop is over", (_S.LIFTING_OFF, _S.LIFTED), _if(_M._open_loop_over), _S.CLIMBING),
+    Guard("open loop is over", OPEN_LOOP, _if(_M._open_loop_over), _S.CLIMBING),
     Guard("has lifted off", (_S.LIFTING_OFF,), _if(_M._lifted_off), _S.LIFTED),
     Guard("has not left", (_S.CLIMBING,), _if(_M._takeoff_over_but_still_down), _S.RAMPING_DOWN),
     Guard("takeoff is over", (_S.CLIMBING,), _if(_M._takeoff_over), _S.FLYING),

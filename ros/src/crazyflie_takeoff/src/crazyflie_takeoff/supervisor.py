@@ -83,6 +83,13 @@ def step(memory: Memory, facts: Facts, given: Given) -> Any:
     if given is Given.TIME and _is_clear(memory, facts):
         memory.clear_until = facts.now + LONGEST_STEP
         return None
+    control = _step(memory, facts, given)
+    if isinstance(control, SafeSetpoint):
+        facts.sent = control
+    return control
+
+
+def _step(memory, facts, given):
     facts.look()
     if given is Given.TAKEOFF:
         _keep_takeoff(memory, facts)
@@ -130,7 +137,7 @@ def _take_over(memory, facts):
     motion = facts.measured.within(facts.now, LAST_STATE)
     age = facts.measured.age(facts.now)
     flown = _passed(memory, facts)
-    memory.fallback = SafeControl(facts.hover, motion, age, flown, facts.blind_hover)
+    memory.fallback = SafeControl(facts.hover, motion, age, flown)
     memory.own_at = facts.now
     facts.flown = None
     facts.ground.begin_descent()
@@ -206,7 +213,7 @@ def _pass_takeoff(memory, facts):
     if not memory.phase.follows:
         return None
     setpoint = facts.takeoff.setpoint
-    memory.takeoff = _limited(facts, setpoint, 0.0, is_ramp=True)
+    memory.takeoff = facts.sent = _limited(facts, setpoint, 0.0, is_ramp=True)
     return facts.takeoff.control if memory.takeoff == setpoint else memory.takeoff
 
 
@@ -237,6 +244,9 @@ def _pass_commanded(memory, facts):
 def _limited(facts, setpoint, lowest, is_ramp=False):
     motion, hover = facts.seen, facts.hover
     control = facts.limits.in_range(setpoint, lowest)
+    if is_ramp and facts.flight is FlightState.LANDING:
+        # No ramp of a landing lifts the vehicle; a restarted server assumes that it hovers at g.
+        control = control._replace(thrust=min(control.thrust, hover))
     climb = LANDING_CLIMB if facts.lands else facts.limits.climb
     thrust, excess = within_climb(control.thrust, hover, motion, facts.highest, climb)
     facts.climb_excess = "" if facts.lands else excess

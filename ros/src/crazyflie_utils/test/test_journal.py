@@ -4,11 +4,13 @@ import errno
 import json
 import struct
 import zlib
+from concurrent.futures import Future
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from std_msgs.msg import Empty, Float64, String
+from std_msgs.msg import Empty, Float32, Float64, String
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest
 
 from crazyflie_utils import Node
@@ -174,6 +176,47 @@ def test_publishers_that_come_and_go_are_seen_again(path):
     assert told == ["True"] * 3 + ["False"] * 10
     again = [message.data for _, message in run_again(path).published]
     assert again == told
+
+
+class DigitsNode(Node):
+    """Publishes as text what it is given."""
+
+    def load_parameters(self, handle):
+        pass
+
+    def register_callbacks(self, handle):
+        self.text = handle.publisher("/text", String)
+        handle.advertise_service("/set", SetBool, self.on_set)
+        handle.subscribe("/in", Float32, lambda message: self.tell(message.data))
+        handle.timer(0.1, self.on_timer)
+
+    def tell(self, value):
+        self.text.publish(String(repr(value)))
+
+    def on_set(self, request):
+        self.tell(request.data)
+        return SetBoolResponse()
+
+    def on_timer(self):
+        asked = self._handle.call_service("/other", SetBool, SetBoolRequest(), 1.0)
+        asked.add_done_callback(lambda done: self.tell(done.result().success))
+
+
+def test_nodes_are_given_the_digits_that_are_written(path):
+    """Those of a float32 are fewer; a bool on the wire is no number."""
+    recorder = Recorder(JournalWriter(path, HEADER, 1e9, print))
+    process = FakeProcess(recorder=recorder)
+    assert process.launch(DigitsNode(), "/digits")
+    answer = Future()
+    answer.set_result(SetBoolResponse(success=1))
+    process.transport.services["/other"] = lambda request: answer
+    process.publish("/in", Float32(0.1))
+    process.call("/set", SetBoolRequest(1))
+    process.advance(0.1)
+    recorder.close()
+    told = [message.data for message in process.published("/text")]
+    assert [message.data for _, message in run_again(path).published] == told
+    assert told == [repr(float(np.float32(0.1))), "True", "True"]
 
 
 def test_other_code_is_found_with_time_and_callback(recorded, monkeypatch):

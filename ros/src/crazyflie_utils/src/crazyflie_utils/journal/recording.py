@@ -2,7 +2,8 @@
 
 Everything that comes from outside is passed on in turn with all other work, as an input, and is
 written when its turn comes; so is everything that callbacks read, and a checksum of every message
-that they publish. Other threads read and publish without being recorded.
+that they publish. Other threads read and publish without being recorded. Callbacks are given what
+was written: a float32 has the digits that it has on the wire.
 
 While an input is processed, the clock stands still: callbacks see the moment at which it began.
 """
@@ -361,29 +362,35 @@ class _RecordedSubscriber(ExternalSubscriber):
         """Write a message and pass it on, in turn unless it was waiting."""
         recorder = self._recorder
         if self._is_collecting and recorder.executor._runner == get_ident():
-            recorder.row(_COLLECTED, self._number, self._empty, self._data(message))
+            data, message = self._written(message)
+            recorder.row(_COLLECTED, self._number, self._empty, data)
             self._empty = SAME_COLLECTION
             self._deliver(message)
         else:
             self._post(self._pass_on, message)
 
     def _pass_on(self, message):
-        self._recorder.input(_MESSAGE, self._number, self._data(message))
+        data, message = self._written(message)
+        self._recorder.input(_MESSAGE, self._number, data)
         self._deliver(message)
 
-    def _data(self, message):
+    def _written(self, message):
+        """Return the data of a message, and the message as a replay reads it from them."""
         header = getattr(message, "_connection_header", None)
         # Most messages come by the same connection, and share its header.
         if header is not self._header:
             self._header = header
             self._origin = ORIGIN.pack(self._recorder.origin(header))
+        origin, kind = self._origin, type(message)
         try:
             data = message.raw
         except AttributeError:
             data = serialized(message)
-        if type(message) is self._plain_type:
-            return ORIGIN.pack(ORIGIN.unpack(self._origin)[0] | PLAIN) + data
-        return self._origin + data
+            message = kind().deserialize(data)
+            message._connection_header = header
+        if kind is self._plain_type:
+            origin = ORIGIN.pack(ORIGIN.unpack(origin)[0] | PLAIN)
+        return origin + data, message
 
     def has_publishers(self) -> bool:
         return self.flag()
@@ -444,7 +451,8 @@ class RecordingTransport(Transport):
 
     def set_param_later(self, name: str, value: Any) -> "Future[None]":
         """Set a parameter; the future is done as an input."""
-        return self._request(self._transport.set_param_later(name, value), name, repr(value))
+        inner = self._transport.set_param_later(name, value)
+        return self._request(inner, name, repr(value).encode())
 
     def advertise(self, topic: str, message_type: Any, latch: bool) -> ExternalPublisher:
         """Announce a topic."""
@@ -485,8 +493,10 @@ class RecordingTransport(Transport):
             answer: Future[Any] = Future()
 
             def run():
-                recorder.input(Kind.CALL, number, serialized(request))
-                inner = serve(request, lambda: recorder.value("withdrawn", is_withdrawn))
+                data = serialized(request)
+                recorder.input(Kind.CALL, number, data)
+                given = service_type._request_class().deserialize(data)
+                inner = serve(given, lambda: recorder.value("withdrawn", is_withdrawn))
                 inner.add_done_callback(lambda done: copy_outcome(done, answer))
 
             recorder.executor.post(run)
@@ -504,25 +514,26 @@ class RecordingTransport(Transport):
     ) -> Future[Any]:
         """Call a service; its answer comes in turn."""
         inner = self._transport.call_service(name, service_type, request, limit, start_limit)
-        return self._request(inner, name, serialized(request))
+        return self._request(inner, name, serialized(request), service_type)
 
-    def _request(self, inner, name, content):
+    def _request(self, inner, name, content, service_type=None):
         self._requests += 1
         number, recorder = self._requests % 0x10000, self._recorder
         outer: Future[Any] = Future()
         if recorder.executor.is_in_turn:
-            told = content if isinstance(content, bytes) else content.encode()
-            recorder.row(Kind.REQUESTED, number, zlib.crc32(name.encode() + told))
+            recorder.row(Kind.REQUESTED, number, zlib.crc32(name.encode() + content))
 
         def settle():
             error = inner.exception()
-            if error is None:
-                response = inner.result()
-                data = b"\0" + (b"" if response is None else serialized(response))
-            else:
-                data = b"\1" + str(error).encode()
-            recorder.input(Kind.REPLY, number, data)
-            copy_outcome(inner, outer)
+            if error is not None:
+                recorder.input(Kind.REPLY, number, b"\1" + str(error).encode())
+                copy_outcome(inner, outer)
+                return
+            data = b"" if service_type is None else serialized(inner.result())
+            recorder.input(Kind.REPLY, number, b"\0" + data)
+            if not outer.done():
+                response = service_type and service_type._response_class().deserialize(data)
+                outer.set_result(response)
 
         inner.add_done_callback(lambda _: recorder.executor.post(settle))
         return outer

@@ -9,8 +9,7 @@ import pytest
 from std_msgs.msg import Float32, String
 
 from crazyflie_reports.flight_input import _JournalInput
-from crazyflie_utils.journal.journal_file import JournalError, Kind, Row
-from crazyflie_utils.journal.recording import ORIGIN
+from crazyflie_utils.journal.journal_file import ORIGIN, JournalError, Kind, Row
 
 HEADER = {"clock": "steady", "us": 0, "start": 0.0, "node": "/node"}
 

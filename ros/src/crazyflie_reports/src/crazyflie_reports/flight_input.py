@@ -27,8 +27,9 @@ from crazyflie_utils.journal.journal_file import (
     JournalError,
     Kind,
     Row,
+    received,
 )
-from crazyflie_utils.journal.recording import ORIGIN, PLAIN, plain_type, serialized
+from crazyflie_utils.journal.recording import plain_type, serialized
 from crazyflie_utils.journal.replay import Replay
 from crazyflie_utils.journal.replay_transport import DifferenceError, EndError
 
@@ -304,8 +305,7 @@ class _JournalInput:
         message_type = roslib.message.get_message_class(datatype)
         if message_type is None:
             raise ValueError(datatype)
-        (origin,) = ORIGIN.unpack_from(row.data)
-        data, number = row.data[ORIGIN.size :], origin & ~PLAIN
+        connection, _, data = received(row)
         if topic == "/clock" and self._clock == "simulated":
             self._time = message_type().deserialize(data).clock.to_sec()
         if row.number not in self._messages:
@@ -314,7 +314,7 @@ class _JournalInput:
             except genpy.DeserializationError:
                 self.outdated[topic] = datatype
                 return
-        caller = self._names.get((Kind.CALLER, number), [""])[0]
+        caller = self._names.get((Kind.CALLER, connection), [""])[0]
         time = self._time + self._wall
         given = Given(time, topic, message_type, data, caller, self._inputs)
         self._messages.setdefault(row.number, []).append(given)

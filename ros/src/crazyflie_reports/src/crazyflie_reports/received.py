@@ -1,14 +1,14 @@
 """The messages of a process in the journals of those that received them."""
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import genpy
 
-from crazyflie_utils.journal.journal_file import INPUTS, Journal, JournalError, Kind
-from crazyflie_utils.journal.recording import ORIGIN, PLAIN, serialized
+from crazyflie_utils.journal.journal_file import INPUTS, Journal, JournalError, Kind, received
+from crazyflie_utils.journal.recording import serialized
 from crazyflie_utils.journal.replay_transport import Rows
 
 _I64 = struct.Struct("<q")
@@ -23,7 +23,7 @@ class Received(NamedTuple):
 
 
 def received_value(
-    journals: Sequence[Path],
+    journals: Iterable[Path],
     node: str,
     topic: str,
     published: Sequence[genpy.Message],
@@ -78,11 +78,11 @@ def _messages(path: Path, node: str, topic: str, type_name: str) -> Iterator[Rec
                 continue
             if rows.names[Kind.SUBSCRIBED].get(row.number) != [topic, type_name]:
                 continue
-            (origin,) = ORIGIN.unpack_from(row.data)
-            connection = rows.connection(origin & ~PLAIN) or {}
+            number, _, data = received(row)
+            connection = rows.connection(number) or {}
             if connection.get("callerid") == node and first in (None, row.number):
                 first = row.number
-                yield Received(journal.header["node"], us * 1000 + wall, row.data[ORIGIN.size :])
+                yield Received(journal.header["node"], us * 1000 + wall, data)
     except (JournalError, struct.error, ValueError, TypeError):
         # What can be read of it is enough.
         return

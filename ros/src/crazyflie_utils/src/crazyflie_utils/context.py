@@ -149,11 +149,11 @@ class Throttle:
 
 
 class NodeLog:
-    """Log of one node, whose absolute name begins each text."""
+    """Log of one node, whose absolute name begins each text; ``time`` is the machine's clock, s."""
 
-    def __init__(self, transport: Transport, node: str):
+    def __init__(self, transport: Transport, node: str, time: Callable[[], float]):
         self._transport = transport
-        self._node = node
+        self._node, self._time = node, time
         self._throttle = Throttle()
 
     def info(self, text: str) -> None:
@@ -166,7 +166,7 @@ class NodeLog:
         The time is that of the machine's clock, also in simulated time. A varying text needs a key.
         """
         key = text if key is None else key
-        if throttle <= 0.0 or self._throttle.passes(key, throttle, time.monotonic()):
+        if throttle <= 0.0 or self._throttle.passes(key, throttle, self._time()):
             self._transport.log("warn", f"{self._node}: {text}")
 
     def error(self, text: str) -> None:
@@ -233,7 +233,7 @@ class ProcessContext:
             SimulatedClock() if use_sim_time else machine_clock
         )
         given.time = transport.time = self.clock.time
-        tf_log = NodeLog(transport, "/tf")
+        tf_log = NodeLog(transport, "/tf", self.machine_time)
         self.transforms = Transforms(
             self.topics,
             lambda text, key: tf_log.warn(text, throttle=1.0, key=key),
@@ -268,6 +268,12 @@ class ProcessContext:
     def end(self, status: int) -> None:
         """Shut the process down; it exits with ``status``."""
         self.exit_status = status
+
+    def machine_time(self) -> float:
+        """Return seconds of the machine's clock, for what is not to be in a journal."""
+        if self.recorder is not None and self.executor.is_running_here:
+            return float(self.recorder.clock.now * 1e-9)
+        return time.monotonic()
 
     @property
     def uses_sim_time(self) -> bool:

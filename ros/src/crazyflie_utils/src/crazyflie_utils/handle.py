@@ -49,7 +49,7 @@ class NodeHandle:
         self._undo: list[Callable[[], None]] = []
         self._latest: list[LatestMessage] = []
         self._own_parameters: PrivateParameters | None = None
-        log = NodeLog(process.transport, name)
+        log = NodeLog(process.transport, name, process.machine_time)
         self.info, self.warn, self.error = log.info, log.warn, log.error  #: See `NodeLog`.
         self._faults = FaultHandler(log)
         self.report_fault = self._faults.report  #: See `FaultHandler.report`.

@@ -74,6 +74,10 @@ class OfflineProcess(Process):
         """Advance both clocks (s), with a stop at every timer's deadline."""
         pass_time(duration, self.clock.time, self.next_deadline, self.set_clocks)
 
+    @override
+    def machine_time(self) -> float:
+        return self.machine_clock.time()
+
     def next_deadline(self) -> float:
         """Return the time at which the next timer of either clock is due, in simulated time (s)."""
         ahead = self.machine_clock.time() - self.clock.time()

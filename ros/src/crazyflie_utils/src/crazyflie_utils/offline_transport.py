@@ -75,6 +75,8 @@ class OfflineTransport(Transport):
         self.services: dict[str, Callable[[Any], Future[Any]]] = {}
         self.service_types: dict[str, type] = {}
         self.log_records: list[tuple[str, str]] = []
+        #: Called with level and text of what the nodes log.
+        self.on_log: Callable[[str, str], None] = lambda level, text: None
 
     def deliver(self, topic: str, message: genpy.Message) -> None:
         """Give the process a message from outside; KeyError if it does not subscribe."""
@@ -160,6 +162,7 @@ class OfflineTransport(Transport):
     def log(self, level: str, text: str) -> None:
         """Keep the record."""
         self.log_records.append((level, text))
+        self.on_log(level, text)
 
     def clock_was_set(self, stamp: genpy.Time) -> None:
         """Do nothing."""

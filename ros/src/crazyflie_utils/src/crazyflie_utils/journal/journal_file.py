@@ -32,10 +32,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 FORMAT = "crazyflie journal 2"  #: The first field of the header; another format has another number.
-#: Only read. A head is followed by its data, if its kind has any: length (u16, or 0xFFFF and u32)
-#: and bytes, of a message the difference to the one before, if that is as long; both are taken as
-#: numbers, the first byte the least. `PUBLISHED` has its check itself.
-_FORMAT_1 = "crazyflie journal 1"
 #: Fields of each header: absolute name of the process's node; "package.module:name" of what made
 #: the nodes; "steady", "simulated" or "manual"; the machine's clock at the beginning, us; time of a
 #: manual clock at the beginning, s.
@@ -48,7 +44,8 @@ HEAD = struct.Struct("<IIHB")
 _HEADS = np.dtype([("size", "<u4"), ("value", "<u4"), ("number", "<u2"), ("kind", "u1")])
 _HEAD_SIZE, _pack_head = HEAD.size, HEAD.pack_into
 _NUMBER = struct.Struct("<I")
-_HEAD_1, _WITHOUT_DATA_1 = struct.Struct("<BHI"), (2, 3, 7, 8, 23, 40, 41)
+ORIGIN = struct.Struct("<H")  #: Before a message: `PLAIN`, and the number of its connection, or 0.
+PLAIN = 0x8000  #: It came decoded.
 
 _HALF = 1 << 18  #: Size of each half of the tail (bytes).
 _FULL = 1 << 16  #: Size from which rows become a chunk (bytes).
@@ -66,7 +63,7 @@ class Kind(enum.IntEnum):
     """
 
     # Inputs.
-    MESSAGE = 1  #: A message. Subscription; `Origin` and the message.
+    MESSAGE = 1  #: A message. Subscription; `ORIGIN` and the message.
     TIMERS = 2  #: Timers are due, or may be: the first one runs.
     TIMER = 3  #: The next one of the timers that were due runs.
     CALL = 4  #: A call of a service. Service; the request.
@@ -81,14 +78,10 @@ class Kind(enum.IntEnum):
     #: Wall clock minus machine's clock has changed. 1: as a callback reads it; i64: ns.
     WALL = 21
     COLLECTED = 22  #: A message that waited. Subscription; collections without one; as `MESSAGE`.
-    #: Whether somebody listens, or publishes, has changed: as a callback read it, in the format 1.
-    #: Flag; times it was read as the same.
-    FLAG = 23
-    VALUE = (
-        24  #: A value. JSON: what; then true and the value, or false, type and text of an error.
-    )
+    #: A value. JSON: what; then true and the value, or false, type and text of an error.
+    VALUE = 24
     NAME = 25  #: A remapped name. JSON: name, remapped.
-    CALLER = 26  #: The name of a node that `Origin` may have.
+    CALLER = 26  #: A connection that `ORIGIN` may have: node, topic.
     PEERS = 28  #: Whether somebody listens, or publishes, has changed. Flag; 0 or 1.
     FILE = 27  #: A file was read (1), or not (0). JSON: path; a line feed; content, or JSON: error.
     # What there is.
@@ -117,6 +110,12 @@ class Row(NamedTuple):
     number: int
     value: int
     data: bytes = b""
+
+
+def received(row: Row) -> tuple[int, bool, bytes]:
+    """Return of a message the number of its connection, whether it came decoded, its bytes."""
+    (origin,) = ORIGIN.unpack_from(row.data)
+    return origin & ~PLAIN, bool(origin & PLAIN), row.data[ORIGIN.size :]
 
 
 class JournalError(Exception):
@@ -370,7 +369,7 @@ class Journal:
             raise JournalError(
                 f"{path} is not a journal; expected a first line of JSON with the format {FORMAT!r}"
             ) from None
-        if found not in (FORMAT, _FORMAT_1):
+        if found != FORMAT:
             raise JournalError(f"{path} has the format {found!r}; expected {FORMAT!r}")
         for name, kind in _HEADER.items():
             if not isinstance(self.header.get(name), kind):
@@ -380,13 +379,9 @@ class Journal:
 
     def rows(self) -> Iterator[Row]:
         """Yield all rows in order; `damage` says whether there may have been more."""
-        rows = self._all_rows()
-        return rows if self.header["format"] == _FORMAT_1 else _with_checks(rows)
+        return _with_checks(self._all_rows())
 
     def _all_rows(self):
-        read_rows, read_tail = _rows, _tail_rows
-        if self.header["format"] == _FORMAT_1:
-            read_rows = read_tail = _rows_1
         expected = 1
         for number, content, is_tail in self._chunks():
             if number != expected:
@@ -399,7 +394,7 @@ class Journal:
                 return
             expected = number + 1
             try:
-                yield from (read_tail if is_tail else read_rows)(content)
+                yield from (_tail_rows if is_tail else _rows)(content)
             except (struct.error, ValueError):
                 self.damage = "a row is damaged"
                 return
@@ -457,30 +452,6 @@ def _made(heads: NDArray[Any], data: bytes) -> Iterator[Row]:
         if begin < 0:
             raise ValueError("the data of a row are missing")
         yield Row(Kind(kind), number, value, data[begin:end])
-
-
-def _rows_1(content: bytes) -> Iterator[Row]:
-    """Yield the rows of the format 1, of a chunk or half a tail."""
-    last: dict[int, tuple[int, int]] = {}
-    at, size = 0, 0
-    while at < len(content) and content[at]:
-        kind, number, value = _HEAD_1.unpack_from(content, at)
-        at, size = at + _HEAD_1.size, 0
-        if kind not in _WITHOUT_DATA_1:
-            at, size = at + 2, int.from_bytes(content[at : at + 2], "little")
-            if size == 0xFFFF:
-                at, size = at + 4, int.from_bytes(content[at : at + 4], "little")
-        own, at = content[at : at + size], at + size
-        if at > len(content):
-            raise ValueError("the data of a row are missing")
-        if kind in _DIFFERENCES:
-            length, before = last.get(number, (-1, 0))
-            figure = int.from_bytes(own, "little")
-            if length == size:
-                figure = (figure + before) % (1 << 8 * size)
-                own = figure.to_bytes(size, "little")
-            last[number] = size, figure
-        yield Row(Kind(kind), number, value, own)
 
 
 def _with_checks(rows: Iterable[Row]) -> Iterator[Row]:

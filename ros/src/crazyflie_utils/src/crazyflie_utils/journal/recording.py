@@ -27,7 +27,7 @@ import genpy
 from typing_extensions import override
 
 from crazyflie_utils import text_file
-from crazyflie_utils.journal.journal_file import JournalWriter, Kind
+from crazyflie_utils.journal.journal_file import ORIGIN, PLAIN, JournalWriter, Kind
 from crazyflie_utils.timers import Executor, SteadyClock
 from crazyflie_utils.topics import (
     Condition,
@@ -41,8 +41,6 @@ from crazyflie_utils.topics import (
 
 _U64, _I64, _MOMENT = struct.Struct("<Q"), struct.Struct("<q"), struct.Struct("<d")
 SAME_COLLECTION = 0xFFFFFFFF  #: Value of `Kind.COLLECTED` for more messages of one collection.
-ORIGIN = struct.Struct("<H")  #: Before a message: `PLAIN`, and the number of its connection, or 0.
-PLAIN = 0x8000  #: It came decoded.
 _LONGEST = 0xFFFFFFFF  #: Longest time between two inputs that is written (us).
 _LOOK_PERIOD = 10_000  #: Period of such looks at inputs (us).
 _CHECKED_TOGETHER = 64  #: Number of messages that are checked together.

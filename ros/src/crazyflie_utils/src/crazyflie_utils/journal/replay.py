@@ -95,14 +95,7 @@ class _ReplayClock(SteadyClock):
         if not self._executor.is_running_here:
             row = self._rows.expect(Kind.TIME, 0, "reads the clock")
             (self.now,) = _U64.unpack(row.data)
-            # As the format 1 has it.
-            self._look_at_wall(0)
         return self.now
-
-    def _look_at_wall(self, number):
-        row = self._rows.next
-        if row is not None and row.kind is Kind.WALL and row.number == number:
-            (self.wall_offset,) = _I64.unpack(self._rows.take().data)
 
     @override
     def time(self) -> float:
@@ -110,8 +103,9 @@ class _ReplayClock(SteadyClock):
 
     @override
     def nanoseconds(self, moment: float | None = None) -> int:
-        now = self._read()
-        self._look_at_wall(1)
+        now, row = self._read(), self._rows.next
+        if row is not None and row.kind is Kind.WALL and row.number == 1:
+            (self.wall_offset,) = _I64.unpack(self._rows.take().data)
         return (now if moment is None else round(moment * 1e9)) + self.wall_offset
 
 
@@ -126,6 +120,10 @@ class _RosProcess(Process):
         super().__init__(transport, clock == "simulated", simulated, executor=executor)
         tf = self.transforms.gather, self.transforms.send_gathered
         self._steady = TimerQueue(executor, self.machine, *tf)
+
+    @override
+    def machine_time(self) -> float:
+        return self.machine.now * 1e-9
 
     def move_to(self, moment: int) -> None:
         """Set the machine's clock (ns)."""
@@ -349,7 +347,7 @@ class Replay:
 
     def _message(self, row):
         own = self.transport.subscribers[row.number]
-        self._executor.submit(own.deliver, own.message(row.data))
+        self._executor.submit(own.deliver, own.message(row))
 
     def _timers(self, _):
         self.process.find_due()

@@ -18,10 +18,9 @@ from crazyflie_utils.journal.journal_file import (
     JournalError,
     Kind,
     Row,
+    received,
 )
 from crazyflie_utils.journal.recording import (
-    ORIGIN,
-    PLAIN,
     SAME_COLLECTION,
     Digest,
     keeps_data,
@@ -133,28 +132,14 @@ class Rows:
             Kind.FILE: f"it read the file {text.partition(chr(10))[0]}",
             Kind.NAME: f"it looked for the remapped name {text}",
             Kind.TIME: "it read the clock",
-            Kind.FLAG: "it saw a subscriber or a publisher come or go",
         }
         return texts.get(row.kind, f"there was a {row.kind.name} {number}")
 
 
 class _Flag:
-    def __init__(self, rows: Rows, number: int):
-        self.value = False
-        self._rows, self._number, self._same = rows, number, 0
+    value = False
 
     def __call__(self) -> bool:
-        row = self._rows.next
-        if (
-            row is not None
-            and row.kind is Kind.FLAG
-            and row.number == self._number
-            and row.value == self._same
-        ):
-            self._rows.take()
-            self.value, self._same = not self.value, 0
-        else:
-            self._same += 1
         return self.value
 
 
@@ -189,11 +174,12 @@ class _Subscriber(ExternalSubscriber):
         self._rows, self._number, self._types, self._flag = rows, number, types, flag
         self._empty = 0
 
-    def message(self, data: bytes) -> Any:
-        (origin,) = ORIGIN.unpack_from(data)
+    def message(self, row: Row) -> Any:
+        """Return the message that a row has."""
+        connection, is_plain, data = received(row)
         plain, keeping = self._types
-        message = (plain if origin & PLAIN else keeping)().deserialize(data[ORIGIN.size :])
-        message._connection_header = self._rows.connection(origin & ~PLAIN)
+        message = (plain if is_plain else keeping)().deserialize(data)
+        message._connection_header = self._rows.connection(connection)
         return message
 
     def has_publishers(self) -> bool:
@@ -209,7 +195,7 @@ class _Subscriber(ExternalSubscriber):
         ):
             self._rows.take()
             expected, found = SAME_COLLECTION, True
-            self.deliver(self.message(row.data))
+            self.deliver(self.message(row))
         self._empty = 0 if found else self._empty + 1
 
     def close(self) -> None:
@@ -235,7 +221,7 @@ class ReplayTransport(Transport):
 
     def _flag(self):
         number = len(self.flags) + 1
-        self.flags[number] = _Flag(self.rows, number)
+        self.flags[number] = _Flag()
         return self.flags[number]
 
     def value(self, what: str, doing: str) -> Any:

@@ -1,5 +1,6 @@
 """What a recorded figure eight would have been with today's nodes, and with other gains."""
 
+import csv
 import math
 import re
 import shutil
@@ -58,6 +59,17 @@ def test_soft_gains_are_predicted_within_10_percent(tmp_path):
     really = rms_of(flown, tmp_path / "really")
     assert predicted == pytest.approx(really, rel=0.1)
     assert really > 1.5 * before
+
+
+def test_warnings_of_the_other_flight_are_its_events(tmp_path):
+    limit = ["--set", "lqr_controller/reference/max_jump=0.1"]
+    assert main([str(BAG), "--out", str(tmp_path), *limit]) == 0
+    with (tmp_path / "events.csv").open() as file:
+        events = [row for row in csv.DictReader(file) if row["recording"] == "what if"]
+    texts = [event["text"] for event in events if event["kind"] == "warning"]
+    assert any(
+        "/lqr_controller" in text and "flying 0.1 m in its direction" in text for text in texts
+    )
 
 
 def gusts(process):

@@ -5,6 +5,7 @@ import json
 import os
 import signal
 import sys
+import time
 
 import pytest
 from geometry_msgs.msg import PointStamped
@@ -191,6 +192,17 @@ def test_the_debugger_takes_one_journal(folder, capsys):
     assert "--break-at takes one journal, not 2" in capsys.readouterr().err
 
 
+def test_the_log_is_printed_with_times(folder, capsys, monkeypatch):
+    monkeypatch.setattr(
+        ScaleNode, "on_timer", lambda self: self._handle.warn("as asked", throttle=0.35)
+    )
+    status, text = run_program(capsys, folder / "scale.journal", "--log")
+    assert status == 0
+    # The timer has 0.1 s.
+    lines = [line.strip() for line in text.splitlines() if "as asked" in line]
+    assert lines == [f"{time:.6f} s [warn] /scale: as asked" for time in (0.1, 0.5, 0.9)]
+
+
 def test_a_profile_names_the_functions(folder, capsys):
     status, text = run_program(capsys, folder / "scale.journal", "--profile")
     assert status == 0
@@ -269,6 +281,23 @@ def test_a_callback_that_does_not_return_is_ended(tmp_path, monkeypatch, capsys)
     status, text = run_program(capsys, ending(tmp_path, monkeypatch, wait))
     assert status == 0
     assert "did not return from a callback within 0.5 s again" in text
+
+
+def test_the_search_for_the_value_of_then_is_no_callback(folder, monkeypatch, capsys):
+    """It may take longer: one journal after the other is read."""
+    monkeypatch.setattr(ScaleNode, "factor", 2.0)
+    for k in range(40):
+        (folder / f"other{k}.journal").write_bytes((folder / "listen.journal").read_bytes())
+
+    def slow(journals, *_):
+        for _ in journals:
+            time.sleep(0.05)
+
+    monkeypatch.setattr(replay_program, "_LIMIT", 1.0)
+    monkeypatch.setattr("crazyflie_reports.replay.received_value", slow)
+    status, text = run_program(capsys, folder / "scale.journal")
+    assert status == 1
+    assert "other values are published on /point" in text
 
 
 def test_a_node_that_was_not_initialized_is_refused_again(tmp_path):

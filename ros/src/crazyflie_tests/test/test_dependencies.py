@@ -226,6 +226,7 @@ def import_without_others(modules, brought):
     ("word", "module"),
     [
         ("identify", "crazyflie_identification.command"),
+        ("journal", "crazyflie_reports.journal_program"),
         ("replay", "crazyflie_reports.replay_program"),
         ("doctor", "crazyflie_doctor.program"),
         ("first_flight", "crazyflie_examples.first_flight_program"),

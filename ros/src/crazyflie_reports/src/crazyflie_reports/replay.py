@@ -11,7 +11,7 @@ import sys
 import time
 import traceback
 from collections import defaultdict, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -67,15 +67,17 @@ def replay(
     report: Report = lambda time, position, inputs: None,
     break_at: float | None = None,
     has_profile: bool = False,
+    has_log: bool = False,
 ) -> Outcome:
     """Run a journal again.
 
     ``others`` are the journals in which the recorded value of a difference is looked for;
-    ``report`` is called before each input. A debugger stops in the first callback from ``break_at``
-    on (s since the start).
+    ``report`` is called before each input, and again before each of those. A debugger stops in the
+    first callback from ``break_at`` on (s since the start). With ``has_log`` the text has all that
+    the nodes log.
     """
     try:
-        run = _Run(Journal(path), others, report)
+        run = _Run(Journal(path), others, report, has_log)
     except JournalError as error:
         return Outcome(Status.NOT_RUN, str(error))
     except DifferenceError as error:
@@ -103,8 +105,8 @@ class _QuitError(BaseException):
 class _Run:
     """A replay, and what is to be said of it."""
 
-    def __init__(self, journal: Journal, others: Sequence[Path], report: Report):
-        self._journal, self._report = journal, report
+    def __init__(self, journal: Journal, others: Sequence[Path], report: Report, has_log: bool):
+        self._journal, self._report, self._has_log = journal, report, has_log
         self._others = [each for each in others if each != journal.path]
         self._replay = Replay(journal)
         self._replay.transport.on_publish = self._remember
@@ -143,7 +145,10 @@ class _Run:
             text = f"identical so far, and then not known: {journal.damage}"
             return self._outcome(Status.NOT_RUN, text)
         if journal.header["clock"] != "manual" and not replay.rows.counts[Kind.SHUTDOWN]:
-            self._notes.append("it did not end by itself: it was killed, or died, after that")
+            self._notes.append(
+                "it did not end by itself: it was killed or died after that, or a callback did not "
+                "return"
+            )
         return self._outcome(Status.IDENTICAL, "identical")
 
     def _start(self):
@@ -167,7 +172,9 @@ class _Run:
         self._published[topic].append(message)
 
     def _log(self, level: str, text: str) -> None:
-        if level in ("error", "fatal"):
+        if self._has_log:
+            self._notes.append(f"{self._replay.time:.6f} s [{level}] {text.strip()}")
+        elif level in ("error", "fatal"):
             self._note(text)
 
     def _note(self, text: str) -> None:
@@ -182,6 +189,8 @@ class _Run:
             f"{messages:,} messages; {passed:.1f} s in {took:.1f} s, "
             f"{passed / took:.0f} times real time"
         )
+        if began := self._journal.header.get("began"):
+            first += f"; began {began}".replace("T", " ")
         text = "\n  ".join([first, *self._notes])
         return Outcome(status, text, passed, self._replay.transport.digest.value)
 
@@ -204,7 +213,7 @@ class _Run:
         topic, message = error.published
         node = self._journal.header["node"]
         published = list(self._published[topic])
-        found = received_value(self._others, node, topic, published, self._replay.wall_time)
+        found = received_value(self._searched(), node, topic, published, self._replay.wall_time)
         if found is None:
             now = str(message).splitlines()[:_MAX_LINES]
             return [
@@ -217,6 +226,11 @@ class _Run:
             return [f"this message is as {receiver} received it: one that went before was not"]
         field, new, old = difference
         return [f"{field}: now {new!r}; then {old!r}, as {receiver} received it"]
+
+    def _searched(self) -> Iterator[Path]:
+        for path in self._others:
+            self._report(self._replay.time, self._journal.position, self._inputs)
+            yield path
 
     def _place(self, error: BaseException) -> str:
         """Return in which callback, and where, an error was raised."""

@@ -33,27 +33,32 @@ _FORK = multiprocessing.get_context("fork")
 
 
 class _Progress(Structure):
-    """What a worker has done; see `crazyflie_reports.replay.Report`."""
+    """What a worker has done; see `crazyflie_reports.replay.Report`, and how often it said so."""
 
-    _fields_ = (("time", c_double), ("position", c_longlong), ("inputs", c_longlong))
+    _fields_ = (
+        ("time", c_double),
+        ("position", c_longlong),
+        ("inputs", c_longlong),
+        ("reports", c_longlong),
+    )
 
 
 class _Worker:
     """A process that runs a journal again, and may die as the one did that is repeated."""
 
-    def __init__(self, path: Path, others: Sequence[Path], has_profile: bool):
+    def __init__(self, path: Path, others: Sequence[Path], options: dict[str, bool]):
         self.path, self.progress = path, RawValue(_Progress)
         self.connection, end = _FORK.Pipe(duplex=False)
         self._seen, self._seen_at = -1, time.monotonic()
-        arguments = path, others, self.progress, has_profile, end
+        arguments = path, others, self.progress, options, end
         self._process = _FORK.Process(target=_work, args=arguments, daemon=True)
         self._process.start()
         end.close()
 
     def has_stopped(self) -> bool:
         """Return whether a callback has not returned for too long."""
-        if self.progress.inputs != self._seen:
-            self._seen, self._seen_at = self.progress.inputs, time.monotonic()
+        if self.progress.reports != self._seen:
+            self._seen, self._seen_at = self.progress.reports, time.monotonic()
         return time.monotonic() - self._seen_at > _LIMIT
 
     def outcome(self) -> Outcome:
@@ -91,22 +96,23 @@ def _describe_end(code):
     return f"died by {signal.Signals(-code).name}" if code < 0 else f"exited with status {code}"
 
 
-def _work(path, others, progress, has_profile, connection):
+def _work(path, others, progress, options, connection):
     # The program ends its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def report(moment, position, inputs):
         progress.time, progress.position, progress.inputs = moment, position, inputs
+        progress.reports += 1
 
-    connection.send(replay(path, others, report, has_profile=has_profile))
+    connection.send(replay(path, others, report, **options))
 
 
 def replay_all(
-    paths: Sequence[Path], others: Sequence[Path] = (), has_profile: bool = False
+    paths: Sequence[Path], others: Sequence[Path] = (), **options: bool
 ) -> Iterator[Outcome]:
     """Run journals again, as many at a time as there are processors; yield their outcomes.
 
-    They come in the order of the paths; ``others`` as for `replay.replay`.
+    They come in the order of the paths; ``others`` and ``options`` as for `replay.replay`.
     """
     waiting = deque(enumerate(paths))
     working: dict[int, _Worker] = {}
@@ -118,7 +124,7 @@ def replay_all(
                 while k not in outcomes:
                     while waiting and len(working) < (os.cpu_count() or 1):
                         number, path = waiting.popleft()
-                        working[number] = _Worker(path, others, has_profile)
+                        working[number] = _Worker(path, others, options)
                     ready = wait([each.connection for each in working.values()], _PERIOD)
                     for number, worker in list(working.items()):
                         if worker.connection in ready:
@@ -164,11 +170,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if len(paths) > 1:
             parser.error(f"--break-at takes one journal, not {len(paths)}")
         # Here, where the terminal is.
-        outcome = replay(paths[0], others, break_at=options.break_at)
+        outcome = replay(paths[0], others, break_at=options.break_at, has_log=options.log)
         print(outcome.text)
         return outcome.status
     began, outcomes = time.monotonic(), []
-    for outcome in replay_all(paths, others, options.profile):
+    for outcome in replay_all(paths, others, has_profile=options.profile, has_log=options.log):
         outcomes.append(outcome)
         tqdm.write(outcome.text)
     if len(paths) > 1:
@@ -199,6 +205,7 @@ def _parser():
         metavar="SECONDS",
         help="stop in the debugger pdb in the callback at this time since the start, as printed",
     )
+    parser.add_argument("--log", action="store_true", help="print what the nodes log, with times")
     parser.add_argument(
         "--profile", action="store_true", help="print in which functions the time was spent"
     )

@@ -12,6 +12,8 @@ from typing import Any
 import genpy
 import numpy as np
 from geometry_msgs.msg import Quaternion, Vector3
+from rosgraph_msgs.msg import Log
+from std_msgs.msg import Header
 
 from crazyflie_reports.bag_topics import role_of, row_of
 from crazyflie_reports.flight_input import COMPOSED, FlightInput, Given, InputError
@@ -21,7 +23,8 @@ from crazyflie_utils.offline_process import OfflineProcess
 from crazyflie_utils.offline_transport import OfflineTransport
 from crazyflie_utils.program import load, missing_module
 
-TF = "/tf"
+TF, _ROSOUT = "/tf", "/rosout"
+_LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warn": Log.WARN, "error": Log.ERROR}
 _APART = "/what_if"  # Namespace of the controls that do not reach the nodes by themselves.
 _SAME = 5e-6  # Largest difference of times that are the same (s).
 _LONGEST_PAUSE = 600.0  # Between two messages, s.
@@ -119,7 +122,7 @@ class Rerun:
         transport = self._transport = OfflineTransport(given.parameters)
         self._process = OfflineProcess(transport, 0.0)
         self._process.clock.wall_offset = self._start
-        transport.on_publish = self._on_publish
+        transport.on_publish, transport.on_log = self._on_publish, self._on_log
         for name, each in interfaces.items():
             # Otherwise, in open loop, an estimator would take the new controls for those that flew.
             is_apart = self.cut is not None and self.cut in each.publishes
@@ -194,6 +197,13 @@ class Rerun:
             model.advance_to(now)
             model.command(row_of(name, message), now)
 
+    def _on_log(self, level, text):
+        # As rospy publishes it; the text begins with the node's name.
+        now = self._start + self._process.clock.time()
+        header, name = Header(stamp=genpy.Time.from_sec(now)), text.partition(":")[0]
+        line = Log(header=header, level=_LEVELS.get(level, Log.FATAL), name=name, msg=text)
+        self._sent.published.append((now, _ROSOUT, line))
+
     def _deliver(self, given):
         topic, is_flown = given.topic, self._is_flown(given.time)
         if self.is_own(given):
@@ -220,6 +230,8 @@ class Rerun:
         References may come from outside as well: they are the nodes' own where the recording tells
         senders apart. rosbag in Python writes the first sender of a topic for all.
         """
+        if given.topic == _ROSOUT:
+            return given.message().name in self._callers
         if given.topic not in self._own:
             return False
         found = role_of(given.topic, given.message_type._type, {})

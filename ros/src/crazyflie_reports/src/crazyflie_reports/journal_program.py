@@ -1,0 +1,176 @@
+"""The program journal: what a journal has, or the messages of one of its topics."""
+
+import argparse
+import json
+import struct
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import genpy
+import roslib.message
+
+from crazyflie_utils.journal.journal_file import INPUTS, Journal, JournalError, Kind, Row, received
+from crazyflie_utils.journal.replay_transport import Rows
+
+_GAP = 0.5  #: Time without an input that is listed (s): longer than most periods.
+_MAX_LINES = 20  #: Lines of calls, and of gaps.
+_MOMENT = struct.Struct("<d")
+
+
+class Contents:
+    """What a journal has; times are s since the start, as `replay` prints them."""
+
+    def __init__(self, path: Path):
+        self.journal = Journal(path)
+        self.names = Rows(self.journal)
+        self.time = 0.0
+        self.parameters: dict[str, Any] = {}
+        self.calls: list[str] = []
+        self.gaps: list[str] = []
+        self.counts: Counter[tuple[Kind, int]] = Counter()
+        self.callers: defaultdict[int, set[str]] = defaultdict(set)
+        self.kinds: Counter[Kind] = Counter()
+
+    def rows(self) -> Iterator[Row]:
+        """Yield the rows, and count them; `JournalError` or ValueError for one that is none."""
+        start, is_manual = self.journal.header["start"], self.journal.header["clock"] == "manual"
+        while self.names.next is not None:
+            row, before = self.names.take(), self.time
+            self.kinds[row.kind] += 1
+            if is_manual and row.kind is Kind.CLOCK and row.number == 0:
+                self.time = _MOMENT.unpack(row.data)[0] - start
+            elif not is_manual and row.kind in INPUTS:
+                self.time += row.value * 1e-6
+            if self.time - before > _GAP:
+                self.gaps.append(f"{before:.3f} s to {self.time:.3f} s")
+            self._count(row)
+            yield row
+
+    def _count(self, row):
+        if row.kind in (Kind.MESSAGE, Kind.COLLECTED):
+            self.counts[Kind.SUBSCRIBED, row.number] += 1
+            header = self.names.connection(received(row)[0]) or {}
+            self.callers[row.number].add(header.get("callerid") or "?")
+        elif row.kind is Kind.PUBLISHED:
+            self.counts[Kind.ADVERTISED, row.number] += 1
+        elif row.kind is Kind.CALL:
+            self.counts[Kind.OFFERED, row.number] += 1
+            name, kind = self.name(Kind.OFFERED, row.number)
+            service_type = roslib.message.get_service_class(kind)
+            text = f"{len(row.data)} bytes of an unknown type"
+            if service_type is not None:
+                text = _line(service_type._request_class().deserialize(row.data))
+            self.calls.append(f"{self.time:.6f} s {name} {text}".rstrip())
+        elif row.kind is Kind.VALUE:
+            what, is_value, *rest = json.loads(row.data)
+            # The first value is that of the start.
+            if is_value and what.startswith("/"):
+                self.parameters.setdefault(what, rest[0])
+
+    def name(self, kind: Kind, number: int) -> list[str]:
+        """Return name and type of a topic or service."""
+        return self.names.names[kind].get(number, ["(a thread has registered it)", "?"])
+
+    def began(self) -> str:
+        """Return the wall time at the start, if it is known."""
+        began = self.journal.header.get("began")
+        if not isinstance(began, str):
+            return "when is not known"
+        return f"began {began.replace('T', ' ')}"
+
+    def text(self) -> str:
+        """Return all of it for people, once `rows` has been read."""
+        header, journal = self.journal.header, self.journal
+        what = header["program"] or "nodes without a program"
+        lines = [f"{header['node']} ({what}), clock {header['clock']}, {self.began()}"]
+        inputs = sum(count for kind, count in self.kinds.items() if kind in INPUTS)
+        lines.append(f"{self.time:.1f} s, {inputs:,} inputs; {self._end()}")
+        lines += _section(
+            "parameters at the start",
+            [f"{name}: {json.dumps(value)}" for name, value in self.parameters.items()],
+        )
+        for title, kind in (
+            ("subscriptions", Kind.SUBSCRIBED),
+            ("publishers", Kind.ADVERTISED),
+            ("services", Kind.OFFERED),
+        ):
+            numbers = sorted(
+                self.names.names[kind].keys() | {n for k, n in self.counts if k is kind}
+            )
+            lines += _section(title, [self._registered(kind, number) for number in numbers])
+        lines += _section("calls", self.calls, _MAX_LINES)
+        lines += _section(f"more than {_GAP:g} s without an input", self.gaps, _MAX_LINES)
+        if journal.damage:
+            lines.append(journal.damage)
+        return "\n".join(lines)
+
+    def _registered(self, kind, number):
+        name, type_name = self.name(kind, number)
+        count = self.counts[kind, number]
+        callers = ", ".join(sorted(self.callers[number])) if kind is Kind.SUBSCRIBED else ""
+        rate = f", {count / self.time:.1f} Hz" if self.time and kind is not Kind.OFFERED else ""
+        return f"{name} ({type_name}): {count:,}{rate}{callers and f', from {callers}'}"
+
+    def _end(self):
+        if self.journal.header["clock"] == "manual":
+            return "with a clock set by hand"
+        return "ended by itself" if self.kinds[Kind.SHUTDOWN] else "did not end by itself"
+
+
+def _section(title, lines, most=sys.maxsize):
+    if not lines:
+        return []
+    more = [f"  and {len(lines) - most:,} more"] if len(lines) > most else []
+    return [f"{title}:", *(f"  {line}" for line in lines[:most]), *more]
+
+
+def _line(message: genpy.Message) -> str:
+    return " ".join(str(message).split())
+
+
+def print_messages(contents: Contents, topic: str) -> int:
+    """Print the messages that were received on a topic; return how many."""
+    count = 0
+    for row in contents.rows():
+        if row.kind not in (Kind.MESSAGE, Kind.COLLECTED):
+            continue
+        name, kind = contents.name(Kind.SUBSCRIBED, row.number)
+        message_type = roslib.message.get_message_class(kind) if name == topic else None
+        if message_type is not None:
+            count += 1
+            text = _line(message_type().deserialize(received(row)[2]))
+            print(f"{contents.time:.6f} s: {text}")
+    return count
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; return its exit status."""
+    parser = argparse.ArgumentParser(
+        prog="journal",
+        description="Print what a journal has: parameters, topics, services, calls, gaps. "
+        "Exit status: 0; 2 if it cannot be read, or lacks the topic.",
+    )
+    parser.add_argument("journal", type=Path, metavar="JOURNAL")
+    parser.add_argument("--topic", metavar="NAME", help="print the messages received on this topic")
+    options: Any = parser.parse_args(arguments)
+    try:
+        contents = Contents(options.journal)
+        if options.topic is not None:
+            if not print_messages(contents, options.topic):
+                known = sorted(name for name, _ in contents.names.names[Kind.SUBSCRIBED].values())
+                parser.error(
+                    f"{options.journal} has no message on {options.topic}; its subscriptions: "
+                    + (", ".join(known) or "none")
+                )
+            return 0
+        for _ in contents.rows():
+            pass
+    except (ValueError, LookupError, TypeError, struct.error, genpy.DeserializationError) as error:
+        parser.error(f"{options.journal}: a row cannot be read: {error}")
+    except JournalError as error:
+        parser.error(str(error))
+    print(contents.text())
+    return 0

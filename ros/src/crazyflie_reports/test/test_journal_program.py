@@ -1,0 +1,94 @@
+"""The program journal prints what a journal has."""
+
+import pytest
+from std_msgs.msg import Float64, String
+from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
+
+from crazyflie_reports.journal_program import main
+from crazyflie_utils import Node
+from crazyflie_utils.journal.journal_file import Journal, JournalWriter
+from crazyflie_utils.journal.recording import Recorder
+from crazyflie_utils.parameters.declaration import Parameters, parameter
+from crazyflie_utils.parameters.types import Number
+from crazyflie_utils.testing import FakeGraph
+
+
+class EchoParameters(Parameters):
+    """Parameters of the node."""
+
+    gain: float = parameter(Number(), "gain", 2.0)
+
+
+class EchoNode(Node[EchoParameters]):
+    """Publishes numbers as text."""
+
+    def register_callbacks(self, handle):
+        self.text = handle.publisher("/text", String)
+        handle.advertise_service("/set", SetBool, lambda request: SetBoolResponse(True, ""))
+        handle.subscribe("/number", Float64, lambda message: self.text.publish(String("got")))
+
+
+@pytest.fixture
+def path(tmp_path):
+    """Return the journal of a process that gets three numbers, and a call after 2 s."""
+    path = tmp_path / "echo.journal"
+    header = {"node": "/echo", "program": "", "clock": "manual", "start": 100.0, "us": 0}
+    writer = JournalWriter(path, {**header, "began": "2026-11-29T12:00:00+01:00"}, 1e9, pytest.fail)
+    graph = FakeGraph({"/echo/gain": 3.0}, recorder=lambda name, time: Recorder(writer))
+    graph.start("/echo", EchoNode())
+    for k in range(3):
+        graph.publish("/number", Float64(k), caller="/lab")
+        graph.advance(0.1)
+    graph.advance(2.0)
+    graph.call("/set", SetBoolRequest(True))
+    graph.end("/echo")
+    return path
+
+
+def test_what_a_journal_has_is_printed(path, capsys):
+    assert main([str(path)]) == 0
+    text = capsys.readouterr().out
+    for line in (
+        "began 2026-11-29 12:00:00+01:00",
+        '/echo: {"gain": 3.0}',
+        "/number (std_msgs/Float64): 3, 1.3 Hz, from /lab",
+        "/text (std_msgs/String): 3, 1.3 Hz",
+        "/set (std_srvs/SetBool): 1",
+        "2.300000 s /set data: True",
+        "more than 0.5 s without an input:\n  0.300 s to 2.300 s",
+    ):
+        assert line in text
+
+
+def test_messages_of_a_topic_are_printed_with_times(path, capsys):
+    assert main([str(path), "--topic", "/number"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines == [f"{0.1 * k:.6f} s: data: {float(k)}" for k in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("change", "arguments", "reason"),
+    [
+        (
+            lambda data: data,
+            ["--topic", "/numbers"],
+            "no message on /numbers; its subscriptions: /clock, /number",
+        ),
+        (lambda data: b"#ROSBAG", [], "is not a journal"),
+        (lambda data: data.replace(b'"node": "/echo"', b'"node": 1'), [], "node is 1"),
+    ],
+)
+def test_what_cannot_be_printed_is_named(path, capsys, change, arguments, reason):
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(SystemExit) as end:
+        main([str(path), *arguments])
+    assert end.value.code == 2
+    assert reason in capsys.readouterr().err
+
+
+def test_a_cut_journal_is_printed_to_the_cut(path, capsys):
+    data = path.read_bytes()
+    path.write_bytes(data[:-5])
+    assert main([str(path)]) == 0
+    assert "is damaged or cut" in capsys.readouterr().out
+    assert Journal(path).header["node"] == "/echo"

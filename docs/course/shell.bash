@@ -11,6 +11,7 @@ page=$(compgen -G "$page")
 # The first command of the page that is awaited and launches something.
 launch=$(awk '/^<!-- run: until \//{awaited=1} awaited && /^roslaunch/{print; exit} /^```$/{awaited=0}' "$page")
 [ -z "${DISPLAY:-}" ] || launch=$(sed -E 's/ (rviz:=false|sim_time:=true|real_time_factor:=[0-9]+)//g' <<<"$launch")
+launch=${launch//'$QUICK'/$QUICK}
 if [ -z "$launch" ]; then
   echo "This lesson has no flight to launch."
 elif rostopic list >/dev/null 2>&1; then

@@ -133,3 +133,13 @@ def test_an_exercise_that_needs_a_package_of_the_lesson_says_so(tmp_path):
     assert result.returncode == 1
     assert "make the package spike_filter first" in result.stderr
     assert not (tmp_path / "my_workspace").exists()
+
+
+def test_the_launch_of_a_lesson_is_shown_as_it_is_called(tmp_path):
+    stubs = """export LESSON=5; unset DISPLAY
+        roslaunch() { [ "$1" = --nodes ] || echo "$@" >>~/called; }
+        rostopic() { [ -e ~/called ]; }"""
+    shown = in_a_terminal(tmp_path, f"{stubs}\nexercise() {{ :; }}; source {COURSE}/shell.bash")
+    (called,) = (tmp_path / "called").read_text().splitlines()
+    assert "sim_time:=true" in called
+    assert f"Launched: roslaunch {called}\n" in shown.stdout

@@ -119,6 +119,28 @@ def test_a_build_finds_what_was_installed_after_the_last_one(tmp_path):
     assert [Path(each).name for each in found] == ["TOOL-NOTFOUND", "tool"]
 
 
+def test_a_workspace_that_was_copied_or_moved_is_built_anew(tmp_path):
+    first, copied, moved = (tmp_path / name for name in ("first", "copied", "moved"))
+    package = first / "ros" / "src" / "finder"
+    package.mkdir(parents=True)
+    shutil.copy(TOP / "run", first)
+    for name, text in FINDER.items():
+        (package / name).write_text(text)
+    for name in ("debian.txt", "requirements.txt"):
+        (first / "ros" / name).write_text("# none\n")
+    subprocess.run(["./run", "build"], cwd=first, check=True, timeout=LIMIT)
+    shutil.copytree(first, copied, symlinks=True)
+    first.rename(moved)
+    for folder in (copied, moved):
+        subprocess.run(["./run", "install"], cwd=folder, check=True, timeout=LIMIT)
+        subprocess.run(["./run", "build"], cwd=folder, check=True, timeout=LIMIT)
+        sourced = "source ros/devel/setup.bash && rospack find finder && ros/.venv/bin/pip --version"
+        found = subprocess.check_output(["bash", "-c", sourced], cwd=folder, text=True)
+        place, pip = found.splitlines()
+        assert place == str(folder / "ros" / "src" / "finder")
+        assert f" {folder}/ros/.venv/" in pip
+
+
 def test_a_section_on_demand_is_not_installed_with_all_others(tmp_path):
     shutil.copy(TOP / "run", tmp_path)
     (tmp_path / "ros").mkdir()
@@ -135,6 +157,16 @@ def test_a_section_on_demand_is_not_installed_with_all_others(tmp_path):
     )
     assert installed.returncode == 0, installed.stderr
     assert "no-such-package" not in installed.stderr
+
+
+@pytest.mark.parametrize(
+    ("word", "hint"),
+    [("docotr", "did you mean doctor?"), ("xyz", "./run help lists all words")],
+)
+def test_a_word_that_is_not_there_gets_the_nearest_one(word, hint):
+    result = subprocess.run([TOP / "run", word], capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert result.stderr == f"run: there is no '{word}'; {hint}\n"
 
 
 def test_words_used_elsewhere_exist():

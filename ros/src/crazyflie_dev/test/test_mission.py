@@ -15,13 +15,22 @@ def test_vehicles_are_those_that_the_script_names(script, n):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["none.py"], "the file none.py does not exist"),
+        (["none.py"], "none.py: No such file"),
+        (["README.md"], "README.md: expected a mission script, FILE.py"),
+        (["broken.py"], "broken.py is no Python script: invalid syntax"),
+        (["data.py"], "data.py is no Python script: "),
         ([__file__, "0"], "n is 0; expected one number of vehicles"),
         ([__file__, "2", "3"], "n is 2 3; expected one number"),
         ([__file__, "two"], "n is two; expected one number"),
     ],
 )
-def test_bad_input_is_named(arguments, complaint, monkeypatch, capsys):
+def test_bad_input_is_named_before_anything_is_launched(
+    arguments, complaint, monkeypatch, capsys, tmp_path
+):
+    (tmp_path / "README.md").write_text("# A page\n")
+    (tmp_path / "broken.py").write_text("def f(:\n")
+    (tmp_path / "data.py").write_bytes(b"\xff\xfe\x00")
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["mission", *arguments])
     with pytest.raises(SystemExit) as end:
         mission.main()

@@ -134,7 +134,9 @@ def test_a_workspace_that_was_copied_or_moved_is_built_anew(tmp_path):
     for folder in (copied, moved):
         subprocess.run(["./run", "install"], cwd=folder, check=True, timeout=LIMIT)
         subprocess.run(["./run", "build"], cwd=folder, check=True, timeout=LIMIT)
-        sourced = "source ros/devel/setup.bash && rospack find finder && ros/.venv/bin/pip --version"
+        sourced = (
+            "source ros/devel/setup.bash && rospack find finder && ros/.venv/bin/pip --version"
+        )
         found = subprocess.check_output(["bash", "-c", sourced], cwd=folder, text=True)
         place, pip = found.splitlines()
         assert place == str(folder / "ros" / "src" / "finder")

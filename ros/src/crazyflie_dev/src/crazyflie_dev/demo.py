@@ -17,6 +17,7 @@ from crazyflie_reports.bag_flights import Flight, flights
 from crazyflie_reports.flight_operator import FlightError, FlightOperator
 from crazyflie_reports.flight_record import FlightReport
 from crazyflie_utils.main import begin
+from crazyflie_utils.terminal import waiting
 from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
 
 HOVER = (0.0, 0.0, 1.0)
@@ -111,14 +112,15 @@ def fly(folder: Path, launch_arguments: list[str]) -> int:
     return report(recordings, folder, log)
 
 
-def wait_for_recording(topic: str) -> None:
-    """Wait until the recorder has subscribed to a topic; raises `FlightError` after `LIMIT`."""
-    deadline = time.monotonic() + LIMIT
+def wait_for_recording(topic: str, limit: float = LIMIT) -> None:
+    """Wait until the recorder has subscribed to a topic; raises `FlightError` after ``limit``."""
+    deadline = time.monotonic() + limit
     graph = rosgraph.Master("/demo")
-    while "/recorder" not in dict(graph.getSystemState()[1]).get(topic, []):
-        if time.monotonic() > deadline:
-            raise FlightError(f"/recorder has not subscribed to {topic} for {LIMIT:g} s")
-        time.sleep(0.05)
+    with waiting(f"until {topic} is recorded"):
+        while "/recorder" not in dict(graph.getSystemState()[1]).get(topic, []):
+            if time.monotonic() > deadline:
+                raise FlightError(f"/recorder has not subscribed to {topic} for {limit:g} s")
+            time.sleep(0.05)
 
 
 def report_recording(recordings: Path, folder: Path) -> tuple[bag_report.Report, list[Flight]]:
@@ -127,9 +129,10 @@ def report_recording(recordings: Path, folder: Path) -> tuple[bag_report.Report,
     page = bag_report.Report()
     with tempfile.TemporaryDirectory(dir=folder) as series:
         (recorded,) = bag_log.read(recording, Path(series))
-        page.add(recorded)
-        flown = list(flights(recorded))
-    page.write(folder)
+        with waiting("writing the report"):
+            page.add(recorded)
+            flown = list(flights(recorded))
+            page.write(folder)
     return page, flown
 
 

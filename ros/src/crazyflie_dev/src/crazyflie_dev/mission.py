@@ -13,7 +13,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from crazyflie_dev.demo import report_recording, wait_for_recording
+from crazyflie_dev.demo import LIMIT, report_recording, wait_for_recording
+from crazyflie_dev.fly import count_and_arguments
 from crazyflie_reports.bag_flights import Flight
 from crazyflie_reports.bag_report import PAGE
 from crazyflie_reports.flight_operator import FlightError
@@ -21,6 +22,7 @@ from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
 
 PICTURE = "from_above.png"
 
+START_TIME = 0.2  #: Time that a vehicle takes to start, beside others, on a busy computer (s).
 _DEFAULT_COUNT = 5  #: Number of vehicles of a script that names none.
 
 
@@ -28,6 +30,20 @@ def vehicles_of(script: str) -> int:
     """Return the number of vehicles of a script: the highest k of the names cfk in its text."""
     numbers = [int(number) for number in re.findall(r"\bcf([1-9][0-9]*)\b", script)]
     return max(numbers, default=_DEFAULT_COUNT)
+
+
+def checked(script: Path) -> str:
+    """Return the text of a mission script; ArgumentTypeError if it cannot be one."""
+    if script.suffix != ".py":
+        raise argparse.ArgumentTypeError(f"{script}: expected a mission script, FILE.py")
+    try:
+        text = script.read_text()
+        compile(text, str(script), "exec")
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"{script}: {error.strerror}") from None
+    except (SyntaxError, ValueError) as error:
+        raise argparse.ArgumentTypeError(f"{script} is no Python script: {error}") from None
+    return text
 
 
 def fly(script: list[str], n: int, folder: Path, launch_arguments: list[str]) -> int:
@@ -45,7 +61,7 @@ def fly(script: list[str], n: int, folder: Path, launch_arguments: list[str]) ->
     print(f"launching {' '.join(arguments)}  (its output: {log})", flush=True)
     begin = time.monotonic()
     with roslaunch(arguments, log):
-        wait_for_recording(f"/cf{n}/state")
+        wait_for_recording(f"/cf{n}/state", LIMIT + START_TIME * n)
         command = [sys.executable, "-m", "crazyflie_mission_api.mission_runner", "fly", *script]
         with subprocess.Popen(command) as process:
             try:
@@ -53,9 +69,12 @@ def fly(script: list[str], n: int, folder: Path, launch_arguments: list[str]) ->
             except KeyboardInterrupt:
                 # The script lands its vehicles first.
                 status = process.wait()
-    print(f"flown in {time.monotonic() - begin:.0f} s; writing the report", flush=True)
+    passed = f"{time.monotonic() - begin:.0f} s"
     if status:
+        print(f"the script failed after {passed}", file=sys.stderr)
         print(*complaints(log), sep="\n", file=sys.stderr)
+    else:
+        print(f"flown in {passed}", flush=True)
     page, flights = report_recording(recordings, folder)
     draw_from_above(flights).savefig(folder / PICTURE, dpi=150)
     print(page.table())
@@ -85,27 +104,27 @@ def main() -> int:
     cut = arguments.index("--") if "--" in arguments else len(arguments)
     parser = argparse.ArgumentParser(prog="run mission", description=__doc__)
     parser.add_argument("script", type=Path, metavar="FILE.py", help="see crazyflie_mission_api")
-    parser.add_argument("n", nargs="*", metavar="n", help="number of vehicles, arguments of "
-                        "sw_swarm.launch such as spacing:=1.8; n is by default the highest of the "
-                        f"names cf1, cf2, ... in the script, or {_DEFAULT_COUNT}")  # fmt: skip
+    parser.add_argument("words", nargs="*", metavar="n|NAME:=VALUE",
+                        help="number of vehicles, arguments of sw_swarm.launch such as "
+                        "spacing:=1.8; n is by default the highest of the names cf1, cf2, ... in "
+                        f"the script, or {_DEFAULT_COUNT}")  # fmt: skip
     parser.add_argument("--out", type=Path, help="folder for report, picture, log (out/NAME)")
     options = parser.parse_args(arguments[:cut])
     script = options.script
-    if not script.is_file():
-        parser.error(f"the file {script} does not exist; expected a mission script")
-    launch_arguments = [each for each in options.n if ":=" in each]
-    numbers = [each for each in options.n if ":=" not in each] or [vehicles_of(script.read_text())]
-    if len(numbers) > 1 or not str(numbers[0]).isdecimal() or int(numbers[0]) < 1:
-        parser.error(
-            f"n is {' '.join(map(str, numbers))}; expected one number of vehicles, 1 or more"
-        )
+    try:
+        text = checked(script)
+        n, launch_arguments = count_and_arguments(options.words, vehicles_of(text))
+    except argparse.ArgumentTypeError as error:
+        parser.error(str(error))
     folder = (options.out or Path("out") / script.stem).resolve()
     try:
-        command = [str(script), *arguments[cut + 1 :]]
-        return fly(command, int(numbers[0]), folder, launch_arguments)
+        return fly([str(script), *arguments[cut + 1 :]], n, folder, launch_arguments)
     except (LaunchError, FlightError) as error:
         print(error, file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
 
 
 if __name__ == "__main__":

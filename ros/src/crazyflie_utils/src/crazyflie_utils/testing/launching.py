@@ -14,6 +14,7 @@ from roslaunch.core import RLException
 from roslaunch.xmlloader import XmlParseException
 
 from crazyflie_utils.launch_file import unknown_arguments
+from crazyflie_utils.terminal import waiting
 from crazyflie_utils.testing.programs import free_port, running
 
 _START_LIMIT = 60.0  #: Longest time until roslaunch's master answers (s).
@@ -67,9 +68,10 @@ def _with_master(log, program, *arguments):
         running(*command, stdout=output, stderr=subprocess.STDOUT) as process,
     ):
         deadline = time.monotonic() + _START_LIMIT
-        while not rosgraph.is_master_online():
-            if process.poll() is not None or time.monotonic() > deadline:
-                reasons = complaints(log) or log.read_text(errors="replace").splitlines()[-3:]
-                raise LaunchError("\n".join(["roslaunch has not started anything:", *reasons]))
-            time.sleep(0.02)
+        with waiting("until a ROS master answers"):
+            while not rosgraph.is_master_online():
+                if process.poll() is not None or time.monotonic() > deadline:
+                    reasons = complaints(log) or log.read_text(errors="replace").splitlines()[-3:]
+                    raise LaunchError("\n".join(["roslaunch has not started anything:", *reasons]))
+                time.sleep(0.02)
         yield process

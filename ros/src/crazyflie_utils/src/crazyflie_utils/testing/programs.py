@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from crazyflie_utils.terminal import waiting
+
 LIMIT = 60.0  #: Timeout of a wait (s).
 
 #: Longest time until a program ends after each signal (s); roslaunch gives its nodes 15 s.
@@ -45,7 +47,8 @@ def running(*command: object, **options: Any) -> Iterator[subprocess.Popen[Any]]
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGINT)
             try:
-                process.wait(_END_LIMIT)
+                with waiting(f"until {command[0]} has ended"):
+                    process.wait(_END_LIMIT)
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()

@@ -55,7 +55,7 @@ def free_port():
         ([], (3, [])),
         (["9"], (9, [])),
         (["n:=9", "spacing:=2"], (9, ["spacing:=2"])),
-        (["fleet:=a", "12"], (12, ["fleet:=a"])),
+        (["spacing:=2", "12"], (12, ["spacing:=2"])),
     ],
 )
 def test_n_is_a_number_with_or_without_its_name(words, expected):
@@ -97,6 +97,7 @@ def test_words_are_checked_before_anything_is_launched(fly, tmp_path):
         port = server.getsockname()[1]
         for words, complaint in (
             ([f"port:={port}"], f"port {port} of 127.0.0.1 is in use by "),
+            (["fleet:=none.yaml"], "none.yaml: cannot be read"),
             (["folder:=x"], "sw_swarm.launch has no argument folder; did you mean folders?"),
         ):
             with fly(*words) as program:

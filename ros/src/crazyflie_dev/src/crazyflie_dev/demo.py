@@ -116,11 +116,14 @@ def wait_for_recording(topic: str, limit: float = LIMIT) -> None:
     """Wait until the recorder has subscribed to a topic; raises `FlightError` after ``limit``."""
     deadline = time.monotonic() + limit
     graph = rosgraph.Master("/demo")
-    with waiting(f"until {topic} is recorded"):
-        while "/recorder" not in dict(graph.getSystemState()[1]).get(topic, []):
-            if time.monotonic() > deadline:
-                raise FlightError(f"/recorder has not subscribed to {topic} for {limit:g} s")
-            time.sleep(0.05)
+    try:
+        with waiting(f"until {topic} is recorded"):
+            while "/recorder" not in dict(graph.getSystemState()[1]).get(topic, []):
+                if time.monotonic() > deadline:
+                    raise FlightError(f"/recorder has not subscribed to {topic} for {limit:g} s")
+                time.sleep(0.05)
+    except OSError as error:
+        raise FlightError(f"the ROS master answers no more: {error}") from None
 
 
 def report_recording(recordings: Path, folder: Path) -> tuple[bag_report.Report, list[Flight]]:

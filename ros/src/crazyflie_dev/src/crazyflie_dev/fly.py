@@ -9,14 +9,20 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
+from roslaunch.core import RLException
+from roslaunch.xmlloader import XmlParseException
+
 from crazyflie_dashboard.access import AccessError, expect_free_port
+from crazyflie_fleet import fleet_file
+from crazyflie_utils import ParameterError
 from crazyflie_utils.launch_file import unknown_arguments
 from crazyflie_utils.terminal import copy_output, say, waiting
+from crazyflie_utils.text_file import user_path
 
 _DEFAULT_COUNT = 3  #: Number of vehicles.
 _PORT = "8642"  #: The page's, by default.
 _POLL = 0.1  #: Longest time until a signal, or the page, is noticed (s).
-_LAUNCHED = ("crazyflie_examples", "sw_swarm.launch", "rviz:=false", "dashboard:=true")
+LAUNCHED = ("crazyflie_examples", "sw_swarm.launch")
 
 STEPS = """{n} simulated vehicles, and a page to fly them: {url}
   1. Click "Take control", then "All" and "Take off".
@@ -26,13 +32,25 @@ Warnings follow; all other output is in {log}"""
 
 
 def count_and_arguments(words: Sequence[str], default: int) -> tuple[int, list[str]]:
-    """Return the number of vehicles, given as ``9`` or ``n:=9``, and the other words."""
+    """Return the number of vehicles, given as ``9`` or ``n:=9``, and arguments of sw_swarm.launch.
+
+    ArgumentTypeError: it has no such argument, or cannot read its fleet file.
+    """
     counts = [word.removeprefix("n:=") for word in words if re.match("n:=|(?!.*:=)", word)]
     if len(counts) > 1 or not all(re.fullmatch("[1-9][0-9]*", count) for count in counts):
         raise argparse.ArgumentTypeError(
             f"n is {' '.join(counts)}; expected one number of vehicles, such as 9 or n:=9"
         )
     others = [word for word in words if ":=" in word and not word.startswith("n:=")]
+    try:
+        problems = unknown_arguments([*LAUNCHED, "dashboard:=true", *others])
+        for word in others:
+            if word.startswith("fleet:="):
+                fleet_file.load(user_path(word.partition(":=")[2]))
+    except (RLException, XmlParseException, ParameterError) as error:
+        problems = [str(error)]
+    if problems:
+        raise argparse.ArgumentTypeError("; ".join(problems))
     return int(counts[0]) if counts else default, others
 
 
@@ -57,7 +75,7 @@ def fly(n: int, launch_arguments: list[str], log: Path) -> int:
 
     with subprocess.Popen(
         # In a session of its own: this program passes signals on, whichever way they come.
-        ["roslaunch", *_LAUNCHED, f"n:={n}", *launch_arguments],
+        ["roslaunch", *LAUNCHED, f"n:={n}", "rviz:=false", "dashboard:=true", *launch_arguments],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
         start_new_session=True,
     ) as launched:  # fmt: skip
@@ -93,8 +111,6 @@ def main() -> int:
     options = parser.parse_args()
     try:
         n, launch_arguments = count_and_arguments(options.words, _DEFAULT_COUNT)
-        if problems := unknown_arguments([*_LAUNCHED, f"n:={n}", *launch_arguments]):
-            parser.error("; ".join(problems))
         ports = [word.partition(":=")[2] for word in launch_arguments if word.startswith("port:=")]
         expect_free_port("127.0.0.1", int((ports or [_PORT])[-1]))
     except (argparse.ArgumentTypeError, AccessError, ValueError) as error:

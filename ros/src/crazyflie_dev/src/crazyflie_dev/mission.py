@@ -14,7 +14,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from crazyflie_dev.demo import LIMIT, report_recording, wait_for_recording
-from crazyflie_dev.fly import count_and_arguments
+from crazyflie_dev.fly import LAUNCHED, count_and_arguments
 from crazyflie_reports.bag_flights import Flight
 from crazyflie_reports.bag_report import PAGE
 from crazyflie_reports.flight_operator import FlightError
@@ -54,7 +54,7 @@ def fly(script: list[str], n: int, folder: Path, launch_arguments: list[str]) ->
     # In simulated time at real speed: on a busy computer the flight is slower, but as good. At full
     # speed, the recording would lack messages.
     arguments = [
-        *("crazyflie_examples", "sw_swarm.launch", f"n:={n}", "sim_time:=true", f"rviz:={rviz}"),
+        *(*LAUNCHED, f"n:={n}", "sim_time:=true", f"rviz:={rviz}"),
         *("record:=true", f"record_folder:={recordings}"),
         *launch_arguments,
     ]

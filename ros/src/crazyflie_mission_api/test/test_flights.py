@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
-from simulated import Swarm
+from simulated import NODES, Swarm
+
+from crazyflie_mission_api import Limits
+from crazyflie_reports.flight_record import OVERSHOOT_LIMIT
 
 PAIR = ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
@@ -19,6 +22,15 @@ def test_a_takeoff_goes_to_the_height_that_was_asked_for(pair):
         for name in pair.names:
             assert pair.track(name)[-1, 2] == pytest.approx(0.4, abs=0.05)
             assert pair.track(name)[:, 2].max() < 0.5
+
+
+def test_a_takeoff_is_no_faster_than_the_mission_and_does_not_overshoot(pair):
+    with pair.fleet(limits=Limits(speed=1.0, acceleration=1.5)) as fleet:
+        fleet.takeoff(1.0)
+        for name in pair.names:
+            heights = pair.track(name)[:, 2]
+            assert heights.max() - 1.0 < 0.8 * OVERSHOOT_LIMIT
+            assert np.diff(heights).max() < 1.0 * NODES["state_estimator"]["time_step"]
 
 
 def test_a_takeoff_goes_straight_up_from_wherever_the_vehicle_is(pair):

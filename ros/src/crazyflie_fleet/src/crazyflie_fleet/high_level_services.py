@@ -85,6 +85,9 @@ def setpoint_of(
 #: Namespace, below a vehicle's name, of the node; below /all of the same services for all.
 HIGH_LEVEL = "high_level"
 
+#: Time from a takeoff until the references of its climb begin, for which the rest is left (s).
+TAKEOFF_LEAD = 1.5
+
 #: Names of nodes, separated by spaces, that start their uploaded trajectory 0: vehicles that are
 #: called one after the other do not start together.
 START_TOPIC = "/all/start_trajectory"

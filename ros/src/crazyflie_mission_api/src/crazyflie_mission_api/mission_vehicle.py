@@ -140,6 +140,8 @@ class MissionVehicle(Commands, Protocol):
     bounds: Bounds  #: Box of its fence.
     #: Largest delay of its start if several vehicles are called to `start` in a row (s).
     start_skew: float
+    #: Part of a takeoff's duration that passes before the climb to the height begins (s).
+    takeoff_lead: float = 0.0
 
     def position(self) -> Triple | None:
         """Return the position, m; None when it is not known."""

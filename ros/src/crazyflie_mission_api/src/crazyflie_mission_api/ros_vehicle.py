@@ -16,6 +16,7 @@ from typing_extensions import override
 from crazyflie_driver import srv
 from crazyflie_fleet.high_level_services import (
     HIGH_LEVEL,
+    TAKEOFF_LEAD,
     heading,
     to_message,
 )
@@ -314,6 +315,7 @@ class RosVehicle(RosVehicleState, ServiceCommands, MissionVehicle):
         ServiceCommands.__init__(self, handle, access.top)
         self.bounds = fence(handle, prefix(name))
         self.start_skew = START_SKEW if access.uses_driver else 0.0
+        self.takeoff_lead = 0.0 if access.uses_driver else TAKEOFF_LEAD
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
         self._has_uploaded = False

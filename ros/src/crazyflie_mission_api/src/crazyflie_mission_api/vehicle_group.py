@@ -57,7 +57,10 @@ class VehicleGroup(GroupState):
         with self._commanding():
             # Stored first: vehicles that have begun to take off must be landed after any error.
             self._commanded.update({n: TimedTrajectory(c, self.time()) for n, c in climbs.items()})
-            calls = {n: self._vehicles[n].takeoff(height, duration(c)) for n, c in climbs.items()}
+            calls = {}
+            for name, climb in climbs.items():
+                vehicle = self._vehicles[name]
+                calls[name] = vehicle.takeoff(height, duration(climb) + vehicle.takeoff_lead)
         failures = self._answers(calls)
         for name, climb in climbs.items():
             # A takeoff server answers after some time, before the height is reached.

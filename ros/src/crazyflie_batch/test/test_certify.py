@@ -75,7 +75,7 @@ def test_a_controller_of_ones_own_is_flown(tmp_path, small, capsys):
     ("text", "expected"),
     [
         ("model: cf22\n", "model (settings.yaml:1) is 'cf22'"),
-        ("model: cf21\nbraking: {vertical: 1.0}\n", "expected more than the disturbance, 1.2"),
+        ("model: cf21\nbraking: {vertical: 1.0}\n", "expected more than the disturbance, 1 m"),
         ("model: cf21\ncontroller: other.py:control\n", "no such file; expected FILE.py:FUNCTION"),
         ("model: cf21\ncontroller: mine.py:other\n", "KeyError('other'); expected FILE.py"),
         ("model: cf21\ncontroller: mine.py:scalar\n", "it returned [0. 0. 0.]; expected FILE.py"),

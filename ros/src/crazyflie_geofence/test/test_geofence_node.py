@@ -56,7 +56,7 @@ def test_answers_a_state_with_what_the_fence_says(process):
     publish_regular(process, *REGULAR)
     publish_state(process, *STATE)
     [message] = process.published("/control/geofence")
-    axes = bounds.axes(bounds.OF_TYPES, 1.3, 2.5, 0.01, 0.01)
+    axes = bounds.axes(bounds.OF_TYPES, 1.4, 2.0, 0.01, 0.01)
     fence = Geofence((-1.0, -2.0, 0.0), (2.0, 1.0, 3.0), axes, bounds.max_thrust("cf21"))
     control, priority = fence.control(0.0, STATE[:3], STATE[3:6], STATE[6], REGULAR)
     np.testing.assert_array_equal(to_vector(message.control.control), control)
@@ -100,11 +100,11 @@ def test_topics_and_box_are_required(name):
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
     [
-        ("box/max/x", -0.5, "at least -0.33 m: the proof needs 0.67 m between the walls"),
-        ("box/max/y", -2.0, "at least -1.33 m"),
-        ("box/max/z", 0.3, "at least 0.3536 m: the proof needs 0.35 m"),
+        ("box/max/x", -0.5, "at least -0.2201 m: the proof needs 0.78 m between the walls"),
+        ("box/max/y", -2.0, "at least -1.22 m"),
+        ("box/max/z", 0.3, "at least 0.4126 m: the proof needs 0.41 m"),
         ("box/min/x", math.nan, "a finite number >= -1e+09"),
-        ("braking/horizontal", 1.4, "at most 1.338 m/s^2"),
+        ("braking/horizontal", 1.5, "at most 1.429 m/s^2"),
         ("braking/vertical", 3.5, "at most 3.2"),
         ("bounds/lag/horizontal", 0.0, ">= 0.001"),
         ("bounds/delay", -0.1, ">= 0"),
@@ -121,7 +121,7 @@ def test_bad_parameters_are_named(name, value, expected):
 
 @pytest.mark.parametrize(
     ("name", "axis", "braking"),
-    [("horizontal", "x", 1.3), ("vertical", "z", 2.5)],
+    [("horizontal", "x", 1.4), ("vertical", "z", 2.0)],
 )
 def test_a_disturbance_that_braking_does_not_exceed_is_refused(name, axis, braking):
     fake = FakeProcess()
@@ -173,7 +173,7 @@ def test_the_box_may_be_changed_in_flight(process):
 
 
 def test_diagnostics_say_when_the_box_is_not_certain(process):
-    """A wind of 1 m/s^2 that nothing explains, beyond the bound of 0.5 m/s^2."""
+    """A wind of 1 m/s^2 that nothing explains, beyond the bound of 0.6 m/s^2."""
     publish_regular(process, 0.0, 0.0, 0.0, 9.81)
     for k in range(105):
         publish_state(process, 0.5, -0.5, 1.5, 0.0, 0.01 * k - 0.5, 0.0, 0.0)
@@ -181,7 +181,7 @@ def test_diagnostics_say_when_the_box_is_not_certain(process):
     status = process.published("/diagnostics")[-1].status[0]
     assert status.name == "geofence: certificate"
     assert status.level == DiagnosticStatus.WARN
-    assert "the box is not certain: disturbance along y 0.8 m/s^2, bound 0.5" in status.message
+    assert "the box is not certain: disturbance along y 0.8 m/s^2, bound 0.6" in status.message
     for _ in range(600):
         publish_state(process, 0.5, -0.5, 1.5, 0.0, 0.5, 0.0, 0.0)
         process.advance(0.01)
@@ -189,7 +189,7 @@ def test_diagnostics_say_when_the_box_is_not_certain(process):
 
 
 def test_a_box_that_is_too_small_is_refused(process):
-    with pytest.raises(ServiceError, match="box/max/z is 3.0; expected at least 3.154 m"):
+    with pytest.raises(ServiceError, match="box/max/z is 3.0; expected at least 3.213 m"):
         process.reconfigure("/geofence", **{"box/min/z": 2.8})
     publish_regular(process, *REGULAR)
     publish_state(process, *STATE)

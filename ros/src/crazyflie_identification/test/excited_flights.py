@@ -74,8 +74,18 @@ class Virtual:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "true.yaml"
             model_file.save(path, "cf21_markers", true, {})
-            settings = {"model": str(path), "positioning": "none", "observer/port": 0}
-            self._vehicle = VirtualVehicle(VehicleSettings.from_mapping(settings))
+            self._turn_on(model=str(path))
+
+    @classmethod
+    def of_type(cls, name, _, mass_error, thrust_error):
+        """Return a vehicle of a type with errors, as fractions."""
+        made = cls.__new__(cls)
+        made._turn_on(model=name, mass_error=mass_error, thrust_error=thrust_error)
+        return made
+
+    def _turn_on(self, **settings):
+        settings = {"positioning": "none", "observer/port": 0, **settings}
+        self._vehicle = VirtualVehicle(VehicleSettings.from_mapping(settings))
         self._start = 0.2
         self.advance_to(0.0)
         # Opens the lock of the thrust.
@@ -89,6 +99,11 @@ class Virtual:
     def pose(self):
         """Position in m, and quaternion."""
         return self._vehicle.physics.position, self._vehicle.physics.quaternion
+
+    @property
+    def velocity(self):
+        """m/s."""
+        return self._vehicle.physics.velocity
 
     def send(self, roll, pitch, yaw_dot, pwm):
         """Command an attitude (rad, rad/s) and a thrust (PWM), as the driver does."""

@@ -38,6 +38,8 @@ def test_an_ideal_vehicle_in_still_air_is_hardly_disturbed(true, recording, tmp_
     assert 0.0 < limits["disturbance"]["horizontal"] < 0.6
     assert 0.0 < limits["disturbance"]["vertical"] < 0.6
     assert 0.0 < limits["error"]["position"] < 0.005
+    # A control has its effect a lag later than the filter thinks.
+    assert 0.02 < limits["error"]["velocity"] < 0.3
     assert limits["seconds"] == pytest.approx(20.0, abs=3.0)
     # The fence reads them from the model file.
     path = tmp_path / "mine.yaml"

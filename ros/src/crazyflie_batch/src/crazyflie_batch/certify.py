@@ -38,10 +38,10 @@ class CertifyParameters(Parameters):
     seed: int = parameter(Integer(0, 2**32 - 1), "seed of all random numbers", 0)
     duration: float = parameter(Number("s", minimum=0.1, maximum=60.0), "of a flight", 3.0)
     horizontal_braking: float = parameter(
-        Number("m/s^2", minimum=0.01), "as in the geofence", 1.3, "braking/horizontal"
+        Number("m/s^2", minimum=0.01), "as in the geofence", 1.4, "braking/horizontal"
     )
     vertical_braking: float = parameter(
-        Number("m/s^2", minimum=0.01), "as in the geofence", 2.5, "braking/vertical"
+        Number("m/s^2", minimum=0.01), "as in the geofence", 2.0, "braking/vertical"
     )
     vary: float = parameter(
         Number(minimum=1.0, maximum=4.0),

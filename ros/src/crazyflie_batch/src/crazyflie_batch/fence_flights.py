@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Controller = Callable[[float, Array, Array, Array, tuple[float, float]], Array]
 
 SUBSTEPS = 4  #: Of a period; delay and spread are whole numbers of them.
-_FEATURES, _OUTPUTS = 6, 5
+_FEATURES, _OUTPUTS = 6, 6
 POLICY_SIZE = _FEATURES * _OUTPUTS  #: Numbers that define an adversary.
 
 
@@ -49,7 +49,8 @@ class Adversary:
     """What acts against the fence: a policy for each flight, shape (POLICY_SIZE, n).
 
     Linear in position, velocity, acceleration, a sine and a random telegraph; its signs are the
-    regular control, the disturbance, both errors, and whether a control takes effect late.
+    regular control, the disturbance, both errors, whether a control takes effect late, and how much
+    of what is not certain of it the vehicle has.
     """
 
     def __init__(self, policy: Array, case: Case, random: np.random.Generator):
@@ -61,7 +62,7 @@ class Adversary:
         self._frequency = 10.0 ** random.uniform(-0.5, 1.3, n)
 
     def act(self, t: float, p: Array, v: Array, a: Array) -> Array:
-        """Return control, disturbance, errors of position and velocity, lateness, each -1 to 1."""
+        """Return control, disturbance, both errors, lateness and share, each -1 to 1."""
         case = self._case
         half, braking = (case.high - case.low) / 2.0, case.axis.braking
         flips = self._random.random(len(p)) < self._rate
@@ -90,6 +91,8 @@ def fly(case: Case, policy: Array, seed: int, controller: Controller | None = No
     n = policy.shape[1]
     adversary = Adversary(policy, case, random)
     p, v, a = np.full(n, (case.low + case.high) / 2.0), np.zeros(n), np.zeros(n)
+    # The largest and the smallest acceleration that the fence knows of.
+    most, least = np.zeros((2, n))
     step = response(case.substep, axis.tau)
     delayed = round(axis.delay / case.substep)
     spread = round(axis.spread / case.substep)
@@ -100,16 +103,18 @@ def fly(case: Case, policy: Array, seed: int, controller: Controller | None = No
     farthest = np.full(n, -np.inf)
     for tick in range(case.ticks):
         now = tick * axis.period
-        regular, d, e_p, e_v, late = adversary.act(now, p, v, a)
+        regular, d, e_p, e_v, late, share = adversary.act(now, p, v, a)
         wanted = regular * axis.largest
         if controller is not None:
             wanted = np.clip(
                 controller(now, p, v, a, (case.low, case.high)), -axis.largest, axis.largest
             )
-        at = p + e_p * axis.position_error, v + e_v * axis.velocity_error, a
+        shown = p + e_p * axis.position_error, v + e_v * axis.velocity_error
+        up, down = (*shown, most), (*shown, least)
         for u in queue[:delayed]:
-            at = _moved(step, *at, u, 0.0)
-        control, was_free = _fenced(case, *at, wanted, last, was_free)
+            up = _moved(step, *up, np.maximum(u, -axis.certain), 0.0)
+            down = _moved(step, *down, np.minimum(u, axis.certain), 0.0)
+        control, was_free = _fenced(case, up, down, wanted, last, was_free)
         begin = delayed + np.where(late > 0.0, spread, 0)
         queue += [queue[-1]] * (delayed + spread + SUBSTEPS + 1 - len(queue))
         # Until it takes effect, the control before stays in force.
@@ -118,7 +123,12 @@ def fly(case: Case, policy: Array, seed: int, controller: Controller | None = No
         ]
         last = control
         for _ in range(SUBSTEPS):
-            p, v, a = _moved(step, p, v, a, queue.pop(0), d * axis.disturbance * case.excess)
+            u = queue.pop(0)
+            certain = np.clip(u, -axis.certain, axis.certain)
+            had = certain + (share + 1.0) / 2.0 * (u - certain)
+            p, v, a = _moved(step, p, v, a, had, d * axis.disturbance * case.excess)
+            most = most * step.fade + np.maximum(u, -axis.certain) * (1.0 - step.fade)
+            least = least * step.fade + np.minimum(u, axis.certain) * (1.0 - step.fade)
             farthest = np.maximum(farthest, np.maximum(p - case.high, case.low - p))
     return farthest
 
@@ -132,11 +142,17 @@ def _moved(step, p, v, a, u, d):
     )
 
 
-def _fenced(case, p, v, a, wanted, last, was_free):
-    """Return what the fence makes of controls, and where any control is free."""
+def _fenced(case, up, down, wanted, last, was_free):
+    """Return what the fence makes of controls, and where any control is free.
+
+    ``up`` and ``down`` are position, velocity and acceleration as the upper and the lower wall have
+    to expect them.
+    """
     axis, top = case.axis, case.axis.largest
-    free = np.ones(len(p), dtype=bool)
-    for distance, speed, acceleration in ((case.high - p, v, a), (p - case.low, -v, -a)):
+    up = case.high - up[0], up[1], up[2]
+    down = down[0] - case.low, -down[1], -down[2]
+    free = np.ones(len(wanted), dtype=bool)
+    for distance, speed, acceleration in (up, down):
         way = axis.reach(speed + axis.velocity_margin, acceleration, top, top)
         free &= way <= distance - axis.position_margin - axis.bulge
     (near,) = np.nonzero(~free)
@@ -144,7 +160,8 @@ def _fenced(case, p, v, a, wanted, last, was_free):
     if len(near):
         before = last[near]
         before = np.where(was_free[near], -top, before), np.where(was_free[near], top, before)
-        part = ((case.high - p)[near], (p - case.low)[near], v[near], a[near], before)
-        low, high = axis.control_range(*part)
+        low, high = axis.control_range(
+            tuple(each[near] for each in up), tuple(each[near] for each in down), before
+        )
         control[near] = np.clip(wanted[near], low, high)
     return control, free

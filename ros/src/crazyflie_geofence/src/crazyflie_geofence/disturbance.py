@@ -17,7 +17,7 @@ class DisturbanceWatch:
         self.widest = [0.0, 0.0, 0.0]
         self._errors: Sequence[float] = (0.0, 0.0, 0.0)
         self._start: tuple[float, Sequence[float]] | None = None
-        self._gained = [0.0, 0.0, 0.0]
+        self._gained = [0.0] * 6
 
     def expect(self, errors: Sequence[float]) -> None:
         """Set the largest errors of measured velocities, m/s."""
@@ -28,12 +28,11 @@ class DisturbanceWatch:
         self._start = None
 
     def gain(self, velocity: Sequence[float]) -> None:
-        """Add what the controls explain of a change of the velocity, m/s."""
-        x, y, z = velocity
-        gained = self._gained
-        gained[0] += x
-        gained[1] += y
-        gained[2] += z
+        """Add what the controls explain of a change of the velocity, m/s.
+
+        At most upwards along x, y and z, then at most downwards.
+        """
+        self._gained = [a + b for a, b in zip(self._gained, velocity, strict=True)]
 
     def is_due(self, time: float) -> bool:
         """Return whether a span has ended, or none has begun, at ``time`` (s)."""
@@ -43,9 +42,13 @@ class DisturbanceWatch:
         """End a span at ``time`` (s) with a measured velocity (m/s), and begin the next."""
         start = self._start
         if start is not None and 0.0 < time - start[0] < 2.0 * SPAN:
-            changes = zip(velocity, start[1], self._gained, self._errors, self.widest, strict=True)
+            up, down = self._gained[:3], self._gained[3:]
+            changes = zip(velocity, start[1], up, down, self._errors, self.widest, strict=True)
             self.widest = [
-                max((abs(v - v0 - gained) - 2.0 * error) / (time - start[0]), _FADE * old)
-                for v, v0, gained, error, old in changes
+                max(
+                    (max(v - v0 - most, v0 - v - least) - 2.0 * error) / (time - start[0]),
+                    _FADE * old,
+                )
+                for v, v0, most, least, error, old in changes
             ]
-        self._start, self._gained = (time, velocity), [0.0, 0.0, 0.0]
+        self._start, self._gained = (time, velocity), [0.0] * 6

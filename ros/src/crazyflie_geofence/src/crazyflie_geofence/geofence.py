@@ -78,11 +78,12 @@ class Geofence:
     ):
         self._obstacles = obstacles or Obstacles((), 0.0)
         self._max_thrust = min(max_thrust, MAX_THRUST)
-        self._acceleration = [0.0, 0.0, 0.0]
-        self._in_force: Sequence[float] = _HOVER  # Accelerations that are commanded, m/s^2.
+        # Towards the upper walls of the axes, then towards the lower ones (m/s^2).
+        self._acceleration = [0.0] * 6
+        self._in_force = [0.0] * 6  # Commanded ones.
         self._time: float | None = None  # Of the accelerations.
         self._new: deque[tuple[float, Control, float]] = deque(maxlen=_MEMORY)
-        self._sent: deque[tuple[float, Sequence[float]]] = deque()
+        self._sent: deque[tuple[float, list[float]]] = deque()
         self._last: list[float] | None = None  # Accelerations of the fence's last control.
         self._watch = DisturbanceWatch()
         self.change(lower, upper, axes)
@@ -126,7 +127,7 @@ class Geofence:
             return self._axis(plane).is_far(distance, speed)
 
         planes = self._obstacles.choose(
-            position, is_far, lambda plane: self._room(plane, position, velocity)
+            position, velocity, is_far, lambda plane: self._room(plane, position, velocity)
         )
         # Far from all walls, a prediction would change nothing.
         if all(
@@ -136,28 +137,40 @@ class Geofence:
             self._last = None
             return regular, 0.0
         self._advance(time)
-        state = self._predict(time, position, velocity)
-        # Towards each plane: the distance, the velocity and the acceleration.
-        p, v, a = zip(*state, strict=True)
-        towards = [(each.distance(p), -each.along(v), -each.along(a)) for each in planes]
+        # Towards each wall, and each plane: the distance, the velocity and the acceleration.
+        moves = self._predict(time, velocity)
+        sides = [
+            ((high - p - up[0], *up[1:]), (p - low - down[0], *down[1:]))
+            for (low, high, _), p, up, down in zip(
+                self._walls, position, moves[:3], moves[3:], strict=True
+            )
+        ]
+        towards = []
+        for plane in planes:
+            way, v, a = (_along(plane, parts) for parts in zip(*moves, strict=True))
+            towards.append((plane.distance(position) - way, v, a))
         if all(
-            _is_free(axis, low, high, *each)
-            for (low, high, axis), each in zip(self._walls, state, strict=True)
+            _is_free(axis, *side)
+            for (_, _, axis), both in zip(self._walls, sides, strict=True)
+            for side in both
         ) and all(
-            _is_free_of(self._axis(plane), *each)
-            for plane, each in zip(planes, towards, strict=True)
+            _is_free(self._axis(plane), *each) for plane, each in zip(planes, towards, strict=True)
         ):
             self._last = None
             return regular, 0.0
         ranges = [
-            _range(axis, low, high, state[i], None if self._last is None else self._last[i])
-            for i, (low, high, axis) in enumerate(self._walls)
+            _range(axis, *both, None if self._last is None else self._last[i])
+            for i, ((_, _, axis), both) in enumerate(zip(self._walls, sides, strict=True))
         ]
         limits = [
             (plane, self._most(plane, *each)) for plane, each in zip(planes, towards, strict=True)
         ]
+        wanted = self._acceleration_of(regular, yaw)
+        nearest = _allowed(wanted, ranges, limits)
+        if nearest == wanted:
+            self._last = nearest
+            return self._limited(regular), 1.0
         safe = _allowed(_HOVER, ranges, limits)
-        nearest = _allowed(self._acceleration_of(regular, yaw), ranges, limits)
         self._last = self._producible(safe, nearest, yaw)
         roll, pitch, thrust = _control(self._last, yaw)
         return self._limited((roll, pitch, regular[2], thrust)), 1.0
@@ -169,7 +182,7 @@ class Geofence:
     def _room(self, plane, position, velocity):
         """Return the distance between the stopping point and a plane, m, from now on."""
         distance, speed = plane.distance(position), -plane.along(velocity)
-        acceleration = -plane.along(tuple(self._acceleration))
+        acceleration = _along(plane, self._acceleration)
         return distance - self._axis(plane).stopping_distance(speed, acceleration)
 
     def _most(self, plane, distance, v, a):
@@ -186,7 +199,15 @@ class Geofence:
             sent, control, heading = self._new.popleft()
             # Below the thrust of flights the vehicle stands.
             flies = control[3] >= MIN_THRUST
-            self._sent.append((sent, self._acceleration_of(control, heading) if flies else _HOVER))
+            u = self._acceleration_of(control, heading) if flies else _HOVER
+            most = [axis.certain for axis in self._axes]
+            self._sent.append(
+                (
+                    sent,
+                    [max(part, -c) for part, c in zip(u, most, strict=True)]
+                    + [max(-part, -c) for part, c in zip(u, most, strict=True)],
+                )
+            )
             if not flies:
                 self._watch.restart()
         delay = self._axes[0].delay
@@ -199,37 +220,36 @@ class Geofence:
         # A clock that has stepped back belongs to another run.
         elapsed = 0.0 if self._time is None else max(time - self._time, 0.0)
         self._time = time
-        gained, tau = [], None
-        for i, axis in enumerate(self._axes):
-            if axis.tau != tau:
-                tau = axis.tau
-                r = response(elapsed, tau)
+        gained = []
+        for i, r in enumerate(self._responses(elapsed)):
             a, u = self._acceleration[i], self._in_force[i]
             gained.append(a * r.speed + u * r.held_speed)
             self._acceleration[i] = a * r.fade + u * (1.0 - r.fade)
         self._watch.gain(gained)
 
-    def _predict(self, time, position, velocity):
-        """Return position, velocity and acceleration of each axis at the end of the delay."""
+    def _responses(self, duration):
+        x, _, z = (axis.tau for axis in self._axes)
+        horizontal, vertical = response(duration, x), response(duration, z)
+        return (horizontal, horizontal, vertical) * 2
+
+    def _predict(self, time, velocity):
+        """Return the way, velocity and acceleration towards each wall at the end of the delay."""
         delay, in_force, start = self._axes[0].delay, self._in_force, time
         pieces = []
         for begin, following in self._sent:
-            pieces.append((begin + delay - start, in_force))
+            pieces.append((self._responses(begin + delay - start), in_force))
             start, in_force = begin + delay, following
-        pieces.append((time + delay - start, in_force))
-        states, tau = [], None
-        for i, p in enumerate(position):
-            v, a = velocity[i], self._acceleration[i]
-            if self._axes[i].tau != tau:
-                tau = self._axes[i].tau
-                responses = [response(duration, tau) for duration, _ in pieces]
-            for r, (_, controls) in zip(responses, pieces, strict=True):
-                u = controls[i]
-                p += v * r.time + a * r.way + u * r.held_way
+        pieces.append((self._responses(time + delay - start), in_force))
+        moves = []
+        for i, v in enumerate((*velocity, *(-v for v in velocity))):
+            way, a = 0.0, self._acceleration[i]
+            for responses, controls in pieces:
+                r, u = responses[i], controls[i]
+                way += v * r.time + a * r.way + u * r.held_way
                 v += a * r.speed + u * r.held_speed
                 a = a * r.fade + u * (1.0 - r.fade)
-            states.append((p, v, a))
-        return states
+            moves.append((way, v, a))
+        return moves
 
     def _acceleration_of(self, control, yaw):
         return coupled_acceleration(self._limited(control), yaw)
@@ -266,11 +286,14 @@ class Geofence:
         )
 
 
-def _is_free(axis, low, high, p, v, a):
-    return _is_free_of(axis, high - p, v, a) and _is_free_of(axis, p - low, -v, -a)
+def _along(plane, towards):
+    """Return the part towards a plane of what is known towards each of the six walls."""
+    return sum(
+        abs(part) * towards[i if part < 0.0 else i + 3] for i, part in enumerate(plane.normal)
+    )
 
 
-def _is_free_of(axis, distance, v, a):
+def _is_free(axis, distance, v, a):
     return axis.is_free(distance - axis.position_margin, v + axis.velocity_margin, a)
 
 
@@ -289,16 +312,14 @@ def _allowed(wanted, ranges, limits):
     return u
 
 
-def _range(axis, low, high, state, last):
+def _range(axis, up, down, last):
     """Return the smallest and the largest acceleration that both walls allow."""
-    p, v, a = state
-    above, below, most = high - p, p - low, axis.largest
-    before = (-most, most) if last is None else (last, last)
-    if above < -axis.position_margin:
-        return -most, _return(axis, above, v)
-    if below < -axis.position_margin:
-        return -_return(axis, below, -v), most
-    return axis.control_range(above, below, v, a, before)
+    most = axis.largest
+    if up[0] < -axis.position_margin:
+        return -most, _return(axis, *up[:2])
+    if down[0] < -axis.position_margin:
+        return -_return(axis, *down[:2]), most
+    return axis.control_range(up, down, (-most, most) if last is None else (last, last))
 
 
 def _return(axis, distance, v):

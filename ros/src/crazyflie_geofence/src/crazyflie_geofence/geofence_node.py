@@ -65,10 +65,10 @@ class GeofenceParameters(Parameters):
     lower: CornerParameters = group(CornerParameters, "box/min")
     upper: CornerParameters = group(CornerParameters, "box/max")
     horizontal_braking: float = parameter(
-        _BRAKING, "A: acceleration along x and y that it counts on", 1.3, "braking/horizontal", True
+        _BRAKING, "A: acceleration along x and y that it counts on", 1.4, "braking/horizontal", True
     )
     vertical_braking: float = parameter(
-        _BRAKING, "A along z; what is more leaves less along x and y", 2.5, "braking/vertical", True
+        _BRAKING, "A along z; what is more leaves less along x and y", 2.0, "braking/vertical", True
     )
     model: str = parameter(
         VEHICLE_MODEL, "type of the vehicle, or model file with its bounds", "cf21"

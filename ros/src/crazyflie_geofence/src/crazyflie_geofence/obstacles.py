@@ -1,7 +1,7 @@
 """Planes in front of obstacles: a vehicle that stays beyond one does not touch the obstacle.
 
 An obstacle is convex. The plane of each face separates it from all vehicles outside of the face; a
-round one has a plane for each direction, of which the one towards the vehicle counts.
+round one has a plane for each direction. Those count that face the vehicle, and where it passes.
 """
 
 import math
@@ -11,6 +11,9 @@ from typing import NamedTuple
 from crazyflie_world.shapes import Ball, Box, Cylinder, Shape
 
 Triple = tuple[float, float, float]
+
+#: Where on its way past a round obstacle a plane faces the vehicle.
+_PASSING_SHARES = (0.0, 0.5, 0.75, 1.0)
 
 
 class Plane(NamedTuple):
@@ -29,8 +32,11 @@ class Plane(NamedTuple):
         return a * x + b * y + c * z
 
 
-def planes(shape: Shape, position: Triple, clearance: float) -> list[Plane]:
-    """Return the planes that may separate a vehicle from an obstacle, with a clearance (m)."""
+def planes(shape: Shape, position: Triple, velocity: Triple, clearance: float) -> list[Plane]:
+    """Return the planes that may separate a vehicle from an obstacle, with a clearance (m).
+
+    Position (m) and velocity (m/s) are those of the vehicle.
+    """
     x, y, z = shape.centre
     half_x, half_y, half_z = (length / 2.0 + clearance for length in shape.size)
     found = [Plane((0.0, 0.0, 1.0), z + half_z), Plane((0.0, 0.0, -1.0), half_z - z)]
@@ -41,10 +47,14 @@ def planes(shape: Shape, position: Triple, clearance: float) -> list[Plane]:
             found += [Plane((a, b, 0.0), middle + half), Plane((-a, -b, 0.0), half - middle)]
     elif isinstance(shape, Cylinder | Ball):
         # A ball is taken for the cylinder around it.
-        ahead, left = position[0] - x, position[1] - y
-        distance = math.hypot(ahead, left)
-        a, b = (ahead / distance, left / distance) if distance > 0.0 else (1.0, 0.0)
-        found.append(Plane((a, b, 0.0), a * x + b * y + half_x))
+        ahead, left, vx, vy = position[0] - x, position[1] - y, velocity[0], velocity[1]
+        # Until it is nearest, if it flies straight on.
+        passing = max(-(ahead * vx + left * vy), 0.0) / max(vx * vx + vy * vy, 1e-9)
+        for share in _PASSING_SHARES:
+            to_x, to_y = ahead + share * passing * vx, left + share * passing * vy
+            distance = math.hypot(to_x, to_y)
+            a, b = (to_x / distance, to_y / distance) if distance > 0.0 else (1.0, 0.0)
+            found.append(Plane((a, b, 0.0), a * x + b * y + half_x))
     return found
 
 
@@ -56,7 +66,11 @@ class Obstacles:
         self._chosen: list[Plane | None] = [None] * len(self._shapes)
 
     def choose(
-        self, position: Triple, is_far: Callable[[Plane], bool], room: Callable[[Plane], float]
+        self,
+        position: Triple,
+        velocity: Triple,
+        is_far: Callable[[Plane], bool],
+        room: Callable[[Plane], float],
     ) -> list[Plane]:
         """Return a plane for each obstacle; the present one while it is far.
 
@@ -65,7 +79,7 @@ class Obstacles:
         """
         for i, present in enumerate(self._chosen):
             if present is None or not is_far(present):
-                best = max(planes(self._shapes[i], position, self._clearance), key=room)
+                best = max(planes(self._shapes[i], position, velocity, self._clearance), key=room)
                 if present is None or room(best) > room(present):
                     self._chosen[i] = best
         return [plane for plane in self._chosen if plane is not None]

@@ -23,7 +23,7 @@ _ROOT_STEPS = 5  #: Newton steps, after which the distance is exact to 1e-6 m or
 _CONTROL_STEPS = 5  #: Newton steps to the largest control.
 #: Time for which the fence's own controls could be held, s. The proof needs a period only, but then
 #: 1 cm/s of noise would change them by 1 m/s^2.
-_SMOOTH = 0.06
+_SMOOTH = 0.02
 _GRID = 41  #: Speeds and accelerations at which the smallest box is computed.
 
 _SCALAR = SimpleNamespace(exp=math.exp, log=math.log, max=max, min=min)
@@ -69,6 +69,9 @@ class Axis:
     delay: float  #: From a measurement to the earliest time at which its control is in force.
     spread: float  #: From the earliest to the latest such time.
     period: float  #: Longest time from one control to the next.
+    #: Largest acceleration that a control certainly has, m/s^2: of a larger one, a part may be
+    #: missing, as thrust has limits that attitude loops and batteries lower.
+    certain: float = math.inf
 
     def disturbed(self, more: float) -> "Axis":
         """Return the same with a disturbance of at least this (m/s^2), as far as braking allows."""
@@ -191,21 +194,25 @@ class Axis:
         return way + self.bulge <= room
 
     def control_range(
-        self, above: Number, below: Number, v: Number, a: Number, last: tuple[Number, Number]
+        self,
+        up: tuple[Number, Number, Number],
+        down: tuple[Number, Number, Number],
+        last: tuple[Number, Number],
     ) -> tuple[Number, Number]:
         """Return the smallest and the largest control that both walls allow, m/s^2.
 
-        ``above`` and ``below`` are the distances from the walls (m); ``last`` has the smallest and
-        the largest control before. Others are as in `largest_control`.
+        ``up`` and ``down`` are the distances from the upper and the lower wall (m), and velocity
+        and acceleration towards it, as in `largest_control`; ``last`` has the smallest and the
+        largest control before.
         """
-        f = _functions(v)
-        high = self.smooth_control(above, v, a, last[1])
-        low = -self.smooth_control(below, -v, -a, -last[0])
+        f = _functions(up[1])
+        high = self.smooth_control(*up, last[1])
+        low = -self.smooth_control(*down, -last[0])
         if not np.any(low > high):
             return low, high
         contrary = low > high
-        largest = where(contrary, self.largest_control(above, v, a, last[1]), high)
-        smallest = where(contrary, -self.largest_control(below, -v, -a, -last[0]), low)
+        largest = where(contrary, self.largest_control(*up, last[1]), high)
+        smallest = where(contrary, -self.largest_control(*down, -last[0]), low)
         # In a box of the proof, the smallest is at most the largest.
         middle = f.max(f.min((smallest + largest) / 2.0, self.braking), -self.braking)
         return f.min(smallest, f.max(middle, largest)), f.max(largest, f.min(middle, smallest))
@@ -266,7 +273,13 @@ class Axis:
         the proof.
         """
         b, t = self.braking - self.disturbance, self.delay + self.horizon
-        both = 2.0 * (self.velocity_error + self.disturbance * t)
+        # Towards one wall an acceleration may be this much more than away from the other: of the
+        # controls that are sent, and of one that may come early or late.
+        late = 2.0 * self.largest
+        sent = max(self.largest - self.certain, 0.0)
+        gap = sent + late * (1.0 - self._gap.fade)
+        both = 2.0 * (self.velocity_error + self.disturbance * t) + sent * self.delay
+        both += late * self._gap.held_speed + gap * self.period
         edges = np.linspace(-self.largest, self.largest, _GRID)
         slack = (self.largest + self.disturbance) * self.horizon
 
@@ -279,10 +292,11 @@ class Axis:
         largest = 0.0
         for low, high in zip(edges[:-1], edges[1:], strict=True):
             fastest = max(slack, float(lost(-low)))
+            high = min(high + gap, self.largest)
             slowest = -both - max(slack, float(lost(high)))
             v = np.linspace(slowest, fastest, _GRID)
             up = self.stopping_distance(v[1:] + both, np.full(_GRID - 1, high))
             down = self.stopping_distance(-v[:-1], np.full(_GRID - 1, -low))
             largest = max(largest, float(np.max(up + down)))
         position = self.position_error + t * (self.velocity_error + self.disturbance * t / 2.0)
-        return 2.0 * (position + self.bulge) + largest
+        return 2.0 * (position + self.bulge) + gap * t * t / 2.0 + largest

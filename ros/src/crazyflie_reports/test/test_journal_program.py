@@ -1,5 +1,9 @@
 """The program journal prints what a journal has."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 from std_msgs.msg import Float64, String
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
@@ -84,6 +88,17 @@ def test_what_cannot_be_printed_is_named(path, capsys, change, arguments, reason
         main([str(path), *arguments])
     assert end.value.code == 2
     assert reason in capsys.readouterr().err
+
+
+def test_a_reader_that_wants_no_more_is_no_error(path):
+    """As ``journal JOURNAL --topic NAME | head`` is."""
+    read, write = os.pipe()
+    os.close(read)
+    program = "import sys; from crazyflie_reports.journal_program import main; sys.exit(main())"
+    command = [sys.executable, "-c", program, str(path), "--topic", "/number"]
+    done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, timeout=60, check=False)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, b"")
 
 
 def test_a_cut_journal_is_printed_to_the_cut(path, capsys):

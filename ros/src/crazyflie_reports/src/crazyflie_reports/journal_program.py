@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import struct
 import sys
 from collections import Counter, defaultdict
@@ -158,19 +159,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options: Any = parser.parse_args(arguments)
     try:
         contents = Contents(options.journal)
-        if options.topic is not None:
-            if not print_messages(contents, options.topic):
-                known = sorted(name for name, _ in contents.names.names[Kind.SUBSCRIBED].values())
-                parser.error(
-                    f"{options.journal} has no message on {options.topic}; its subscriptions: "
-                    + (", ".join(known) or "none")
-                )
-            return 0
-        for _ in contents.rows():
-            pass
+        if options.topic is None:
+            for _ in contents.rows():
+                pass
+            print(contents.text())
+        elif not print_messages(contents, options.topic):
+            known = sorted(name for name, _ in contents.names.names[Kind.SUBSCRIBED].values())
+            parser.error(
+                f"{options.journal} has no message on {options.topic}; its subscriptions: "
+                + (", ".join(known) or "none")
+            )
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader has closed the pipe, and Python would still flush into it at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (ValueError, LookupError, TypeError, struct.error, genpy.DeserializationError) as error:
         parser.error(f"{options.journal}: a row cannot be read: {error}")
     except JournalError as error:
         parser.error(str(error))
-    print(contents.text())
     return 0

@@ -196,7 +196,6 @@ class JournalWriter:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = open(path, "w+b", buffering=0)
             self._file.write(json.dumps(self.header).encode() + b"\n")
-            self._header_end = self._file.tell()
             self._tail_path = path.with_name(path.name + ".tail")
             tail = os.open(self._tail_path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
             try:

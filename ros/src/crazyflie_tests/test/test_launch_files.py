@@ -208,6 +208,25 @@ def test_what_a_user_gives_to_the_first_launch_file_reaches_the_last():
     assert parameters["/crazyflie/crazyflie_add/estimator"] == "kalman"
 
 
+def test_without_a_display_it_is_said_how_to_launch_without_rviz():
+    """Qt's error does not."""
+    files = [path for path in TOP.glob("ros/**/launch/**/*.launch") if "test" not in path.parts]
+    with_rviz = [path for path in files if 'type="rviz"' in path.read_text()]
+    assert len(with_rviz) > 4
+    assert all("/on_display.sh" in path.read_text() for path in with_rviz)
+    node = launch_files.expand(path_of("crazyflie_examples/sw_hover.launch"))[0]["/rviz"]
+    for display, printed in (("", ""), (":9", "shown\n")):
+        result = subprocess.run(
+            [*node.launch_prefix.split(), "echo", "shown"],
+            env={**os.environ, "DISPLAY": display, "WAYLAND_DISPLAY": ""},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert result.stdout == printed
+        assert ("rviz:=false launches without it" in result.stderr) is not bool(printed)
+
+
 def test_arguments_without_a_meaning_are_told():
     file = path_of("crazyflie_examples/hw_hover.launch")
     nodes, _ = launch_files.expand(file, rviz="false", sim_init_x="1.0")

@@ -57,6 +57,7 @@ from crazyflie_utils.parameters import model_file, vehicle_model
 from crazyflie_utils.parameters.command_line import parse_arguments
 from crazyflie_utils.parameters.types import BOOLEAN, FILE, FINITE, FRAME, Text
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
+from crazyflie_utils.terminal import copy_output, waiting
 from crazyflie_utils.vectors import stamped
 
 PREFIX = "/crazyflie"  #: Namespace of the driver.
@@ -96,7 +97,7 @@ class LiveRig:
     def __init__(self, uri: str, options: FirstFlightParameters, folder: Path):
         self.samples: list[Sample] = []
         self._uri, self._options, self._folder = uri, options, folder
-        self._launched: list[subprocess.Popen[bytes]] = []
+        self._launched: list[subprocess.Popen[str]] = []
         self._signals: list[int] = []
         self.model = vehicle_model.load(options.model)
         self._model_file = options.model  # With the measured thrust of hover, once there is one.
@@ -115,7 +116,7 @@ class LiveRig:
 
     def begin(self) -> None:
         """Connect to the graph."""
-        if not self._wait(rosgraph.is_master_online, _LIMIT):
+        if not self._wait(rosgraph.is_master_online, _LIMIT, what="until a ROS master answers"):
             raise Stop(f"no ROS master at {rosgraph.get_master_uri()} for {_LIMIT:g} s")
         process, self._end_node = begin_script("first_flight")
         self._handle = handle = process.handle("/first_flight")
@@ -197,7 +198,7 @@ class LiveRig:
     def _check(self):
         self._check_signals()
         if any(launched.poll() is not None for launched in self._launched):
-            raise Stop("the launch has ended; see its log above")
+            raise Stop(f"the launch has ended; see the logs in {self._folder}")
         if self._landing is None:
             return
         now = self._handle.time()
@@ -208,8 +209,12 @@ class LiveRig:
             if now - last > _MAX_SILENCE:
                 raise Stop(f"no {what} has come for {_MAX_SILENCE:g} s in flight")
 
-    def _wait(self, is_over, limit, ends_at_key=True):
+    def _wait(self, is_over, limit, ends_at_key=True, what="under way"):
         """Wait until a condition holds, or for a time (s); return whether the condition holds."""
+        with waiting(what):
+            return self._wait_unseen(is_over, limit, ends_at_key)
+
+    def _wait_unseen(self, is_over, limit, ends_at_key):
         end = time.monotonic() + limit
         while not is_over():
             left = end - time.monotonic()
@@ -257,7 +262,7 @@ class LiveRig:
                 self._examined = None
 
         threading.Thread(target=work, daemon=True).start()
-        self._wait(examined.done, math.inf)
+        self._wait(examined.done, math.inf, what="the doctor examines the vehicle")
         return examined.result()
 
     def _begin_estimate(self, vehicle):
@@ -387,8 +392,13 @@ class LiveRig:
             f"record_folder:={self._folder.resolve()}",
         )
         # Its gains may take seconds to design; the server does not know yet that there is none.
-        if not self._wait(lambda: self._has_controller, _LIMIT):
-            raise Stop(f"no controller publishes {_LIMIT:g} s after the launch; see its log above")
+        if not self._wait(
+            lambda: self._has_controller, _LIMIT, what="until a controller publishes"
+        ):
+            raise Stop(
+                f"no controller publishes {_LIMIT:g} s after the launch; see the logs in "
+                f"{self._folder}"
+            )
         self._arm(
             lambda: self._supervisor,
             lambda do_arm: self._call("arm", SetBool, SetBoolRequest(do_arm)),
@@ -439,12 +449,16 @@ class LiveRig:
 
     def _launch(self, name, *arguments):
         command = ["roslaunch", str(_package() / "launch" / name), f"uri:={self._uri}", *arguments]
-        self._launched.append(_start(command))
+        self._launched.append(_start(command, self._folder / f"{Path(name).stem}.log"))
 
     def _await_poses(self):
         self._is_connected = False
         before = len(self.samples)
-        if not self._wait(lambda: self._is_connected and len(self.samples) > before + 10, _LIMIT):
+        if not self._wait(
+            lambda: self._is_connected and len(self.samples) > before + 10,
+            _LIMIT,
+            what=f"until poses come in the frame {self._frame}",
+        ):
             raise Stop(
                 f"no pose in the frame {self._frame} within {_LIMIT:g} s of the launch; does "
                 "motion capture see the vehicle, and is it connected?"
@@ -474,14 +488,18 @@ def _line(limit: float) -> bytes | None:
     return line
 
 
-def _start(command: list[str]) -> subprocess.Popen[bytes]:
-    # In a session of its own: Ctrl-C would end it before the landing.
-    return subprocess.Popen(
-        command, stdout=sys.stderr, stdin=subprocess.DEVNULL, start_new_session=True
-    )
+def _start(command: list[str], log: Path) -> subprocess.Popen[str]:
+    """Start a program, whose output goes to a log; only warnings are shown."""
+    launched = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+        # In a session of its own: Ctrl-C would end it before the landing.
+        text=True, errors="replace", start_new_session=True,
+    )  # fmt: skip
+    threading.Thread(target=copy_output, args=(launched.stdout, log), daemon=True).start()
+    return launched
 
 
-def _end_launch(launched: subprocess.Popen[bytes]) -> None:
+def _end_launch(launched: subprocess.Popen[str]) -> None:
     """End a roslaunch, whose nodes land a vehicle that flies before they end."""
     launched.send_signal(signal.SIGINT)
     try:
@@ -517,6 +535,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     folder = Path(options.out) / datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
     folder.mkdir(parents=True)
+    print(f"first_flight: all output of what is launched is in {folder}; warnings are shown")
     rig = LiveRig(uri, options, folder)
     for number in _SIGNALS:
         signal.signal(number, lambda number, _: rig.note(number))
@@ -525,7 +544,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         if not rosgraph.is_master_online():
             port = urlsplit(rosgraph.get_master_uri()).port
-            core = _start(["roscore", "-p", str(port)])
+            core = _start(["roscore", "-p", str(port)], folder / "roscore.log")
         rig.begin()
         for verdict in fly(rig, rig.ask):
             verdicts.append(verdict)

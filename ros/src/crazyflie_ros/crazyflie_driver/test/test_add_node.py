@@ -101,7 +101,10 @@ def test_all_parameters_arrive():
         "genericLogTopic_a_Variables": ["pm.vbat"],
         "genericLogTopic_b_Variables": ["mag.x", "mag.y"],
     }
-    (request,) = Launch({**PARAMETERS, **changes}).requests
+    launch = Launch({**PARAMETERS, **changes})
+    (request,) = launch.requests
+    # Each is one that the node knows.
+    assert launch.process.logged("warn") == []
     assert (request.roll_trim, request.pitch_trim) == (1.0, -0.5)
     assert not request.enable_logging
     assert not request.use_ros_time

@@ -95,9 +95,8 @@ class NodeHandle:
         change.
         """
         source = PrivateParameters(self._process.transport.get_param, self.name, self.resolve)
-        declarations = parameters.declarations()
-        self._process.known_parameters.update(source.full_name(d.name) for d in declarations)
         loaded = parameters.read(source.get, source.full_name)
+        self._process.known_parameters |= source.asked_for
         self._own_parameters = source
         if on_change is not None and any(each.live for each in parameters.declarations()):
             Reconfiguration(self, loaded, source.get, on_change)

@@ -40,6 +40,7 @@ class PrivateParameters:
         self._get_param = get_param
         self._prefix = node + "/"
         self._resolve = resolve
+        self.asked_for: set[str] = set()  #: Absolute names of parameters that were asked for.
         try:
             self._own = get_param(node)
         except KeyError:
@@ -63,6 +64,7 @@ class PrivateParameters:
     def get(self, name: str) -> Any:
         """Return the raw value of a parameter; KeyError without."""
         full_name = self.full_name(name)
+        self.asked_for.add(full_name)
         if not full_name.startswith(self._prefix):
             return self._get_param(full_name)
         value = self._own

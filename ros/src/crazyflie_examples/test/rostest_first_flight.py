@@ -119,7 +119,10 @@ def test_a_driver_that_dies_in_its_hover_ends_the_flight(terminal):
     flight.hovers()
     driver = living_node("/crazyflie_server")
     os.kill(int(driver.split()[1]), signal.SIGKILL)
-    flight.wait_for("FAILED  hover by the driver: the launch has ended")
+    flight.wait_for("FAILED  hover by the driver: ")
+    # On a busy computer roslaunch notices it later than the silence is.
+    reasons = "the launch has ended", "has come for 1 s in flight"
+    assert any(reason in flight.output for reason in reasons)
     flight.ends()
 
 

@@ -40,12 +40,12 @@ def test_the_open_loop_ends_when_the_vehicle_has_lifted_off(hover):
     assert fastest < 0.7
     assert states(network)[-1] == "taking_off"
     assert network.on("/ref")[0][0] == pytest.approx(network.time - 0.5, abs=0.03)
-    assert measured(network) == [pytest.approx(hover * GRAVITY, rel=0.06)]
+    assert measured(network)[-1] == pytest.approx(hover * GRAVITY, rel=0.06)
     # Until the controller is selected, it is repeated.
     begin = network.on("/ref")[0][0]
     repeated = thrusts(network, begin + 0.02)
     assert len(repeated) > 40
-    assert repeated == pytest.approx([measured(network)[0]] * len(repeated), abs=0.01)
+    assert repeated == pytest.approx([measured(network)[-1]] * len(repeated), abs=0.01)
 
 
 @pytest.mark.parametrize("hover", [1.0, 1.1, 1.3])
@@ -116,6 +116,22 @@ def test_a_vehicle_that_is_lost_early_in_its_climb_is_kept_by_its_own_thrust_of_
 
 
 @pytest.mark.parametrize("hover", [0.65, 0.8])
+@pytest.mark.parametrize("moment", [0.2, 0.5])
+def test_a_landing_in_the_liftoff_lifts_no_vehicle_that_hovers_at_less(hover, moment):
+    """Its ramp began at g: the vehicle rose to 1.3 m, and fell from there."""
+    network = scaled(hover)
+    network.call("/takeoff")
+    network.advance(moment)
+    begin = highest = network.vehicle.z
+    network.call("/land")
+    while states(network)[-1] != "on_ground":
+        network.advance(0.01)
+        highest = max(highest, network.vehicle.z)
+    assert highest < begin + 0.2
+    assert network.vehicle.touchdown_speed < 1.3
+
+
+@pytest.mark.parametrize("hover", [0.65, 0.8])
 @pytest.mark.parametrize("moment", [1.0, 4.0])
 def test_a_server_that_is_restarted_lifts_no_vehicle_that_hovers_at_less(hover, moment):
     """It does not know the thrust of hover: its ramp began at g, and the vehicle leapt to 1.1 m."""
@@ -136,7 +152,7 @@ def test_a_server_that_is_restarted_lifts_no_vehicle_that_hovers_at_less(hover, 
 
 
 @pytest.mark.parametrize("hover", [0.65, 0.8])
-@pytest.mark.parametrize("moment", [0.1, 0.4, 0.8])
+@pytest.mark.parametrize("moment", [0.2, 0.4, 0.8])
 def test_a_server_that_dies_in_the_liftoff_leaves_no_thrust_that_lifts(hover, moment):
     """The filter believed in g until the controller flew: the vehicle rose to 1.65 m."""
     network = scaled(hover)
@@ -147,11 +163,11 @@ def test_a_server_that_dies_in_the_liftoff_leaves_no_thrust_that_lifts(hover, mo
     for _ in range(500):
         network.advance(0.01)
         highest = max(highest, network.vehicle.z)
-    assert highest < begin + 0.7
+    assert highest < begin + 0.75
 
 
 @pytest.mark.parametrize("hover", [0.65, 0.8, 1.0])
-@pytest.mark.parametrize("moment", [0.02, 0.11, 0.2])
+@pytest.mark.parametrize("moment", [0.02, 0.11, 0.2, 0.8])
 def test_nothing_lifts_a_vehicle_that_is_not_seen_any_more(hover, moment):
     """The open loop went on: a vehicle that hovers at 0.65 of the assumed thrust rose to 4.2 m."""
     network = scaled(hover)

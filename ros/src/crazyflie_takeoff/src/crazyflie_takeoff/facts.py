@@ -103,8 +103,6 @@ class Facts:
         self.set_hover(None)
         #: The commanded control that flies the vehicle; None while another one does.
         self.flown: Any = None
-        #: The last control that was sent in place of a commanded one.
-        self.sent: SafeSetpoint | None = None
         self._learned = math.nan
         self.vehicle = vehicle
         # The flight, as the server says: its state, or the toggles of in_flight before that.
@@ -194,24 +192,16 @@ class Facts:
         step, self._learned = self.now - self._learned, self.now
         motion = self.seen
         speed = None if motion is None else motion.velocity[2]
-        flown = self.flown
-        if flown is not None and self.silence > 0.5 * self.hold:
-            flown = None  # A late control fades.
-        elif flown is None and self._is_lifted(motion):
-            flown = self.sent
-        if flown is None or not 0.0 < step < LEARNING_STEP:
+        # A late control fades.
+        is_late = self.silence > 0.5 * self.hold
+        if self.flown is None or is_late or not 0.0 < step < LEARNING_STEP:
             if step != 0.0:
                 self._hover_mean.skip(speed)
                 self._last_hover.skip(speed)
             return
-        lift = lift_of(flown)
+        lift = lift_of(self.flown)
         self._hover_mean.update(step, lift, speed)
         self._last_hover.update(step, lift, speed)
-
-    def _is_lifted(self, motion):
-        """Return whether the vehicle climbs by another control than the controller's."""
-        is_seen = self.flight is FlightState.TAKING_OFF and motion is not None
-        return is_seen and self.ground.height(motion) > TOUCHDOWN_HEIGHT
 
     @property
     def hover(self) -> float:

@@ -25,6 +25,8 @@ class LiftOff:
     def __init__(self, thrust: float = LIFT_OFF_THRUST) -> None:
         self.thrust = thrust  #: The thrust to send, m/s^2.
         self._hover = HoverThrust(AVERAGING, thrust)
+        self._is_seen = False
+        self.is_lost = False  #: Whether the speed was known, and is not any more.
 
     @property
     def hover(self) -> float:
@@ -34,6 +36,8 @@ class LiftOff:
     def measure(self, step: float, z_dot: float | None) -> None:
         """Process the vertical speed after ``step`` s with `thrust`; None if it is not known."""
         self._hover.update(step, self.thrust, z_dot)
+        self._is_seen = self._is_seen or z_dot is not None
+        self.is_lost = self._is_seen and z_dot is None
 
     def climb(self, distance: float, z_dot: float) -> None:
         """Choose the thrust of a vehicle below the hover point (``distance``, m)."""

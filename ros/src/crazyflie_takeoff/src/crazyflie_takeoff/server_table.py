@@ -192,7 +192,7 @@ class FlightStateMachine:
         if self.state is ServerState.CLIMBING:
             self.reference = (*self.plan.hover, 0.0, 0.0, 0.0)
             if before is ServerState.LIFTED:
-                self.hover_thrust = self.measured_hover = self.lift_off.hover
+                self.hover_thrust = self.measured_hover
         elif before is ServerState.RAMPING_DOWN and self.state is ServerState.DESCENDING:
             # It has sunk in the ramp: the ground is lower than where it took off.
             self.ground_is_known = False
@@ -238,6 +238,7 @@ class FlightStateMachine:
             pass
         if self.state is ServerState.LIFTED and self.z_dot is not None:
             self.lift_off.climb(self._distance() or 0.0, self.z_dot)
+            self.hover_thrust = self.measured_hover = self.lift_off.hover
         if self.descent is not None:
             self.reference = self.descent.reference(self.elapsed)
             if position is None:
@@ -290,8 +291,7 @@ class FlightStateMachine:
     def _thrust(self):
         if self.state in OPEN_LOOP:
             # Nothing lifts a vehicle that is not seen any more: it is hardly above the ground.
-            is_lost = self._position is not None and self.z_dot is None
-            return LEAST_HOVER if is_lost else self.lift_off.thrust
+            return LEAST_HOVER if self.lift_off.is_lost else self.lift_off.thrust
         if self.hover_thrust is not None:
             # The filter repeats it until the controller has the vehicle.
             return self.hover_thrust
@@ -339,7 +339,7 @@ class FlightStateMachine:
         return distance is not None and z_dot is not None and has_lifted_off(distance, z_dot)
 
     def _open_loop_over(self):
-        return self.elapsed + ROUNDING >= self.plan.open_loop
+        return self.elapsed + ROUNDING >= self.plan.open_loop and not self.lift_off.is_lost
 
     def _takeoff_over(self):
         return self.elapsed + ROUNDING >= self.plan.open_loop + self.plan.settle

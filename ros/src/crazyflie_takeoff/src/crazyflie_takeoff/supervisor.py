@@ -83,13 +83,6 @@ def step(memory: Memory, facts: Facts, given: Given) -> Any:
     if given is Given.TIME and _is_clear(memory, facts):
         memory.clear_until = facts.now + LONGEST_STEP
         return None
-    control = _step(memory, facts, given)
-    if isinstance(control, SafeSetpoint):
-        facts.sent = control
-    return control
-
-
-def _step(memory, facts, given):
     facts.look()
     if given is Given.TAKEOFF:
         _keep_takeoff(memory, facts)
@@ -213,7 +206,7 @@ def _pass_takeoff(memory, facts):
     if not memory.phase.follows:
         return None
     setpoint = facts.takeoff.setpoint
-    memory.takeoff = facts.sent = _limited(facts, setpoint, 0.0, is_ramp=True)
+    memory.takeoff = _limited(facts, setpoint, 0.0, is_ramp=True)
     return facts.takeoff.control if memory.takeoff == setpoint else memory.takeoff
 
 

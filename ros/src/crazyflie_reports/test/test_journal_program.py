@@ -10,7 +10,7 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
 from crazyflie_reports.journal_program import main
 from crazyflie_utils import Node
-from crazyflie_utils.journal.journal_file import Journal, JournalWriter
+from crazyflie_utils.journal.journal_file import Journal, JournalWriter, Kind
 from crazyflie_utils.journal.recording import Recorder
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import Number
@@ -44,6 +44,7 @@ def path(tmp_path):
         graph.publish("/number", Float64(k), caller="/lab")
         graph.advance(0.1)
     graph.advance(2.0)
+    writer.row(Kind.SUBMITTED, 0, 0, b'["/echo", "LogTopics.publish", "(1,)"]')
     graph.call("/set", SetBoolRequest(True))
     graph.end("/echo")
     return path
@@ -60,6 +61,7 @@ def test_what_a_journal_has_is_printed(path, capsys):
         "/set (std_srvs/SetBool): 1",
         "2.300000 s /set data: True",
         "more than 0.5 s without an input:\n  0.300 s to 2.300 s",
+        "called by threads, which cannot be run again:\n  LogTopics.publish: 1",
     ):
         assert line in text
 

@@ -2,6 +2,7 @@
 
 import errno
 import json
+import threading
 from concurrent.futures import Future
 
 import numpy as np
@@ -218,6 +219,32 @@ def test_nodes_are_given_the_digits_that_are_written(path):
     told = [message.data for message in process.published("/text")]
     assert [message.data for _, message in run_again(path).published] == told
     assert told == [repr(float(np.float32(0.1))), "True", "True"]
+
+
+def test_what_a_thread_registers_has_its_name(path):
+    """As a driver's topics, which its jobs register while other callbacks run."""
+    recorder = Recorder(JournalWriter(path, HEADER, 1e9, print))
+    process = FakeProcess(recorder=recorder)
+
+    def register():
+        handle = process.handle("/thread")
+        text = handle.publisher("/late/text", String)
+        handle.subscribe("/late/in", Float64, lambda message: text.publish(String("got")))
+
+    thread = threading.Thread(target=register)
+    # It does not wait for the turn of callbacks.
+    process.executor.submit(lambda: (thread.start(), thread.join()))
+    process.publish("/late/in", Float64(1.0))
+    recorder.close()
+    names, seen = {}, []
+    for row in Journal(path).rows():
+        if row.kind in (Kind.SUBSCRIBED, Kind.ADVERTISED):
+            names[row.kind, row.number] = json.loads(row.data)[0]
+        elif row.kind is Kind.MESSAGE:
+            seen.append(names[Kind.SUBSCRIBED, row.number])
+        elif row.kind is Kind.PUBLISHED:
+            seen.append(names[Kind.ADVERTISED, row.number])
+    assert seen == ["/late/in", "/late/text"]
 
 
 def test_other_code_is_found_with_time_and_callback(recorded, monkeypatch):

@@ -34,6 +34,7 @@ class Contents:
         self.counts: Counter[tuple[Kind, int]] = Counter()
         self.callers: defaultdict[int, set[str]] = defaultdict(set)
         self.kinds: Counter[Kind] = Counter()
+        self.threads: Counter[str] = Counter()  #: Functions that threads have called.
 
     def rows(self) -> Iterator[Row]:
         """Yield the rows, and count them; `JournalError` or ValueError for one that is none."""
@@ -65,6 +66,8 @@ class Contents:
             if service_type is not None:
                 text = _line(service_type._request_class().deserialize(row.data))
             self.calls.append(f"{self.time:.6f} s {name} {text}".rstrip())
+        elif row.kind is Kind.SUBMITTED and row.number == 0:
+            self.threads[json.loads(row.data)[1]] += 1
         elif row.kind is Kind.VALUE:
             what, is_value, *rest = json.loads(row.data)
             # The first value is that of the start.
@@ -103,6 +106,8 @@ class Contents:
             )
             lines += _section(title, [self._registered(kind, number) for number in numbers])
         lines += _section("calls", self.calls, _MAX_LINES)
+        threads = [f"{name}: {count:,}" for name, count in self.threads.most_common()]
+        lines += _section("called by threads, which cannot be run again", threads, _MAX_LINES)
         lines += _section(f"more than {_GAP:g} s without an input", self.gaps, _MAX_LINES)
         if journal.damage:
             lines.append(journal.damage)

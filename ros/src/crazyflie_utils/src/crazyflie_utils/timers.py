@@ -196,6 +196,10 @@ class Executor:
         if self._runner != threading.get_ident():
             self._drain()
 
+    def enqueue(self, work: Callable[..., None], *arguments: Any) -> None:
+        """Run ``work(*arguments)`` before the next input; from any thread, which does not wait."""
+        self._inputs.append((work, arguments))
+
     def submit_all(self, works: Iterable[Callable[[], None]]) -> None:
         """Submit several pieces of work; see `submit`. They are looked for in their turn.
 

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from functools import partial
+from itertools import count
 from threading import get_ident
 from types import SimpleNamespace
 from typing import Any
@@ -219,7 +220,8 @@ class Recorder:
         """Run a callback that another thread has submitted for a node."""
 
         def run():
-            known = [node, getattr(callback, "__qualname__", ""), repr(arguments)]
+            inner = callback.func if isinstance(callback, partial) else callback
+            known = [node, getattr(inner, "__qualname__", ""), repr(arguments)]
             self.input(Kind.SUBMITTED, 0, json.dumps(known).encode())
             work(*arguments)
 
@@ -288,9 +290,18 @@ class Recorder:
         return number
 
     def name(self, kind: Kind, number: int, *names: str) -> None:
-        """Write the name of something that has a number."""
+        """Write the name of something that has a number; of a thread's, before the next input."""
+
+        def write():
+            try:
+                self.row(kind, number, 0, json.dumps(names).encode())
+            except Exception as error:
+                self._writer.end(repr(error))
+
         if self.executor.is_in_turn:
-            self.row(kind, number, 0, json.dumps(names).encode())
+            write()
+        else:
+            self.executor.enqueue(write)
 
     def value(self, what: str, read: Callable[[], Any]) -> Any:
         """Return what is read, and write it."""
@@ -415,15 +426,17 @@ class RecordingTransport(Transport):
     def __init__(self, transport: Transport, recorder: Recorder):
         self._transport, self._recorder = transport, recorder
         self._names: dict[str, str] = {}
-        self._publishers = self._subscriptions = self._services = self._requests = self._flags = 0
+        # Threads, too, take the next numbers.
+        self._publishers, self._subscriptions, self._services = count(1), count(1), count(1)
+        self._requests, self._flags = count(1), count(1)
 
     def __getattr__(self, name: str) -> Any:
         # The others, and what tests look at.
         return getattr(self._transport, name)
 
     def _flag(self, read: Condition) -> _Flag:
-        self._flags += 1
-        flag = self._recorder.flags[self._flags] = _Flag(self._recorder, self._flags, read)
+        number = next(self._flags)
+        flag = self._recorder.flags[number] = _Flag(self._recorder, number, read)
         return flag
 
     def starting(self) -> AbstractContextManager[None]:
@@ -455,11 +468,11 @@ class RecordingTransport(Transport):
     def advertise(self, topic: str, message_type: Any, latch: bool) -> ExternalPublisher:
         """Announce a topic."""
         external: Any = self._transport.advertise(topic, message_type, latch)
-        self._publishers += 1
-        self._recorder.name(Kind.ADVERTISED, self._publishers, topic, message_type._type)
+        number = next(self._publishers)
+        self._recorder.name(Kind.ADVERTISED, number, topic, message_type._type)
         # Called for each message: not a class around the other.
         recorded: Any = SimpleNamespace(
-            note=partial(self._recorder.published, self._publishers),
+            note=partial(self._recorder.published, number),
             has_subscribers=self._flag(external.has_subscribers),
             publish=external.publish,
             close=external.close,
@@ -470,11 +483,11 @@ class RecordingTransport(Transport):
         self, topic: str, message_type: Any, deliver: Receiver, may_wait: Condition = never
     ) -> ExternalSubscriber:
         """Subscribe to a topic; its messages come in turn."""
-        self._subscriptions += 1
-        self._recorder.name(Kind.SUBSCRIBED, self._subscriptions, topic, message_type._type)
+        number = next(self._subscriptions)
+        self._recorder.name(Kind.SUBSCRIBED, number, topic, message_type._type)
         # Otherwise a message that came decoded is the same.
         plain = plain_type(message_type) if plain_type(message_type) != message_type else None
-        own = _RecordedSubscriber(self._recorder, self._subscriptions, plain, deliver)
+        own = _RecordedSubscriber(self._recorder, number, plain, deliver)
         keeping = keeps_data(message_type)
         # Messages may come before this returns.
         own.external = self._transport.subscribe(topic, keeping, own.receive, may_wait)
@@ -483,8 +496,7 @@ class RecordingTransport(Transport):
 
     def advertise_service(self, name: str, service_type: Any, serve: Serve) -> Callable[[], None]:
         """Offer a service; its calls come in turn."""
-        self._services += 1
-        number, recorder = self._services, self._recorder
+        number, recorder = next(self._services), self._recorder
         recorder.name(Kind.OFFERED, number, name, service_type._type)
 
         def begin(request: Any, is_withdrawn: Condition) -> Future[Any]:
@@ -515,8 +527,7 @@ class RecordingTransport(Transport):
         return self._request(inner, name, serialized(request), service_type)
 
     def _request(self, inner, name, content, service_type=None):
-        self._requests += 1
-        number, recorder = self._requests % 0x10000, self._recorder
+        number, recorder = next(self._requests) % 0x10000, self._recorder
         outer: Future[Any] = Future()
         if recorder.executor.is_in_turn:
             recorder.row(Kind.REQUESTED, number, zlib.crc32(name.encode() + content))

@@ -8,10 +8,17 @@ from types import SimpleNamespace
 import pytest
 from std_msgs.msg import Float32, String
 
-from crazyflie_reports.flight_input import _JournalInput
-from crazyflie_utils.journal.journal_file import ORIGIN, JournalError, Kind, Row
+from crazyflie_reports.flight_input import _JournalInput, of_journals
+from crazyflie_utils.journal.journal_file import ORIGIN, JournalError, JournalWriter, Kind, Row
+from crazyflie_utils.node import Node
 
 HEADER = {"clock": "steady", "us": 0, "start": 0.0, "node": "/node"}
+
+
+class SocketNode(Node):
+    """Reads more than its handle gives."""
+
+    sources = "sockets"
 
 
 def packed(message):
@@ -48,3 +55,16 @@ def test_messages_of_another_version_of_their_type_are_named(given):
 def test_a_row_that_is_no_row_is_damage(given):
     with pytest.raises(JournalError, match="node.journal: a SUBSCRIBED cannot be read"):
         given.take(Row(Kind.SUBSCRIBED, 1, 0, b"{"))
+
+
+def test_what_a_node_with_sources_published_is_not_known(tmp_path):
+    header = {**HEADER, "program": f"{__name__}:SocketNode"}
+    writer = JournalWriter(tmp_path / "node.journal", header, 1e9, pytest.fail)
+    writer.row(Kind.SUBSCRIBED, 1, 0, b'["/text", "std_msgs/String"]')
+    writer.row(Kind.MESSAGE, 1, 0, packed(String("hello")))
+    writer.close()
+    found = of_journals([tmp_path / "node.journal"])
+    assert [each.topic for each in found.messages] == ["/text"]
+    (remark,) = found.remarks
+    assert remark.startswith("what it published is not known: ")
+    assert "/node reads sockets" in remark

@@ -27,6 +27,7 @@ from crazyflie_utils.journal.journal_file import (
     JournalError,
     Kind,
     Row,
+    SourcesError,
     received,
 )
 from crazyflie_utils.journal.recording import plain_type, serialized
@@ -345,6 +346,8 @@ def _published_again(journal: Journal, found: FlightInput) -> dict[str, list[Giv
             while is_running and (row := replay.rows.next) is not None:
                 inputs += row.kind in INPUTS
                 replay.step()
+    except SourcesError as error:
+        found.remarks.append(f"what it published is not known: {error}")
     except (JournalError, DifferenceError) as error:
         found.remarks.append(
             f"{journal.path.name}: what was published after {replay.time:.3f} s is not known, "

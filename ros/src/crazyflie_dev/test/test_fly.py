@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from crazyflie_dev.fly import STEPS, count_and_arguments
+from crazyflie_dev.fly import STEPS, vehicles_and_arguments
 from crazyflie_utils.testing.programs import LIMIT
 
 #: Stands in for roslaunch: the page comes up, a vehicle warns, and Ctrl-C ends it.
@@ -50,22 +50,32 @@ def free_port():
 
 
 @pytest.mark.parametrize(
-    ("words", "expected"),
+    ("words", "n", "arguments"),
     [
-        ([], (3, [])),
-        (["9"], (9, [])),
-        (["n:=9", "spacing:=2"], (9, ["spacing:=2"])),
-        (["spacing:=2", "12"], (12, ["spacing:=2"])),
+        ([], 3, []),
+        (["9"], 9, []),
+        (["n:=9", "spacing:=2"], 9, ["spacing:=2"]),
+        (["spacing:=2", "12"], 12, ["spacing:=2"]),
     ],
 )
-def test_n_is_a_number_with_or_without_its_name(words, expected):
-    assert count_and_arguments(words, 3) == expected
+def test_n_is_a_number_with_or_without_its_name(words, n, arguments):
+    names = [f"cf{k}" for k in range(1, n + 1)]
+    assert vehicles_and_arguments(words, 3) == (names, arguments)
+
+
+def test_files_and_folders_are_those_of_the_terminal(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lab.yaml").write_text("robots:\n  left: {initial_position: [0, 0, 0]}\n")
+    found = vehicles_and_arguments(["fleet:=lab.yaml", "folders:=.:/tmp"], 3)
+    assert found == (["left"], [f"fleet:={tmp_path}/lab.yaml", f"folders:={tmp_path}:/tmp"])
+    with pytest.raises(argparse.ArgumentTypeError, match="none is no folder"):
+        vehicles_and_arguments(["folders:=none"], 3)
 
 
 @pytest.mark.parametrize("words", [["0"], ["n:=x"], ["3", "n:=4"], ["README.md"]])
 def test_another_n_is_refused(words):
     with pytest.raises(argparse.ArgumentTypeError, match="expected one number of vehicles"):
-        count_and_arguments(words, 3)
+        vehicles_and_arguments(words, 3)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

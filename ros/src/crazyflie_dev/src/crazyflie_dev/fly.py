@@ -31,10 +31,11 @@ STEPS = """{n} simulated vehicles, and a page to fly them: {url}
 Warnings follow; all other output is in {log}"""
 
 
-def count_and_arguments(words: Sequence[str], default: int) -> tuple[int, list[str]]:
-    """Return the number of vehicles, given as ``9`` or ``n:=9``, and arguments of sw_swarm.launch.
+def vehicles_and_arguments(words: Sequence[str], default: int) -> tuple[list[str], list[str]]:
+    """Return the names of the vehicles, and the arguments of sw_swarm.launch.
 
-    ArgumentTypeError: it has no such argument, or cannot read its fleet file.
+    Their number is given as ``9`` or ``n:=9``, or by a fleet file; else it is the default.
+    ArgumentTypeError: the launch file has no such argument, or a file or folder cannot be read.
     """
     counts = [word.removeprefix("n:=") for word in words if re.match("n:=|(?!.*:=)", word)]
     if len(counts) > 1 or not all(re.fullmatch("[1-9][0-9]*", count) for count in counts):
@@ -42,16 +43,24 @@ def count_and_arguments(words: Sequence[str], default: int) -> tuple[int, list[s
             f"n is {' '.join(counts)}; expected one number of vehicles, such as 9 or n:=9"
         )
     others = [word for word in words if ":=" in word and not word.startswith("n:=")]
+    names = [f"cf{k + 1}" for k in range(int(counts[0]) if counts else default)]
     try:
         problems = unknown_arguments([*LAUNCHED, "dashboard:=true", *others])
-        for word in others:
-            if word.startswith("fleet:="):
-                fleet_file.load(user_path(word.partition(":=")[2]))
+        for place, (name, value) in enumerate(word.split(":=", 1) for word in others):
+            # Nodes do not run in this folder.
+            paths = [user_path(path).absolute() for path in value.split(":") if path]
+            if name == "fleet" and paths:
+                names = [vehicle.name for vehicle in fleet_file.load(paths[0]).vehicles]
+            elif name == "folders":
+                problems += [f"folders: {path} is no folder" for path in paths if not path.is_dir()]
+            else:
+                continue
+            others[place] = f"{name}:={':'.join(map(str, paths))}"
     except (RLException, XmlParseException, ParameterError) as error:
         problems = [str(error)]
     if problems:
         raise argparse.ArgumentTypeError("; ".join(problems))
-    return int(counts[0]) if counts else default, others
+    return names, others
 
 
 def fly(n: int, launch_arguments: list[str], log: Path) -> int:
@@ -110,13 +119,13 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder of the log")
     options = parser.parse_args()
     try:
-        n, launch_arguments = count_and_arguments(options.words, _DEFAULT_COUNT)
+        names, launch_arguments = vehicles_and_arguments(options.words, _DEFAULT_COUNT)
         ports = [word.partition(":=")[2] for word in launch_arguments if word.startswith("port:=")]
         expect_free_port("127.0.0.1", int((ports or [_PORT])[-1]))
     except (argparse.ArgumentTypeError, AccessError, ValueError) as error:
         parser.error(str(error))
     options.out.mkdir(parents=True, exist_ok=True)
-    return fly(n, launch_arguments, options.out / "fly.log")
+    return fly(len(names), launch_arguments, options.out / "fly.log")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from crazyflie_dev.demo import LIMIT, report_recording, wait_for_recording
-from crazyflie_dev.fly import LAUNCHED, count_and_arguments
+from crazyflie_dev.fly import LAUNCHED, vehicles_and_arguments
 from crazyflie_reports.bag_flights import Flight
 from crazyflie_reports.bag_report import PAGE
 from crazyflie_reports.flight_operator import FlightError
@@ -46,22 +46,22 @@ def checked(script: Path) -> str:
     return text
 
 
-def fly(script: list[str], n: int, folder: Path, launch_arguments: list[str]) -> int:
-    """Fly a script (path and its arguments) with n vehicles; return the exit status."""
+def fly(script: list[str], names: list[str], folder: Path, launch_arguments: list[str]) -> int:
+    """Fly a script (path and its arguments) with vehicles; return the exit status."""
     folder.mkdir(parents=True, exist_ok=True)
     log, recordings = folder / "swarm.log", folder / "recordings"
     rviz = "true" if os.environ.get("DISPLAY") else "false"
     # In simulated time at real speed: on a busy computer the flight is slower, but as good. At full
     # speed, the recording would lack messages.
     arguments = [
-        *(*LAUNCHED, f"n:={n}", "sim_time:=true", f"rviz:={rviz}"),
+        *(*LAUNCHED, f"n:={len(names)}", "sim_time:=true", f"rviz:={rviz}"),
         *("record:=true", f"record_folder:={recordings}"),
         *launch_arguments,
     ]
     print(f"launching {' '.join(arguments)}  (its output: {log})", flush=True)
     begin = time.monotonic()
     with roslaunch(arguments, log):
-        wait_for_recording(f"/cf{n}/state", LIMIT + START_TIME * n)
+        wait_for_recording(f"/{names[-1]}/state", LIMIT + START_TIME * len(names))
         command = [sys.executable, "-m", "crazyflie_mission_api.mission_runner", "fly", *script]
         with subprocess.Popen(command) as process:
             try:
@@ -113,12 +113,12 @@ def main() -> int:
     script = options.script
     try:
         text = checked(script)
-        n, launch_arguments = count_and_arguments(options.words, vehicles_of(text))
+        names, launch_arguments = vehicles_and_arguments(options.words, vehicles_of(text))
     except argparse.ArgumentTypeError as error:
         parser.error(str(error))
     folder = (options.out or Path("out") / script.stem).resolve()
     try:
-        return fly([str(script), *arguments[cut + 1 :]], n, folder, launch_arguments)
+        return fly([str(script), *arguments[cut + 1 :]], names, folder, launch_arguments)
     except (LaunchError, FlightError) as error:
         print(error, file=sys.stderr)
         return 1

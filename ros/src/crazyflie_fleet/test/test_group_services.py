@@ -7,7 +7,7 @@ from simulated_fleet import Swarm
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_driver import srv
-from crazyflie_fleet.high_level_services import to_message
+from crazyflie_driver.trajectory_messages import to_message
 from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import at_rest
 from crazyflie_msgs.msg import FlightStatus

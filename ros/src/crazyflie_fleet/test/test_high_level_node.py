@@ -10,7 +10,8 @@ from std_msgs.msg import String
 from visualization_msgs.msg import Marker
 
 from crazyflie_driver import srv
-from crazyflie_fleet.high_level_services import full_state_message, to_message
+from crazyflie_driver.trajectory_messages import to_message
+from crazyflie_fleet.high_level_services import full_state_message
 from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import (

@@ -9,9 +9,10 @@ from std_msgs.msg import Float64MultiArray, String
 
 from crazyflie_driver.msg import Hover, Position
 from crazyflie_driver.srv import GoToRequest, UploadTrajectoryRequest
+from crazyflie_driver.trajectory_messages import to_message
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.high_level_node import HighLevelNode
-from crazyflie_fleet.high_level_services import full_state_message, to_message
+from crazyflie_fleet.high_level_services import full_state_message
 from crazyflie_fleet.references_node import ReferencesNode
 from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import Goal, at_rest

@@ -14,11 +14,11 @@ from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
+from crazyflie_driver.trajectory_messages import from_message
 from crazyflie_fleet.commanded_references import CommandedReferences
 from crazyflie_fleet.follower import CommandFollower
 from crazyflie_fleet.high_level_services import (
     HighLevelParameters,
-    from_message,
     relay,
     setpoint_of,
 )

@@ -4,14 +4,13 @@ import math
 from concurrent.futures import Future
 from typing import Any
 
-import genpy
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_driver import msg
 from crazyflie_fleet.follower import Velocity
 from crazyflie_model.angles import quaternion_from_rpy
-from crazyflie_model.polynomials import Goal, PolynomialPiece, at_rest
+from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import (
     PositionVelocityState,
     PositionVelocityStateStamped,
@@ -23,19 +22,6 @@ from crazyflie_utils.flight_status import FlightTopics
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, SERVICE, TIME_STEP
 from crazyflie_utils.vectors import to_tuple
-
-
-def to_message(piece: PolynomialPiece) -> msg.TrajectoryPolynomialPiece:
-    """Return a piece for the service upload_trajectory."""
-    return msg.TrajectoryPolynomialPiece(
-        *piece.padded_axes, genpy.Duration.from_sec(piece.duration)
-    )
-
-
-def from_message(message: msg.TrajectoryPolynomialPiece) -> PolynomialPiece:
-    """Return an uploaded piece."""
-    axes = (message.poly_x, message.poly_y, message.poly_z, message.poly_yaw)
-    return PolynomialPiece(message.duration.to_sec(), *axes)
 
 
 def reference_message(

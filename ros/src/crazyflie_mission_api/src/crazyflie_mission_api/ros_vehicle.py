@@ -14,11 +14,11 @@ from std_srvs.srv import Empty, EmptyRequest, SetBool
 from typing_extensions import override
 
 from crazyflie_driver import srv
+from crazyflie_driver.trajectory_messages import to_message
 from crazyflie_fleet.high_level_services import (
     HIGH_LEVEL,
     TAKEOFF_LEAD,
     heading,
-    to_message,
 )
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.mission_vehicle import (

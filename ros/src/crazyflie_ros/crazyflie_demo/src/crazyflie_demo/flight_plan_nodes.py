@@ -9,7 +9,7 @@ from typing_extensions import TypeVar, override
 
 from crazyflie_demo.trajectory_file import load, summary
 from crazyflie_driver import srv
-from crazyflie_fleet.high_level_services import to_message
+from crazyflie_driver.trajectory_messages import to_message
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, METRES, Number, path_of

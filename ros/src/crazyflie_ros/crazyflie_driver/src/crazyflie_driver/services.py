@@ -15,12 +15,12 @@ from crazyflie_driver import srv
 from crazyflie_driver.commands import SERVICE_TYPES, FlightState, requested
 from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.setpoint_gate import GateEvent
+from crazyflie_driver.trajectory_messages import from_message
 from crazyflie_driver.vehicle_base import BaseVehicle, Job
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_link.triggers import is_trigger
 from crazyflie_model.lights import COLOR_LED_DECKS, wrgb
-from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.parameters.types import FIRMWARE_NUMBER, Converted
@@ -327,12 +327,7 @@ class VehicleServices:
         return SetBoolResponse(True, "armed" if request.data else "disarmed")
 
     def _upload(self, job, request):
-        pieces = [
-            PolynomialPiece(
-                piece.duration.to_sec(), piece.poly_x, piece.poly_y, piece.poly_z, piece.poly_yaw
-            )
-            for piece in request.pieces
-        ]
+        pieces = [from_message(piece) for piece in request.pieces]
         self._vehicle.crazyflie.trajectories.guarded(job.may_send).upload(
             request.trajectoryId, request.pieceOffset, pieces, job.check
         )

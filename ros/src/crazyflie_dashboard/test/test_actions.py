@@ -112,6 +112,21 @@ def test_a_goal_far_away_is_refused_where_there_is_no_fence(fleet, goal):
     assert fleet.command(Action.GO_TO, ["cf1"], goal=(13.0, 0.0, 1.0)) == {"cf1": ""}
 
 
+def test_a_formation_may_go_to_the_ground_whatever_the_rounding(fleet):
+    fleet.fly(cf1=(0.0, 0.0, 0.1), cf2=(4.0, 0.0, 0.7), cf3=(8.0, 2.0, 0.1))
+    places = ["cf1", "cf3"]
+    assert fleet.command(Action.GO_TO, places, goal=(4.0, 1.0, 0.0)) == dict.fromkeys(places, "")
+    middle = (0.1 + 0.7) / 2.0
+    with pytest.raises(RefusalError, match="cf1 would go to z = -0.30 m; expected 0 or more"):
+        fleet.command(Action.GO_TO, ["cf1", "cf2"], goal=(2.0, 0.0, middle - 0.4))
+
+
+def test_distances_that_round_to_the_limit_are_shown_with_more_digits(fleet):
+    fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 2.0, 1.0))
+    with pytest.raises(RefusalError, match=r"would be 0.299 m apart, .* at least 0.300 m"):
+        fleet.command(Action.GO_TO, ["cf1"], goal=(0.701, 0.0, 1.0))
+
+
 def test_a_goal_outside_of_the_room_of_the_world_file_is_refused(fleet):
     topics = {**fleet.graph.topics, "/world/markers": MarkerArray._type}
     fleet.graph = Graph(topics, topics, fleet.graph.services)
@@ -345,7 +360,7 @@ def test_commands_refusals_and_control_are_logged(fleet):
     assert "page 1 has control" in info
     assert "page 1: take off cf1, cf2" in info
     assert "page 1: take off cf1, cf2 to 1 m: cf2: the battery is at 2.9 V" in warn
-    assert "page 1: land cf1, cf2, cf3: land: the command is 3.0 s old" in warn
+    assert "page 1: land cf1, cf2, cf3: the command is 3.0 s old" in warn
     assert "page 1 has given up control" in info
 
 

@@ -780,3 +780,48 @@ def test_the_distance_of_two_points_is_shown(browser, driver):
     browser.has(" m", ".tag.measure")
     assert float(browser.text(".tag.measure").split()[0]) == pytest.approx(1.0, abs=0.03)
     browser.has("0 of 3 selected")
+
+
+def test_keys_move_the_goal_and_are_explained(browser, server):
+    browser.has("3 vehicles")
+    browser.click_floor(0.5, -0.5)
+    wait_for(lambda: browser.in_scene("goal.visible"), "the goal")
+    x, y = (browser.in_scene(f"goal.position.{axis}") for axis in "xy")
+    browser.type(Keys.ARROW_RIGHT, Keys.ARROW_UP, Keys.ARROW_UP, Keys.PAGE_DOWN)
+    there = pytest.approx([x + 0.1, y + 0.2, 0.9])
+    parts = ("goal.position.x", "goal.position.y", "goal.height")
+    wait_for(lambda: [browser.in_scene(each) for each in parts] == there, "the goal is moved")
+    browser.type("?")
+    browser.has("emergency: stop the motors of all vehicles", ".keys")
+    browser.type(Keys.ESCAPE)
+    wait_for(lambda: not browser.count(".keys"), "closed")
+    browser.press("Clear")
+    wait_for(lambda: not browser.in_scene("goal.visible"), "no goal")
+
+
+def test_the_page_is_light_or_dark_as_the_system_is(browser, driver):
+    def has(scheme):
+        feature = {"name": "prefers-color-scheme", "value": scheme}
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [feature]})
+        color = "getComputedStyle(document.body).backgroundColor"
+        level = f"return Number({color}.match(/\\d+/)[0])"
+        scene = "scene.background.r"
+        is_light = scheme == "light"
+        wait_for(lambda: (driver.execute_script(level) > 128) == is_light, scheme)
+        wait_for(lambda: (browser.in_scene(scene) > 0.5) == is_light, f"a {scheme} scene")
+
+    has("light")
+    has("dark")
+
+
+def test_the_bar_has_one_height(browser, driver, server):
+    try:
+        for width in (1400, 900, 390):
+            metrics = {"width": width, "height": 844, "deviceScaleFactor": 0.5, "mobile": False}
+            driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+            for missions in ((), ("a mission with a name that is long · takeoff: cf1",)):
+                server.dashboard.set_vehicles(vehicle("cf1", 0.0), missions=missions)
+                wait_for(lambda m=missions: browser.count(".timebar .mission") == len(m), width)
+                assert browser.find(".bar").rect["height"] == 52
+    finally:
+        driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

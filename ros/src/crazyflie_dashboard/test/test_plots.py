@@ -3,8 +3,10 @@
 import itertools
 import math
 import threading
+from pathlib import Path
 
 import pytest
+import roslib.packages
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import Imu
 
@@ -153,3 +155,13 @@ def test_numbers_of_a_type_are_offered_as_paths():
     assert "header/stamp" in fields_of("sensor_msgs/Imu")
     assert not any("covariance" in each for each in fields_of("sensor_msgs/Imu"))
     assert fields_of("unknown_msgs/Unknown") == []
+
+
+def test_x_y_and_z_have_one_color_in_plots_scene_and_report():
+    def text(package, path):
+        return (Path(roslib.packages.get_pkg_dir(package)) / path).read_text()
+
+    quoted = ", ".join(f'"{color}"' for color in AXES.values())
+    scene = "src/crazyflie_dashboard/page/objects/vehicles.js"
+    assert f"AXES = [{quoted}]" in text("crazyflie_dashboard", scene)
+    assert f"COLORS = [{quoted}, " in text("crazyflie_reports", "page/plots.js")

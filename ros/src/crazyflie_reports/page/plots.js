@@ -1,8 +1,9 @@
 // Plots of numbers over time, by uPlot: phases as bands, events as ticks, the time of the replay as a
 // line; wheel or drag to zoom, click to set the time, double click for all.
 
-// None is red, which is for what is not normal; they can be told apart by those who see no red or green.
-const COLORS = ["#0072b2", "#d98200", "#009e73", "#7b3fa0", "#475569"];
+// Those of x, y and z are the dashboard's, too. None is red, which is for what is not normal; they can be told
+// apart by those who see no red or green.
+const COLORS = ["#1f86cc", "#d98200", "#0f9f76", "#9257c2", "#64748b"];
 const BANDS = { "taking off": "#e3f2e6", "flying": "#ffffff", "descending": "#fdf1dc", "landing": "#fbe3d4" };
 const KINDS = {
   "refusal": "#b45309", "pose rejected": "#9333ea", "hold": "#0891b2", "emergency": "#b42318",

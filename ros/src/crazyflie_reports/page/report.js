@@ -17,8 +17,11 @@ function counted(number, noun) {
   return `${number} ${noun}${number === 1 ? "" : "s"}`;
 }
 
+const NOTHING = 1e-6;  // Of mm, s or V: a rounding error.
+
 function shown(value) {
   if (value === null) return "–";
+  if (Math.abs(value) < NOTHING) return "0";
   return Number.isInteger(value) ? String(value) : value.toPrecision(3).replace(/e.*/, (e) => ` ${e}`);
 }
 

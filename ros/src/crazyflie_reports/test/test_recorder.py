@@ -62,7 +62,7 @@ def test_says_how_large_the_recording_is(run, tmp_path):
     status, output = run(write)
     assert status == 0
     (folder,) = (tmp_path / "flights").iterdir()
-    assert f"recorded 2.5 MB in 1 bags: {folder}" in output
+    assert f"recorded 2.5 MB in 1 bag: {folder}" in output
     assert {each.name for each in folder.iterdir()} == {"flight.bag", "parameters.yaml"}
 
 

@@ -42,6 +42,7 @@ _GROUPS = {
 }
 #: Speed above which vehicles are sent to their own goals: "relative" is where they are then (m/s).
 _AT_REST = 0.2
+_ROUNDING = 1e-6  #: Distance by which a goal may be out of bounds (m).
 _DIGITS = 6  #: Decimal places in which the ways of a formation agree (m).
 
 _HOLD_DURATION = 1.0  #: Duration of a move to a vehicle's own position (s).
@@ -425,7 +426,7 @@ def _check(command: Command) -> None:
             f"go to: the speed is {command.speed:g} m/s; expected more than 0 and at most "
             f"{_MAX_SPEED:g} m/s"
         )
-    if command.goal[2] < 0.0:
+    if command.goal[2] < -_ROUNDING:
         raise RefusalError(f"go to: z is {command.goal[2]:g} m; expected 0 or more")
 
 
@@ -449,14 +450,15 @@ def _expect_inside(name: str, place: Triple, goal: Triple, own: Triple, bounds: 
 
     Where there is no geofence, a vehicle that is out of bounds may go back.
     """
-    if own[2] < 0.0:
+    # The middle of a formation at 0 may lie a rounding error below it.
+    if own[2] < -_ROUNDING:
         raise RefusalError(f"go to: {name} would go to z = {own[2]:.2f} m; expected 0 or more")
     box, what, is_fence = bounds
     x = own if is_fence else goal
     for k, axis in enumerate("xyz"):
         low, high = box.lower[k], box.upper[k]
         is_back = not is_fence and min(place[k], low) <= x[k] <= max(place[k], high)
-        if not (low <= x[k] <= high or is_back):
+        if not (low - _ROUNDING <= x[k] <= high + _ROUNDING or is_back):
             raise RefusalError(
                 f"go to: {name} would leave {what}: {axis} is {x[k]:.2f} m; expected {low:g} to "
                 f"{high:g} m"

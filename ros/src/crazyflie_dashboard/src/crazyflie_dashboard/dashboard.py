@@ -166,7 +166,8 @@ class Dashboard:
         An emergency is none: it has a way of its own, `emergency`.
         """
         number = self._begin_progress(page, command.title, command.vehicles, command)
-        outcome = self._control(page, command.words, self._actions.carry_out, command)
+        said = f"{command.action.value}: "
+        outcome = self._control(page, command.words, self._actions.carry_out, command, said=said)
         outcome.add_done_callback(lambda done: self._commands.answered(number, done))
         return outcome
 
@@ -319,9 +320,12 @@ class Dashboard:
         return outcome
 
     def _control(
-        self, page: int, what: str, work: Callable[..., Any], *arguments: Any
+        self, page: int, what: str, work: Callable[..., Any], *arguments: Any, said: str = ""
     ) -> "Future[Any]":
-        """Do work as `_do` for the page that has control; log the request and its outcome."""
+        """Do work as `_do` for the page that has control; log the request and its outcome.
+
+        ``said`` is a beginning of refusals that ``what`` has, too.
+        """
         what = f"page {page}: {what}"
 
         def do():
@@ -330,9 +334,9 @@ class Dashboard:
 
         def log(done):
             error, result = done.exception(), None if done.exception() else done.result()
-            refused = [words(error)] if error else []
+            refused = [words(error).removeprefix(said)] if error else []
             if isinstance(result, dict):
-                refused = summary(result)
+                refused = summary({n: text.removeprefix(said) for n, text in result.items()})
             if refused:
                 self._handle.warn(f"{what}: {'; '.join(refused)}")
             else:

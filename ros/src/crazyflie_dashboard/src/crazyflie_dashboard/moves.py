@@ -11,7 +11,7 @@ from crazyflie_fleet.fleet_config import DOWNWASH, close_pairs
 from crazyflie_fleet.separation import RELEASE_RATIO
 from crazyflie_model.angles import rotate_back, rpy_from_quaternion
 from crazyflie_model.trajectory import minimum_jerk
-from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.refusal import RefusalError, distinct
 
 SEPARATION = 0.3  #: Distance between two vehicles, as that of missions by default (m).
 #: Distance from its planned move beyond which a vehicle has received another command (m).
@@ -93,9 +93,10 @@ def expect_apart(
             one, two = names[i], names[j]
             apart = np.linalg.norm((before[i] - before[j]) / (1.0, 1.0, DOWNWASH))
             if moves.keys() & {one, two} and distance < apart - _APPROACH:
+                shown, least = distinct(distance, limit)
                 raise RefusalError(
-                    f"go to: {one} and {two} would be {distance:.2f} m apart, {time - now:.1f} s "
-                    f"from now; expected at least {limit:.2f} m, with vertical distances halved"
+                    f"go to: {one} and {two} would be {shown} m apart, {time - now:.1f} s from "
+                    f"now; expected at least {least} m, with vertical distances halved"
                 )
 
 

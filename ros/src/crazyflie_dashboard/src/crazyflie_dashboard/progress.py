@@ -115,10 +115,11 @@ class Commands:
         row = self._rows.get(number)
         if row is None or not row.is_open:
             return
+        said = f"{row.command.action.value}: " if row.command else ""
         if error := done.exception():
-            self._end(row, Stage.REFUSED, "none of them", (words(error),))
+            self._end(row, Stage.REFUSED, "", (words(error).removeprefix(said),))
             return
-        outcomes = done.result() or {}
+        outcomes = {n: text.removeprefix(said) for n, text in (done.result() or {}).items()}
         refused = {name: text for name, text in outcomes.items() if text}
         count = f"{len(row.vehicles) - len(refused)}/{len(row.vehicles)} accepted"
         if refused:

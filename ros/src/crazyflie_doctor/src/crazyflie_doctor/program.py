@@ -55,7 +55,8 @@ def doctor(arguments: list[str] | None = None) -> int:
         for level, line in lines(check):
             print(line, flush=True)
             count[level] = count.get(level, 0) + 1
-    print(f"{count[ERROR]} errors, {count[WARN]} warnings", flush=True)
+    words = ((count[ERROR], "error"), (count[WARN], "warning"))
+    print(", ".join(f"{n} {word}{'' if n == 1 else 's'}" for n, word in words), flush=True)
     watchdog.cancel()
     return 1 if count[ERROR] else 0
 

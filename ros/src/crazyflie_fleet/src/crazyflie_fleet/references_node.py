@@ -37,6 +37,7 @@ from crazyflie_msgs.msg import PositionVelocityYawStateStamped as Reference
 from crazyflie_takeoff.motion import MAX_POSITION_AGE
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter, topic
 from crazyflie_utils.parameters.types import TIME_STEP
+from crazyflie_utils.refusal import distinct
 from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_utils.timers import Timer
 from crazyflie_utils.topics import Publisher
@@ -472,9 +473,10 @@ class ReferencesNode(Node[ReferencesParameters]):
 
     def _warn_of_pair(self, pair):
         first, second = (self.states.names[k] for k in (pair.first, pair.second))
+        distance, limit = distinct(pair.distance, pair.limit)
         self._handle.warn(
-            f"{first} and {second} are {pair.distance:.2f} m apart and must not come closer than "
-            f"{pair.limit:.2f} m: a vehicle whose reference approaches the other is held",
+            f"{first} and {second} are {distance} m apart and must not come closer than "
+            f"{limit} m: a vehicle whose reference approaches the other is held",
             throttle=1.0,
             key=(pair.first, pair.second),
         )
@@ -510,7 +512,8 @@ class ReferencesNode(Node[ReferencesParameters]):
             return f"{what}, and the positions of both are not known"
         buffers = [self._buffers[number] for number in numbers]
         for _, _, distance, limit in close_pairs(self.states.positions[numbers], buffers):
-            return f"{what}, and are {distance:.2f} m apart; expected at least {limit:.2f} m"
+            shown, least = distinct(distance, limit)
+            return f"{what}, and are {shown} m apart; expected at least {least} m"
         return ""
 
     def _on_descent(self, tracked, message):

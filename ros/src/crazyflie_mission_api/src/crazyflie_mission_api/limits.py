@@ -12,6 +12,7 @@ from crazyflie_fleet.separation import LOOK_AHEAD, RELEASE_RATIO, SCALE, Separat
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 from crazyflie_utils.parameters.types import Number
+from crazyflie_utils.refusal import distinct
 
 Array = NDArray[np.float64]
 
@@ -184,9 +185,10 @@ class Clearance:
             worst = int((distances - limits).argmin())
             if distances[worst] < limits[worst] - 1e-9:
                 one, two = names[first[worst]], names[second[worst]]
+                shown, least = distinct(distances[worst], limits[worst], "g", 3)
                 raise MissionError(
-                    f"{one} and {two} would be {distances[worst]:.3g} m apart, {time:.1f} s from "
-                    f"now; expected at least {limits[worst]:.3g} m{self._reasons(one, two)}"
+                    f"{one} and {two} would be {shown} m apart, {time:.1f} s from now; expected at "
+                    f"least {least} m{self._reasons(one, two)}"
                 )
         self._check_speeds(names, times, places)
 

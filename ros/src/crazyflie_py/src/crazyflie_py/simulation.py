@@ -13,6 +13,7 @@ from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.simulated_vehicle import SimulatedVehicle
 from crazyflie_py.swarm import Order, Swarm
 from crazyflie_py.visualizer import visualizer_for
+from crazyflie_utils.refusal import distinct
 
 _log = logging.getLogger(__name__)
 
@@ -89,14 +90,15 @@ class Simulation(Swarm):
         for i, j, distance, allowed in close_pairs(positions, self._buffers):
             one, two = self.vehicles[i], self.vehicles[j]
             if (i, j) not in self._close and (one.is_flying or two.is_flying):
+                shown, least = distinct(distance, allowed)
                 _log.warning(
-                    "%s and %s are %.2f m apart at %.2f s; expected at least %.2f m (vertical "
+                    "%s and %s are %s m apart at %.2f s; expected at least %s m (vertical "
                     "distances are halved)",
                     one.name,
                     two.name,
-                    distance,
+                    shown,
                     self.time(),
-                    allowed,
+                    least,
                 )
             if (i, j) in self._close or one.is_flying or two.is_flying:
                 close.add((i, j))

@@ -81,7 +81,8 @@ def record(folder: Path, topics: str, ros_arguments: list[str]) -> int:
     status = process.wait()
     bags = [each for each in folder.iterdir() if each.name.endswith((".bag", ".bag.active"))]
     size = sum(each.stat().st_size for each in bags)
-    print(f"recorded {size / 1e6:.1f} MB in {len(bags)} bags: {folder}", flush=True)
+    count = f"{len(bags)} bag{'' if len(bags) == 1 else 's'}"
+    print(f"recorded {size / 1e6:.1f} MB in {count}: {folder}", flush=True)
     return status
 
 

@@ -44,6 +44,7 @@ BAG, RECORDED = "what_if.bag", "recorded.bag"
 #: Launch files with nodes and parameters of recordings that have none, simulated or driven.
 LAUNCH = {False: "crazyflie_examples/sw_hover.launch", True: "crazyflie_examples/hw_hover.launch"}
 _SHARED = ("/tf", "/tf_static", "/rosout", "/diagnostics", "/flights")  # In no namespace.
+_NOTHING = 1e-6  # Of mm, s or V: a rounding error.
 _BEFORE = 0.1  # Time before the takeoff at which a closed loop begins, s.
 
 
@@ -109,7 +110,8 @@ class Result:
 
 
 def _shown(value):
-    return "–" if math.isnan(value) else f"{value:.4g}"
+    # A rounding error is no length.
+    return "–" if math.isnan(value) else f"{0.0 if abs(value) < _NOTHING else value:.4g}"
 
 
 def compare(options: Options, out: Path) -> Result:

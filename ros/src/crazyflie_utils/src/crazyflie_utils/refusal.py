@@ -16,6 +16,17 @@ class ServiceError(Exception):
     """A service refused or failed; the text is the reason, for the caller."""
 
 
+def distinct(value: float, limit: float, form: str = "f", digits: int = 2) -> tuple[str, str]:
+    """Return two different numbers as texts that differ, with more digits if they need them.
+
+    ``form`` is that of a format: "f" for decimal places, "g" for significant digits.
+    """
+    shown, least = (f"{number:.{digits}{form}}" for number in (value, limit))
+    if shown == least and value != limit and digits < 9:
+        return distinct(value, limit, form, digits + 1)
+    return shown, least
+
+
 def by_reason(refusals: Mapping[str, str], listed: Callable[..., str] = ", ".join) -> list[str]:
     """Return refusals (vehicle to reason) as texts: each reason once, after its vehicles.
 

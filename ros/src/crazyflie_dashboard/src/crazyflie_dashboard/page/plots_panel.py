@@ -11,6 +11,7 @@ import numpy as np
 from nicegui import context, ui
 from nicegui.events import GenericEventArguments, ValueChangeEventArguments
 
+from crazyflie_dashboard.page.scene_view import COLORS
 from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.snapshot import Scene
@@ -19,9 +20,8 @@ SPAN = 60.0  #: Time that is shown (s).
 MAX_POINTS = 300  #: Largest number of points of a line: the plot has no pixels for more.
 HEIGHT, GAP, TOP = 105, 34, 26  #: Height of a plot, space between two and above the first (px).
 
-#: Colors of lines; those of x, y and z are those of the scene's axes.
-COLORS = ["#4ea1ff", "#ffb545", "#b58cff", "#5fd3e0", "#f178b6", "#b3d465", "#93a0b2", "#e0c9a6"]
-AXES = {"x": "#ff6b6b", "y": "#35c98a", "z": "#4ea1ff"}
+#: Colors of x, y and z, those of the report; `vehicles.js` has them for the scene's axes.
+AXES = {"x": "#1f86cc", "y": "#d98200", "z": "#0f9f76"}
 #: What is plotted before anything else is chosen: names of `VehiclePlots`.
 FIRST = (
     "position x",
@@ -48,7 +48,7 @@ TOOLTIP = {
     "borderColor": "#2a323e",
     "textStyle": {"color": "#e4e9f0"},
 }
-SPLIT_LINE = {"lineStyle": {"color": "#2a323e"}}
+SPLIT_LINE = {"lineStyle": {"color": "rgba(128, 128, 128, 0.25)"}}
 
 
 class Line(NamedTuple):

@@ -1,10 +1,10 @@
 // The vehicles and what is around them in three dimensions.
 
 import { CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
-import { FEW, Goal, Measure, Surroundings, Vehicles, Waypoints } from "dashboard-objects";
+import { FEW, Goal, Measure, Surroundings, Vehicles, Waypoints, axesOf } from "dashboard-objects";
 
 const LABEL_PERIOD = 0.2;  // Between two layouts of more names than FEW, s: they cost more than all else.
-const FLOOR = "void main() { gl_FragColor = vec4(0.106, 0.133, 0.173, 1.0); }";  // It is most of the picture.
+const FLOOR = "uniform vec3 color; void main() { gl_FragColor = linearToOutputTexel(vec4(color, 1.0)); }";  // It is most of the picture.
 const CLICK = 5;  // A pointer that has moved further, px, has turned the view.
 
 export default {
@@ -24,7 +24,6 @@ export default {
     }
     this.labels = new CSS2DRenderer({ element: this.$el.children[1] });
     this.scene = new THREE.Scene();
-    this.scene.background = new THREE.Color("#0e1218");
     this.camera = new THREE.PerspectiveCamera(45, 1, 0.02, 500);
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(-2.6, -3.2, 2.6);
@@ -34,16 +33,19 @@ export default {
     const sun = new THREE.DirectionalLight("#ffffff", 1.6);
     sun.position.set(3, -5, 8);
     const floor = new THREE.Mesh(new THREE.CircleGeometry(14, 64),
-      new THREE.ShaderMaterial({ fragmentShader: FLOOR }));
+      new THREE.ShaderMaterial({ fragmentShader: FLOOR, uniforms: { color: { value: new THREE.Color() } } }));
     floor.position.z = -0.004;
-    const grid = new THREE.GridHelper(20, 20, "#56657a", "#2f3947").rotateX(Math.PI / 2);
+    this.floor = floor;
+    const grid = this.grid = new THREE.GridHelper(20, 20, "#56657a", "#2f3947").rotateX(Math.PI / 2);
     this.surroundings = new Surroundings();
     this.goal = new Goal();
     this.waypoints = new Waypoints();
     this.measure = new Measure();
     this.scene.add(new THREE.HemisphereLight("#ffffff", "#30343c", 2.2), sun, floor, grid,
-      new THREE.AxesHelper(0.3), this.surroundings, this.goal, this.waypoints, this.measure);
+      axesOf(0.3), this.surroundings, this.goal, this.waypoints, this.measure);
     this.setVehicles([]);
+    this.setColors();
+    matchMedia("(prefers-color-scheme: light)").addEventListener("change", () => this.setColors());
     this.listen();
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.$el);
@@ -163,6 +165,7 @@ export default {
         const place = this.vehicles.positionOf(each);
         if (place) box.expandByPoint(place);
       }
+      for (const plan of [this.surroundings.paths, this.waypoints]) box.expandByObject(plan);
       const target = followed ?? box.getCenter(new THREE.Vector3());
       // A picture that is higher than wide has less to its sides.
       const narrow = Math.max(1, 1 / this.camera.aspect);
@@ -229,6 +232,20 @@ export default {
               add: event.ctrlKey });
           } else if (place) tell(place);
         }
+      });
+    },
+
+    // Remove what was set in the scene.
+    clear() { this.change(() => this.measure.mark(null)); },
+
+    // Take the colors of the page, which follow the system's setting.
+    setColors() {
+      const style = getComputedStyle(document.documentElement), of = (name) => new THREE.Color(style.getPropertyValue(name).trim());
+      this.change(() => {
+        this.scene.background = of("--scene");
+        this.grid.material.transparent = true;
+        this.grid.material.opacity = matchMedia("(prefers-color-scheme: light)").matches ? 0.2 : 1;
+        this.floor.material.uniforms.color.value = of("--floor");
       });
     },
 

@@ -21,6 +21,8 @@ FOLDER = Path(__file__).parent
 MAX_UNANSWERED = 3
 ANSWER_LIMIT = 2.0  #: Time after which a scene is treated as answered (s).
 PART_TIME = 1e-5  #: Time between two transmissions of solids, for each of them (s).
+#: Colors of vehicles, for plans and plots.
+COLORS = ("#4ea1ff", "#ffb545", "#b58cff", "#5fd3e0", "#f178b6", "#b3d465", "#93a0b2", "#e0c9a6")
 DIGITS = 4  #: Decimal places of positions (m) and quaternions that the browser is sent.
 
 ui.scene  # noqa: B018  Registers three.js.
@@ -101,7 +103,7 @@ class SceneView(
             self._send("placeSolids", [[place for _, *place in scene.solids]])
         fences = [[box.lower, box.upper, *place] for box, *place in scene.fences]
         self._send("setFences", [fences])
-        self._send("setPaths", [[*scene.paths.values()]])
+        self._send("setPaths", [path_rows(scene)])
         frames = [[name, *_pose(place, turn)] for name, place, turn in scene.frames]
         self._send("setFrames", [frames])
         rows = vehicle_rows(scene, chosen)
@@ -149,6 +151,14 @@ def vehicle_rows(scene: Scene, chosen: set[str]) -> list[list[Any]]:
         reference = _rounded(vehicle.reference or ())
         rows.append([*pose, condition(vehicle), name in chosen, remark, *reference])
     return rows
+
+
+def path_rows(scene: Scene) -> list[list[Any]]:
+    """Return the planned paths, each with the color of its vehicle."""
+    numbers = {name: k for k, name in enumerate(scene.vehicles)}
+    owners = (next((part for part in key.split("/") if part in numbers), "") for key in scene.paths)
+    colors = (COLORS[numbers.get(name, 2) % len(COLORS)] for name in owners)
+    return [[path, color] for path, color in zip(scene.paths.values(), colors, strict=True)]
 
 
 def condition(vehicle: VehicleSnapshot) -> int:

@@ -84,7 +84,7 @@ class Page:
         ui.page("/", title="Crazyflie mission control")(lambda: View(dashboard))
         ui.run_with(
             application,
-            dark=True,
+            dark=None,  # As the system is.
             tailwind=False,
             binding_refresh_interval=None,
             message_history_length=0,

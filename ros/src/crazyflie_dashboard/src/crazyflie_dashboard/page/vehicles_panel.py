@@ -26,6 +26,15 @@ RATES = {
     "cmd_vel": "control",
 }
 CHARGE_RANGE = 3.0, 4.2  #: Voltages of an empty and of a full battery (V).
+#: Axis and step (m) by which a key moves the goal.
+NUDGES = {
+    "ArrowLeft": (0, -0.1),
+    "ArrowRight": (0, 0.1),
+    "ArrowDown": (1, -0.1),
+    "ArrowUp": (1, 0.1),
+    "PageDown": (2, -0.1),
+    "PageUp": (2, 0.1),
+}
 LOOKS = ("ground", "flight", "stale", "emergency")
 
 
@@ -145,6 +154,18 @@ class VehiclesPanel:
         x.value, y.value = round(event.args["x"], 2), round(event.args["y"], 2)
         if z.value is None:
             z.value = self._height.value or 1.0
+
+    def nudge(self, key: str) -> None:
+        """Move the goal, if there is one, by a key."""
+        if key not in NUDGES or any(field.value is None for field in self._goal):
+            return
+        axis, step = NUDGES[key]
+        self._goal[axis].value = round(self._goal[axis].value + step, 2)
+
+    def clear_goal(self) -> None:
+        """Remove the goal."""
+        for field in self._goal:
+            field.value = None
 
     def _draw_goal(self) -> None:
         x, y, z = (field.value for field in self._goal)

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 from nicegui import context, ui
-from nicegui.events import GenericEventArguments
+from nicegui.events import GenericEventArguments, KeyEventArguments
 
 from crazyflie_dashboard.dashboard import Dashboard
 from crazyflie_dashboard.page.cameras_panel import CamerasPanel
@@ -26,8 +26,22 @@ from crazyflie_dashboard.page.vehicles_panel import VehiclesPanel
 from crazyflie_dashboard.snapshot import Scene, Sentence, VehicleSnapshot
 
 SCENE_PERIOD = 0.05
+#: Keys and what they do, as the page says.
+KEYS = (
+    ("Esc Esc", "emergency: stop the motors of all vehicles"),
+    ("← → ↑ ↓", "move the goal by 0.1 m along x and y"),
+    ("Page ↑, Page ↓", "raise or lower it by 0.1 m"),
+    ("click on the floor", "set the goal, or a waypoint"),
+    ("Ctrl + click", "add a vehicle to the selection, or remove it"),
+    ("Shift + click, twice", "distance of two points"),
+    ("drag, wheel", "turn the view, zoom"),
+    ("?", "this list"),
+)
 PANEL_PERIOD = 0.5  #: Period of the panels (s).
 MAX_SCENE_AGE = 1.0  #: Age after which a scene is shown as old (s).
+ALARM = (
+    "Sounds when a vehicle has an emergency, or in flight no pose, a low battery or one too near"
+)
 LOADING_TIME = 2.0  #: Longest time until the first scene (s).
 
 
@@ -52,6 +66,7 @@ class View:
                 with ui.element("div").classes("side"):
                     self._build_panels()
         self._session.on_seek = self._seek
+        ui.keyboard(self._on_key)
         ui.timer(SCENE_PERIOD, self._draw)
         ui.timer(PANEL_PERIOD, self._refresh)
 
@@ -59,12 +74,11 @@ class View:
         ui.label("Mission control").classes("title")
         self._summary = ui.label().classes("summary")
         ui.element("div").classes("space")
-        self._missions = ui.label().classes("summary")
         self._stop = ui.button("Stop mission").props("unelevated color=warning icon=stop")
-        self._stop.on("click", self._stop_mission, js_handler=CLICKED)
+        self._stop.classes("sign").on("click", self._stop_mission, js_handler=CLICKED)
         self._record = ui.button("Record", on_click=self._turn_recording)
-        self._record.props("flat dense icon=fiber_manual_record")
-        self._sound = ui.switch("Alarm", value=True).props("dense")
+        self._record.props("flat dense icon=fiber_manual_record").classes("sign")
+        self._sound = ui.switch("Alarm", value=True).props(f'dense title="{ALARM}"')
         self._control = ui.label().classes("control")
         self._take = ui.button("Take control", on_click=self._take_or_release)
         self._take.props("outline").classes("take")
@@ -83,9 +97,14 @@ class View:
                 ("Follow", "follow", "center_focus_strong"),
             ):
                 button = ui.button(
-                    text, on_click=lambda view=view: self._scene_view.look(view, self._watched())
+                    text,
+                    color=None,
+                    on_click=lambda view=view: self._scene_view.look(view, self._watched()),
                 )
-                button.props(f"dense unelevated icon={icon} color=dark")
+                button.props(f'dense unelevated icon={icon} aria-label="{text}"')
+            clear = ui.button("Clear", color=None, on_click=self._clear)
+            clear.props('dense unelevated icon=clear aria-label="Clear"')
+            clear.props('title="Remove plans, goal and distance from the scene"')
 
     def _build_panels(self) -> None:
         builders: dict[str, Callable[[Session], Any]] = {
@@ -97,7 +116,7 @@ class View:
             "Messages": MessagesPanel,
             "Cameras": CamerasPanel,
         }
-        with ui.tabs().props("dense no-caps inline-label") as tabs:
+        with ui.tabs().props("dense no-caps inline-label outside-arrows") as tabs:
             for name in builders:
                 ui.tab(name)
         self._tabs = ui.tab_panels(tabs, value="Vehicles", animated=False, keep_alive=True)
@@ -109,6 +128,30 @@ class View:
         tabs.on_value_change(self._refresh)
         tabs.on_value_change(lambda event: self._session.keep(tab=event.value))
         self._session.on_restore.append(lambda kept: tabs.set_value(kept.get("tab", tabs.value)))
+
+    def _clear(self) -> None:
+        self._dashboard.forget_paths(self._session.page)
+        self._panels["Vehicles"].clear_goal()
+        self._scene_view.run_method("clear")
+
+    def _on_key(self, event: KeyEventArguments) -> None:
+        if not event.action.keydown:
+            return
+        if event.key == "?":
+            self._show_keys()
+        elif not (event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta):
+            self._panels["Vehicles"].nudge(event.key.name)
+
+    def _show_keys(self) -> None:
+        with ui.dialog() as dialog, ui.card(), ui.element("dl").classes("keys"):
+            for key, what in KEYS:
+                with ui.element("div"):
+                    with ui.element("dt"):
+                        ui.label(key)
+                    with ui.element("dd"):
+                        ui.label(what)
+        dialog.on_value_change(lambda event: None if event.value else dialog.delete())
+        dialog.open()
 
     def _watched(self) -> str | None:
         return self._session.watched or next(iter(self._session.vehicles), None)
@@ -151,12 +194,11 @@ class View:
         if self._sound.value and (new := sorted(alarms - self._alarms)):
             ui.run_javascript(f"alarm({json.dumps(new)})")
         self._alarms = alarms
-        self._missions.text = " · ".join(scene.missions)
         why = self._session.obstacle
         self._stop.set_visibility(bool(scene.missions))
         allow(self._stop, why)
         is_on = scene.recording == "recording"
-        self._record.text = f"Stop recording {scene.recorded}".strip() if is_on else "Record"
+        self._record.text = "Stop recording" if is_on else "Record"
         self._record.classes(add="recording" if is_on else "", remove="" if is_on else "recording")
         is_busy = scene.recording not in ("", "recording")
         allow(self._record, why or (scene.recording if is_busy else ""))

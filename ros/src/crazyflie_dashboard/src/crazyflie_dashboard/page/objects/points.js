@@ -67,8 +67,8 @@ export class Waypoints extends THREE.Group {
 export class Measure extends THREE.Group {
   points = [];
 
-  mark(point) {
-    this.points = this.points.length === 1 ? [...this.points, point] : [point];
+  mark(point) {  // None of them for null.
+    this.points = point === null ? [] : this.points.length === 1 ? [...this.points, point] : [point];
     empty(this);
     for (const each of this.points) this.add(ball(each, 0.03));
     if (this.points.length < 2) return;

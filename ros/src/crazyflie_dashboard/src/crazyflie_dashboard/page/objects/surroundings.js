@@ -1,7 +1,10 @@
 // What is around the vehicles: walls, obstacles, fence, planned trajectories, frames, and the goal.
 
 import { THREE } from "nicegui-scene";
-import { label } from "./vehicles.js";
+import { AXES, label } from "./vehicles.js";
+
+// Return axes of a length, m, in the colors of x, y and z.
+export const axesOf = (length) => new THREE.AxesHelper(length).setColors(...AXES.map((each) => new THREE.Color(each)));
 
 const MANY = 1000;  // More balls or cylinders have fewer triangles.
 const SHAPES = {
@@ -86,13 +89,13 @@ export class Surroundings extends THREE.Group {
     }
   }
 
-  // Replace the planned trajectories: lists of points.
+  // Replace the planned trajectories: lists of points, each with its color.
   setPaths(paths) {
     empty(this.paths);
-    for (const path of paths) {
+    for (const [path, color] of paths) {
       const points = path.map((point) => new THREE.Vector3(...point));
       this.paths.add(new THREE.Line(new THREE.BufferGeometry().setFromPoints(points),
-        new THREE.LineBasicMaterial({ color: "#b58cff" })));
+        new THREE.LineBasicMaterial({ color })));
     }
   }
 
@@ -107,7 +110,7 @@ export class Surroundings extends THREE.Group {
     }
     for (const [name, ...pose] of frames) {
       if (!this.frames.has(name)) {
-        const axes = new THREE.AxesHelper(0.12);
+        const axes = axesOf(0.12);
         axes.add(label(name, "tag frame"));
         this.frames.set(name, axes);
         this.add(axes);

@@ -13,6 +13,8 @@ const CONDITIONS = ["ground", "flight", "stale", "emergency"];
 // By a vehicle's condition, its number in the list above.
 const TINTS = ["#ffffff", "#ffffff", "#5b6068", "#ff4040"].map((text) => new THREE.Color(text));
 const RINGS = ["#8b97a8", "#35c98a", "#5b6068", "#ff3b3b"].map((text) => new THREE.Color(text));
+// Of x, y and z, as in the plots and in the report.
+export const AXES = ["#1f86cc", "#d98200", "#0f9f76"];
 const CHOSEN = new THREE.Color("#4ea1ff");
 
 // Return a text in the scene. It is set as text, never as HTML.

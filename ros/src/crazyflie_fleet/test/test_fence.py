@@ -1,5 +1,7 @@
 """A fleet whose vehicles have geofences."""
 
+import math
+
 import pytest
 from simulated_fleet import NODES, Swarm
 
@@ -32,3 +34,24 @@ def test_each_vehicle_stays_in_the_box(together):
             assert -SIDE < swarm.position(name)[0] < 1.0 + SIDE
     assert swarm.position("cf1")[0] == pytest.approx(-SIDE, abs=0.1)
     assert swarm.position("cf2")[0] == pytest.approx(1.0 + SIDE, abs=0.1)
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_each_vehicle_has_half_of_the_room_between_them(together):
+    """References that change places."""
+    nodes = {**NODES, "geofence": BOX}
+    swarm = Swarm(nodes, fleet={"n": 2}, together=together, fence=True)
+    swarm.call("/all/takeoff", seconds=8.0)
+    swarm.process.advance(6.0)
+    nearest = math.inf
+    for _ in range(80):
+        for name, y in (("cf1", 3.0), ("cf2", -3.0)):
+            x, _, z = swarm.position(name)
+            state = PositionVelocityState(x=x, y=y, z=z)
+            swarm.process.publish(f"/{name}/ref", PositionVelocityStateStamped(state=state))
+        swarm.process.advance(0.05)
+        nearest = min(nearest, math.dist(swarm.position("cf1"), swarm.position("cf2")))
+    buffer = swarm.process.transport.get_param("/cf1/geofence/buffer")
+    assert 2.0 * buffer < nearest < 2.0 * buffer + 0.1
+    # The separation of references had nothing to do.
+    assert [each.data for each in swarm.process.published("/fleet/waiting")] == [""]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from test_geofence import AXES, Flight, control_of
 
 from crazyflie_geofence.geofence import Geofence
-from crazyflie_geofence.obstacles import Obstacles, planes
+from crazyflie_geofence.obstacles import DOWNWASH, Obstacles, halfway, planes
 from crazyflie_model.dynamics import coupled_acceleration
 from crazyflie_world.shapes import Ball, Box, Cylinder
 
@@ -109,3 +109,42 @@ def test_the_heading_does_not_matter():
         )
         assert priority == 1.0
         assert coupled_acceleration(control, yaw)[0] < 0.0
+
+
+BUFFER = 0.15
+PLACE = st.tuples(UNIT, UNIT, UNIT)
+
+
+@given(PLACE, PLACE)
+def test_both_vehicles_find_the_same_plane(a, b):
+    mine, theirs = halfway(a, b, BUFFER), halfway(b, a, BUFFER)
+    assert mine.distance(a) == pytest.approx(theirs.distance(b))
+    # Where both are in front of their planes, their ellipsoids do not overlap.
+    if mine.distance(a) >= 0.0:
+        away = np.subtract(a, b) / (1.0, 1.0, DOWNWASH)
+        assert np.linalg.norm(away) >= 2.0 * BUFFER - 1e-9
+
+
+@pytest.mark.parametrize("draw", [0.0, 1.0, -1.0])
+@pytest.mark.parametrize("beside", [0.0, 0.1])
+@pytest.mark.parametrize("ahead", [2.0, 0.5])
+def test_two_vehicles_that_fly_at_each_other_stay_apart(draw, beside, ahead):
+    """At full tilt both ways, again and again; or one hovers (0.5 m/s^2)."""
+    flights = [
+        Among(position=(side, side * beside, 1.4), draw=lambda: draw) for side in (-1.2, 1.2)
+    ]
+    for flight in flights:
+        flight.fence.buffer = BUFFER
+    nearest = math.inf
+    for k in range(600):
+        places = [tuple(flight.position) for flight in flights]
+        sign = 1.0 if k % 400 < 300 else -1.0
+        for flight, other, u in zip(
+            flights, places[::-1], (sign * 2.0, -sign * ahead), strict=True
+        ):
+            flight.fence.others = [other]
+            flight.step(control_of((u, 0.0, 0.0), 0.0))
+        nearest = min(nearest, math.dist(flights[0].position, flights[1].position))
+    assert nearest > 2.0 * BUFFER
+    # They came near: sideways, they slide past each other.
+    assert draw or beside or nearest < 2.0 * BUFFER + 0.1

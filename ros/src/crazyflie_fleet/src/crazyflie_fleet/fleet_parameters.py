@@ -116,7 +116,10 @@ class FlyParameters(FleetParameters):
         False,
     )
     fence: bool = parameter(
-        BOOLEAN, "whether each vehicle has a geofence, whose box is in nodes/geofence/box", False
+        BOOLEAN,
+        "whether each vehicle has a geofence, whose box is in nodes/geofence/box; of up to 21 "
+        "vehicles, each also has half of the room between it and another",
+        False,
     )
     common: Mapping[str, Any] = parameter(
         NODE_PARAMETERS, "parameters of every vehicle's nodes, node by node", name="nodes"

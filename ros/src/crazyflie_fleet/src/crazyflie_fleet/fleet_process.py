@@ -44,6 +44,10 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     return _NodeFactory(handle, handle.load(FlyParameters)).nodes
 
 
+#: Most vehicles with which a fence shares the room: each answers the states of all of them.
+MAX_NEIGHBOURS = 20
+
+
 class _NodeFactory:
     """Makes the nodes of the process."""
 
@@ -131,7 +135,10 @@ class _NodeFactory:
         self._handle.set_param(f"/{vehicle.name}/{BUFFER}", vehicle.buffer)
         self._handle.set_param(f"/{vehicle.name}/{PLACE}", self._places[vehicle.name])
         frames = {"fixed": self._config.fixed_frame, "robot": vehicle.name}
-        tree = parameters(vehicle, frames, self._common(vehicle.dynamics), fence)
+        others = [name for name in self._places if name != vehicle.name]
+        if len(others) > MAX_NEIGHBOURS:
+            others = []
+        tree = parameters(vehicle, frames, self._common(vehicle.dynamics), fence, others)
         if vehicle.name in self._unplaced:
             tree["takeoff_server"]["topics"]["inhibition"] = INHIBITION
         for name, node_class in (self._config.extra_nodes or {}).items():

@@ -1,6 +1,6 @@
 """The nodes that fly one vehicle, and their parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from crazyflie_control_merger.cmd_vel_converter_node import CmdVelConverterNode
@@ -81,11 +81,12 @@ def parameters(
     frames: Mapping[str, str],
     common: Mapping[str, Any],
     has_fence: bool = False,
+    others: Sequence[str] = (),
 ) -> Tree:
     """Return the parameters of a vehicle's nodes, node by node.
 
     ``frames`` are the names of the tf frames, fixed and robot; ``common`` the parameters of all
-    vehicles, node by node.
+    vehicles, node by node; ``others`` the names of those with which its fence shares the room.
     """
     hover, model = vehicle.hover_point, vehicle.vehicle_model
     own: Tree = {
@@ -148,8 +149,10 @@ def parameters(
                 "control": LQR_CONTROL,
                 "prioritized_control": FENCE_CONTROL,
                 "final_control": FINAL_CONTROL,
+                "others": [f"/{name}/{STATE}" for name in others],
             },
             "model": model,
+            "buffer": vehicle.buffer,
         }
         own["control_merger"] = {
             "topics": {

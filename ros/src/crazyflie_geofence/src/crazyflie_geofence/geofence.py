@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from crazyflie_geofence.disturbance import DisturbanceWatch
-from crazyflie_geofence.obstacles import Obstacles, Plane
+from crazyflie_geofence.obstacles import Obstacles, Plane, halfway
 from crazyflie_geofence.viable_set import Axis, response
 from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.dynamics import coupled_acceleration
@@ -77,6 +77,10 @@ class Geofence:
         obstacles: Obstacles | None = None,
     ):
         self._obstacles = obstacles or Obstacles((), 0.0)
+        #: Positions of other vehicles (m), each of which has half of the room, and what is kept
+        #: free of it (m).
+        self.others: Sequence[Triple] = ()
+        self.buffer = 0.0
         self._max_thrust = min(max_thrust, MAX_THRUST)
         # Towards the upper walls of the axes, then towards the lower ones (m/s^2).
         self._acceleration = [0.0] * 6
@@ -129,6 +133,7 @@ class Geofence:
         planes = self._obstacles.choose(
             position, velocity, is_far, lambda plane: self._room(plane, position, velocity)
         )
+        planes += [halfway(position, other, self.buffer) for other in self.others]
         # Far from all walls, a prediction would change nothing.
         if all(
             axis.is_far(high - p, v) and axis.is_far(p - low, -v)

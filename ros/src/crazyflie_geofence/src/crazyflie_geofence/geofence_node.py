@@ -1,7 +1,7 @@
 """ROS interface of the geofence."""
 
 from collections.abc import Iterator
-from functools import cached_property
+from functools import cached_property, partial
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import Header
@@ -17,6 +17,7 @@ from crazyflie_geofence.geofence import (
 )
 from crazyflie_geofence.obstacles import Obstacles
 from crazyflie_geofence.viable_set import Axis
+from crazyflie_model.limits import HOLD_LIMIT
 from crazyflie_msgs.msg import Control as ControlMessage
 from crazyflie_msgs.msg import (
     ControlStamped,
@@ -26,7 +27,7 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter, topic
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import Number
+from crazyflie_utils.parameters.types import TOPIC, ListOf, Number
 from crazyflie_utils.parameters.vehicle_model import VEHICLE_MODEL
 from crazyflie_utils.vectors import to_tuple
 from crazyflie_world.world import World
@@ -79,6 +80,15 @@ class GeofenceParameters(Parameters):
     )
     clearance: float = parameter(
         Number("m", minimum=0.0), "from the vehicle's middle to what may touch no obstacle", 0.1
+    )
+    others: tuple[str, ...] = parameter(
+        ListOf(TOPIC),
+        "states of other vehicles: each has half of the room between it and this one",
+        (),
+        "topics/others",
+    )
+    buffer: float = parameter(
+        Number("m", minimum=0.0), "what this vehicle keeps free of its half", 0.15
     )
     spread: float = parameter(
         Number("s", minimum=0.0, maximum=0.1),
@@ -143,6 +153,7 @@ class GeofenceNode(Node[GeofenceParameters]):
     def __init__(self) -> None:
         self._regular: Control | None = None
         self._yaw = 0.0
+        self._others: dict[str, tuple[float, tuple[float, float, float]]] = {}
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -152,6 +163,7 @@ class GeofenceNode(Node[GeofenceParameters]):
         self._fence = Geofence(
             own.lower.vector(), own.upper.vector(), own.axes, own.max_thrust, obstacles
         )
+        self._fence.buffer = own.buffer
         self._publisher = handle.publisher(own.prioritized_topic, PrioritizedControlStamped)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         handle.subscribe(own.control_topic, ControlStamped, self._on_control, finite="control")
@@ -160,10 +172,17 @@ class GeofenceNode(Node[GeofenceParameters]):
         handle.subscribe(
             own.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
         )
+        for other in own.others:
+            on_other = partial(self._on_other, other)
+            handle.subscribe(other, PositionVelocityYawStateStamped, on_other, finite="state")
         handle.timer(_REPORT_PERIOD, self._report)
 
     def _reconfigure(self, parameters):
         self._fence.change(parameters.lower.vector(), parameters.upper.vector(), parameters.axes)
+
+    def _on_other(self, name, message):
+        x, y, z, *_ = to_tuple(message.state)
+        self._others[name] = self._handle.time(), (x, y, z)
 
     def _on_control(self, message):
         self._regular = to_tuple(message.control)
@@ -176,6 +195,7 @@ class GeofenceNode(Node[GeofenceParameters]):
             return
         now = self._handle.time()
         x, y, z, vx, vy, vz, self._yaw = to_tuple(message.state)
+        self._fence.others = [p for t, p in self._others.values() if 0.0 <= now - t < HOLD_LIMIT]
         u, priority = self._fence.control(now, (x, y, z), (vx, vy, vz), self._yaw, self._regular)
         if self._parameters.final_topic is None:
             self._fence.sent(now, u, self._yaw)

@@ -12,6 +12,9 @@ from crazyflie_world.shapes import Ball, Box, Cylinder, Shape
 
 Triple = tuple[float, float, float]
 
+#: How much further than beside each other vehicles are kept above each other.
+DOWNWASH = 2.0
+
 #: Where on its way past a round obstacle a plane faces the vehicle.
 _PASSING_SHARES = (0.0, 0.5, 0.75, 1.0)
 
@@ -56,6 +59,22 @@ def planes(shape: Shape, position: Triple, velocity: Triple, clearance: float) -
             a, b = (to_x / distance, to_y / distance) if distance > 0.0 else (1.0, 0.0)
             found.append(Plane((a, b, 0.0), a * x + b * y + half_x))
     return found
+
+
+def halfway(position: Triple, other: Triple, buffer: float) -> Plane:
+    """Return the plane behind which a vehicle has half of the room to another, less a buffer (m).
+
+    Beside each other, or above each other with `DOWNWASH` times the buffer: where there is more
+    room. The other vehicle finds the same plane, seen from the other side.
+    """
+    ahead, left, above = (a - b for a, b in zip(position, other, strict=True))
+    distance = math.hypot(ahead, left)
+    if abs(above) / DOWNWASH > distance or distance == 0.0:
+        normal, buffer = (0.0, 0.0, math.copysign(1.0, above)), DOWNWASH * buffer
+    else:
+        normal = ahead / distance, left / distance, 0.0
+    middle = sum(n * (a + b) / 2.0 for n, a, b in zip(normal, position, other, strict=True))
+    return Plane(normal, middle + buffer)
 
 
 class Obstacles:

@@ -309,6 +309,10 @@ BAD = {
     ),
     "type": (["--closed", "--type", "boeing"], "the model boeing does not exist; expected one of"),
     "launch": (["--launch", "crazyflie_examples/no.launch"], "no.launch cannot be read"),
+    "argument": (
+        ["--launch", "crazyflie_examples/sw_hover.launch", "dynamic:=quadrotor"],
+        "sw_hover.launch has no argument dynamic; did you mean dynamics?",
+    ),
     "no control": (["--closed", "--nodes", "estimator,lqr"], "needs a node that publishes control"),
     "times": (["--from", "9", "--to", "3"], "--from 9.0 is not before --to 3"),
     "vehicle": (["--vehicle", "cf7"], "--vehicle cf7: expected one of"),

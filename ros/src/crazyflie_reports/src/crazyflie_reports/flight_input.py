@@ -88,9 +88,12 @@ def of_launch_file(
         given = {"composed": "true", "rviz": "false"} | dict(
             each.split(":=", 1) for each in arguments
         )
+        problems = launch_file.unknown_arguments([str(path), *arguments])
         _, parameters = launch_file.expand(path, **given)
     except (rospkg.ResourceNotFound, RLException, OSError, ValueError) as error:
         raise InputError(f"--launch {launch} cannot be read: {error}") from None
+    if problems:
+        raise InputError("; ".join(problems))
     found = FlightInput([], parameters, {})
     file = (recording if recording.is_dir() else recording.parent) / PARAMETERS
     recorded: dict[str, Any] = {}

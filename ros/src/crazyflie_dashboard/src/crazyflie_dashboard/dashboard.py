@@ -37,6 +37,8 @@ from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.steps import follow
 
+_COMPARE_PERIOD = 0.2  #: Period in which commands are compared with what vehicles do (s).
+
 
 class Dashboard:
     """The graph, as pages see and command it; requests are carried out in the node's turn.
@@ -84,7 +86,8 @@ class Dashboard:
         self._model = GraphModel(handle, self._workers, master, clock)
         self._actions = Actions(self._model, reach)
         self._commands = Commands(clock)
-        self._model.on_scene = lambda scene: self._commands.update(scene.vehicles)
+        self._compared = 0.0  # When commands were last compared with a scene (s).
+        self._model.on_scene = self._compare
         self._lane = lane
         self._parameters = LiveParameters(self._model)
         self._missions = missions.Missions()
@@ -351,6 +354,11 @@ class Dashboard:
         return self._commands.begin(page, title, vehicles, self._places(vehicles), command)
 
     # Called in the node's turn.
+
+    def _compare(self, scene):
+        if scene.made - self._compared >= _COMPARE_PERIOD:
+            self._compared = scene.made
+            self._commands.update(scene.vehicles)
 
     def _places(self, names):
         known = self._model.scene.vehicles

@@ -132,6 +132,23 @@ def test_a_landing_in_the_liftoff_lifts_no_vehicle_that_hovers_at_less(hover, mo
 
 
 @pytest.mark.parametrize("hover", [0.65, 0.8])
+@pytest.mark.parametrize("moment", [0.05, 0.15])
+def test_a_server_that_is_restarted_before_a_vehicle_has_lifted_off_stops_the_motors(hover, moment):
+    """It ramped the thrust down from g: the vehicle rose to 0.7 m, and fell."""
+    network = scaled(hover)
+    network.call("/takeoff")
+    network.advance(moment)
+    network.kill("server")
+    network.advance(0.02)
+    network.start_server()
+    highest = 0.0
+    while states(network)[-1] != "on_ground":
+        network.advance(0.01)
+        highest = max(highest, network.vehicle.z)
+    assert highest < 0.2
+
+
+@pytest.mark.parametrize("hover", [0.65, 0.8])
 @pytest.mark.parametrize("moment", [1.0, 4.0])
 def test_a_server_that_is_restarted_lifts_no_vehicle_that_hovers_at_less(hover, moment):
     """It does not know the thrust of hover: its ramp began at g, and the vehicle leapt to 1.1 m."""

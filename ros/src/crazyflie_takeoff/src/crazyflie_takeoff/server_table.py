@@ -328,6 +328,10 @@ class FlightStateMachine:
         """Return whether the vehicle is seen as low as the ground from which it took off."""
         return self.measured is not None and self.measured[2] - self.ground < TOUCHDOWN_HEIGHT
 
+    def _down_in_a_takeoff(self):
+        # The thrust with which the vehicle hovers is not known: a ramp might lift it.
+        return self.filter.remembered is FlightState.TAKING_OFF and self._down()
+
     def _seen_and_landings_have_a_descent(self):
         return self.measured is not None and self._landings_have_a_descent()
 
@@ -416,6 +420,7 @@ REQUESTS: tuple[Guard, ...] = (
     _recover("no flight is remembered", _M._no_flight_remembered, _S.ON_GROUND),
     _recover("flying is remembered", _M._flying_remembered, _S.FLYING),
     # The caller of an interrupted takeoff or landing got an error, and expects safety.
+    _recover("has not left", _M._down_in_a_takeoff, _S.TOUCHING_DOWN),
     _recover("is down", _M._down, _S.RAMPING_DOWN),
     _recover("is seen in the air", _M._seen_and_landings_have_a_descent, _S.DESCENDING),
     _recover("is not seen", None, _S.FLYING),

@@ -1,0 +1,93 @@
+"""Takeoffs and landings of vehicles of any weight in which one thing fails at a random moment."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from std_msgs.msg import Float64
+from takeoff_helpers import GRAVITY, SERVER, ControllerNode, HoverNetwork, PointMass, control
+
+from crazyflie_msgs.msg import FlightStatus
+
+#: What fails, and for how long it does (s).
+FAILURES = st.one_of(
+    st.tuples(st.just("camera"), st.sampled_from([0.1, 0.3, 1.0, 3.0, 60.0])),
+    st.tuples(st.just("server"), st.sampled_from([0.05, 0.3, 1.0, 60.0])),
+    st.tuples(st.just("controller"), st.sampled_from([0.05, 0.3, 1.0, 60.0])),
+    st.tuples(st.just("filter"), st.just(0.05)),  # Nothing flies the vehicle meanwhile.
+)
+
+
+class Vehicle(PointMass):
+    """A vehicle that hovers at a fraction of the assumed thrust, which its motors follow late."""
+
+    LAG = 0.065
+
+    def __init__(self, hover):
+        super().__init__()
+        self._hover, self._motors = hover, 0.0
+
+    def _step(self):
+        sent = self.thrust
+        if sent is not None:
+            self._motors += self.STEP / self.LAG * (sent / self._hover - self._motors)
+            self.thrust = self._motors
+        super()._step()
+        self.thrust = sent
+
+
+class Controller(ControllerNode):
+    """One that begins with the measured thrust of hover, as the LQR does."""
+
+    def register_callbacks(self, handle):
+        super().register_callbacks(handle)
+        publish, self._hover = self._control.publish, GRAVITY
+        self._control.publish = lambda message: publish(
+            control(min(max(message.control.thrust + self._hover - GRAVITY, 4.0), 16.0))
+        )
+        handle.subscribe("/in_flight_hover_thrust", Float64, self._on_hover_thrust)
+        handle.subscribe("/in_flight_flight_status", FlightStatus, self._on_flight_status)
+
+    def _on_hover_thrust(self, message):
+        self._hover = message.data
+
+    def _on_flight_status(self, message):
+        if message.state == FlightStatus.ON_GROUND:
+            self._hover = GRAVITY
+
+
+def start(network, name):
+    """Start what has failed again."""
+    if name == "camera":
+        network.vehicle_node.sees = True
+    elif name == "controller":
+        network.start(name, Controller())
+    else:
+        getattr(network, f"start_{name}")()
+
+
+@pytest.mark.parametrize("lands", [False, True])
+@given(st.floats(0.65, 1.3), st.sampled_from([0.3, 1.0]), st.floats(0.2, 4.0), FAILURES)
+def test_no_single_failure_lifts_a_vehicle_or_drops_it(lands, hover, height, moment, failure):
+    network = HoverNetwork({**SERVER, "hover/z": height})
+    network.vehicle = network.vehicle_node.vehicle = Vehicle(hover)
+    network.kill("controller")
+    network.start("controller", Controller())
+    network.advance(0.5)
+    answer = network.call("/takeoff")
+    if lands:
+        network.advance_until(answer.done)
+        network.call("/land")
+    network.advance(moment)
+    name, duration = failure
+    if name == "camera":
+        network.vehicle_node.sees = False
+    else:
+        network.kill(name)
+    begin, highest = network.vehicle.z, 0.0
+    for tick in range(1200):
+        if tick == round(100 * duration):
+            start(network, name)
+        network.advance(0.01)
+        highest = max(highest, network.vehicle.z)
+    assert highest < max(begin, height) + 0.75
+    assert network.vehicle.touchdown_speed < 2.0

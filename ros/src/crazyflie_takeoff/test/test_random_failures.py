@@ -90,4 +90,4 @@ def test_no_single_failure_lifts_a_vehicle_or_drops_it(lands, hover, height, mom
         network.advance(0.01)
         highest = max(highest, network.vehicle.z)
     assert highest < max(begin, height) + 0.75
-    assert network.vehicle.touchdown_speed < 2.0
+    assert network.vehicle.touchdown_speed < 2.4  # A fall from 0.3 m.

@@ -48,7 +48,7 @@ class Bounds(Parameters):
 
 
 #: Bounds of the Crazyflie 2.1, measured on vehicles that are simulated: docs/geofence_proof.md says
-#: how. They hold for velocities from differences of poses; no real vehicle was measured.
+#: how, and what exceeded them. With velocities from differences of poses; no real vehicle.
 OF_TYPES = Bounds(
     horizontal_lag=0.12,
     vertical_lag=0.05,

@@ -19,6 +19,7 @@ from crazyflie_dashboard.master import MasterError
 from crazyflie_dashboard.page_data import Command, DryRunResult
 from crazyflie_dashboard.snapshot import Action
 from crazyflie_driver import srv
+from crazyflie_fleet.high_level_services import TAKEOFF_LEAD
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.tf.frame_tree import StampedPose, encode_poses
@@ -43,7 +44,7 @@ def test_a_takeoff_of_some_calls_their_services(fleet):
     assert called(fleet) == ["/cf1/high_level/takeoff", "/cf3/high_level/takeoff"]
     request = fleet.calls[0][1]
     assert request.height == pytest.approx(0.8)
-    assert request.duration.to_sec() == pytest.approx(1.6)
+    assert request.duration.to_sec() == pytest.approx(1.6 + TAKEOFF_LEAD)
 
 
 def test_each_vehicle_has_its_own_outcome_in_the_words_of_its_service(fleet):

@@ -17,6 +17,7 @@ from crazyflie_dashboard.page_data import MAX_COMMAND_AGE, Command, Outcomes, ga
 from crazyflie_dashboard.snapshot import Action, Triple, VehicleSnapshot
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import BUFFER
+from crazyflie_fleet.high_level_services import TAKEOFF_LEAD
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.lights import COLOR_LED_DECKS, wrgb
 from crazyflie_takeoff.envelope import Box
@@ -472,6 +473,8 @@ def _request(command: Command, service: Service, target: Target) -> Any:
         return SetBoolRequest(command.action == Action.ARM)
     if service.kind is srv.Takeoff:
         duration = max(_MIN_DURATION, command.height / _CLIMB_SPEED)
+        if "flight_status" in target.vehicle.topics:
+            duration += TAKEOFF_LEAD
         return srv.TakeoffRequest(0, command.height, genpy.Duration.from_sec(duration))
     if service.kind is srv.GoTo:
         return _hold_request()

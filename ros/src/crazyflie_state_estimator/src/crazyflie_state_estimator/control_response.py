@@ -38,6 +38,8 @@ class ControlInput:
     def __init__(self) -> None:
         self._control: Sequence[float] | None = None
         self._time = 0.0
+        self._response: list[float] | None = None
+        self._answered = 0.0
 
     def command(self, control: Sequence[float], time: float) -> None:
         """Set the control (roll, pitch, yaw rate, thrust; rad, rad/s, m/s^2) at ``time`` (s)."""
@@ -57,6 +59,22 @@ class ControlInput:
             return None
         thrust = min(thrust, MAX_THRUST)
         return coupled_acceleration((roll, pitch, yaw_dot, thrust), yaw)
+
+    def response(self, acceleration: list[float] | None, time: float) -> list[float] | None:
+        """Return the acceleration (3,), m/s^2, with which a vehicle answers at ``time`` (s).
+
+        It follows that of the control, `acceleration`, with the time constant `LAG`.
+        """
+        dt, self._answered = time - self._answered, time
+        if acceleration is None or self._response is None or not 0.0 <= dt <= HOLD_LIMIT:
+            self._response = acceleration
+        else:
+            share = 1.0 - math.exp(-dt / LAG)
+            self._response = [
+                old + share * (new - old)
+                for old, new in zip(self._response, acceleration, strict=True)
+            ]
+        return self._response
 
 
 #: Least duration (s) and number of poses over which poses and controls are averaged.

@@ -285,6 +285,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         attitude = rpy_from_quaternion(*pose.rotation)
         acceleration = self._control.acceleration(attitude[2], now)
         verdict = self._monitor.update(stamp, pose.position, pose.rotation, acceleration)
+        response = self._control.response(acceleration, now)
         was_good = self._pose_status[0] == EstimateStatus.GOOD
         self._pose_status = status, reason = self._statuses[verdict]
         if verdict is Verdict.IMPOSSIBLE:
@@ -292,14 +293,14 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         if status != EstimateStatus.GOOD:
             self._handle.warn(reason, throttle=1.0, key="frozen")
             # The predicted motion, when the measured one has just turned out to be wrong.
-            if verdict is Verdict.REPEATED and was_good and acceleration is not None:
-                return self._estimator.without_last(pose.stamp, acceleration)
+            if verdict is Verdict.REPEATED and was_good and response is not None:
+                return self._estimator.without_last(pose.stamp, response)
             departure = self._monitor.departure
             return departure and EstimatedMotion(*departure, attitude, (0.0, 0.0, 0.0))
         if verdict is Verdict.MOVED:
             self._estimator.reset()
         self._good_stamp = pose.time
-        return self._estimator.update(pose.stamp, pose.position, attitude, acceleration)
+        return self._estimator.update(pose.stamp, pose.position, attitude, response)
 
     def _publish_status(self, now):
         facts = *self._pose_status, self._is_tilted

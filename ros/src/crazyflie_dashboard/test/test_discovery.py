@@ -89,3 +89,20 @@ def test_objects_of_the_world_are_vehicles_only_where_nothing_else_is():
 
 def test_topics_of_other_types_are_not_those_of_a_vehicle():
     assert names(Graph(topics={"/robot/state": "std_msgs/String"})) == []
+
+
+def test_vehicles_by_remapped_topics_have_the_names_at_their_ends():
+    graph = Graph(
+        topics={
+            **{f"/state{name}": STATE for name in ("HY4", "HY5")},
+            "/in_flightHY4_flight_status": "crazyflie_msgs/FlightStatus",
+            "/state_smooth": STATE,
+        },
+        services=services("/takeoffHY4", "/landHY4", "/emergencyHY4", "/takeoffHY5"),
+    )
+    found = {each.name: each for each in vehicles(graph)}
+    assert found.keys() == {"HY4", "HY5"}
+    assert found["HY4"].topics["flight_status"][0] == "/in_flightHY4_flight_status"
+    assert found["HY4"].services[Action.TAKEOFF].name == "/takeoffHY4"
+    assert found["HY4"].emergencies == ("/emergencyHY4",)
+    assert found["HY5"].actions == {Action.TAKEOFF}

@@ -3,7 +3,7 @@
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,13 +11,19 @@ from std_srvs.srv import Empty, SetBool
 
 from crazyflie_dashboard.snapshot import Action
 from crazyflie_driver import srv
-from crazyflie_reports.bag_topics import ROLES
+from crazyflie_reports.bag_topics import ROLES, VEHICLE, namespace_of
 
 #: Topics in addition to the roles of recordings: names below the vehicle's namespace, and types.
 _STATUS = {
-    "flight_status": (r"in_flight_flight_status|flight_status", "crazyflie_msgs/FlightStatus"),
-    "filter_status": (r"in_flight_filter_status|filter_status", "crazyflie_msgs/FilterStatus"),
-    "flight_state": (r"in_flight_state", "std_msgs/String"),
+    "flight_status": (
+        rf"in_flight{VEHICLE}_flight_status|flight_status",
+        "crazyflie_msgs/FlightStatus",
+    ),
+    "filter_status": (
+        rf"in_flight{VEHICLE}_filter_status|filter_status",
+        "crazyflie_msgs/FilterStatus",
+    ),
+    "flight_state": (rf"in_flight{VEHICLE}_state", "std_msgs/String"),
     "vehicle_status": (r"vehicle_status", "crazyflie_msgs/VehicleStatus"),
 }
 
@@ -107,26 +113,40 @@ def _natural(name):
 def _by_namespace(topics: Mapping[str, str]) -> dict[str, dict[str, tuple[str, str]]]:
     """Return role -> topic and type, by namespace."""
     found: dict[str, dict[str, tuple[str, str]]] = defaultdict(dict)
-    known = [(role.name, role.topics, set(role.rows)) for role in ROLES]
+    known = [(role.name, f"(?:{role.topics}){VEHICLE}", set(role.rows)) for role in ROLES]
     known += [(role, names, {kind}) for role, (names, kind) in _STATUS.items()]
-    patterns = [(role, re.compile(rf"(.*)/(?:{names})"), kinds) for role, names, kinds in known]
     for topic, kind in sorted(topics.items()):
-        for role, pattern, kinds in patterns:
-            if kind in kinds and (match := pattern.fullmatch(topic)):
-                found[match[1]].setdefault(role, (topic, kind))
+        for role, names, kinds in known:
+            if kind in kinds and (namespace := namespace_of(topic, names)) is not None:
+                found[namespace and f"/{namespace}"].setdefault(role, (topic, kind))
+    return found
+
+
+#: Services that launch files of vehicles by remapped topics name as these: /takeoffHY4.
+_NAMED = rf"(?:takeoff|land|emergency|emergency_reset){VEHICLE}"
+
+
+def _by_vehicle(services: Mapping[str, str]) -> dict[str, str]:
+    """Return services by the names that they would have in their vehicle's namespace."""
+    found = {name: name for name in services}
+    for name in services:
+        if vehicle := namespace_of(name, _NAMED):
+            plain = name.rpartition("/")[2].removesuffix(vehicle.rpartition("/")[2]).rstrip("_")
+            found.setdefault(f"/{vehicle}/{plain}", name)
     return found
 
 
 def _vehicle(top, driver, topics, services, has_driver):
     merged = {**topics.get(driver, {}), **topics.get(top, {})}
     found: dict[Action, Service] = {}
+    names = _by_vehicle(services)
     for action, service in _candidates(top, driver, services):
-        if service.name in services:
-            found.setdefault(action, service)
+        if service.name in names:
+            found.setdefault(action, replace(service, name=names[service.name]))
     if Action.GO_TO not in found and {f"{top}/takeoff", f"{top}/land"} <= services.keys():
         found[Action.GO_TO] = Service(f"{top}/high_level/go_to", srv.GoTo, needs_commander=True)
     stops = dict.fromkeys((f"{top}/emergency", f"{driver}/emergency"))
-    emergencies = tuple(name for name in stops if name in services)
+    emergencies = tuple(names[name] for name in stops if name in names)
     return FoundVehicle(top, driver, merged, found, emergencies, has_driver)
 
 

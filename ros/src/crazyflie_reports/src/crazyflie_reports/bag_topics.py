@@ -117,14 +117,14 @@ ROLES = (
     Role("toggle", "in_flight", (), {"std_msgs/Empty": lambda message: ()}),
 )
 
-#: Name of a vehicle at the end of a topic's, by which launch files tell vehicles apart: /refHY4. It
-#: has a digit, unlike /ref_descent, and a letter, unlike /state2.
-_VEHICLE = r"(?:_?(?P<vehicle>[A-Za-z]+\d\w*?))?"
+#: Pattern of the name of a vehicle at the end of a topic's, by which launch files tell vehicles
+#: apart: /refHY4. It has a digit, unlike /ref_descent, and a letter, unlike /state2.
+VEHICLE = r"(?:_?(?P<vehicle>[A-Za-z]+\d\w*?))?"
 
 #: Types that are not series, with the names of their topics below a namespace.
 EVENT_TYPES = {
-    "crazyflie_msgs/FlightStatus": rf"in_flight{_VEHICLE}_flight_status|.*flight_status",
-    "crazyflie_msgs/FilterStatus": rf"in_flight{_VEHICLE}_filter_status|.*filter_status",
+    "crazyflie_msgs/FlightStatus": rf"in_flight{VEHICLE}_flight_status|.*flight_status",
+    "crazyflie_msgs/FilterStatus": rf"in_flight{VEHICLE}_filter_status|.*filter_status",
     "crazyflie_msgs/VehicleStatus": r"vehicle_status",
     "dynamic_reconfigure/Config": r".+/parameter_updates",
     "rosgraph_msgs/Log": r"rosout",
@@ -156,9 +156,9 @@ def topic_of(connection: Connection, names: dict[str, str]) -> Topic | None:
         namespace, role = found
         return Topic(namespace, role, _decoder(connection, role.rows[connection.datatype]))
     if connection.datatype in EVENT_TYPES:
-        namespace = _namespace(connection.topic, EVENT_TYPES[connection.datatype])
-        if namespace is not None:
-            return Topic(namespace, None, _decoder(connection, lambda message: message))
+        of_event = namespace_of(connection.topic, EVENT_TYPES[connection.datatype])
+        if of_event is not None:
+            return Topic(of_event, None, _decoder(connection, lambda message: message))
     return None
 
 
@@ -166,7 +166,7 @@ def role_of(topic: str, datatype: str, names: dict[str, str]) -> tuple[str, Role
     """Return the namespace and the series of a topic of a type; None if it has no role."""
     for role in ROLES:
         own = names.get(role.name, role.topics).strip("/")
-        namespace = _namespace(topic, f"(?:{own}){_VEHICLE}")
+        namespace = namespace_of(topic, f"(?:{own}){VEHICLE}")
         if namespace is not None and datatype in role.rows:
             return namespace, role
     return None
@@ -189,7 +189,11 @@ def expected() -> str:
     )
 
 
-def _namespace(topic, names):
+def namespace_of(topic: str, names: str) -> str | None:
+    """Return the namespace of a topic, without slashes at its ends; None if its name is another.
+
+    ``names`` is a pattern of its name; where it contains `VEHICLE`, that is a namespace, too.
+    """
     match = re.fullmatch(rf"/?(?:(?P<above>.*)/)?(?:{names})", topic)
     if match is None:
         return None

@@ -150,7 +150,7 @@ FLOWN = (_P.PASSING, _P.RETURNING)
 #: The vehicle is in the air, and the supervisor has not decided yet to bring it down.
 HELD = (*FLOWN, _P.HOLDING)
 AIRBORNE = (*HELD, _P.SINKING)
-LANDS, BROUGHT_DOWN = "{}; the filter lands", "brought down by the filter because {cause}"
+LANDS = "{}; the filter lands"
 STAYS_UP = f"the vehicle has not come down for {DESCENT_TIMEOUT:g} s of a landing"
 _ALL_BUT_EMERGENCY = tuple(phase for phase in Phase if phase is not _P.EMERGENCY)
 

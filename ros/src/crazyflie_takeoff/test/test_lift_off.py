@@ -2,7 +2,7 @@
 
 import pytest
 from flight_words import states, thrusts
-from takeoff_helpers import GRAVITY, SERVER, HoverNetwork
+from takeoff_helpers import BARE, GRAVITY, SERVER, HoverNetwork
 
 from crazyflie_takeoff.hover_thrust import LEAST_HOVER, MOST_HOVER
 from crazyflie_takeoff.lift_off import CLIMB_SPEED, LIFT_OFF_THRUST, LiftOff
@@ -113,6 +113,13 @@ def test_a_vehicle_that_is_lost_early_in_its_climb_is_kept_by_its_own_thrust_of_
         network.advance(0.01)
         highest = max(highest, network.vehicle.z)
     assert highest < begin + 0.3
+
+
+@pytest.mark.parametrize(("hover", "height"), [(0.65, 2.2), (0.8, 1.7), (1.0, 1.05)])
+def test_the_filter_limits_the_climb_of_a_server_that_sees_nothing(hover, height):
+    """As that of C++: its vehicle rose to 9.3 m, or 4.0 m."""
+    highest, _ = take_off(scaled(hover, BARE), 8.0)
+    assert highest < height
 
 
 @pytest.mark.parametrize("hover", [0.65, 0.8])

@@ -16,6 +16,7 @@ CLIMB_RESPONSE = 0.1  #: Time constant with which a climb approaches its limit (
 CLIMB_BRAKING = 4.0  #: Deceleration of a climb below the highest position (m/s^2).
 RETURN_RATE = 0.5  #: Rate at which a vehicle above the highest position returns to it (1/s).
 LANDING_CLIMB = 0.5  #: Fastest climb of a vehicle that is to land (m/s).
+TAKEOFF_CLIMB = 1.0  #: Fastest climb by takeoff controls (m/s).
 MAX_SPEED_CHANGE = 0.5  #: Change of the speed by a control while the filter does not run (m/s).
 #: Pause of the filter after which the vehicle's z_dot itself is kept within `MAX_SPEED_CHANGE`,
 #: since controls that are calculated from states before the pause add up (s).

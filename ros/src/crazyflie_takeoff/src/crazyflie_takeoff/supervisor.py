@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from crazyflie_model.limits import MIN_THRUST
-from crazyflie_takeoff.envelope import LANDING_CLIMB, within_climb, within_pause
+from crazyflie_takeoff.envelope import LANDING_CLIMB, TAKEOFF_CLIMB, within_climb, within_pause
 from crazyflie_takeoff.facts import TAKEOFF_CONTROL_LIMIT, Facts
 from crazyflie_takeoff.fallback import (
     LONGEST_STEP,
@@ -205,9 +205,13 @@ def _pass_takeoff(memory, facts):
         return MOTORS_OFF
     if not memory.phase.follows:
         return None
-    setpoint = facts.takeoff.setpoint
-    memory.takeoff = _limited(facts, setpoint, 0.0, is_ramp=True)
-    return facts.takeoff.control if memory.takeoff == setpoint else memory.takeoff
+    return _takeoff_control(memory, facts, facts.takeoff)
+
+
+def _takeoff_control(memory, facts, heard):
+    """Return a takeoff control, or what is left of it within the limits."""
+    memory.takeoff = _limited(facts, heard.setpoint, 0.0, is_ramp=True)
+    return heard.control if memory.takeoff == heard.setpoint else memory.takeoff
 
 
 def _pass_commanded(memory, facts):
@@ -218,7 +222,7 @@ def _pass_commanded(memory, facts):
         # flight state is outdated then.
         is_kept_down = facts.flight is FlightState.ON_GROUND and facts.kept_thrust <= 0.0
         if is_kept_down or facts.takeoff_age <= TAKEOFF_CONTROL_LIMIT:
-            return _late_takeoff(memory, facts) or facts.kept.control
+            return _late_takeoff(memory, facts) or _kept(memory, facts)
     late = max(facts.commanded.age, facts.silence)
     if late > facts.hold:
         return None
@@ -234,13 +238,22 @@ def _pass_commanded(memory, facts):
     return facts.commanded.control if allowed == setpoint else allowed
 
 
+def _kept(memory, facts):
+    kept = facts.kept
+    return None if kept.setpoint is None else _takeoff_control(memory, facts, kept)
+
+
 def _limited(facts, setpoint, lowest, is_ramp=False):
     motion, hover = facts.seen, facts.hover
     control = facts.limits.in_range(setpoint, lowest)
     if is_ramp and facts.flight is FlightState.LANDING:
         # No ramp of a landing lifts the vehicle; a restarted server assumes that it hovers at g.
         control = control._replace(thrust=min(control.thrust, hover))
-    climb = LANDING_CLIMB if facts.lands else facts.limits.climb
+    climb = facts.limits.climb
+    if facts.lands:
+        climb = LANDING_CLIMB
+    elif is_ramp:
+        climb = min(climb, TAKEOFF_CLIMB)
     thrust, excess = within_climb(control.thrust, hover, motion, facts.highest, climb)
     facts.climb_excess = "" if facts.lands else excess
     z_dot = 0.0 if motion is None else motion.velocity[2]

@@ -107,7 +107,7 @@ def test_no_token_is_given_where_others_can_read_it():
     # The command line of roslaunch, and the parameter server.
     launch = ElementTree.parse(Path(__file__).parents[1] / "launch" / "dashboard.launch")
     names = {each.get("name") for each in launch.iter() if each.tag in ("arg", "param")}
-    assert names == {"host", "port", "token_file", "folders"}
+    assert names == {"host", "port", "token_file", "folders", "goal_limit"}
 
 
 def test_short_tokens_are_refused():

@@ -9,7 +9,8 @@ from std_msgs.msg import Empty
 
 from crazyflie_driver import srv
 from crazyflie_driver.msg import Hover, Position, VelocityWorld
-from crazyflie_fleet.high_level_services import full_state_message, setpoint_of, to_message
+from crazyflie_driver.trajectory_messages import to_message
+from crazyflie_fleet.high_level_services import full_state_message, setpoint_of
 from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_utils import ServiceError

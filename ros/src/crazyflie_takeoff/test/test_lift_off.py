@@ -206,12 +206,25 @@ def test_nothing_lifts_a_vehicle_that_is_not_seen_any_more(hover, moment):
     assert "the state on /state was lost in the liftoff" in str(answer.exception())
 
 
-def test_a_liftoff_goes_on_after_a_short_time_without_a_state():
-    network = scaled(1.0)
+@pytest.mark.parametrize("moment", [0.1, 0.3])
+@pytest.mark.parametrize("hover", [0.7, 0.9, 1.0])
+def test_a_liftoff_goes_on_after_a_short_time_without_a_state(hover, moment):
+    network = scaled(hover)
     answer = network.call("/takeoff")
-    network.advance(0.1)
+    network.advance(moment)
     network.vehicle_node.sees = False
     network.advance(0.4)
     network.vehicle_node.sees = True
     network.advance_until(answer.done)
     assert answer.exception() is None
+    # One that has come down meanwhile has less thrust than it needs.
+    assert all(thrust < 1.06 * hover * GRAVITY for thrust in measured(network)[-1:])
+
+
+def test_a_vehicle_of_the_assumed_weight_is_pushed_on_through_a_short_time_without_a_state():
+    network = scaled(1.0)
+    network.call("/takeoff")
+    network.advance(0.3)
+    network.vehicle_node.sees = False
+    network.advance(0.4)
+    assert set(thrusts(network, network.time - 0.65)) == {LIFT_OFF_THRUST}

@@ -6,6 +6,7 @@ Speeds are in m/s, z up; thrusts in m/s^2, mass-normalised for a vehicle that ho
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.fallback import MAX_BRAKING, MAX_CORRECTION, SETTLING, limited
 from crazyflie_takeoff.hover_thrust import HoverThrust
+from crazyflie_takeoff.motion import MAX_FEEDBACK_AGE
 
 LIFT_OFF_THRUST = GRAVITY + 0.2  #: Default thrust of the open-loop part of a takeoff (m/s^2).
 #: Speed of a vehicle that has lifted off (m/s). One that hovers at g reaches it after 1 s of
@@ -13,6 +14,10 @@ LIFT_OFF_THRUST = GRAVITY + 0.2  #: Default thrust of the open-loop part of a ta
 LIFT_OFF_SPEED = 0.2
 CLIMB_SPEED = 0.1  #: Largest speed of the climb that follows (m/s).
 CLIMB_GAIN = 2.0  #: That speed over the distance from the hover point (1/s).
+#: Time in which a vehicle that hovers at less than 0.85 g is faster than `LIFT_OFF_SPEED`, and
+#: after which a speed is not known any more (s).
+KNOWN_TIME = 0.15 + MAX_FEEDBACK_AGE
+LEAST_STEP = 1e-6  #: Shortest time for which a speed counts as known (s).
 AVERAGING = 0.12  #: Time over which the thrust of hover is averaged (s).
 
 
@@ -25,8 +30,8 @@ class LiftOff:
     def __init__(self, thrust: float = LIFT_OFF_THRUST) -> None:
         self.thrust = thrust  #: The thrust to send, m/s^2.
         self._hover = HoverThrust(AVERAGING, thrust)
-        self._is_seen = False
         self.is_lost = False  #: Whether the speed was known, and is not any more.
+        self._seen = 0.0  # Time for which the speed was known (s).
 
     @property
     def hover(self) -> float:
@@ -35,9 +40,18 @@ class LiftOff:
 
     def measure(self, step: float, z_dot: float | None) -> None:
         """Process the vertical speed after ``step`` s with `thrust`; None if it is not known."""
-        self._hover.update(step, self.thrust, z_dot)
-        self._is_seen = self._is_seen or z_dot is not None
-        self.is_lost = self._is_seen and z_dot is None
+        was_lost, self.is_lost = self.is_lost, z_dot is None and self._seen > 0.0
+        if self.is_lost or was_lost:
+            self._hover.skip(z_dot)
+        else:
+            self._hover.update(step, self.thrust, z_dot)
+        if z_dot is not None:
+            self._seen += max(step, LEAST_STEP)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether a vehicle that has not lifted off yet is not one that hovers at much less."""
+        return self._seen > KNOWN_TIME
 
     def climb(self, distance: float, z_dot: float) -> None:
         """Choose the thrust of a vehicle below the hover point (``distance``, m)."""

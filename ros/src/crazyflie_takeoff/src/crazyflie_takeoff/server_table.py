@@ -290,8 +290,10 @@ class FlightStateMachine:
 
     def _thrust(self):
         if self.state in OPEN_LOOP:
-            # Nothing lifts a vehicle that is not seen any more: it is hardly above the ground.
-            return LEAST_HOVER if self.lift_off.is_lost else self.lift_off.thrust
+            # Nothing lifts a vehicle that may be light, and is not seen any more: it is not high.
+            may_be_light = self.state is ServerState.LIFTED or not self.lift_off.is_known
+            is_pushed = not (self.lift_off.is_lost and may_be_light)
+            return self.lift_off.thrust if is_pushed else LEAST_HOVER
         if self.hover_thrust is not None:
             # The filter repeats it until the controller has the vehicle.
             return self.hover_thrust

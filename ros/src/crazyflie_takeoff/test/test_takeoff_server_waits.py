@@ -244,7 +244,8 @@ def test_a_driver_that_has_died_is_not_connected():
 @pytest.mark.parametrize(
     ("status", "reason"),
     [
-        ({"supervisor": VehicleStatus.LOCKED}, "cannot fly, its state is: locked; restart it"),
+        ({"supervisor": VehicleStatus.LOCKED}, "its state is: locked; restart the vehicle"),
+        ({"supervisor": 1 << 11}, "its state is: deck fault; .* see that its decks sit right"),
         ({"supervisor": VehicleStatus.CRASHED}, "state is: crashed"),
         ({"is_emergency": True}, "stopped by emergency; remove it, restart it"),
         ({"has_supervisor": True}, "/takeoff refused: the vehicle is not armed; call /cf1/arm"),

@@ -17,7 +17,6 @@ CLIMB_GAIN = 2.0  #: That speed over the distance from the hover point (1/s).
 #: Time in which a vehicle that hovers at less than 0.85 g is faster than `LIFT_OFF_SPEED`, and
 #: after which a speed is not known any more (s).
 KNOWN_TIME = 0.15 + MAX_FEEDBACK_AGE
-LEAST_STEP = 1e-6  #: Shortest time for which a speed counts as known (s).
 AVERAGING = 0.12  #: Time over which the thrust of hover is averaged (s).
 
 
@@ -31,7 +30,7 @@ class LiftOff:
         self.thrust = thrust  #: The thrust to send, m/s^2.
         self._hover = HoverThrust(AVERAGING, thrust)
         self.is_lost = False  #: Whether the speed was known, and is not any more.
-        self._seen = 0.0  # Time for which the speed was known (s).
+        self._seen: float | None = None  # Time for which the speed was known (s); None before.
 
     @property
     def hover(self) -> float:
@@ -40,18 +39,18 @@ class LiftOff:
 
     def measure(self, step: float, z_dot: float | None) -> None:
         """Process the vertical speed after ``step`` s with `thrust`; None if it is not known."""
-        was_lost, self.is_lost = self.is_lost, z_dot is None and self._seen > 0.0
+        was_lost, self.is_lost = self.is_lost, z_dot is None and self._seen is not None
         if self.is_lost or was_lost:
             self._hover.skip(z_dot)
         else:
             self._hover.update(step, self.thrust, z_dot)
         if z_dot is not None:
-            self._seen += max(step, LEAST_STEP)
+            self._seen = 0.0 if self._seen is None else self._seen + step
 
     @property
     def is_known(self) -> bool:
         """Whether a vehicle that has not lifted off yet is not one that hovers at much less."""
-        return self._seen > KNOWN_TIME
+        return self._seen is not None and self._seen > KNOWN_TIME
 
     def climb(self, distance: float, z_dot: float) -> None:
         """Choose the thrust of a vehicle below the hover point (``distance``, m)."""

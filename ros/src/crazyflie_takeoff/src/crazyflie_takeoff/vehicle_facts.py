@@ -103,7 +103,7 @@ class VehicleFacts:
         if is_emergency and now - time <= MAX_FACT_AGE:
             return "the vehicle was stopped by emergency; remove it, restart it and add it again"
         if faults := self._state(now).faults:
-            return f"the vehicle cannot fly, its state is: {faults.words()}; restart it"
+            return f"the vehicle cannot fly, its state is: {faults.words()}; {faults.remedy}"
         return ""
 
     def is_soon_ready(self, now: float) -> bool:

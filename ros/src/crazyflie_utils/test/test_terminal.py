@@ -8,7 +8,7 @@ import pytest
 
 from crazyflie_utils import terminal
 
-OUTPUT = """... logging to /root/.ros/log
+OUTPUT = """... logging to /home/ada/.ros/log
  * /cf1/state_estimator/time_step: 0.01
 \x1b[0m[INFO] [1795984322.0]: /cf1: taking off\x1b[0m
 \x1b[33m[WARN] [1795984322.012]: /cf1: too far\x1b[0m

@@ -235,10 +235,7 @@ class FleetConnectNode(Node):
 def lighthouse_file(fleet_file: str, vehicle: VehicleConfig) -> str:
     """Return the file with the base stations of a vehicle of a fleet file.
 
-    Raises
-    ------
-    ParameterError
-        There is no such file.
+    `ParameterError`: there is no such file.
     """
     file = user_path(fleet_file).resolve().parent / user_path(vehicle.lighthouse)
     if not file.is_file():

@@ -44,10 +44,7 @@ def node_parameters(path: str | Path) -> yaml_file.Entry:
 def load_motion_capture(path: str | Path) -> dict[str, Any]:
     """Return backend, address, and configurations of markers and dynamics, as mocap_node has them.
 
-    Raises
-    ------
-    ParameterError
-        The text names all errors: file, line, and what was expected.
+    `ParameterError` names all errors: file, line, and what was expected.
     """
     node = node_parameters(path)
     # Here, their topics and rigid bodies follow from the fleet file.
@@ -83,10 +80,7 @@ class ServerSettings(Parameters):
 def load_server(path: str | Path) -> tuple[dict[str, Any], dict[str, Any], tuple[str, ...]]:
     """Return the content of server.yaml: parameters of the driver and of mocap_node, and remarks.
 
-    Raises
-    ------
-    ParameterError
-        The text names all errors: file, line, and what was expected.
+    `ParameterError` names all errors: file, line, and what was expected.
     """
     node = node_parameters(path)
     remarks = Remarks()

@@ -21,10 +21,7 @@ class DriverFleetParameters(FleetParameters):
 def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     """Return the driver, and set the parameters that the files contain.
 
-    Raises
-    ------
-    ParameterError
-        A parameter, or a file, is wrong.
+    `ParameterError`: a parameter, or a file, is wrong.
     """
     config = handle.load(DriverFleetParameters)
     given = config.fleet().broadcasts

@@ -367,19 +367,8 @@ def close_pairs(
 ) -> Iterator[tuple[int, int, float, float]]:
     """Yield the pairs of places that are closer than the buffers of their vehicles.
 
-    Parameters
-    ----------
-    positions : (n, 3) array
-        x, y, z in m.
-    buffers : (n,) array
-        Radii, m.
-
-    Yields
-    ------
-    i, j : int
-        With i < j.
-    distance, allowed : float
-        m; heights are divided by `DOWNWASH`.
+    Positions, shape (n, 3), and buffers (radii), shape (n,), are in m. A pair is i < j, its
+    distance and the allowed one, m, with heights divided by `DOWNWASH`.
     """
     radii = np.asarray(buffers, dtype=float)
     if len(radii) < 2:

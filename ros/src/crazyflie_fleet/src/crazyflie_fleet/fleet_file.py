@@ -15,6 +15,7 @@ from crazyflie_utils.parameters.declaration import Complaints
 from crazyflie_utils.parameters.types import Integer
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_utils.text_file import user_path
+from crazyflie_virtual.settings import FIRST_PORT
 
 VEHICLES, TYPES = "crazyflies", "crazyflieTypes"  #: Keys at the top of the two files.
 
@@ -31,7 +32,6 @@ _TYPE_KEYS = {
 _ID = Integer(0, 255)
 _CHANNEL = Integer(0, 125)
 
-FIRST_PORT = 19850  #: UDP port of a grid's first vehicle.
 TYPES_FILE = "crazyflieTypes.yaml"  #: Name of Crazyswarm 1's second file, in the same folder.
 
 
@@ -40,11 +40,7 @@ def converted(vehicles: Entry, types: Entry | None) -> Entry:
 
     Vehicle k is named cfk; its address is radio://0/CHANNEL/2M/E7E7E7E7 and k with two hexadecimal
     digits. One without a channel has no address. Without ``types`` no vehicle has a type.
-
-    Raises
-    ------
-    ParameterError
-        A vehicle has no id, or that of another one.
+    `ParameterError`: a vehicle has no id, or that of another one.
     """
     robots: dict[str, yaml.Node] = {}
     errors = Complaints()
@@ -128,11 +124,7 @@ def load(path: str | Path) -> FleetConfig:
     """Return the fleet that a file describes.
 
     A file in Crazyswarm 1's layout has its types in `TYPES_FILE` in the same folder.
-
-    Raises
-    ------
-    ParameterError
-        The text names all errors: file, line, and what was expected.
+    `ParameterError` names all errors: file, line, and what was expected.
     """
     types = user_path(path).parent / TYPES_FILE
     return _fleet(yaml_file.load(path), types if types.exists() else None)
@@ -141,10 +133,7 @@ def load(path: str | Path) -> FleetConfig:
 def parse(text: str, name: str = "crazyflies.yaml") -> FleetConfig:
     """Return the fleet that a YAML text describes, in either layout; ``name`` is for errors.
 
-    Raises
-    ------
-    ParameterError
-        As `load`.
+    `ParameterError`: as `load`.
     """
     return _fleet(yaml_file.parse(text, name), None)
 
@@ -160,18 +149,9 @@ def _fleet(top, types):
 
 
 def grid(n: int, spacing: float = 1.0) -> FleetConfig:
-    """Return n vehicles cf1, cf2, ... in rows around the origin.
+    """Return n vehicles cf1, cf2, ... in rows around the origin; ``spacing`` is in m.
 
-    Parameters
-    ----------
-    n : int
-    spacing : float
-        Distance between neighbours, m.
-
-    Raises
-    ------
-    ParameterError
-        The grid is not possible.
+    `ParameterError`: the grid is not possible.
     """
     if n < 1:
         raise ParameterError(f"a grid of {n} vehicles; expected at least one")

@@ -63,10 +63,7 @@ class FleetParameters(Parameters):
     def fleet(self) -> FleetConfig:
         """Return all vehicles, those of other machines included.
 
-        Raises
-        ------
-        ParameterError
-            The text names all errors of the file.
+        `ParameterError` names all errors of the file.
         """
         fleet = fleet_file.load(self.file) if self.file else fleet_file.grid(self.n, self.spacing)
         if self.positioning:
@@ -83,10 +80,7 @@ class FleetParameters(Parameters):
     def own_names(self, fleet: FleetConfig) -> tuple[str, ...]:
         """Return the names of the vehicles that are flown here.
 
-        Raises
-        ------
-        ParameterError
-            No vehicle is flown here.
+        `ParameterError`: no vehicle is flown here.
         """
         if self.machine == "*":
             return fleet.names

@@ -69,10 +69,7 @@ class Remarks:
     def unknown(self, entry: Entry, known: Iterable[str]) -> None:
         """Add an entry with an unknown key.
 
-        Raises
-        ------
-        ParameterError
-            The key is a misspelt known one.
+        `ParameterError`: the key is a misspelt known one.
         """
         key = entry.name.rpartition("/")[2]
         words = {word for name in known for word in name.split("/")}

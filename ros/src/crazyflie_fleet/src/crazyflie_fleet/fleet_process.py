@@ -36,10 +36,7 @@ from crazyflie_utils import Node, NodeHandle, ParameterError
 def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     """Return all nodes of the process by name, and set the parameters that they will load.
 
-    Raises
-    ------
-    ParameterError
-        A parameter, or the fleet file, is wrong.
+    `ParameterError`: a parameter, or the fleet file, is wrong.
     """
     return _NodeFactory(handle, handle.load(FlyParameters)).nodes
 

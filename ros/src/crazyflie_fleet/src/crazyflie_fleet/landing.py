@@ -158,14 +158,11 @@ class Scene:
         self._is_lowest = lands & ~(beneath & lands).any(axis=1)
 
     def next_round(self) -> dict[int, tuple[float, float]]:
-        """Return which vehicles land next, and above which points they do.
+        """Return which vehicles land next, and above which points: number to x, y in m.
 
-        Returns
-        -------
-        dict of int to tuple
-            Number to x, y in m: where the vehicle is, or a free place, to which all of the round
-            can fly straight and at the same time. At least one vehicle, if any is to land. If no
-            path is free, one vehicle gets a free place; if no place is free, its own.
+        The point is where the vehicle is, or a free place, to which all of the round can fly
+        straight and at the same time. At least one vehicle, if any is to land. If no path is free,
+        one vehicle gets a free place; if no place is free, its own.
         """
         straight = np.flatnonzero(self._is_lowest & ~self._is_obstructed)
         if straight.size:
@@ -277,12 +274,8 @@ class SafeDescents:
     ) -> float:
         """Choose the landing place of a vehicle at a time (s); return its distance, m.
 
-        Parameters
-        ----------
-        positions : (n, 3) array
-            Positions of all vehicles, m; NaN where they are not known.
-        is_landing : (n,) array of bool
-            Which of them descend, or are on the ground.
+        ``positions`` are those of all vehicles, shape (n, 3), m, NaN where they are not known;
+        ``is_landing``, shape (n,), says which descend, or are on the ground.
         """
         start, places = positions[number].copy(), positions.copy()
         for other, descent in self._descents.items():

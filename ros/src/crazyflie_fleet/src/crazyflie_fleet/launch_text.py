@@ -13,12 +13,8 @@ from crazyflie_utils.text_file import user_path
 def launch_text(path: str | Path) -> str:
     """Return a launch file by which each machine of a fleet file simulates its vehicles.
 
-    The file has the same ``path`` on all these computers.
-
-    Raises
-    ------
-    ParameterError
-        The text names all errors of the file.
+    The file has the same ``path`` on all these computers. `ParameterError` names all errors of
+    the file.
     """
     path = user_path(path).absolute()
     fleet = fleet_file.load(path)

@@ -43,14 +43,8 @@ def bodies(
     """Return the parameters of mocap_node for its bodies and markers.
 
     A vehicle with one marker gets its position, for its own estimator, by the driver's topic
-    external_position, and its yaw on tf is that estimator's.
-
-    Parameters
-    ----------
-    fleet : FleetConfig
-    fixed_frame : str
-    dynamics, markers : dict of str to dict
-        ``dynamics_configurations`` and ``marker_configurations``.
+    external_position, and its yaw on tf is that estimator's. ``dynamics`` and ``markers`` are
+    mocap_node's ``dynamics_configurations`` and ``marker_configurations``.
     """
     result: dict[str, Any] = {}
     for vehicle in (*fleet.vehicles, *fleet.obstacles):
@@ -103,10 +97,7 @@ def _check_names(fleet, key, setting, configurations):
 def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     """Return mocap_node, which publishes the bodies of the fleet file and those configured.
 
-    Raises
-    ------
-    ParameterError
-        A parameter, or the fleet file, is wrong.
+    `ParameterError`: a parameter, or the fleet file, is wrong.
     """
     config = handle.load(MocapFleetParameters)
     given = load_motion_capture(config.motion_capture) if config.motion_capture else {}

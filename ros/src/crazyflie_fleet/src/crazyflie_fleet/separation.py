@@ -30,11 +30,7 @@ class Separation:
 
     A vehicle is held while it is too close to another, now or `LOOK_AHEAD` from now at the present
     velocities, and its reference approaches the other. One whose reference moves away is not held.
-
-    Parameters
-    ----------
-    buffers : sequence of float
-        Collision buffer of each vehicle, m.
+    ``buffers`` are the collision buffers of the vehicles, m.
     """
 
     def __init__(self, buffers: Sequence[float]):
@@ -49,12 +45,9 @@ class Separation:
     ) -> tuple[NDArray[np.bool_], list[ClosePair]]:
         """Return which vehicles are held, shape (n,), and the pairs that are too close.
 
-        Parameters
-        ----------
-        positions, velocities, goals : (n, 3) array
-            Positions and velocities of vehicles, and positions of references, m and m/s, fixed
-            frame. A vehicle whose position is NaN is ignored; the goal of one without a reference
-            is its position.
+        Positions and velocities of vehicles, and positions of references (``goals``), have the
+        shape (n, 3), m and m/s, fixed frame. A vehicle whose position is NaN is ignored; the goal
+        of one without a reference is its position.
         """
         known = np.flatnonzero(np.isfinite(positions).all(axis=1))
         buffers = self._buffers[known] * np.where(self._held[known], RELEASE_RATIO, 1.0)

@@ -88,12 +88,7 @@ def batch_control(
 ) -> NDArray[np.float64]:
     """Return the controls, shape (n, 4), of an `IntegralStateFeedback` without an integrator.
 
-    Parameters
-    ----------
-    K : ndarray, shape (4, 7)
-    u_ref : ndarray, shape (4,)
-    x, x_ref : ndarray, shape (n, 7)
-        States and references.
+    Shapes: K (4, 7), u_ref (4,), and (n, 7) of the states x and references x_ref.
     """
     error = heading_error(split(x), split(x_ref))
     return join(limited(linear_control(K.tolist(), u_ref.tolist(), error)))

@@ -14,13 +14,7 @@ _NEVER = np.iinfo(np.int64).max
 class VectorizedVehicles:
     """Vehicles that each fly like a `crazyflie_simulator.vehicle.SimulatedVehicle`, on one clock.
 
-    Parameters
-    ----------
-    dynamics : SevenDimensional
-    positions : array_like, shape (n, 3)
-        Positions at the beginning, m, fixed frame.
-    time : float
-        Time at the beginning, s.
+    ``positions``, shape (n, 3), m, fixed frame, and ``time``, s, are those of the beginning.
     """
 
     def __init__(self, dynamics: SevenDimensional, positions: ArrayLike, time: float):

@@ -8,7 +8,7 @@ from crazyflie_model.aerodynamics import Air
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, PORT, Number
 from crazyflie_virtual.nodes import VirtualCrazyflieNode, VirtualMocapNode
-from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO
+from crazyflie_virtual.settings import DECK, FLOW, LIGHTHOUSE, LOCO, OBSERVER_PORT
 from mocap_optitrack.mocap_node import MocapNode
 
 _FRACTION = Number(minimum=-0.5, maximum=0.5)
@@ -17,7 +17,7 @@ _FRACTION = Number(minimum=-0.5, maximum=0.5)
 class VirtualFleetParameters(FleetParameters):
     """Parameters of the process."""
 
-    observer_port: int = parameter(PORT, "UDP port of the vehicles' true poses", 19800)
+    observer_port: int = parameter(PORT, "UDP port of the vehicles' true poses", OBSERVER_PORT)
     command_port: int = parameter(PORT, "UDP port of motion capture", 1510)
     data_port: int = parameter(PORT, "UDP port of its stream", 1511)
     mass_error: float = parameter(_FRACTION, "how much heavier than nominal the vehicles are", 0.05)
@@ -35,10 +35,7 @@ class VirtualFleetParameters(FleetParameters):
 def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     """Return all nodes of the process by name, and set the parameters that they will load.
 
-    Raises
-    ------
-    ParameterError
-        A parameter, or the fleet file, is wrong.
+    `ParameterError`: a parameter, or the fleet file, is wrong.
     """
     config = handle.load(VirtualFleetParameters)
     if not config.virtual_port:

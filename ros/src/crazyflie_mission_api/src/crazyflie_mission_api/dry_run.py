@@ -34,17 +34,7 @@ _MIN_DURATION = 0.01  #: Shortest duration of a plan, as in the firmware (s).
 class IdealVehicle(MissionVehicle):
     """A vehicle that follows the plans of the firmware's high-level commander without an error.
 
-    Parameters
-    ----------
-    name : str
-    time : callable
-        Returns the time, s.
-    position : tuple, 3 components
-        Position at the beginning, on the ground, m.
-    yaw : float
-        rad.
-    bounds, start_skew
-        Those of the real one.
+    ``time()`` returns the time, s. It begins on the ground, at a position (m) and yaw (rad).
     """
 
     def __init__(
@@ -322,11 +312,7 @@ def dry_run(group: VehicleGroup, mission: Callable[[VehicleGroup], Any]) -> floa
     """Fly ``mission(group)`` with ideal vehicles; return its duration, s.
 
     The group is on the ground. Commands of the mission must not depend on measurements.
-
-    Raises
-    ------
-    MissionError
-        The mission fails, or a vehicle is in flight.
+    `MissionError`: the mission fails, or a vehicle is in flight.
     """
     if group.flying:
         raise MissionError(f"{', '.join(group.flying)}: in flight; expected to be on the ground")

@@ -199,10 +199,7 @@ class Fleet(VehicleGroup):
     def dry_run(self, mission: Callable[[VehicleGroup], Any]) -> float:
         """Check ``mission(fleet)`` by a dry run; return its duration, s.
 
-        Raises
-        ------
-        MissionError
-            The mission would fail.
+        `MissionError`: the mission would fail.
         """
         return dry_run(self, mission)
 
@@ -346,10 +343,7 @@ class Fleet(VehicleGroup):
 def vehicles_of(names: str | Path | Sequence[str]) -> tuple[list[str], dict[str, float]]:
     """Return the names of vehicles, and the collision buffers (m) of those in a fleet file.
 
-    Raises
-    ------
-    MissionError
-        The list is empty, or has a name twice.
+    `MissionError`: the list is empty, or has a name twice.
     """
     if isinstance(names, Path) or (isinstance(names, str) and names.endswith((".yaml", ".yml"))):
         try:

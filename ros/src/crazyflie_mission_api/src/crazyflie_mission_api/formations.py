@@ -18,21 +18,10 @@ def lattice(
     spacing: float | Sequence[float],
     center: Sequence[float] = (0.0, 0.0, 1.0),
 ) -> Array:
-    """Return the places of a box of vehicles.
+    """Return the places of a box of vehicles about a centre (m), shape (n, 3), m.
 
-    Parameters
-    ----------
-    counts : tuple, 3 components
-        Numbers along x, y and z.
-    spacing : float or sequence, 3 components
-        Distance of neighbours, m; along x, y and z.
-    center : sequence, 3 components
-        m.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        m.
+    ``counts`` are the numbers along x, y and z; ``spacing`` is the distance of neighbours (m), one
+    or one for each axis.
     """
     spacings = np.broadcast_to(spacing, 3)
     axes = [
@@ -55,14 +44,7 @@ def assign(places: Mapping[str, Sequence[float]], goals: Array) -> dict[str, Poi
     Vehicles that then fly there on straight lines, with the same time law, stay at least this far
     apart: min(start distance, goal distance) / sqrt(2), distances as in `Clearance`: Turpin,
     Michael and Kumar, CAPT: Concurrent Assignment and Planning of Trajectories for Multiple Robots
-    (IJRR 2014).
-
-    Parameters
-    ----------
-    places : mapping of str to x, y, z
-        Position of each vehicle, m.
-    goals : ndarray, shape (n, 3)
-        As many as vehicles, m.
+    (IJRR 2014). ``places`` are the positions by vehicle (m), ``goals`` as many, shape (n, 3), m.
     """
     starts = np.array([*places.values()], dtype=float)
     squares = cdist(starts * SCALE, goals * SCALE, "sqeuclidean")

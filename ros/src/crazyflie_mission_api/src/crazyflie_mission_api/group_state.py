@@ -118,10 +118,7 @@ class GroupState:
     def arrive(self) -> None:
         """Wait until all vehicles are at their commanded destinations.
 
-        Raises
-        ------
-        MissionError
-            A vehicle has not arrived `Rules.arrival_timeout` after the planned end.
+        `MissionError`: a vehicle has not arrived `Rules.arrival_timeout` after the planned end.
         """
         end = max((self._commanded[name].end for name in self.flying), default=self.time())
         self._wait(never, end)

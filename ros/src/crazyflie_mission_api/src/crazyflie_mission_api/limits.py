@@ -73,18 +73,9 @@ class Bounds:
         return Bounds(tuple(lower), tuple(np.minimum(self.upper, other.upper).tolist()))
 
     def check(self, positions: Array, what: str) -> None:
-        """Refuse positions outside.
+        """Refuse positions outside by a `MissionError`, in which they are ``what``.
 
-        Parameters
-        ----------
-        positions : ndarray, shape (3,) or (n, 3)
-            m.
-        what : str
-            Name of the positions in the error text.
-
-        Raises
-        ------
-        MissionError
+        The positions have the shape (3,) or (n, 3), m.
         """
         for axis, name in enumerate("xyz"):
             values = np.atleast_2d(positions)[:, axis]
@@ -103,10 +94,7 @@ EVERYWHERE = Bounds((-math.inf, -math.inf, 0.0), (math.inf, math.inf, math.inf))
 def point(value: Sequence[float], what: str) -> Array:
     """Return a point of a user as an array, shape (3,), m.
 
-    Raises
-    ------
-    MissionError
-        The value is not three finite numbers.
+    `MissionError`: the value is not three finite numbers.
     """
     try:
         array = np.asarray(value, dtype=float)
@@ -124,12 +112,7 @@ def number(
     above: float = -math.inf,
     maximum: float = math.inf,
 ) -> float:
-    """Return a finite number, ``minimum`` to ``maximum``, that is more than ``above``.
-
-    Raises
-    ------
-    MissionError
-    """
+    """Return a finite number, minimum to maximum and more than ``above``; or `MissionError`."""
     kind = Number(above=above, minimum=minimum, maximum=maximum)
     try:
         # A text may be a number in a file, and not here.
@@ -162,20 +145,9 @@ class Clearance:
     ) -> None:
         """Refuse positions that are too near, or approached so fast that the fleet holds vehicles.
 
-        Parameters
-        ----------
-        names : sequence of str
-            Names of n vehicles, two at least.
-        times : ndarray, shape (m,)
-            Times from now, s.
-        places : ndarray, shape (n, m, 3)
-            Positions of the vehicles at these times, m.
-        resting : collection of str
-            Vehicles on the ground with their motors off: two of them may be at any distance.
-
-        Raises
-        ------
-        MissionError
+        ``places``, shape (n, m, 3), are the positions (m) of n vehicles, two at least, at ``times``
+        from now (s), shape (m,). Two that are ``resting``, on the ground with their motors off, may
+        be at any distance. `MissionError` names two vehicles, and the time.
         """
         first, second = np.triu_indices(len(names), 1)
         rests = np.array([name in resting for name in names])

@@ -55,12 +55,9 @@ def plan(
 
 
 def best_times(points: Array) -> Array:
-    """Return the times of the points, shape (n,), as fractions of the total time.
+    """Return the times of points as fractions of the total time, shape (n,).
 
-    Parameters
-    ----------
-    points : ndarray, shape (n, 4)
-        x, y, z (m) and yaw (rad).
+    The points, shape (n, 4), are x, y, z (m) and yaw (rad).
     """
     distances = np.linalg.norm(np.diff(points, axis=0), axis=1)
 

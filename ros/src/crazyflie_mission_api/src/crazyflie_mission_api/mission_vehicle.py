@@ -188,10 +188,7 @@ class Clock(Protocol):
     def wait_until(self, condition: Callable[[], bool], deadline: float) -> bool:
         """Wait until ``condition()`` is true or it is ``deadline`` (s); return the condition.
 
-        Raises
-        ------
-        MissionError
-            Time stands still, or ROS shuts down.
+        `MissionError`: time stands still, or ROS shuts down.
         """
 
 

@@ -50,17 +50,9 @@ class SetpointStream:
     the firmware levels out after 0.5 s and stops the motors after 2 s. So they go on until the
     driver has accepted a command; at the end of the trajectory that is ``hold``'s.
 
-    Commands are sent one after the other. All methods may be called from any thread.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    topic : str
-        The driver's topic of crazyflie_driver/FullState.
-    frame : str
-        Frame of the setpoints.
-    hold : callable
-        ``hold(goal)`` commands the vehicle to stay at a `Goal`; it returns the answer's future.
+    Commands are sent one after the other. All methods may be called from any thread. The setpoints,
+    in a frame, go to the driver's topic of crazyflie_driver/FullState; ``hold(goal)`` commands the
+    vehicle to stay at a `Goal`, and returns the answer's future.
     """
 
     def __init__(

@@ -59,13 +59,8 @@ def sampled(pieces: Pieces) -> tuple[Array, Array]:
 def demands(values: Array) -> dict[str, Array]:
     """Return the demands on the vehicle, shape (n,), by the name of the limit.
 
-    Thrust points along acceleration minus gravity (Mellinger and Kumar, Minimum Snap
-    Trajectory Generation and Control for Quadrotors, ICRA 2011).
-
-    Parameters
-    ----------
-    values : ndarray, shape (3, 4, n)
-        As from `sampled`.
+    The values are as from `sampled`. Thrust points along acceleration minus gravity (Mellinger and
+    Kumar, Minimum Snap Trajectory Generation and Control for Quadrotors, ICRA 2011).
     """
     _, velocity, acceleration = values
     thrust = acceleration[:3] + [[0.0], [0.0], [GRAVITY]]
@@ -92,12 +87,7 @@ def excess(pieces: Pieces, limits: Limits) -> dict[str, tuple[float, float]]:
 
 
 def check_numbers(pieces: Pieces, what: str) -> None:
-    """Refuse an invalid trajectory: without pieces, or with numbers that are not finite.
-
-    Raises
-    ------
-    MissionError
-    """
+    """Refuse a trajectory without pieces, or with numbers that are not finite: `MissionError`."""
     try:
         valid = all(isinstance(piece, PolynomialPiece) for piece in pieces)
     except TypeError:
@@ -118,11 +108,7 @@ def check_numbers(pieces: Pieces, what: str) -> None:
 def check(pieces: Pieces, limits: Limits, bounds: Bounds, what: str, slower: str) -> None:
     """Refuse a trajectory that demands too much, or leaves the bounds.
 
-    The error names ``what`` it is, and a remedy that makes it ``slower``.
-
-    Raises
-    ------
-    MissionError
+    `MissionError` names ``what`` it is, and a remedy that makes it ``slower``.
     """
     bounds.check(sampled(pieces)[1][0, :3].T, what)
     for name, (value, time) in excess(pieces, limits).items():
@@ -212,10 +198,7 @@ def check_apart(
     """Refuse trajectories on which two vehicles come too near, unless both are ``resting``.
 
     They are also checked with a late start of each vehicle, if starts ``may_be_late``.
-
-    Raises
-    ------
-    MissionError
+    `MissionError` names the vehicles.
     """
     if len(trajectories) < 2:
         return

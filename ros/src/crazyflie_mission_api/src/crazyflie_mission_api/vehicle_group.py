@@ -199,12 +199,8 @@ class VehicleGroup(GroupState):
 
         Vehicles land where they are, those below before those above them. Where another is beneath
         a vehicle, on the ground or in flight outside the group, it flies to the nearest free place
-        first.
-
-        Raises
-        ------
-        MissionError
-            Two vehicles would come too near, or some cannot land; the text names them.
+        first. `MissionError`: two vehicles would come too near, or some cannot land; the text names
+        them.
         """
         raise_failures("land", land_all(self, is_checked=True))
 

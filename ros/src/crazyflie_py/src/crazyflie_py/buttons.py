@@ -75,14 +75,9 @@ def _unattended(time: Callable[[], float]) -> Iterator[Sequence[int]]:
 class Input:
     """``swarm.input``: a joystick, or else the terminal's keys.
 
-    Parameters
-    ----------
-    time_helper : TimeHelper
-    is_simulated : bool
-        Whether the button is pressed automatically without both. Otherwise methods raise
-        RuntimeError, since a wait would never end.
-    devices : str
-        Pattern of joysticks; the first that can be read is used.
+    Without both the button is pressed automatically if it ``is_simulated``; otherwise methods raise
+    RuntimeError, since a wait would never end. ``devices`` is a pattern of joysticks, of which the
+    first that can be read is used.
     """
 
     def __init__(

@@ -42,10 +42,7 @@ def load(crazyflies_yaml: str | Path | None) -> list[FleetVehicle]:
 
     Without either they are those of the usual file, or else those of the examples.
 
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        The message says what was expected.
+    FileNotFoundError, ValueError: the message says what was expected.
     """
     if crazyflies_yaml is None:
         crazyflies_yaml = _usual_file()

@@ -212,10 +212,7 @@ class RosSwarm(Swarm):
 def running_vehicles(handle: NodeHandle) -> list[str]:
     """Return the names of the running vehicles: in the order of their fleet file, then by number.
 
-    Raises
-    ------
-    MissionError
-        No vehicle is running.
+    `MissionError`: no vehicle is running.
     """
     end = time.monotonic() + _SEARCH_LIMIT
     while time.monotonic() < end:

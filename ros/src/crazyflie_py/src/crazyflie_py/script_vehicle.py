@@ -300,10 +300,7 @@ class ScriptVehicle:
     def state(self) -> ScriptState:
         """Return the state; its velocity is that between two poses.
 
-        Raises
-        ------
-        TimeoutError
-            No pose has come for 10 s.
+        `TimeoutError`: no pose has come for 10 s.
         """
         pose, last = self._wait(lambda pose: True), self._last_pose
         if last is None or pose.time - last.time > _VELOCITY_SPAN:

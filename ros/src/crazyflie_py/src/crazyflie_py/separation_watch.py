@@ -18,15 +18,9 @@ _REPEAT = 2.0  #: Shortest time between two warnings of a vehicle (s).
 class SeparationWatch:
     """Holds vehicles that come too near to another, by the rule of a fleet.
 
-    The goal of a vehicle without setpoints follows from its velocity.
-
-    Parameters
-    ----------
-    vehicles : sequence of ScriptVehicle
-    buffers : sequence of float
-        Radii of the space that is reserved for each vehicle, m.
-    connection : Connection
-        Logs warnings; if unchecked, vehicles are not held.
+    The goal of a vehicle without setpoints follows from its velocity. ``buffers`` are the radii of
+    the space that is reserved for each vehicle, m. If the connection is unchecked, there are only
+    warnings.
     """
 
     def __init__(

@@ -59,17 +59,9 @@ class SimulatedVehicle(IdealVehicle):
     """The ideal vehicle of missions, which moves in steps.
 
     It follows its plan, or the last setpoint, as far as speed and avoidance permit. A warning is
-    logged once where a real vehicle would do less.
-
-    Parameters
-    ----------
-    vehicle : FleetVehicle
-    time : callable
-        Returns the time of the simulation, s.
-    max_speed, disturbance : float
-        Options --maxvel and --disturbance, m/s.
-    said : set of str
-        See `SimulatedParameters`.
+    logged once where a real vehicle would do less. ``time()`` returns the time of the simulation,
+    s; largest speed and disturbance are the options --maxvel and --disturbance, m/s; for ``said``
+    see `SimulatedParameters`.
     """
 
     def __init__(

@@ -21,14 +21,7 @@ _ROUNDING = 1e-9  #: Fraction of a step by which a sleep may be too short, due t
 
 
 class Simulation(Swarm):
-    """A swarm without ROS.
-
-    Parameters
-    ----------
-    fleet : sequence of FleetVehicle
-    options : argparse.Namespace
-        Of `crazyflie_py.crazyswarm_py.build_argparser`.
-    """
+    """A swarm without ROS; for options see `crazyflie_py.crazyswarm_py.build_argparser`."""
 
     vehicles: Sequence[SimulatedVehicle]
 

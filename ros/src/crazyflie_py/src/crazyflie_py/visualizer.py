@@ -26,10 +26,7 @@ _POINTS = 24  #: Number of points of each of the three circles of an ellipsoid.
 class MatplotlibVisualizer(NullVisualizer):
     """Draws vehicles as points in the colours of their LEDs.
 
-    Parameters
-    ----------
-    has_window : bool
-        If False, pictures are drawn for videos only, which needs no display.
+    Without a window, pictures are drawn for videos only, which needs no display.
     """
 
     def __init__(self, has_window: bool):

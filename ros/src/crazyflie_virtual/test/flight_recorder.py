@@ -77,6 +77,11 @@ class Track:
         near = [row[3][axis] for row in self.rows if abs(row[0] - time) < MOMENT]
         return min(near, key=lambda value: abs(value - expected))
 
+    def check(self, recorded):
+        """Compare bits and motors with those of a scenario."""
+        self.check_bits(recorded["bits"])
+        self.check_motors(recorded["motors_on_off"])
+
     def check_bits(self, recorded):
         """Compare with a record of bits: [time, bits] of each change."""
         self._check_changes(1, recorded)

@@ -6,43 +6,20 @@ import pytest
 from cflib.crazyflie.mem import MemoryElement, Poly4D
 from cflib.crtp.udpdriver import UdpDriver
 from cflib.utils.power_switch import PowerSwitch
-from virtual_client import LIMIT, Client
+from virtual_client import LIMIT, Client, connected_vehicle
 
 from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.firmware.supervisor import State
 from crazyflie_virtual.log import log_variables
 from crazyflie_virtual.parameters import parameter_specs
-from crazyflie_virtual.server import VehicleServer
-from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings
-
-
-@pytest.fixture
-def connect(serve):
-    """Return ``connect(**options)``: a vehicle, and a client that is fully connected to it."""
-    clients = []
-
-    def connect(**options):
-        server, uri = serve(**options)
-        client = Client(uri)
-        clients.append(client)
-        client.open().wait_for("fully_connected")
-        return server.vehicle, client
-
-    yield connect
-    for client in clients:
-        client.close()
+from crazyflie_virtual.settings import FIRST_PORT
 
 
 @pytest.fixture(scope="module")
 def connected():
     """Return a vehicle and a client for all tests that do not fly: connections take time."""
-    server = VehicleServer(VehicleSettings(port=0, observer_port=0))
-    server.start()
-    client = Client("udp://{}:{}".format(*server.address))
-    client.open().wait_for("fully_connected")
-    yield server.vehicle, client
-    client.close()
-    server.stop()
+    with connected_vehicle() as vehicle_and_client:
+        yield vehicle_and_client
 
 
 def elements(toc):

@@ -8,24 +8,17 @@ from cflib.crazyflie.mem.deck_memory import SyncDeckMemoryManager
 from cflib.crazyflie.syncCrazyflie import SyncCrazyflie
 from cflib.localization import LighthouseConfigWriter
 from cflib.utils.multiranger import Multiranger
-from virtual_client import LIMIT, Client
+from virtual_client import LIMIT, connected_vehicle
 
 from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.memory import LighthouseMemory
-from crazyflie_virtual.server import VehicleServer
-from crazyflie_virtual.settings import VehicleSettings
 
 
 @pytest.fixture(scope="module")
 def connected():
     """Return a vehicle and a client."""
-    server = VehicleServer(VehicleSettings(port=0, observer_port=0, multiranger=True))
-    server.start()
-    client = Client("udp://{}:{}".format(*server.address))
-    client.open().wait_for("fully_connected")
-    yield server.vehicle, client.cf
-    client.close()
-    server.stop()
+    with connected_vehicle(multiranger=True) as (vehicle, client):
+        yield vehicle, client.cf
 
 
 class Done(threading.Event):

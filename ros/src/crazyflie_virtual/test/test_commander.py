@@ -65,12 +65,6 @@ def test_it_says_why_a_high_level_command_does_nothing():
     assert "HLC: refused command 8: Locked" in said(bench)
 
 
-def test_it_says_what_is_no_setpoint():
-    bench = Bench()
-    bench.ask(Port.GENERIC_SETPOINT, 0, b"\x63")
-    assert "CMD: unknown type of setpoint 63" in said(bench)
-
-
 def test_thrust_without_unlocking_prints_a_warning():
     bench = Bench()
     bench.stream(attitude(thrust=50000), 0.2)

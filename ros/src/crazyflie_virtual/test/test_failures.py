@@ -70,33 +70,29 @@ def test_the_process_ends_when_it_is_asked_to(process):
     assert vehicle.wait(LIMIT) == 0
 
 
-def test_frozen_peer_still_looks_connected(serve, client):
-    server, uri = serve()
-    someone = client(uri).open()
-    someone.wait_for("fully_connected")
+def test_frozen_peer_still_looks_connected(connect):
+    vehicle, someone = connect()
     rows = someone.log("stateEstimate.z")
     someone.cf.high_level_commander.takeoff(0.3, 0.5)
-    wait_until(lambda: server.vehicle.physics.position[2] > 0.2)
-    server.switches.silence = 1e6
-    age = server.vehicle.time
-    wait_until(lambda: server.vehicle.time > age + 0.1)
+    wait_until(lambda: vehicle.physics.position[2] > 0.2)
+    vehicle.faults.silence = 1e6
+    age = vehicle.time
+    wait_until(lambda: vehicle.time > age + 0.1)
     heard = len(rows)
-    wait_until(lambda: server.vehicle.time > age + 0.6)
+    wait_until(lambda: vehicle.time > age + 0.6)
     assert len(rows) == heard
     assert someone.cf.is_connected()
     assert "connection_lost" not in someone.events
     # The vehicle flies on, and is heard again after the silence.
-    assert server.vehicle.physics.position[2] > 0.2
-    server.switches.silence = 0.2
+    assert vehicle.physics.position[2] > 0.2
+    vehicle.faults.silence = 0.2
     wait_until(lambda: len(rows) > heard)
-    assert server.switches.silence == 0.0
+    assert vehicle.faults.silence == 0.0
 
 
-def test_silence_while_streaming_meets_the_watchdogs(serve, client):
-    server, uri = serve()
-    someone = client(uri).open()
-    someone.wait_for("fully_connected")
-    supervisor = server.vehicle.board.firmware.supervisor
+def test_silence_while_streaming_meets_the_watchdogs(connect):
+    vehicle, someone = connect()
+    supervisor = vehicle.board.firmware.supervisor
 
     def stream_until(condition):
         def step():
@@ -105,28 +101,24 @@ def test_silence_while_streaming_meets_the_watchdogs(serve, client):
 
         wait_until(step)
 
-    stream_until(lambda: server.vehicle.physics.position[2] > 0.2)
+    stream_until(lambda: vehicle.physics.position[2] > 0.2)
     # Its answer is silenced, too.
     someone.cf.param.set_value("virtual.silence", 1000.0)
     stream_until(lambda: supervisor.state is State.WARNING_LEVEL_OUT)
     stream_until(lambda: supervisor.state is State.LOCKED)
-    stream_until(lambda: server.vehicle.physics.position[2] == 0.0)
+    stream_until(lambda: vehicle.physics.position[2] == 0.0)
 
 
-def test_motor_failure(serve, client):
-    server, uri = serve()
-    someone = client(uri).open()
-    someone.wait_for("fully_connected")
+def test_motor_failure(connect):
+    vehicle, someone = connect()
     someone.cf.high_level_commander.takeoff(0.3, 0.5)
-    wait_until(lambda: server.vehicle.physics.position[2] > 0.2)
+    wait_until(lambda: vehicle.physics.position[2] > 0.2)
     someone.set("virtual.motorFailure", 2)
-    wait_until(lambda: server.vehicle.physics.position[2] == 0.0)
+    wait_until(lambda: vehicle.physics.position[2] == 0.0)
 
 
-def test_low_battery(serve, client):
-    _, uri = serve()
-    someone = client(uri).open()
-    someone.wait_for("fully_connected")
+def test_low_battery(connect):
+    _, someone = connect()
     rows = someone.log("pm.vbat")
     wait_until(lambda: rows and rows[-1][1]["pm.vbat"] > 4.0)
     someone.set("virtual.lowBattery", 1)

@@ -111,39 +111,34 @@ def test_stop_drops_the_vehicle(bench):
     assert bench.height == 0.0
 
 
-def test_groups(bench):
-    assert command(bench, "set_group_mask", 0b10) == 0
-    assert command(bench, "takeoff", 1.0, 1.0, group_mask=0b01) == 0
-    bench.run(1.0)
-    assert bench.height == 0.0
-    assert command(bench, "takeoff", 1.0, 1.0, group_mask=0b11) == 0
-    bench.run(1.0)
-    assert bench.height > 0.3
+@pytest.mark.parametrize("by_parameter", [False, True])
+def test_groups(bench, by_parameter):
+    if by_parameter:
+        name = b"hlCommander\0groupmask\0"
+        assert bench.ask_one(Port.PARAMETERS, 3, b"\0" + name + b"\x08\x02")[-1] == 0
+    else:
+        assert command(bench, "set_group_mask", 0b10) == 0
+    for mask, flies in ((0b01, False), (0b11, True)):
+        assert command(bench, "takeoff", 1.0, 1.0, group_mask=mask) == 0
+        bench.run(1.0)
+        assert (bench.height > 0.3, bench.height > 0.0) == (flies, flies)
 
 
-def test_the_groups_are_a_parameter(bench):
-    name = b"hlCommander\0groupmask\0"
-    assert bench.ask_one(Port.PARAMETERS, 3, b"\0" + name + b"\x08\x02")[-1] == 0
-    assert bench.firmware.planner.groups == 0b10
-    assert command(bench, "takeoff", 1.0, 1.0, group_mask=0b01) == 0
-    bench.run(1.0)
-    assert bench.height == 0.0
-    assert command(bench, "takeoff", 1.0, 1.0, group_mask=0b10) == 0
-    bench.run(1.0)
-    assert bench.height > 0.3
-
-
-@pytest.mark.parametrize("number", [1, 9])
-def test_other_takeoffs(bench, number):
-    forms = {1: ("<BBff", 0.5, 1.0), 9: ("<BBf?f?f", 0.5, True, 0.0, False, 0.5)}
-    form, *values = forms[number]
-    data = struct.pack(form, number, 0, *values)
-    assert bench.ask_one(Port.HIGH_LEVEL, 0, data)[3] == 0
+@pytest.mark.parametrize(
+    ("takeoff", "land"),
+    [
+        (("<BBff", 1, 0, 0.5, 1.0), ("<BBff", 2, 0, 0.0, 1.0)),
+        (
+            ("<BBf?f?f", 9, 0, 0.5, True, 0.0, False, 0.5),
+            ("<BBf?f?f", 10, 0, 0.5, True, 0.0, False, 0.5),
+        ),
+    ],
+)
+def test_other_takeoffs(bench, takeoff, land):
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, struct.pack(*takeoff))[3] == 0
     bench.run(4.0)
     assert bench.height == pytest.approx(0.5, abs=0.1)
-    forms = {1: ("<BBff", 2, 0, 0.0, 1.0), 9: ("<BBf?f?f", 10, 0, 0.5, True, 0.0, False, 0.5)}
-    form, *values = forms[number]
-    assert bench.ask_one(Port.HIGH_LEVEL, 0, struct.pack(form, *values))[3] == 0
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, struct.pack(*land))[3] == 0
     bench.run(2.0)
     assert bench.height == 0.0
 

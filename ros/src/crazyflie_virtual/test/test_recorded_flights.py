@@ -82,8 +82,7 @@ def test_hl_stop_in_flight():
     track = flight.begin(before_supervisor=0.02)
     assert flight.command(3, "") == firmware["stop_errno"]
     flight.watch(4.0)
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
     ground = next(time for time, *_, place in track.rows if place[2] == 0.0)
     assert ground == pytest.approx(firmware["t_ground"], abs=MOMENT)
     # The times of the record go on from the stop; the takeoff took 1.5 s.
@@ -100,8 +99,7 @@ def test_emergency_stop():
     track = flight.begin(before_supervisor=0.02)
     assert flight.supervise(EMERGENCY_STOP) == []
     flight.watch(3.0)
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
     assert flight.supervise(RECOVER) == firmware["recover_reply"]
     assert flight.supervise(ARM, 1) == firmware["arm_reply"]
     assert flight.up(0.4) == firmware["takeoff_errno"]
@@ -150,8 +148,7 @@ def test_disarm_in_hl_flight():
     track = flight.begin(before_supervisor=0.04)
     assert flight.supervise(ARM, 0) == firmware["reply"]
     flight.watch(6.0)
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
     track.check_heights(firmware["track_z"], (0.0, 0.3, 0.8, 1.3, 1.8))
     assert flight.up(0.4) == firmware["takeoff_errno"]
     flight.watch(3.0)
@@ -228,8 +225,7 @@ def test_tumble():
     track = flight.begin()
     flight.vehicle.faults.motor_failure = 2
     flight.watch(6.0)
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
     ground = next(time for time, *_, place in track.rows if place[2] == 0.0)
     assert ground == pytest.approx(firmware["t_ground"], abs=MOMENT)
     assert flight.supervise(RECOVER) == firmware["recover_while_lying"]

@@ -214,8 +214,7 @@ def test_watchdog_in_flight():
     assert flight.height == pytest.approx(firmware["z"], abs=HEIGHT)
     track = flight.begin()
     flight.watch(2.5)
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
 
 
 def test_go_to_in_takeoff():

@@ -58,8 +58,7 @@ def test_stream_silence(name):
     assert flight.height == pytest.approx(firmware["z_before"], abs=HEIGHT)
     flight.begin()
     track = flight.watch(float(name.rpartition("_")[2]))
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
     assert flight.height == pytest.approx(firmware["z_after_silence"], abs=HEIGHT)
     flight.begin()
     track = flight.watch(1.5, HOVER)
@@ -77,8 +76,7 @@ def test_cmd_vel_silence():
     flight.begin()
     track = flight.watch(3.0)
     track.check_heights([firmware["z_at_silence"]], [0.05])
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
     track.check_heights(firmware["track_z"], (0.5, 1.0, 2.0, 2.9))
 
 
@@ -103,8 +101,7 @@ def test_stop_setpoint_in_flight():
     flight.begin()
     flight.watch(0.3, generic(0, ""))
     track = flight.watch(4.0)
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
     assert hex(flight.bits) == firmware["bits_end"]
 
 
@@ -131,8 +128,7 @@ def test_notify_land_at_once():
     flight.ask(*SETPOINTS_STOP)
     assert flight.land() == firmware["land_errno"]
     flight.watch(4.5)
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
     track.check_heights(firmware["track_z"], (0.0, 0.5, 1.0, 1.5, 2.0, 2.5))
 
 
@@ -142,8 +138,7 @@ def test_land_without_notify():
     track = flight.begin(before_supervisor=0.03)
     assert flight.land() == firmware["land_errno"]
     flight.watch(4.0)
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
     track.check_heights(firmware["track_z"], (0.4, 1.0, 1.9, 2.2, 3.0, 4.0))
     assert hex(flight.bits) == firmware["bits_end"]
 
@@ -156,8 +151,7 @@ def test_one_setpoint_during_hl():
     track = flight.begin(before_supervisor=0.03)
     flight.ask(*HOVER)
     flight.watch(4.0)
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
     track.check_heights(firmware["track_z"], (0.25, 1.0, 1.8, 2.7, 3.5))
 
 
@@ -196,8 +190,7 @@ def test_setpoint_nan():
     track = flight.begin()
     flight.watch(1.0, position(math.nan, 0.0, 0.6))
     flight.watch(2.0, HOVER)
-    track.check_bits(firmware["bits"])
-    track.check_motors(firmware["motors_on_off"])
+    track.check(firmware)
     for time, x, y, z, _ in firmware["track"]:
         found = [track.coordinate(time, value, i) for i, value in enumerate((x, y, z))]
         assert found == pytest.approx([x, y, z], abs=0.1)

@@ -63,36 +63,26 @@ def test_rate_mode_of_attitude_setpoints():
 
 @pytest.mark.filterwarnings("ignore:Using legacy:DeprecationWarning")
 @pytest.mark.parametrize("protocol", [8, 12])
-def test_velocity_world(protocol):
-    setpoint = decoded("send_velocity_world_setpoint", 0.5, -0.5, 0.25, 30.0, protocol=protocol)
-    assert modes(setpoint) == (VELOCITY,) * 4
-    assert (setpoint.vx, setpoint.vy, setpoint.vz) == (0.5, -0.5, 0.25)
-    assert (setpoint.yaw_rate, setpoint.velocity_body) == (30.0, False)
+@pytest.mark.parametrize(
+    ("method", "fields", "expected"),
+    [
+        ("velocity_world", ("vx", "vy", "vz", "yaw_rate"), (VELOCITY,) * 4),
+        (
+            "zdistance",
+            ("roll", "pitch", "yaw_rate", "z"),
+            (DISABLED, DISABLED, ABSOLUTE, VELOCITY),
+        ),
+        ("hover", ("vx", "vy", "yaw_rate", "z"), (VELOCITY, VELOCITY, ABSOLUTE, VELOCITY)),
+        ("position", ("x", "y", "z", "yaw"), (ABSOLUTE,) * 4),
+    ],
+)
+def test_four_numbers(method, fields, expected, protocol):
+    numbers = (0.5, -0.25, 30.0, 0.75)
+    setpoint = decoded(f"send_{method}_setpoint", *numbers, protocol=protocol)
+    assert modes(setpoint) == expected
+    assert tuple(getattr(setpoint, field) for field in fields) == numbers
+    assert setpoint.velocity_body == (method == "hover")
     assert setpoint.time == 3.0
-
-
-@pytest.mark.filterwarnings("ignore:Using legacy:DeprecationWarning")
-@pytest.mark.parametrize("protocol", [8, 12])
-def test_z_distance(protocol):
-    setpoint = decoded("send_zdistance_setpoint", 5.0, 6.0, 30.0, 0.75, protocol=protocol)
-    assert modes(setpoint) == (DISABLED, DISABLED, ABSOLUTE, VELOCITY)
-    assert (setpoint.roll, setpoint.pitch, setpoint.z) == (5.0, 6.0, 0.75)
-    assert setpoint.yaw_rate == 30.0
-
-
-@pytest.mark.filterwarnings("ignore:Using legacy:DeprecationWarning")
-@pytest.mark.parametrize("protocol", [8, 12])
-def test_hover(protocol):
-    setpoint = decoded("send_hover_setpoint", 0.5, -0.25, 30.0, 0.75, protocol=protocol)
-    assert modes(setpoint) == (VELOCITY, VELOCITY, ABSOLUTE, VELOCITY)
-    assert (setpoint.vx, setpoint.vy, setpoint.velocity_body) == (0.5, -0.25, True)
-    assert (setpoint.z, setpoint.yaw_rate) == (0.75, 30.0)
-
-
-def test_position():
-    setpoint = decoded("send_position_setpoint", 1.0, 2.0, 3.0, 90.0)
-    assert modes(setpoint) == (ABSOLUTE,) * 4
-    assert (setpoint.x, setpoint.y, setpoint.z, setpoint.yaw) == (1.0, 2.0, 3.0, 90.0)
 
 
 def test_full_state_rates_are_milliradians():

@@ -1,5 +1,6 @@
 """A cflib program, every wait of which has a limit."""
 
+import contextlib
 import threading
 
 import cflib.crtp
@@ -8,6 +9,7 @@ from cflib.crazyflie.log import LogConfig
 from cflib.crtp.crtpstack import CRTPPacket
 
 from crazyflie_utils.testing.programs import LIMIT
+from crazyflie_virtual.testing import virtual_vehicle
 
 
 class Client:
@@ -79,3 +81,11 @@ class Client:
         self.cf.param.set_value(name, value)
         assert confirmation.wait(LIMIT), f"{name} was not set"
         self.cf.param.remove_update_callback(group, parameter, confirm)
+
+
+@contextlib.contextmanager
+def connected_vehicle(**settings):
+    """Run a vehicle; yield it, and a client that is fully connected to it."""
+    with virtual_vehicle(**settings) as (server, uri), contextlib.closing(Client(uri)) as client:
+        client.open().wait_for("fully_connected")
+        yield server.vehicle, client

@@ -107,8 +107,7 @@ def usage(load: Load, channel: RadioChannel) -> Usage:
         if frames and frames[0] <= now:
             due = frames.pop(0)
             for size in load.frame:
-                done = channel.broadcast(now, size)
-            frame_delay = max(frame_delay, done - due)
+                frame_delay = max(frame_delay, channel.broadcast(now, size) - due)
         else:
             due, vehicle = polls.pop(0)
             poll_delay = max(poll_delay, channel.unicast(now, vehicle, *load.poll_size) - due)

@@ -16,12 +16,6 @@ HOLD = generic(7, "ffff", 0.0, 0.0, 1.0, 0.0)
 LAND = struct.pack("<BBff?f", 8, 0, 0.0, 0.0, False, 2.0)
 
 
-def test_generic_setpoints_need_no_unlocking():
-    bench = Bench()
-    bench.stream(HOLD, 2.0)
-    assert bench.height > 0.5
-
-
 def test_high_level_plans_from_the_vehicles_state_after_a_stream():
     bench = Bench()
     bench.take_off()

@@ -109,22 +109,6 @@ def test_silence_while_streaming_meets_the_watchdogs(connect):
     stream_until(lambda: vehicle.physics.position[2] == 0.0)
 
 
-def test_motor_failure(connect):
-    vehicle, someone = connect()
-    someone.cf.high_level_commander.takeoff(0.3, 0.5)
-    wait_until(lambda: vehicle.physics.position[2] > 0.2)
-    someone.set("virtual.motorFailure", 2)
-    wait_until(lambda: vehicle.physics.position[2] == 0.0)
-
-
-def test_low_battery(connect):
-    _, someone = connect()
-    rows = someone.log("pm.vbat")
-    wait_until(lambda: rows and rows[-1][1]["pm.vbat"] > 4.0)
-    someone.set("virtual.lowBattery", 1)
-    wait_until(lambda: rows[-1][1]["pm.vbat"] < 3.5)
-
-
 def echoes(server, count, limit):
     """Send pings; return how many come back, each within a limit (s)."""
     heard = 0

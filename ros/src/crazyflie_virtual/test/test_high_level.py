@@ -1,4 +1,4 @@
-"""High-level commands: what cflib sends, what is answered, what is flown."""
+"""High-level commands that no record has; the others are in test_recorded_*.py."""
 
 import errno
 import math
@@ -38,29 +38,6 @@ def test_takeoff_turns_to_its_yaw_or_keeps_it():
     assert bench.firmware.setpoint.yaw == pytest.approx(math.degrees(1.0), abs=1.0)
 
 
-def test_land_stops_the_motors_on_the_ground(bench):
-    bench.take_off()
-    assert command(bench, "land", 0.0, 2.0) == 0
-    assert command(bench, "land", 0.0, 2.0) == REFUSED
-    bench.run(2.5)
-    assert bench.height == 0.0
-    assert not bench.motors_run
-    bench.take_off()
-
-
-def test_go_to(bench):
-    bench.take_off()
-    assert command(bench, "takeoff", 2.0, 2.0) == REFUSED
-    assert command(bench, "go_to", 1.0, -0.5, 1.5, math.pi / 2, 3.0) == 0
-    bench.run(6.0)
-    x, y, z = bench.physics.position
-    assert (x, y, z) == pytest.approx((1.0, -0.5, 1.5), abs=0.06)
-    assert bench.firmware.estimate.yaw == pytest.approx(90.0, abs=2.0)
-    assert command(bench, "go_to", 0.0, 0.5, 0.0, 0.0, 2.0, relative=True, linear=True) == 0
-    bench.run(5.0)
-    assert bench.physics.position[1] == pytest.approx(0.0, abs=0.06)
-
-
 def test_flight_by_mellingers_controller(bench):
     for number, taken in ((7, 1), (2, 2)):
         name_and_type = b"\0stabilizer\0controller\0\x08"
@@ -83,17 +60,6 @@ def test_flight_by_mellingers_controller(bench):
     assert not bench.motors_run
 
 
-def test_a_spiral_ends_where_it_must(bench):
-    bench.take_off()
-    begin = bench.firmware.setpoint
-    assert command(bench, "spiral", -math.pi / 2, 0.4, 0.6, -0.3, 3.0, clockwise=True) == 0
-    bench.run(7.0)
-    # Backwards about an axis 0.4 m to the right.
-    expected = (begin.x - 0.6, begin.y - 0.4, begin.z - 0.3)
-    assert bench.physics.position == pytest.approx(expected, abs=0.06)
-    assert bench.firmware.estimate.yaw == pytest.approx(90.0, abs=4.0)
-
-
 @pytest.mark.parametrize("angle", [math.nan, math.inf])
 def test_a_spiral_that_is_not_a_number_levels_out(bench, angle):
     bench.take_off()
@@ -104,20 +70,9 @@ def test_a_spiral_that_is_not_a_number_levels_out(bench, angle):
     assert command(bench, "takeoff", 1.0, 2.0) == REFUSED
 
 
-def test_stop_drops_the_vehicle(bench):
-    bench.take_off()
-    assert command(bench, "stop") == 0
-    bench.run(1.0)
-    assert bench.height == 0.0
-
-
-@pytest.mark.parametrize("by_parameter", [False, True])
-def test_groups(bench, by_parameter):
-    if by_parameter:
-        name = b"hlCommander\0groupmask\0"
-        assert bench.ask_one(Port.PARAMETERS, 3, b"\0" + name + b"\x08\x02")[-1] == 0
-    else:
-        assert command(bench, "set_group_mask", 0b10) == 0
+def test_the_groups_are_a_parameter(bench):
+    name = b"hlCommander\0groupmask\0"
+    assert bench.ask_one(Port.PARAMETERS, 3, b"\0" + name + b"\x08\x02")[-1] == 0
     for mask, flies in ((0b01, False), (0b11, True)):
         assert command(bench, "takeoff", 1.0, 1.0, group_mask=mask) == 0
         bench.run(1.0)

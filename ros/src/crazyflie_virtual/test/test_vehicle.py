@@ -1,4 +1,4 @@
-"""Whole flights on the bench: watchdogs, emergency stop, faults, restarts."""
+"""Whole flights on the bench: estimate, emergency stop, faults; more in test_recorded_*.py."""
 
 import struct
 
@@ -78,64 +78,6 @@ def test_positive_yaw_rate_on_the_attitude_port_is_clockwise(flying):
     assert flying.firmware.estimate.yaw < -10.0
 
 
-@pytest.mark.parametrize(("setpoint_type", "sign"), [(10, 1.0), (5, -1.0)])
-def test_yaw_rate_of_hover_setpoints(flying, setpoint_type, sign):
-    flying.stream(generic(setpoint_type, "ffff", 0.0, 0.0, 30.0, 1.0), 1.0)
-    assert sign * flying.firmware.estimate.yaw == pytest.approx(28.0, abs=5.0)
-    assert flying.physics.rates[2] * sign == pytest.approx(np.radians(30.0), abs=0.05)
-
-
-@pytest.mark.parametrize(
-    ("packet", "velocity"),
-    [
-        (generic(8, "ffff", 0.3, -0.2, 0.1, 0.0), (0.3, -0.2, 0.1)),
-        (generic(10, "ffff", 0.3, -0.2, 0.0, 1.0), (0.3, -0.2, 0.0)),
-        (generic(1, "ffff", 0.3, -0.2, 0.1, 0.0), (0.3, -0.2, 0.1)),
-    ],
-)
-def test_velocity_setpoints(flying, packet, velocity):
-    flying.stream(packet, 4.0)
-    assert flying.physics.velocity == pytest.approx(velocity, abs=0.06)
-
-
-def test_z_distance_setpoint(flying):
-    flying.stream(generic(9, "ffff", 0.0, -3.0, 0.0, 0.6), 3.0)
-    assert flying.height == pytest.approx(0.6, abs=0.1)
-    assert flying.physics.velocity[0] > 0.5
-
-
-def test_without_setpoints_it_levels_out_and_then_falls(flying):
-    flying.unlock()
-    flying.stream(HOLD, 1.0)
-    flying.stream(attitude(roll=10.0, thrust=int(1.02 * HOVER_PWM)), 0.3)
-    flying.run(0.46)
-    assert flying.firmware.supervisor.state is State.FLYING
-    assert flying.firmware.estimate.roll == pytest.approx(10.0, abs=3.0)
-    flying.run(0.4)
-    assert flying.firmware.supervisor.state is State.WARNING_LEVEL_OUT
-    assert flying.firmware.estimate.roll == pytest.approx(0.0, abs=3.0)
-    assert flying.motors_run
-    flying.run(1.0)
-    assert flying.motors_run
-    flying.run(0.3)
-    assert flying.firmware.supervisor.state is State.LOCKED
-    assert not flying.motors_run
-    flying.run(3.0)
-    assert flying.height == 0.0
-    # Nothing moves it until it is restarted.
-    flying.stream(HOLD, 0.5)
-    assert not flying.motors_run
-
-
-def test_a_setpoint_in_time_ends_the_levelling(flying):
-    flying.stream(HOLD, 1.0)
-    flying.run(1.5)
-    assert flying.firmware.supervisor.state is State.WARNING_LEVEL_OUT
-    flying.stream(HOLD, 1.0)
-    assert flying.firmware.supervisor.state is State.FLYING
-    assert flying.height > 0.5
-
-
 def test_the_high_level_commander_has_no_watchdog(flying):
     flying.run(20.0)
     assert flying.firmware.supervisor.state is State.FLYING
@@ -163,18 +105,6 @@ def test_emergency_watchdog(flying, packet):
     assert flying.motors_run
     flying.run(0.3)
     assert not flying.motors_run
-
-
-def test_restart_ends_the_locked_state(flying):
-    flying.ask(*EMERGENCY_STOPS["supervisor"])
-    flying.run(2.0)
-    assert len(flying.ask(Port.LINK, 3, b"\xfe\x02")) == 1
-    assert flying.ask(Port.LINK, 0, b"ping") == []
-    flying.run(0.5)
-    assert len(flying.ask(Port.LINK, 3, b"\xfe\x03")) == 1
-    flying.run(0.2)
-    assert flying.ask_one(Port.LINK, 0, b"ping") == b"ping"
-    flying.take_off()
 
 
 def test_reset_restarts_at_once(flying):

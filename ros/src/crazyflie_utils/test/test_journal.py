@@ -384,7 +384,7 @@ def test_only_nodes_are_made(path, program):
         (b"", "is not a journal"),
         (b"#ROSBAG V2.0\n", "is not a journal"),
         (b'{"format": "crazyflie journal 99"}\n', "crazyflie journal 99"),
-        (b'{"format": "crazyflie journal 2", "node": 3}\n', "node is 3; expected str"),
+        (b'{"format": "crazyflie journal 3", "node": 3}\n', "node is 3; expected str"),
     ],
 )
 def test_what_is_no_journal_is_named(path, content, reason):

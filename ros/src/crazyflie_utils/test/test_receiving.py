@@ -11,7 +11,13 @@ import pytest
 from rospy.exceptions import TransportTerminated
 from std_msgs.msg import Int64
 
-from crazyflie_utils.ros1.receiving import MAX_MESSAGE_SIZE, Inbox, RateLimiter, Reception
+from crazyflie_utils.ros1.receiving import (
+    MAX_MESSAGE_SIZE,
+    Inbox,
+    RateLimiter,
+    Reception,
+    collect_waiting,
+)
 from crazyflie_utils.testing.hostile_publisher import frame
 
 
@@ -153,10 +159,10 @@ def test_messages_wait_until_they_are_collected(publisher, subscriber, monkeypat
     assert subscriber.receives(1, 2)  # The thread may have waited for a shorter time already.
     here.sendall(frame(Int64(3)) + frame(Int64(4))[:5])
     assert connection.stat_num_msg == 2
-    subscriber.reception.collect()
+    collect_waiting()
     assert subscriber.received == [1, 2, 3]
     here.sendall(frame(Int64(4))[5:])
-    subscriber.reception.collect()
+    collect_waiting()
     assert subscriber.received == [1, 2, 3, 4]
     assert connection.stat_num_msg == 4
 
@@ -175,7 +181,7 @@ def test_messages_that_may_not_wait_are_received_by_the_thread_alone(publisher, 
     # Two threads that read one socket would mix up the order, also after that.
     subscriber.may_wait = True
     here.sendall(frame(Int64(3)))
-    subscriber.reception.collect()
+    collect_waiting()
     assert subscriber.receives(1, 2, 3)
 
 
@@ -187,7 +193,7 @@ def test_a_flood_does_not_wait(publisher, subscriber, monkeypatch):
     assert subscriber.receives(*range(1, 10))
     subscriber.may_wait = True
     here.sendall(frame(Int64(10)))
-    subscriber.reception.collect()
+    collect_waiting()
     assert subscriber.receives(*range(1, 11))
 
 
@@ -195,8 +201,8 @@ def test_a_hang_up_that_a_collector_sees_ends_the_connection(publisher, subscrib
     here, _ = publisher
     here.sendall(frame(Int64(2)))
     here.close()
-    subscriber.reception.collect()
-    subscriber.reception.collect()
+    collect_waiting()
+    collect_waiting()
     assert subscriber.receives(1, 2)
     assert becomes_true(lambda: subscriber.error is not None)
     assert "hung up" in str(subscriber.error)
@@ -206,7 +212,7 @@ def test_a_message_without_end_that_a_collector_sees_ends_the_connection(publish
     here, _ = publisher
     size = MAX_MESSAGE_SIZE + 1
     here.sendall(struct.pack("<I", size) + frame(Int64(2)))
-    subscriber.reception.collect()
+    collect_waiting()
     assert becomes_true(lambda: subscriber.error is not None)
     assert subscriber.received == [1]
     assert subscriber.reports == [f"disconnecting a publisher of /t: {size} bytes a message"]

@@ -2,6 +2,7 @@
 
 import math
 import threading
+from functools import partial
 
 import pytest
 from hypothesis import given
@@ -125,6 +126,17 @@ def test_those_that_may_be_early_are_due_at_the_same_moments(queue):
         queue.run_due(now)
         moments[round(now * 1000)] = "".join(sorted(due[before:]))
     assert moments == {23: "aequick", 33: "bquick", 43: "cquick", 53: "dquick"}
+
+
+def test_what_waits_is_submitted_before_the_timers_that_are_due():
+    executor, done = started(), []
+    queue = TimerQueue(
+        executor, SimulatedClock(), collect=lambda: executor.submit(done.append, "message")
+    )
+    for name in ("first", "second"):
+        queue.add(1.0, partial(done.append, name))
+    queue.run_due(1.0)
+    assert done == ["message", "first", "second"]
 
 
 def test_rounding_makes_no_tick_late_or_double(queue):

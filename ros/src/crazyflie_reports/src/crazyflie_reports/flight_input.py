@@ -273,7 +273,7 @@ class _JournalInput:
             self._time += row.value * 1e-6 if self._clock == "steady" else 0.0
         if row.kind in NAMES:
             self._names[row.kind, row.number] = json.loads(row.data)
-        elif row.kind in (Kind.MESSAGE, Kind.COLLECTED):
+        elif row.kind is Kind.MESSAGE:
             self._add(row)
         elif row.kind is Kind.WALL and self._clock != "simulated":
             self._wall = int.from_bytes(row.data, "little", signed=True) * 1e-9

@@ -52,7 +52,7 @@ class Contents:
             yield row
 
     def _count(self, row):
-        if row.kind in (Kind.MESSAGE, Kind.COLLECTED):
+        if row.kind is Kind.MESSAGE:
             self.counts[Kind.SUBSCRIBED, row.number] += 1
             header = self.names.connection(received(row)[0]) or {}
             self.callers[row.number].add(header.get("callerid") or "?")
@@ -141,7 +141,7 @@ def print_messages(contents: Contents, topic: str) -> int:
     """Print the messages that were received on a topic; return how many."""
     count = 0
     for row in contents.rows():
-        if row.kind not in (Kind.MESSAGE, Kind.COLLECTED):
+        if row.kind is not Kind.MESSAGE:
             continue
         name, kind = contents.name(Kind.SUBSCRIBED, row.number)
         message_type = roslib.message.get_message_class(kind) if name == topic else None

@@ -74,7 +74,7 @@ def _messages(path: Path, node: str, topic: str, type_name: str) -> Iterator[Rec
             us += row.value if row.kind in INPUTS else 0
             if row.kind is Kind.WALL:
                 (wall,) = _I64.unpack(row.data)
-            if row.kind not in (Kind.MESSAGE, Kind.COLLECTED):
+            if row.kind is not Kind.MESSAGE:
                 continue
             if rows.names[Kind.SUBSCRIBED].get(row.number) != [topic, type_name]:
                 continue

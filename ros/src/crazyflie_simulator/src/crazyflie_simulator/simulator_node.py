@@ -179,7 +179,7 @@ class SimulatorNode(Node[SimulatorParameters]):
         self._vehicle = SimulatedVehicle(
             self._dynamics, position, self._start, self.max_tilt, self.delay
         )
-        self._broadcast = handle.broadcast_poses(lambda: self._catch_up(handle.time()))
+        self._broadcast = handle.broadcast_poses()
         if self._publishes_clock:
             self._set_clock = handle.clock_publisher()
         handle.advertise_service("~reset", Empty, self._on_reset)
@@ -244,7 +244,7 @@ class SimulatorNode(Node[SimulatorParameters]):
         self._timer.set_period(max(IDLE_PERIOD, step) if self._is_idle else step)
 
     def _has_no_consumers(self):
-        """Return whether poses need not be broadcast before they are looked up."""
+        """Return whether poses need not be broadcast in time."""
         # Errors are drawn pose by pose, in sequence.
         return self._motion_capture.is_perfect and not self._handle.has_pose_consumers()
 

@@ -243,7 +243,7 @@ class ProcessContext:
         )
         # The poses of all vehicles that are simulated in one tick form one message.
         tf = self.transforms.gather, self.transforms.send_gathered
-        self._steady = TimerQueue(self.executor, machine_clock, *tf)
+        self._steady = TimerQueue(self.executor, machine_clock, *tf, transport.collect)
         self._simulated = SimulatedTimers(self.executor, self.clock, *tf)
         self._clock_publisher: Publisher | None = None
         #: Work and decoder of each input of `NodeHandle.input`, by its number - 1.

@@ -24,7 +24,6 @@ from crazyflie_utils.parameters.declaration import (
 from crazyflie_utils.parameters.server import PrivateParameters, Reconfiguration
 from crazyflie_utils.parameters.types import ParameterType
 from crazyflie_utils.refusal import RefusalError, ServiceError
-from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_utils.timers import Timer
 from crazyflie_utils.topics import LatestMessage, Publisher, Subscriber
 from crazyflie_utils.vectors import is_finite, number_getter
@@ -59,7 +58,8 @@ class NodeHandle:
         #: For the node that publishes /clock; see `ProcessContext`.
         self.clock_publisher, self.next_event = process.clock_publisher, process.next_event
         tf = process.transforms
-        self.broadcast_transforms = tf.broadcaster  #: Methods of `Transforms`, like the next five.
+        #: Methods of `Transforms`, like the next six.
+        self.broadcast_transforms, self.broadcast_poses = tf.broadcaster, tf.pose_broadcaster
         self.broadcast_static_transforms = tf.static_broadcaster
         self.listen_to_transforms, self.listen_to_poses = tf.listener, tf.pose_listener
         self.has_pose_consumers = tf.has_pose_consumers
@@ -211,6 +211,9 @@ class NodeHandle:
             return answer.set_result(empty if response is None else response)
 
         def begin(request, is_withdrawn):
+            # From outside; a node of this process may call the service in a callback.
+            if not self._process.executor.is_in_turn:
+                self._process.transport.collect()
             answer: Future[Any] = Future()
             self._submit(serve, request, is_withdrawn, answer)
             return answer
@@ -347,20 +350,6 @@ class NodeHandle:
     def random_seed(self) -> int:
         """Return a random seed, 32 bits: callbacks draw no random numbers elsewhere."""
         return self._process.transport.random_seed()
-
-    def broadcast_poses(
-        self, refresh: Callable[[], None] | None = None
-    ) -> Callable[[list[StampedPose]], None]:
-        """Announce /tf and return ``broadcast(list of StampedPose)``; see `Transforms`.
-
-        ``refresh()`` is called before callbacks of this process look poses up, which is early
-        enough to broadcast while `has_pose_consumers` is false.
-        """
-        if refresh is not None:
-            guarded, executor = self.guard(refresh), self._process.executor
-            on_lookup = self._process.transforms.on_lookup
-            on_lookup(lambda: guarded() if executor.is_running_here else None)
-        return self._process.transforms.pose_broadcaster()
 
     def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:
         """Call ``callback()`` for new poses of a frame, once in ``period`` (s, by stamps)."""

@@ -309,7 +309,8 @@ _number = attrgetter("number")
 class TimerQueue:
     """Timers by a clock, in the order of their deadlines; `run_due` runs them, or a thread.
 
-    ``before()`` and ``after()`` are called before and after several timers that are due at once.
+    ``before()`` and ``after()`` are called before and after several timers that are due at once,
+    and ``collect()``, which submits what waits, before all that are.
     """
 
     def __init__(
@@ -318,11 +319,13 @@ class TimerQueue:
         clock: SteadyClock | SimulatedClock,
         before: Callable[[], None] | None = None,
         after: Callable[[], None] | None = None,
+        collect: Callable[[], None] = lambda: None,
     ):
         self._executor = executor
         self._clock = clock
         self._before = before
         self._after = after
+        self._collect = collect
         self._lock = threading.Lock()
         self._heap: list[tuple[float, int, Timer]] = []
         self._order = itertools.count()
@@ -399,6 +402,7 @@ class TimerQueue:
         a period skips the missed ticks and keeps its phase.
         """
         self._is_running = True
+        self._collect()
         self._executor.submit_all(self._due_works(now, times))
 
     def _due_works(self, now, times):

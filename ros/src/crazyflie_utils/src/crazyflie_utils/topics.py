@@ -54,9 +54,6 @@ class ExternalSubscriber(ABC):
     def has_publishers(self) -> bool:
         """Return whether another process publishes."""
 
-    def collect(self) -> None:  # noqa: B027 - Nothing waits in most transports.
-        """Deliver the messages that wait; see `Transport.subscribe`."""
-
     @abstractmethod
     def close(self) -> None:
         """End the subscription."""
@@ -106,8 +103,11 @@ class Transport(ABC):
         """Call ``deliver(message)`` with the messages of other processes.
 
         That includes latched ones; a topic may be subscribed more than once. While ``may_wait()``,
-        messages may be held back until the subscriber's `collect` is called.
+        messages may be held back until `collect` is called.
         """
+
+    def collect(self) -> None:  # noqa: B027 - Nothing waits in most transports.
+        """Deliver the messages that wait, of all topics; not in a callback."""
 
     @abstractmethod
     def advertise_service(self, name: str, service_type: type, serve: Serve) -> Callable[[], None]:
@@ -219,7 +219,6 @@ class Subscriber:
         self._topic = topic
         self._receiver = receiver
         self._external = external
-        self.collect = external.collect  #: Delivers the messages that wait.
 
     def has_publishers(self) -> bool:
         """Return whether there are publishers, in this process or in others."""
@@ -292,13 +291,12 @@ class LatestMessage:
     ):
         self._callback = callback
         self._waiting: deque[Any] = deque(maxlen=1)
-        #: The subscription, whose messages may wait until the next `deliver`.
+        #: The subscription, whose messages may wait until `Transport.collect`.
         self.subscriber = topics.subscribe(
             name, message_type, self._waiting.append, may_wait=lambda: True
         )
 
     def deliver(self) -> None:
         """Call the callback with the latest message, if it is new."""
-        self.subscriber.collect()
         if self._waiting:
             self._callback(self._waiting.pop())

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-FORMAT = "crazyflie journal 2"  #: The first field of the header; another format has another number.
+FORMAT = "crazyflie journal 3"  #: The first field of the header; another format has another number.
 #: Fields of each header: absolute name of the process's node; "package.module:name" of what made
 #: the nodes; "steady", "simulated" or "manual"; the machine's clock at the beginning, us; time of a
 #: manual clock at the beginning, s.
@@ -77,7 +77,6 @@ class Kind(enum.IntEnum):
     TIME = 20  #: The clock was read before the process began. u64: ns.
     #: Wall clock minus machine's clock has changed. 1: as a callback reads it; i64: ns.
     WALL = 21
-    COLLECTED = 22  #: A message that waited. Subscription; collections without one; as `MESSAGE`.
     #: A value. JSON: what; then true and the value, or false, type and text of an error.
     VALUE = 24
     NAME = 25  #: A remapped name. JSON: name, remapped.
@@ -97,7 +96,6 @@ class Kind(enum.IntEnum):
 #: Kinds that name things, and change nothing.
 NAMES = frozenset((Kind.CALLER, Kind.SUBSCRIBED, Kind.ADVERTISED, Kind.OFFERED))
 INPUTS = frozenset(kind for kind in Kind if kind < Kind.TIME)
-_DIFFERENCES = (int(Kind.MESSAGE), int(Kind.COLLECTED))
 
 
 UNCHECKED = -1  #: Value of a message that was published before its process died without the check.
@@ -169,7 +167,7 @@ def _places(heads: NDArray[Any], total: int) -> tuple[list[tuple[int, NDArray[An
     begins = total - np.cumsum(sizes)
     if (begins[-1] if len(begins) else total) != 0:
         raise ValueError("sizes do not add up")
-    is_message = np.isin(heads["kind"], _DIFFERENCES)
+    is_message = heads["kind"] == int(Kind.MESSAGE)
     keys = np.where(is_message, heads["number"].astype(np.int64) << 32 | sizes, 0)
     messages = [(int(sizes[keys == key][0]), begins[keys == key]) for key in np.unique(keys) if key]
     others = zip(begins[~is_message].tolist(), sizes[~is_message].tolist(), strict=True)

@@ -41,15 +41,12 @@ from crazyflie_utils.topics import (
 )
 
 _U64, _I64, _MOMENT = struct.Struct("<Q"), struct.Struct("<q"), struct.Struct("<d")
-SAME_COLLECTION = 0xFFFFFFFF  #: Value of `Kind.COLLECTED` for more messages of one collection.
 _LONGEST = 0xFFFFFFFF  #: Longest time between two inputs that is written (us).
 _LOOK_PERIOD = 10_000  #: Period of such looks at inputs (us).
 _CHECKED_TOGETHER = 64  #: Number of messages that are checked together.
 
 # Plain numbers: those of an enumeration take longer to pack.
-_TIMERS, _TIMER, _MESSAGE, _COLLECTED = map(
-    int, (Kind.TIMERS, Kind.TIMER, Kind.MESSAGE, Kind.COLLECTED)
-)
+_TIMERS, _TIMER, _MESSAGE = map(int, (Kind.TIMERS, Kind.TIMER, Kind.MESSAGE))
 _PUBLISHED, _CHECKED, _TIME, _WALL = map(int, (Kind.PUBLISHED, Kind.CHECKED, Kind.TIME, Kind.WALL))
 
 
@@ -355,7 +352,7 @@ class _Flag:
 
 
 class _RecordedSubscriber(ExternalSubscriber):
-    """A subscription; what comes while `collect` runs is passed on at once."""
+    """A subscription, whose messages are inputs."""
 
     def __init__(self, recorder: Recorder, number: int, plain: Any, deliver: Receiver):
         self.external: ExternalSubscriber
@@ -363,20 +360,12 @@ class _RecordedSubscriber(ExternalSubscriber):
         self._recorder, self._number = recorder, number
         self._plain_type, self._deliver = plain, deliver
         self._post = recorder.executor.post
-        self._is_collecting, self._empty = False, 0
         self._header: dict[str, str] | None = None
         self._origin = ORIGIN.pack(0)
 
     def receive(self, message: Any) -> None:
-        """Write a message and pass it on, in turn unless it was waiting."""
-        recorder = self._recorder
-        if self._is_collecting and recorder.executor._runner == get_ident():
-            data, message = self._written(message)
-            recorder.row(_COLLECTED, self._number, self._empty, data)
-            self._empty = SAME_COLLECTION
-            self._deliver(message)
-        else:
-            self._post(self._pass_on, message)
+        """Write a message and pass it on, in its turn."""
+        self._post(self._pass_on, message)
 
     def _pass_on(self, message):
         data, message = self._written(message)
@@ -403,17 +392,6 @@ class _RecordedSubscriber(ExternalSubscriber):
 
     def has_publishers(self) -> bool:
         return self.flag()
-
-    def collect(self) -> None:
-        if not self._recorder.executor.is_running_here:
-            self.external.collect()
-            return
-        self._is_collecting = True
-        try:
-            self.external.collect()
-        finally:
-            self._is_collecting = False
-            self._empty = 0 if self._empty == SAME_COLLECTION else self._empty + 1
 
     def close(self) -> None:
         self._recorder.flags.pop(self.flag.number, None)
@@ -493,6 +471,10 @@ class RecordingTransport(Transport):
         own.external = self._transport.subscribe(topic, keeping, own.receive, may_wait)
         own.flag = self._flag(own.external.has_publishers)
         return own
+
+    def collect(self) -> None:
+        """Deliver the messages that wait."""
+        self._transport.collect()
 
     def advertise_service(self, name: str, service_type: Any, serve: Serve) -> Callable[[], None]:
         """Offer a service; its calls come in turn."""

@@ -21,7 +21,6 @@ from crazyflie_utils.journal.journal_file import (
     received,
 )
 from crazyflie_utils.journal.recording import (
-    SAME_COLLECTION,
     Digest,
     keeps_data,
     plain_type,
@@ -122,11 +121,8 @@ class Rows:
         topic = "a topic that is not advertised now"
         if row.kind is Kind.PUBLISHED:
             topic = self.names[Kind.ADVERTISED].get(number, [topic])[0]
-        elif row.kind is Kind.COLLECTED:
-            topic = self.names[Kind.SUBSCRIBED].get(number, [topic])[0]
         texts = {
             Kind.PUBLISHED: f"it published on {topic}",
-            Kind.COLLECTED: f"it took a message that waited on {topic}",
             Kind.REQUESTED: "it called a service or set a parameter",
             Kind.VALUE: f"it read the value {text}",
             Kind.FILE: f"it read the file {text.partition(chr(10))[0]}",
@@ -168,11 +164,10 @@ class _Publisher(ExternalPublisher):
 
 
 class _Subscriber(ExternalSubscriber):
-    def __init__(self, rows: Rows, number: int, topic: str, types: tuple[Any, Any], flag: _Flag):
+    def __init__(self, rows: Rows, topic: str, types: tuple[Any, Any], flag: _Flag):
         self.topic = topic
         self.deliver: Receiver
-        self._rows, self._number, self._types, self._flag = rows, number, types, flag
-        self._empty = 0
+        self._rows, self._types, self._flag = rows, types, flag
 
     def message(self, row: Row) -> Any:
         """Return the message that a row has."""
@@ -184,19 +179,6 @@ class _Subscriber(ExternalSubscriber):
 
     def has_publishers(self) -> bool:
         return self._flag()
-
-    def collect(self) -> None:
-        expected, found = self._empty, False
-        while (
-            (row := self._rows.next) is not None
-            and row.kind is Kind.COLLECTED
-            and row.number == self._number
-            and row.value == expected
-        ):
-            self._rows.take()
-            expected, found = SAME_COLLECTION, True
-            self.deliver(self.message(row))
-        self._empty = 0 if found else self._empty + 1
 
     def close(self) -> None:
         pass
@@ -272,7 +254,7 @@ class ReplayTransport(Transport):
         number = len(self.subscribers) + 1
         self.rows.check_name(Kind.SUBSCRIBED, number, topic, message_type._type)
         types = plain_type(message_type), keeps_data(message_type)
-        own = self.subscribers[number] = _Subscriber(self.rows, number, topic, types, self._flag())
+        own = self.subscribers[number] = _Subscriber(self.rows, topic, types, self._flag())
         own.deliver = deliver
         return own
 

@@ -173,13 +173,6 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
     def _may_wait(self):
         return self._is_own() and all(callback.may_wait() for callback, _ in self.callbacks or ())
 
-    def collect(self) -> None:
-        """Deliver the messages that wait, in this thread; see `receiving.Reception`."""
-        # None after the last subscription has ended.
-        for connection in self.connections or ():
-            if (reception := getattr(connection, "reception", None)) is not None:
-                reception.collect()
-
     @override
     def has_connection(self, endpoint_id: str) -> bool:
         if "skip_self_connections" in self._patches and endpoint_id == rospy.get_node_uri():

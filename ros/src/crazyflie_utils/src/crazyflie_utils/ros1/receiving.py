@@ -39,6 +39,15 @@ _FLOOD_PERIOD = 0.005  #: Period in which one message of a flood is accepted (s)
 _MAX_READS = 16  #: Largest number of reads of a socket in one period: a flood never ends.
 PATIENCE = 0.15  #: Longest time for which messages wait to be collected (s).
 
+_waiting: "set[Reception]" = set()
+
+
+def collect_waiting() -> None:
+    """Deliver the messages that wait on any connection of the process, in this thread."""
+    # A copy: the connections' own threads add and remove theirs.
+    for reception in tuple(_waiting):
+        reception.collect()
+
 
 class RateLimiter:
     """Detects whether a connection is flooded (a leaky bucket)."""
@@ -174,8 +183,9 @@ class Reception:
     With ``limits_rate`` only the last message of every 5 ms is decoded in a flood of more than
     `MAX_RATE`; all of them, every 5 ms, of a message type with the attribute ``lossless``.
 
-    While ``may_wait()``, messages wait until `collect` is called or `PATIENCE` is over, unless they
-    come as a flood: a thread that wakes up for each of them takes as long as what it does.
+    While ``may_wait()``, messages wait until they are collected (before timers and service calls)
+    or `PATIENCE` is over, unless they come as a flood: a thread that wakes up for each of them
+    takes as long as what it does.
     """
 
     def __init__(
@@ -207,6 +217,7 @@ class Reception:
             # After a reconnection there is another socket.
             if self._inbox is None or self._inbox.sock is not connection.socket:
                 self._inbox = Inbox(connection, self._report)
+                _waiting.add(self)
         messages: list[genpy.Message] = []
         while not (messages or connection.done or rospy.core.is_shutdown()):
             if self._inbox.end is not None:
@@ -222,6 +233,7 @@ class Reception:
         with self._lock:
             inbox = self._inbox
             if inbox is None or inbox.end is not None or not self._is_waiting():
+                _waiting.discard(self)
                 return
             messages, has_more = inbox.collect()
             self._collected = time.monotonic()

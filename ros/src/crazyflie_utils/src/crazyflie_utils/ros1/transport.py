@@ -27,8 +27,9 @@ from crazyflie_utils.ros1.calls import (
     withdrawn,
 )
 from crazyflie_utils.ros1.master_watch import living_node
-from crazyflie_utils.ros1.own_topics import OwnCallback, OwnPublication, OwnSubscription
+from crazyflie_utils.ros1.own_topics import OwnCallback, OwnPublication
 from crazyflie_utils.ros1.patches import log_without_master, shield_screen_log
+from crazyflie_utils.ros1.receiving import collect_waiting
 from crazyflie_utils.topics import (
     Condition,
     ExternalPublisher,
@@ -81,12 +82,6 @@ class _RosSubscriber(ExternalSubscriber):
 
     def has_publishers(self) -> bool:
         return self._subscriber is not None and self._subscriber.get_num_connections() > 0
-
-    def collect(self) -> None:
-        own = self._subscriber and self._subscriber.impl
-        # Most topics have no publisher in another process.
-        if own and own.connections and isinstance(own, OwnSubscription):
-            own.collect()
 
     def close(self) -> None:
         self._run(lambda: self._subscriber and self._subscriber.unregister())
@@ -191,6 +186,10 @@ class RosTransport(Transport):
             return rospy.Subscriber(name, message_type, callback, tcp_nodelay=True)
 
         return _RosSubscriber(register, self._run)
+
+    def collect(self) -> None:
+        """Read the sockets in which messages wait."""
+        collect_waiting()
 
     def _run(self, work):
         """Do work that waits for the master: in order, from callbacks in a thread."""

@@ -63,7 +63,6 @@ class Transforms:
         self._subscriber: Subscriber | None = None
         self._listeners: dict[str, list[_Listener]] = {}
         self._arrived: list[_Listener] = []
-        self._sources: list[Callable[[], None]] = []
         # Each external broadcaster has a thread of its own.
         self._lock = threading.RLock()
 
@@ -99,14 +98,9 @@ class Transforms:
         if self._publisher is None:
             self._publisher = self._topics.publisher("/tf", TFMessage, latch=False)
 
-    def on_lookup(self, refresh: Callable[[], None]) -> None:
-        """Call ``refresh()`` before poses are looked up."""
-        self._sources.append(refresh)
-
     def has_pose_consumers(self) -> bool:
-        """Return whether poses are used when they are broadcast, not only by lookups here."""
-        own = int(self._subscriber is not None)
-        return bool(self._listeners) or self._publisher.has_subscribers(own)
+        """Return whether anybody, here or in other processes, uses the poses of a broadcaster."""
+        return self._publisher.has_subscribers()
 
     def _broadcast_poses(self, poses):
         # A message is made only if it is received outside of this class.
@@ -153,7 +147,6 @@ class Transforms:
             self._subscriber = self._topics.subscribe(
                 "/tf", TFMessage, self._on_transforms, RawTransforms, lambda: not self._listeners
             )
-            self.on_lookup(self._subscriber.collect)
             self._topics.subscribe("/tf_static", TFMessage, self._on_static)
 
     def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:
@@ -179,8 +172,6 @@ class Transforms:
 
     def lookup_pose(self, target: str, source: str, stamp: genpy.Time | None = None) -> StampedPose:
         """Return the result of `lookup` as a pose, which is quicker."""
-        for refresh in self._sources:
-            refresh()
         tree = self._tree
         if target not in tree.followed or source not in tree.followed:
             with self._lock:

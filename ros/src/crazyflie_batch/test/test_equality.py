@@ -16,8 +16,7 @@ from crazyflie_batch.simulation import coupled_7d, near_hover, quadrotor
 from crazyflie_lqr.gain_file import load_matrix
 
 SOFT = load_matrix(str(Path(RosPack().get_path("crazyflie_lqr"), "config", "K_soft.txt")), 4, 7)
-N = 11
-"""More than a group, and no whole number of groups."""
+N = 11  #: More than a group, and no whole number of groups.
 
 
 def numbers(low, high):

@@ -18,8 +18,7 @@ from crazyflie_reports.replay_program import journals_of, replay_all
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.tf.frame_tree import StampedPose, encode_poses
 
-POSE_PERIOD = 0.01
-"""Of the simulator, s; a soak from the command line has twice as many poses."""
+POSE_PERIOD = 0.01  #: Of the simulator, s; a soak from the command line has twice as many poses.
 
 
 @pytest.fixture(scope="module")

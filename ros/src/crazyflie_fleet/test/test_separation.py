@@ -57,11 +57,6 @@ def test_speed_counts():
     assert waiting(near, STILL, near[::-1])[0] == [False, False]
 
 
-def test_one_above_the_other_needs_more_distance():
-    above = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.5]])
-    assert waiting(above, STILL, above[::-1])[0] == [True, True]
-
-
 def test_who_waits_goes_on_only_with_some_more_distance():
     separation = Separation([0.15, 0.15])
     wanted = CLOSE[::-1]
@@ -73,9 +68,11 @@ def test_who_waits_goes_on_only_with_some_more_distance():
     assert not separation.update(far_enough, STILL, far_enough[::-1])[0].any()
 
 
-def test_who_is_not_seen_is_not_regarded():
-    unseen = np.array([[0.0, 0.0, 1.0], [np.nan] * 3])
-    assert waiting(unseen, STILL, unseen) == ([False, False], [])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_who_is_not_seen_is_not_regarded(axis):
+    unseen = CLOSE.copy()
+    unseen[1, axis] = np.nan
+    assert waiting(unseen, STILL, CLOSE[::-1]) == ([False, False], [])
 
 
 COORDINATE = st.floats(-3.0, 3.0)

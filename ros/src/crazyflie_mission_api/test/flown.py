@@ -10,8 +10,7 @@ import rospy
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_utils.testing import peer
 
-LIMIT = 120.0
-"""How long a script may take, s."""
+LIMIT = 120.0  #: How long a script may take, s.
 
 
 @contextlib.contextmanager

@@ -11,8 +11,7 @@ from crazyflie_model.dynamics import Coupled7D, rk4_step
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 
-STEP = 0.05
-"""From one control to the next, s."""
+STEP = 0.05  #: From one control to the next, s.
 
 
 class Flight(NamedTuple):

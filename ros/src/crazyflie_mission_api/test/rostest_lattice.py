@@ -17,8 +17,7 @@ from crazyflie_utils.testing import peer
 EXAMPLE = Path(rospkg.RosPack().get_path("crazyflie_mission_api")) / "examples/lattice.py"
 N = 16
 
-EVERY = 10
-"""Ticks of the simulation, of 10 ms, from one that is looked at to the next."""
+EVERY = 10  #: Ticks of the simulation, of 10 ms, from one that is looked at to the next.
 
 
 @contextlib.contextmanager

@@ -50,17 +50,6 @@ def test_what_is_between_buffers_and_release_would_be_held_for_ever():
         group(buffers={"cf1": 0.31, "cf2": 0.31})["cf1"].go_to((1.36, 0.0, 1.0))
 
 
-def test_ways_on_which_the_fleet_would_hold_a_vehicle_are_refused():
-    quick = Limits(speed=3.0, acceleration=3.0)
-    goal = {"cf1": (1.5, 0.0, 1.0)}
-    group(limits=quick).go_to(goal)
-    flying = group(limits=quick, buffers={"cf1": 0.15, "cf2": 0.15})
-    text = r"cf1 and cf2 would come near each other too fast, .* s from now: at .* m, and in 0.5 s"
-    with pytest.raises(MissionError, match=text):
-        flying.go_to(goal)
-    flying.go_to(goal, duration=6.0)
-
-
 def test_vehicles_on_the_ground_count_too():
     made = DryRun(STARTS)
     made["cf1"].takeoff(0.5)

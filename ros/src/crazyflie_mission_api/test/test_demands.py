@@ -25,8 +25,8 @@ def quadratic(a):
     return (0.0, 0.0, a / 2.0, *NOWHERE[3:])
 
 
+#: Accelerates by (1, 2, 2) m/s^2 and 0.5 rad/s^2 for 2 s.
 ALL_AXES = [PolynomialPiece(2.0, quadratic(1.0), quadratic(2.0), quadratic(2.0), quadratic(0.5))]
-"""Accelerates by (1, 2, 2) m/s^2 and 0.5 rad/s^2 for 2 s."""
 
 # At its end the velocity is (2, 4, 4), the thrust points along (1, 2, 2 + 9.81).
 BY_HAND = {

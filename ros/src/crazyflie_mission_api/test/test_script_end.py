@@ -7,8 +7,7 @@ import pytest
 from crazyflie_mission_api import MissionError
 from crazyflie_mission_api.script_end import ScriptEnd
 
-LIMIT = 10.0
-"""Of a wait for another thread, s."""
+LIMIT = 10.0  #: Of a wait for another thread, s.
 
 
 class Landing:

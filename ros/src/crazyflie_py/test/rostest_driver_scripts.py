@@ -10,8 +10,7 @@ from scripted import EXAMPLES, ctrl_c, fly, kill_node, run, run_until
 from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_utils.testing.programs import wait_until
 
-NEAR = 0.15
-"""m; the vehicles estimate their positions."""
+NEAR = 0.15  #: m; the vehicles estimate their positions.
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scripted import ctrl_c, fly, kill_node, run, run_until
 
-NEAR = 0.1
-"""m; the controllers follow a little behind."""
+NEAR = 0.1  #: m; the controllers follow a little behind.
 
 FAULTY = """
 from pycrazyswarm import Crazyswarm

@@ -14,8 +14,7 @@ import rospkg
 from crazyflie_utils.testing.programs import wait_until
 
 EXAMPLES = Path(rospkg.RosPack().get_path("crazyflie_py")) / "examples"
-LIMIT = 90.0
-"""Of a script, s."""
+LIMIT = 90.0  #: Of a script, s.
 
 TRACE = """
 import json, runpy, sys

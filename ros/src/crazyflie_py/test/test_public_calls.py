@@ -98,8 +98,7 @@ def test_no_public_call_is_missing_in_the_table(owner, calls):
     assert public == calls.keys()
 
 
-TURN = 0.5
-"""Of each setpoint below within a second, rad."""
+TURN = 0.5  #: Of each setpoint below within a second, rad.
 
 
 @pytest.mark.parametrize(

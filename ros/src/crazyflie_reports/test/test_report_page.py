@@ -12,11 +12,8 @@ from selenium.webdriver.chrome.service import Service
 
 from crazyflie_reports.bag_report import make
 
-LONGEST_WAIT = 60.0
-"""s, for what a loaded machine does in one."""
-
-SMALLEST_VEHICLE = 40.0
-"""px, from one propeller to the opposite one."""
+LONGEST_WAIT = 60.0  #: s, for what a loaded machine does in one.
+SMALLEST_VEHICLE = 40.0  #: px, from one propeller to the opposite one.
 
 
 @contextlib.contextmanager

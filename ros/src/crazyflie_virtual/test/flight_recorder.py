@@ -29,29 +29,14 @@ from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_virtual.body import STEP
 from crazyflie_virtual.crtp import Port
 
-MOMENT = 0.06
-"""s."""
-
-HEIGHT = 0.05
-"""m."""
-
-SPEED = 0.04
-"""m/s."""
-
-TURN = 2.0
-"""deg and deg/s."""
-
-TILT = 0.5
-"""deg."""
-
-PWM, PEAK = 500.0, 3000.0
-"""Of motor commands."""
-
-NEAR = 0.06
-"""Of a position of a trajectory, m."""
-
-TURNED = 5.0
-"""Of the heading in a trajectory, deg."""
+MOMENT = 0.06  #: s.
+HEIGHT = 0.05  #: m.
+SPEED = 0.04  #: m/s.
+TURN = 2.0  #: deg and deg/s.
+TILT = 0.5  #: deg.
+PWM, PEAK = 500.0, 3000.0  #: Of motor commands.
+NEAR = 0.06  #: Of a position of a trajectory, m.
+TURNED = 5.0  #: Of the heading in a trajectory, deg.
 
 _SAMPLE = 0.01
 _SUPERVISOR_PERIOD = 0.04

@@ -19,8 +19,8 @@ import pytest
 from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
+#: Time limit of an example (s); the longest takes 52 on a machine that does nothing else.
 LIMIT = 300.0
-"""Time limit of an example (s); the longest takes 52 on a machine that does nothing else."""
 
 
 class Expected(NamedTuple):

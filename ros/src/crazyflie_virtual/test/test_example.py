@@ -11,8 +11,7 @@ from crazyflie_utils.testing.programs import wait_until
 TOP = Path(__file__).resolve().parents[4]
 PROGRAM = TOP / "docs" / "examples" / "cflib_hover" / "hover.py"
 
-LIMIT = 60.0
-"""The program flies for 9 s."""
+LIMIT = 60.0  #: The program flies for 9 s.
 
 
 @pytest.fixture

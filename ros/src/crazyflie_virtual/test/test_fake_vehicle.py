@@ -10,8 +10,7 @@ from recording import recorded
 from crazyflie_virtual import ports
 from crazyflie_virtual.testing import FakeFlight, FakeVehicle
 
-LAG = 0.1
-"""After a recorded moment, s: the firmware's supervisor runs at 25 Hz."""
+LAG = 0.1  #: After a recorded moment, s: the firmware's supervisor runs at 25 Hz.
 
 
 def takeoff(duration=2.0, group=0):

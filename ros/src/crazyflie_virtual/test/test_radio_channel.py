@@ -12,8 +12,8 @@ from crazyflie_virtual.radio import (
     usage,
 )
 
+#: A frame of 20 vehicles: with its header, the type and two poses, or four positions.
 POSES, POSITIONS = (25,) * 10, (30,) * 5
-"""A frame of 20 vehicles: with its header, the type and two poses, or four positions."""
 
 
 def test_the_air_time_is_the_data_sheets():

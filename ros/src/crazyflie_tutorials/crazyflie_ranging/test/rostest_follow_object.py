@@ -10,8 +10,7 @@ from geometry_msgs.msg import PoseStamped
 from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_utils.testing import peer
 
-BOX_FRONT = 0.15
-"""From the box's middle, m."""
+BOX_FRONT = 0.15  #: From the box's middle, m.
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,7 @@ from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_utils.testing import peer
 
-WALL = 1.5
-"""Its x, m."""
+WALL = 1.5  #: Its x, m.
 
 
 def joy(forward=0.0, left=0.0, button=None):

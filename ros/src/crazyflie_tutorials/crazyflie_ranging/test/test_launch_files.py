@@ -16,8 +16,7 @@ LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_ranging")) / "launch"
 COMMON = {"obstacle_stop": ObstacleStopNode}
 FOLLOW = {**COMMON, "follow_object": FollowObjectNode}
 
-LIMIT = 60.0
-"""How long a launch may take to end, s."""
+LIMIT = 60.0  #: How long a launch may take to end, s.
 
 
 @pytest.mark.parametrize(

@@ -41,8 +41,7 @@ def test_cells_fill_the_area_when_their_width_does_not_divide_it():
     assert middles.max(axis=0) == pytest.approx((2.0 - 1.0 / 7, -1.0 / 8))
 
 
-PLAN = {"area/y_min": -1.0, "area/y_max": 1.0}
-"""Of the parameters, what is not the default."""
+PLAN = {"area/y_min": -1.0, "area/y_max": 1.0}  #: Of the parameters, what is not the default.
 
 START = (0.0, 0.0, 0.6)
 DT = 0.02

@@ -131,12 +131,6 @@ def test_vehicles_that_start_at_one_place_do_not_take_off(tmp_path):
     assert swarm.position("a")[2] == swarm.position("b")[2] == 0.0
 
 
-def test_all_cannot_go_to_one_place():
-    swarm = Swarm(fleet={"n": 2})
-    with pytest.raises(ServiceError, match="all vehicles cannot go to one place; expected relat"):
-        swarm.call("/all/go_to", go_to(1.0, relative=False))
-
-
 def test_missions_are_told_the_buffers(tmp_path):
     file = tmp_path / "fleet.yaml"
     file.write_text(

@@ -90,10 +90,11 @@ def test_trajectories_begin_at_the_same_moment(swarm):
     assert references[0].state.x_dot == references[1].state.x_dot > 0.1
 
 
-def test_vehicles_cannot_all_go_to_one_place(swarm):
+@pytest.mark.parametrize("service", ["/all/go_to", "/all/high_level/go_to"])
+def test_vehicles_cannot_all_go_to_one_place(swarm, service):
     request = srv.GoToRequest(0, False, Point(0.0, 0.0, 1.0), 0.0, seconds(2.0))
-    with pytest.raises(ServiceError, match="/all/high_level/go_to refused: all vehicles cannot go"):
-        swarm.call("/all/high_level/go_to", request)
+    with pytest.raises(ServiceError, match=f"{service} refused: all vehicles cannot go to one pl"):
+        swarm.call(service, request)
 
 
 def test_refusals_name_the_vehicles(swarm):

@@ -78,6 +78,31 @@ class Flight:
     def followed(self, name):
         return self.process.published(f"/{name}/ref_safe")
 
+    @property
+    def reference(self):
+        """The last one of cf1."""
+        return self.followed("cf1")[-1].state
+
+    @property
+    def waiting(self):
+        """Names of the vehicles that are held."""
+        return self.process.published("/fleet/waiting")[-1].data
+
+    def hold(self):
+        """Refer cf1 to a place too near to cf2, until it is held at y = 0.8 m."""
+        self.want("cf1", 0.9)
+        self.see("cf1", 0.8)
+        self.process.advance(0.06)
+
+    def hold_in_a_move(self):
+        """Hold cf1 at y = 0.8 m, in a move to a place too near to cf2."""
+        self.go_to(goal=(0.0, 0.9, 1.0), seconds=4.0)
+        self.process.advance(2.6)
+        assert self.reference.y_dot > 0.3
+        self.see("cf1", 0.8)
+        self.process.advance(0.06)
+        assert self.waiting == "cf1"
+
 
 @pytest.fixture
 def flight():
@@ -91,7 +116,7 @@ def test_references_pass_as_they_are(flight):
     assert to_tuple(followed.state) == (*to_tuple(wanted.state), 0.0)
     invalid = PositionVelocityStateStamped(state=PositionVelocityState(x=math.nan))
     flight.process.publish("/cf1/ref", invalid)
-    assert math.isnan(flight.followed("cf1")[-1].state.x)
+    assert math.isnan(flight.reference.x)
 
 
 def test_the_first_value_is_published_as_others_may_have_an_old_one(flight):
@@ -101,14 +126,12 @@ def test_the_first_value_is_published_as_others_may_have_an_old_one(flight):
 
 
 def test_who_would_come_too_close_waits_where_it_is(flight):
-    flight.want("cf1", 0.9)
-    flight.see("cf1", 0.8)
-    flight.process.advance(0.06)
+    flight.hold()
     held = flight.followed("cf1")[-1]
     assert (held.state.y, held.state.y_dot) == (0.8, 0.0)
     flight.want("cf1", 0.95)
     assert flight.followed("cf1")[-1] is held
-    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    assert flight.waiting == "cf1"
     assert flight.process.logged("warn") == [
         "/fleet/references: cf1 and cf2 are 0.20 m apart and must not come closer than 0.30 m: "
         "a vehicle whose reference approaches the other is held"
@@ -117,11 +140,9 @@ def test_who_would_come_too_close_waits_where_it_is(flight):
 
 def test_who_is_flown_elsewhere_is_kept_apart_from():
     flight = Flight(own=1)
-    flight.want("cf1", 0.9)
-    flight.see("cf1", 0.8)
-    flight.process.advance(0.06)
-    assert flight.followed("cf1")[-1].state.y == 0.8
-    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    flight.hold()
+    assert flight.reference.y == 0.8
+    assert flight.waiting == "cf1"
     assert "/cf2/go_to" not in flight.process.transport.services
 
 
@@ -139,11 +160,11 @@ def test_a_vehicle_in_flight_that_is_not_seen_any_more_is_reported(flight):
     # They do, and do not take it for one that goes on with its last speed.
     flight.see("cf1", 0.4)
     flight.process.advance(0.1)
-    assert flight.followed("cf1")[-1].state.y == 0.3
+    assert flight.reference.y == 0.3
     flight.want("cf1", 0.95)
     flight.see("cf1", 0.75)
     flight.process.advance(0.1)
-    assert flight.followed("cf1")[-1].state.y == 0.75
+    assert flight.reference.y == 0.75
 
 
 def test_a_vehicle_on_the_ground_may_be_silent(flight):
@@ -158,7 +179,7 @@ def test_a_way_begins_where_the_vehicle_was(flight):
     flight.process.advance(1.0)
     flight.see("cf1", 0.1)
     flight.process.advance(0.02)
-    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.25, abs=0.02)
+    assert flight.reference.y == pytest.approx(0.25, abs=0.02)
 
 
 def test_a_vehicle_that_was_never_seen_is_reported():
@@ -176,11 +197,11 @@ def test_a_way_stands_still_while_its_vehicle_is_not_seen(flight):
     flight.process.advance(0.5)
     flight.silence("cf1")
     flight.process.advance(3.0)
-    before = flight.followed("cf1")[-1].state.y
+    before = flight.reference.y
     assert before < 0.3
     flight.see("cf1", before)
     flight.process.advance(0.02)
-    assert flight.followed("cf1")[-1].state.y == pytest.approx(before, abs=0.02)
+    assert flight.reference.y == pytest.approx(before, abs=0.02)
 
 
 def test_states_of_many_come_in_one_message():
@@ -197,35 +218,31 @@ def test_states_of_many_come_in_one_message():
 
 
 def test_it_goes_on_when_there_is_room(flight):
-    flight.want("cf1", 0.9)
-    flight.see("cf1", 0.8)
-    flight.process.advance(0.06)
+    flight.hold()
     flight.see("cf2", 2.0)
     flight.process.advance(0.06)
     again = flight.followed("cf1")[-1]
     assert again.state.y == 0.9
     assert again.header.stamp > flight.followed("cf1")[0].header.stamp
-    assert flight.process.published("/fleet/waiting")[-1].data == ""
+    assert flight.waiting == ""
 
 
 def test_a_way_back_is_open(flight):
-    flight.want("cf1", 0.9)
-    flight.see("cf1", 0.8)
-    flight.process.advance(0.06)
+    flight.hold()
     flight.want("cf1", 0.0)
     flight.process.advance(0.06)
-    assert flight.followed("cf1")[-1].state.y == 0.0
+    assert flight.reference.y == 0.0
 
 
 def test_go_to(flight):
     flight.want("cf1", 0.0)
     flight.go_to(goal=(0.0, 0.5, 1.0), seconds=2.0)
     flight.process.advance(1.0)
-    middle = flight.followed("cf1")[-1].state
+    middle = flight.reference
     assert (middle.y, middle.z) == (pytest.approx(0.25, abs=0.01), 1.0)
     assert middle.y_dot == pytest.approx(0.5 / 2.0 * 35.0 / 16.0, abs=0.01)
     flight.process.advance(1.1)
-    end = flight.followed("cf1")[-1].state
+    end = flight.reference
     assert (end.y, end.y_dot) == (pytest.approx(0.5), 0.0)
     assert len(flight.followed("cf1")) == pytest.approx(101, abs=1)
 
@@ -240,53 +257,42 @@ def test_a_move_goes_on_where_its_references_come_late(flight):
 
     flight.process.executor.submit(move_and_follow)
     flight.process.advance(2.1)
-    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.5)
+    assert flight.reference.y == pytest.approx(0.5)
 
 
 def test_a_way_in_a_move_begins_as_the_move_is(flight):
     flight.go_to(goal=(0.0, 0.5, 1.0), seconds=2.0)
     flight.process.advance(1.0)
-    before = flight.followed("cf1")[-1].state
+    before = flight.reference
     flight.see("cf1", before.y)
     flight.go_to(goal=(0.3, 0.25, 1.0), seconds=3.0)
     flight.process.advance(0.02)
-    after = flight.followed("cf1")[-1].state
+    after = flight.reference
     assert before.y_dot == pytest.approx(0.547, abs=0.01)
     assert after.y_dot == pytest.approx(before.y_dot, abs=0.01)
     assert after.y == pytest.approx(before.y + 0.02 * before.y_dot, abs=1e-3)
     for _ in range(10):
         flight.process.advance(0.3)
-        flight.see("cf1", flight.followed("cf1")[-1].state.y)
-    end = flight.followed("cf1")[-1].state
+        flight.see("cf1", flight.reference.y)
+    end = flight.reference
     assert (end.x, end.y) == (pytest.approx(0.3), pytest.approx(0.25))
     assert (end.x_dot, end.y_dot) == (0.0, 0.0)
 
 
 def test_a_way_after_a_hold_begins_at_rest(flight):
-    flight.go_to(goal=(0.0, 0.9, 1.0), seconds=4.0)
-    flight.process.advance(2.6)
-    assert flight.followed("cf1")[-1].state.y_dot > 0.3
-    # Too near: it waits where it is.
-    flight.see("cf1", 0.8)
-    flight.process.advance(0.06)
-    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    flight.hold_in_a_move()
     flight.go_to(goal=(0.0, 0.0, 1.0), seconds=2.0)
     flight.process.advance(0.12)
-    assert flight.process.published("/fleet/waiting")[-1].data == ""
-    assert abs(flight.followed("cf1")[-1].state.y_dot) < 0.05
+    assert flight.waiting == ""
+    assert abs(flight.reference.y_dot) < 0.05
 
 
 def test_a_move_that_was_held_goes_on_at_rest_from_the_place_where_it_was_held(flight):
-    flight.go_to(goal=(0.0, 0.9, 1.0), seconds=4.0)
-    flight.process.advance(2.6)
-    assert flight.followed("cf1")[-1].state.y_dot > 0.3
-    flight.see("cf1", 0.8)
-    flight.process.advance(0.06)
-    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    flight.hold_in_a_move()
     before = len(flight.followed("cf1"))
     flight.see("cf2", 3.0)
     flight.process.advance(3.0)
-    assert flight.process.published("/fleet/waiting")[-1].data == ""
+    assert flight.waiting == ""
     # References that went on where they had stopped, at their speed, would pull it with a jerk.
     references = [each.state for each in flight.followed("cf1")[before:]]
     assert (references[0].y, references[0].y_dot) == (0.8, 0.0)
@@ -296,18 +302,14 @@ def test_a_move_that_was_held_goes_on_at_rest_from_the_place_where_it_was_held(f
 
 
 def test_a_way_back_is_open_also_for_a_vehicle_that_has_not_come_to_rest(flight):
-    flight.go_to(goal=(0.0, 0.9, 1.0), seconds=4.0)
-    flight.process.advance(2.6)
-    flight.see("cf1", 0.8)
-    flight.process.advance(0.06)
-    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    flight.hold_in_a_move()
     # It overshoots the place where it is held, and then rests a little behind it.
     flight.see("cf1", 0.82)
     before = len(flight.followed("cf1"))
     flight.go_to(goal=(0.0, 0.0, 1.0), seconds=4.0)
     flight.see("cf1", 0.79)
     flight.process.advance(5.0)
-    assert flight.process.published("/fleet/waiting")[-1].data == ""
+    assert flight.waiting == ""
     references = [each.state.y for each in flight.followed("cf1")[before:]]
     # The way back begins at the place where it is held, not nearer to the other vehicle.
     assert max(references) <= 0.8
@@ -321,26 +323,22 @@ def test_setpoints_after_a_move_are_followed_again_after_a_hold(flight):
     for _ in range(5):
         flight.process.publish("/cf1/high_level/cmd_position", Position(y=0.9, z=1.0))
         flight.process.advance(0.1)
-    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    assert flight.waiting == "cf1"
     flight.see("cf2", 3.0)
     flight.process.publish("/cf1/high_level/cmd_position", Position(y=0.9, z=1.0))
     flight.process.advance(0.1)
-    assert flight.process.published("/fleet/waiting")[-1].data == ""
-    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.9)
+    assert flight.waiting == ""
+    assert flight.reference.y == pytest.approx(0.9)
     assert flight.process.logged("error") == []
 
 
 def test_a_refused_command_during_a_hold_changes_nothing(flight):
-    flight.go_to(goal=(0.0, 0.9, 1.0), seconds=4.0)
-    flight.process.advance(2.6)
-    flight.see("cf1", 0.8)
-    flight.process.advance(0.06)
-    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    flight.hold_in_a_move()
     with pytest.raises(ServiceError, match="one of the numbers is nan"):
         flight.go_to(goal=(math.nan, 0.0, 1.0))
     flight.see("cf2", 3.0)
     flight.process.advance(3.0)
-    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.9)
+    assert flight.reference.y == pytest.approx(0.9)
 
 
 def test_a_way_of_a_vehicle_that_is_elsewhere_begins_with_its_velocity(flight):
@@ -348,7 +346,7 @@ def test_a_way_of_a_vehicle_that_is_elsewhere_begins_with_its_velocity(flight):
     flight.see("cf1", -0.5, y_dot=0.4)
     flight.go_to(goal=(0.0, -0.5, 1.0), seconds=3.0)
     flight.process.advance(0.02)
-    assert flight.followed("cf1")[-1].state.y_dot == pytest.approx(0.4, abs=0.01)
+    assert flight.reference.y_dot == pytest.approx(0.4, abs=0.01)
 
 
 def test_a_way_that_cannot_be_braked_for_is_refused(flight):
@@ -388,7 +386,7 @@ def test_a_vehicle_that_the_fleet_lands_starts_no_trajectory(flight):
     flight.process.publish("/fleet/landing", String("cf1"))
     flight.process.publish("/all/start_trajectory", String("/cf1/high_level"))
     flight.process.advance(1.0)
-    assert flight.followed("cf1")[-1].state.y == 0.0
+    assert flight.reference.y == 0.0
     assert flight.process.logged("error") == [
         "/cf1/high_level: not done: the fleet is landing the vehicle; it takes no commands"
     ]
@@ -423,28 +421,28 @@ def test_go_to_is_refused(flight):
 def test_references_without_a_heading_keep_it_and_moves_turn(flight):
     flight.see("cf1", 0.0, yaw=0.5)
     flight.want("cf1", 0.1)
-    assert flight.followed("cf1")[-1].state.yaw == 0.5
+    assert flight.reference.yaw == 0.5
     # Not what is measured a moment later.
     flight.see("cf1", 0.0, yaw=0.6)
     flight.want("cf1", 0.0)
-    assert flight.followed("cf1")[-1].state.yaw == 0.5
+    assert flight.reference.yaw == 0.5
     flight.go_to(goal=(0.0, 0.3, 1.0), seconds=2.0, yaw=-0.5)
     flight.process.advance(1.0)
-    assert flight.followed("cf1")[-1].state.yaw == pytest.approx(0.0, abs=0.02)
+    assert flight.reference.yaw == pytest.approx(0.0, abs=0.02)
     flight.process.advance(1.1)
-    assert flight.followed("cf1")[-1].state.yaw == pytest.approx(-0.5)
+    assert flight.reference.yaw == pytest.approx(-0.5)
     flight.go_to(goal=(0.0, 0.0, 1.0), seconds=2.0, yaw=math.nan)
     flight.process.advance(2.1)
-    assert flight.followed("cf1")[-1].state.yaw == pytest.approx(-0.5)
+    assert flight.reference.yaw == pytest.approx(-0.5)
     flight.want("cf1", 0.1)
-    assert flight.followed("cf1")[-1].state.yaw == pytest.approx(-0.5)
+    assert flight.reference.yaw == pytest.approx(-0.5)
     # The next flight keeps the heading that the vehicle has then.
     flight.process.publish("/cf1/in_flight_flight_status", flight_status("ON_GROUND"))
     flight.see("cf1", 0.0, yaw=1.0)
     flight.process.advance(0.1)
     flight.process.publish("/cf1/in_flight_flight_status", flight_status("TAKING_OFF"))
     flight.want("cf1", 0.0)
-    assert flight.followed("cf1")[-1].state.yaw == 1.0
+    assert flight.reference.yaw == 1.0
 
 
 def test_a_vehicle_whose_model_has_no_yaw_refuses_one():
@@ -464,7 +462,7 @@ def test_a_vehicle_whose_model_has_no_yaw_keeps_its_heading_by_setpoints():
         name = type(setpoint).__name__
         topic = {"FullState": "full_state"}.get(name, name.lower())
         flight.process.publish(f"/cf1/high_level/cmd_{topic}", setpoint)
-        assert flight.followed("cf1")[-1].state.yaw == 0.0
+        assert flight.reference.yaw == 0.0
     assert len(flight.followed("cf1")) == 3
 
 
@@ -474,13 +472,13 @@ def test_both_services_fly_the_same_move():
         flight = Flight()
         flight.go_to(goal=(0.0, 0.5, 1.0), seconds=4.0, yaw=0.4)
         flight.process.advance(1.5)
-        flight.see("cf1", flight.followed("cf1")[-1].state.y)
+        flight.see("cf1", flight.reference.y)
         # In the move, back: it brakes first.
         request = GoToRequest(0, False, Point(0.0, -0.5, 1.0), -0.4, rospy.Duration(6.0))
         flight.process.call(f"/cf1/{service}", request)
         for _ in range(31):
             flight.process.advance(0.2)
-            flight.see("cf1", flight.followed("cf1")[-1].state.y)
+            flight.see("cf1", flight.reference.y)
         flown.append([to_tuple(each.state) for each in flight.followed("cf1")])
     assert flown[0] == flown[1]
     assert flown[0][-1] == pytest.approx((0.0, -0.5, 1.0, 0.0, 0.0, 0.0, -0.4))
@@ -492,5 +490,5 @@ def test_a_move_by_which_the_fleet_lands_a_vehicle_follows_its_takeoff(flight):
     flight.go_to(goal=(0.0, 0.5, 1.0), seconds=3.0)
     flight.process.publish("/cf1/in_flight_flight_status", flight_status("FLYING"))
     flight.process.advance(3.5)
-    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.5)
+    assert flight.reference.y == pytest.approx(0.5)
     assert flight.process.logged("error") == []

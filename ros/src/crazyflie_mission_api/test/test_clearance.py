@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from crazyflie_fleet.separation import RELEASE_RATIO, Separation
-from crazyflie_mission_api import DryRun, Limits, MissionError
+from crazyflie_mission_api import DryRun, MissionError
 from crazyflie_mission_api.group_state import Rules
 from crazyflie_mission_api.limits import Clearance
 

@@ -24,20 +24,11 @@ LIMIT = 300.0
 
 
 class Expected(NamedTuple):
-    """Output of an example (regular expressions), and its effect.
-
-    Attributes
-    ----------
-    output : tuple of str
-    peak : tuple of float
-        Range of the vehicle's greatest height, m.
-    end : tuple of float, optional
-        Where it is at the end, x and y, m.
-    """
+    """Output of an example (regular expressions), and its effect."""
 
     output: tuple[str, ...] = ()
-    peak: tuple[float, float] = (0.0, 0.0)
-    end: tuple[float, float] | None = None
+    peak: tuple[float, float] = (0.0, 0.0)  #: Range of the vehicle's greatest height (m).
+    end: tuple[float, float] | None = None  #: Where it is at the end, x and y (m).
 
 
 # The methods of cflib that they call are tested in test_cflib.py.

@@ -26,6 +26,7 @@ import psutil
 import rosgraph
 import socketio
 
+from crazyflie_reports.node_graph import FLYING
 from crazyflie_utils.testing.launching import master, roslaunch
 from crazyflie_utils.testing.programs import running
 
@@ -107,15 +108,8 @@ def start() -> Figures:
     return {"start": statistics.median(times[1:])}
 
 
-_SEPARATE = (
-    "/simulator",
-    "/state_estimator",
-    "/lqr_controller",
-    "/takeoff_server",
-    "/takeoff_control_filter",
-)
 #: Name of a hover -> nodes and launch arguments.
-HOVERS = {"separate": (_SEPARATE, ()), "composed": (("/composed",), ("composed:=true",))}
+HOVERS = {"separate": (sorted(FLYING), ()), "composed": (("/composed",), ("composed:=true",))}
 
 
 def hover(name: str) -> Figures:

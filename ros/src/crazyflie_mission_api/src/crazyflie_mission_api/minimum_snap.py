@@ -36,19 +36,9 @@ def plan(
 ) -> list[PolynomialPiece]:
     """Return the trajectory from rest at the first waypoint to rest at the last one.
 
-    Parameters
-    ----------
-    waypoints : sequence of [x, y, z] or [x, y, z, yaw]
-        At least two, m and rad; without a yaw, a waypoint has that of the one before, or 0.
-    limits : Limits, optional
-        The trajectory is as fast as they allow.
-    what : str
-        Name of a waypoint in errors.
-
-    Raises
-    ------
-    MissionError
-        There are too few waypoints, one is invalid, or two in a row are the same.
+    It is as fast as the limits allow. A waypoint is x, y, z (m) or x, y, z, yaw (rad); without a
+    yaw it has that of the one before, or 0. `MissionError`: there are fewer than two, one is
+    invalid, or two in a row are the same; ``what`` is the name of a waypoint in it.
     """
     points = _points(waypoints, what)
     return within_limits(_pieces(points, best_times(points)), limits or Limits())

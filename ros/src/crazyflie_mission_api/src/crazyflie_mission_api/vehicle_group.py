@@ -175,12 +175,7 @@ class VehicleGroup(GroupState):
     ) -> dict[str, tuple[float, float, float]]:
         """Fly to places without collisions; return the place of each vehicle, m.
 
-        Parameters
-        ----------
-        places : array_like, shape (n, 3)
-            As many as vehicles, m.
-        duration, wait
-            As for `go_to`.
+        The places, shape (n, 3), m, are as many as vehicles. For the others see `go_to`.
         """
         goals = [point(place, f"formation: place {k}") for k, place in enumerate(places, start=1)]
         if len(goals) != len(self._vehicles):

@@ -81,16 +81,9 @@ class ScriptCommands:
         return mask
 
     def takeoff(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
-        """Fly straight up to a height in a duration; returns at once.
+        """Fly straight up to a height (z in the world frame, m) in a duration (s).
 
-        Parameters
-        ----------
-        targetHeight : float
-            z in the world frame, m.
-        duration : float
-            s.
-        groupMask : int
-            0, or the groups of the command; see `Crazyflie.setGroupMask`.
+        It returns at once. A mask is 0, or the groups of the command; see `Crazyflie.setGroupMask`.
         """
         self._climb("takeoff", targetHeight, duration, groupMask, flies=True)
 
@@ -162,12 +155,7 @@ class ScriptCommands:
     def notifySetpointsStop(self, remainValidMillisecs: int = 100, groupMask: int = 0) -> None:
         """Return from setpoints (cmd...) to commands such as `land`.
 
-        Parameters
-        ----------
-        remainValidMillisecs : int
-            Time for which the last setpoint remains valid, ms.
-        groupMask : int
-            See `Crazyflie.setGroupMask`.
+        The last setpoint remains valid for a time (ms). For masks see `Crazyflie.setGroupMask`.
         """
         where = self._where("notifySetpointsStop")
         remain = check.integer(where, "remainValidMillisecs", remainValidMillisecs, 0, 2**31 - 1)
@@ -240,15 +228,10 @@ class Crazyflie(ScriptCommands):
         self._go_to(goal, yaw, duration, relative, groupMask)
 
     def uploadTrajectory(self, trajectoryId: int, pieceOffset: int, trajectory: Trajectory) -> None:
-        """Write a trajectory into the vehicle's memory.
+        """Write a trajectory into the vehicle's memory, under a number for `startTrajectory`.
 
-        Parameters
-        ----------
-        trajectoryId : int
-            Number for `startTrajectory`.
-        pieceOffset : int
-            Pieces of other trajectories before it in the memory, which has room for 31.
-        trajectory : uav_trajectory.Trajectory
+        The offset is the number of pieces of other trajectories before it in the memory, which has
+        room for 31.
         """
         where = self._where("uploadTrajectory")
         number = check.byte(where, "trajectoryId", trajectoryId)

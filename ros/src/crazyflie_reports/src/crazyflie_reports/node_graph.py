@@ -20,15 +20,15 @@ Registrations = list[tuple[str, list[str]]]
 
 HIDDEN_TOPICS = ("/rosout", "/rosout_agg", "/clock", "/tf_static")
 HIDDEN_NODES = {"/rosout"}
-#: Nodes of the software example.
-EXAMPLE = {
+#: Nodes that fly the vehicle of the software example, and all of it.
+FLYING = {
     "/simulator",
     "/state_estimator",
     "/lqr_controller",
     "/takeoff_server",
     "/takeoff_control_filter",
-    "/robot_base_link_publisher",
 }
+EXAMPLE = {*FLYING, "/robot_base_link_publisher"}
 
 _LIMIT = 60.0
 

@@ -18,6 +18,7 @@ from crazyflie_reports.flight_record import (
     Series,
     gaps,
 )
+from crazyflie_utils.flight_status import WORDS
 
 Rows = NDArray[np.float64]
 
@@ -31,13 +32,7 @@ PAUSE = 1.0  #: Time without thrust after which a flight has ended (s).
 LIFT = 0.1  #: Height above the lowest pose from which a vehicle with poses only is in flight (m).
 MARGIN = 1.0  #: Time before and after a flight that is shown (s).
 
-PHASES = {
-    FlightStatus.UNKNOWN: "unknown",
-    FlightStatus.TAKING_OFF: "taking off",
-    FlightStatus.FLYING: "flying",
-    FlightStatus.DESCENDING: "descending",
-    FlightStatus.LANDING: "landing",
-}
+PHASES = {**WORDS, FlightStatus.UNKNOWN: "unknown"}
 
 
 @dataclass

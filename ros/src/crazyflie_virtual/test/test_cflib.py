@@ -102,12 +102,6 @@ def test_memories(connected):
     assert done.wait(LIMIT)
     content = b"".join(bytes(piece.pack()) for piece in pieces)
     assert bytes(vehicle.board.firmware.planner.memory[: len(content)]) == content
-    (eeprom,) = client.cf.mem.get_mems(MemoryElement.TYPE_I2C)
-    read = threading.Event()
-    eeprom.update(lambda _: read.set())
-    assert read.wait(LIMIT)
-    assert eeprom.valid
-    assert eeprom.elements["radio_address"] == 0xE7E7E7E7E7
 
 
 def test_hover_with_the_high_level_commander(connect):

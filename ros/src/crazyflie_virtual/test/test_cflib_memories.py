@@ -67,6 +67,7 @@ def test_configuration_memory_is_read_and_written(connected):
         updated.wait_for()
         assert eeprom.valid
         assert eeprom.elements["radio_channel"] == expected
+        assert eeprom.elements["radio_address"] == 0xE7E7E7E7E7
         eeprom.elements["radio_channel"] = new
         eeprom.write_data(written)
         written.wait_for()

@@ -1,4 +1,4 @@
-"""Log blocks, byte by byte, and the table of variables."""
+"""Log blocks, byte by byte, and the table of variables; errors are in test_recorded_wire.py."""
 
 import errno
 import struct
@@ -51,6 +51,7 @@ def test_table_tells_its_limits(bench):
     info = bench.ask_one(Port.LOG, TABLE, b"\x03")
     assert len(info) == 9
     assert info[-2:] == b"\x10\x80"
+    assert bench.ask(Port.LOG, CONTROL, b"") == []
 
 
 @pytest.mark.parametrize("name", LOGGED_BY_USERS)
@@ -131,24 +132,3 @@ def test_values_are_converted_to_the_type_that_is_asked_for(bench):
 )
 def test_whole_numbers_keep_their_low_bytes(stored, value, code, sent):
     assert packed(value, stored, LOG_TYPES[code]) == sent
-
-
-def test_errors(bench):
-    acc_x = index(bench, "acc.x")
-    assert control(bench, 6, 1, *acc_x)[2] == 0
-    assert control(bench, 6, 1, *acc_x)[2] == errno.EEXIST
-    assert control(bench, 6, 2, 7, 0xFF, 0xFF)[2] == errno.ENOENT
-    assert control(bench, 6, 3, *acc_x * 7)[2] == errno.E2BIG
-    assert control(bench, 7, 9, *acc_x)[2] == errno.ENOENT
-    assert control(bench, 42, 1)[2] == errno.ENOEXEC
-    assert bench.ask(Port.LOG, CONTROL, b"") == []
-
-
-def test_limits_of_blocks_and_variables(bench):
-    flag = index(bench, "sys.canfly")
-    for block in range(16):
-        assert control(bench, 6, block, *flag * 8)[2] == 0
-    assert control(bench, 6, 16, *flag)[2] == errno.ENOMEM
-    assert control(bench, 7, 0, *flag)[2] == errno.ENOMEM
-    control(bench, 5, 0)
-    assert control(bench, 6, 16, *flag)[2] == 0

@@ -10,8 +10,9 @@ from std_srvs.srv import EmptyRequest
 
 from crazyflie_driver.srv import GoToRequest
 from crazyflie_fleet import landing
-from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import ServiceError
+from crazyflie_utils.flight_status import WORDS
 
 
 class Tower(Swarm):
@@ -60,7 +61,8 @@ class Tower(Swarm):
         return self.states()
 
     def states(self):
-        return [self.process.published(f"/cf{k}/in_flight_state")[-1].data for k in (1, 2, 3, 4)]
+        topics = [f"/cf{k}/in_flight_flight_status" for k in (1, 2, 3, 4)]
+        return [WORDS[self.process.published(topic)[-1].state] for topic in topics]
 
 
 def test_vehicles_above_each_other_do_not_land_on_each_other():
@@ -107,9 +109,10 @@ def test_a_vehicle_that_lands_by_itself_lands_beside_those_beneath_it(end):
     tower = Tower((0.7, 1.35, 2.0))
     tower.mark()
     end(tower)
-    states = [tower.process.published(f"/cf{k}/in_flight_state")[-1].data for k in (1, 2, 3)]
-    down = ["on_ground" if end is end_launch else "flying", "on_ground", "on_ground"]
-    assert states == down
+    down = [WORDS[FlightStatus.ON_GROUND]] * 3
+    if end is not end_launch:
+        down[0] = "flying"
+    assert tower.states()[:3] == down
     assert tower.nearest() > 0.3
     assert tower.position("cf1")[:2] == pytest.approx((-0.5, -0.5), abs=0.05)
 
@@ -148,7 +151,7 @@ def test_vehicles_of_a_mission_that_has_died_are_landed():
     tower.process.publish("/all/mission", String("m2 cf4"))
     tower.process.publish("/all/mission", String("m2"))
     assert tower.lands(4.0) == ["flying"] * 4
-    down = ["on_ground"] * 3 + ["flying"]
+    down = [WORDS[FlightStatus.ON_GROUND]] * 3 + ["flying"]
     tower.advance_until(lambda: tower.states() == down, 60.0)
     assert tower.states() == down
     assert tower.nearest() > 0.3

@@ -182,8 +182,9 @@ def test_if_one_refuses_against_its_word_the_others_land_again(swarm):
     with pytest.raises(ServiceError, match=text):
         swarm.call("/takeoff_all", seconds=20.0)
     assert swarm.heights() == pytest.approx([0.0, 0.0, 0.0], abs=0.02)
-    states = [swarm.process.published(f"/cf{k}/in_flight_state")[-1].data for k in (1, 2, 3)]
-    assert states == ["on_ground"] * 3
+    topics = [f"/cf{k}/in_flight_flight_status" for k in (1, 2, 3)]
+    states = [swarm.process.published(topic)[-1].state for topic in topics]
+    assert states == [FlightStatus.ON_GROUND] * 3
 
 
 def test_a_vehicle_that_has_not_begun_does_not_fly(swarm):

@@ -252,16 +252,6 @@ def test_who_does_not_fly_does_not_begin(bench):
     assert bench.process.logged("error") == [f"{TOP}: not started: the vehicle is on the ground"]
 
 
-def test_the_text_of_a_server_without_flight_status_is_read():
-    bench = Bench(**{"topics/flight_state": "in_flight_state"})
-    bench.see((0.0, 0.0, 1.0))
-    with pytest.raises(ServiceError, match="the vehicle is not known to fly; expected it to fly"):
-        bench.go_to((1.0, 0.0, 1.0))
-    bench.process.publish("/cf1/in_flight_state", String("flying"))
-    bench.go_to((1.0, 0.0, 1.0))
-    assert bench.fly(3.0)[-1][0] == pytest.approx(1.0)
-
-
 def test_the_servers_hover_point_is_replaced_by_one_above_the_vehicle(bench):
     bench.be("on_ground", (2.0, 0.0, 0.1))
     bench.call("takeoff", srv.Takeoff, 0, 0.5, SECONDS(2.0))

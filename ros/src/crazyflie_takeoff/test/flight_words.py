@@ -1,8 +1,17 @@
 """The log of a network of processes, for the tests of whole flights."""
 
+import itertools
+
+from takeoff_helpers import text_of
+
+
+def texts(messages):
+    """Return texts and states that differ from the one before."""
+    return [text for text, _ in itertools.groupby(map(text_of, messages))]
+
 
 def states(network):
-    return [message.data for _, message in network.on("/in_flight_state")]
+    return texts(message for _, message in network.on("/in_flight_flight_status"))
 
 
 def thrusts(network, since=0.0, topic="/control/final"):
@@ -10,9 +19,9 @@ def thrusts(network, since=0.0, topic="/control/final"):
 
 
 def until_on_ground(network):
-    network.advance_until(lambda: network.last("/in_flight_state") == "on_ground")
+    network.advance_until(lambda: network.last("/in_flight_flight_status") == "on_ground")
     network.advance(0.5)
 
 
 def word(process):
-    return process.published("/in_flight_state")[-1].data
+    return text_of(process.published("/in_flight_flight_status")[-1])

@@ -1,5 +1,6 @@
 """The takeoff server on a fake process, without a filter."""
 
+from flight_words import texts
 from std_srvs.srv import EmptyRequest
 from takeoff_helpers import BARE, filter_status, state
 
@@ -47,7 +48,7 @@ def thrusts(process):
 
 
 def states(process):
-    return [message.data for message in process.published("/in_flight_state")]
+    return texts(process.published("/in_flight_flight_status"))
 
 
 def toggles(process):

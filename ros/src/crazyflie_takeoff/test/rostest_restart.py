@@ -8,10 +8,10 @@ from xmlrpc.client import ServerProxy
 import pytest
 import rosgraph
 import rospy
-from std_msgs.msg import String
 from std_srvs.srv import Empty as EmptyService
+from takeoff_helpers import text_of
 
-from crazyflie_msgs.msg import Control, ControlStamped
+from crazyflie_msgs.msg import Control, ControlStamped, FilterStatus, FlightStatus
 from crazyflie_utils.testing.peer import LIMIT, listening, wait_until
 
 COMMANDED = 9.0
@@ -22,8 +22,8 @@ SERVER, FILTER = "/takeoff_server", "/takeoff_control_filter"
 def heard():
     """Return a queue for each topic, while a controller is publishing."""
     topics = {
-        "/in_flight_state": String,
-        "/in_flight_filter": String,
+        "/in_flight_flight_status": FlightStatus,
+        "/in_flight_filter_status": FilterStatus,
         "/control/takeoff": ControlStamped,
         "/control/final": ControlStamped,
     }
@@ -71,13 +71,13 @@ def call_when_there(name):
 
 
 def wait_for(heard, topic, word):
-    heard[topic].next(lambda message: message.data == word)
+    heard[topic].next(lambda message: text_of(message) == word)
 
 
 def wait_for_both(heard, word):
     """Wait until the server has said a word and the filter remembers it."""
-    wait_for(heard, "/in_flight_state", word)
-    wait_for(heard, "/in_flight_filter", word)
+    wait_for(heard, "/in_flight_flight_status", word)
+    wait_for(heard, "/in_flight_filter_status", word)
 
 
 def thrusts(heard, topic, count):
@@ -89,10 +89,10 @@ def thrusts(heard, topic, count):
 def test_on_the_ground_first(heard):
     wait_for_both(heard, "on_ground")
     kill(SERVER, heard)
-    wait_for(heard, "/in_flight_state", "on_ground")
+    wait_for(heard, "/in_flight_flight_status", "on_ground")
     assert set(thrusts(heard, "/control/final", 50)) == {0.0}
     kill(FILTER, heard)
-    wait_for(heard, "/in_flight_filter", "on_ground")
+    wait_for(heard, "/in_flight_filter_status", "on_ground")
     assert set(thrusts(heard, "/control/final", 50)) == {0.0}
     with pytest.raises(rospy.ServiceException, match="on the ground"):
         call_when_there("/land")
@@ -102,11 +102,11 @@ def test_then_in_flight(heard):
     call_when_there("/takeoff")
     wait_for_both(heard, "flying")
     kill(SERVER, heard)
-    wait_for(heard, "/in_flight_state", "flying")
+    wait_for(heard, "/in_flight_flight_status", "flying")
     assert set(thrusts(heard, "/control/final", 50)) == {COMMANDED}
     assert heard["/control/takeoff"].empty()
     kill(FILTER, heard)
-    wait_for(heard, "/in_flight_filter", "flying")
+    wait_for(heard, "/in_flight_filter_status", "flying")
     assert set(thrusts(heard, "/control/final", 50)) == {COMMANDED}
     assert heard["/control/takeoff"].empty()
     with pytest.raises(rospy.ServiceException, match="in flight"):
@@ -118,8 +118,8 @@ def test_and_on_the_ground_again(heard):
     wait_for_both(heard, "on_ground")
     thrusts(heard, "/control/final", 20)
     kill(FILTER, heard)
-    wait_for(heard, "/in_flight_filter", "on_ground")
+    wait_for(heard, "/in_flight_filter_status", "on_ground")
     assert set(thrusts(heard, "/control/final", 50)) == {0.0}
     kill(SERVER, heard)
-    wait_for(heard, "/in_flight_state", "on_ground")
+    wait_for(heard, "/in_flight_flight_status", "on_ground")
     assert set(thrusts(heard, "/control/final", 50)) == {0.0}

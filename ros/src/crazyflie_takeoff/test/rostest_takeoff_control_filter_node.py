@@ -2,10 +2,11 @@
 
 import pytest
 import rospy
-from std_msgs.msg import Empty, String
+from std_msgs.msg import Empty
 from std_srvs.srv import Empty as EmptyService
 
-from crazyflie_msgs.msg import Control, ControlStamped
+from crazyflie_msgs.msg import Control, ControlStamped, FilterStatus
+from crazyflie_takeoff.takeoff_control_filter_node import status_text
 from crazyflie_utils.testing.peer import LIMIT, listening, wait_until
 
 
@@ -61,10 +62,10 @@ def test_passes_the_right_control(say, final):
 
     # In flight the controller must not be silent.
     stream = rospy.Timer(rospy.Duration(0.02), lambda _: say("/control/lqr", control(3.0)))
-    with listening("/in_flight_filter", String) as memory:
-        assert memory.next().data.startswith(("unknown", "commanded"))
+    with listening("/in_flight_filter_status", FilterStatus) as memory:
+        assert status_text(memory.next()) in ("unknown", "commanded")
         say("/in_flight", Empty())
-        memory.next(lambda message: message.data == "flying")
+        memory.next(lambda status: status_text(status) == "flying")
     # In flight every control is passed on, whatever the age of the other kind.
     for value in range(5, 15):
         say("/control/takeoff", control(value))
@@ -72,13 +73,13 @@ def test_passes_the_right_control(say, final):
         say("/control/lqr", control(value + 0.5))
         final.next(has_thrust(value + 0.5))
     stream.shutdown()
-    with listening("/in_flight_filter", String) as memory:
-        memory.next(lambda message: message.data.startswith("sinking from flying: no control"))
-        memory.next(lambda message: message.data.startswith("down: "))
+    with listening("/in_flight_filter_status", FilterStatus) as memory:
+        memory.next(lambda status: "sinking from flying: no control" in status_text(status))
+        memory.next(lambda status: status.state == FilterStatus.DOWN)
     final.next(has_thrust(0.0))
     rospy.wait_for_service("/emergency_reset", LIMIT)
     with pytest.raises(rospy.ServiceException, match="there is no emergency"):
         rospy.ServiceProxy("/emergency_reset", EmptyService)()
     rospy.ServiceProxy("/emergency", EmptyService)()
-    with listening("/in_flight_filter", String) as memory:
-        memory.next(lambda message: message.data.endswith("/emergency was called"))
+    with listening("/in_flight_filter_status", FilterStatus) as memory:
+        memory.next(lambda status: status.reason.endswith("/emergency was called"))

@@ -5,10 +5,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import rospy
-from std_msgs.msg import Empty, String
+from std_msgs.msg import Empty
 from std_srvs.srv import Empty as EmptyService
+from takeoff_helpers import text_of
 
-from crazyflie_msgs.msg import ControlStamped, PositionVelocityStateStamped
+from crazyflie_msgs.msg import ControlStamped, FlightStatus, PositionVelocityStateStamped
 from crazyflie_utils.testing.peer import LIMIT, listening
 
 
@@ -16,7 +17,7 @@ from crazyflie_utils.testing.peer import LIMIT, listening
 def heard():
     """Return a queue of what is said on each topic."""
     topics = {
-        "/in_flight_state": String,
+        "/in_flight_flight_status": FlightStatus,
         "/in_flight": Empty,
         "/control/takeoff": ControlStamped,
     }
@@ -36,7 +37,7 @@ def refusal(name):
 
 
 def wait_for_state(heard, state):
-    heard["/in_flight_state"].next(lambda message: message.data == state)
+    heard["/in_flight_flight_status"].next(lambda status: text_of(status) == state)
 
 
 def thrusts(heard):

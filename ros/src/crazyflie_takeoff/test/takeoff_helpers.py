@@ -14,7 +14,8 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
+from crazyflie_takeoff.phases import FlightState
+from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode, status_text
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.node import Node
 from crazyflie_utils.testing.fake_graph import FakeGraph
@@ -162,6 +163,13 @@ class ControllerNode(Node):
             self._control.publish(control(thrust))
 
 
+def text_of(message):
+    """Return the text of a message, or the word of the state that it has."""
+    if isinstance(message, FlightStatus):
+        return FlightState(message.state).word
+    return status_text(message) if isinstance(message, FilterStatus) else message.data
+
+
 class Network(FakeGraph):
     """Processes that remember what they have said; their names are those of their nodes."""
 
@@ -219,8 +227,8 @@ class Network(FakeGraph):
         ]
 
     def last(self, topic):
-        """Return the last text on a topic."""
-        return self._said[topic][-1][1].data
+        """Return the last text or state on a topic."""
+        return text_of(self._said[topic][-1][1])
 
     def last_of(self, name, topic):
         """Return the last message of a process on a topic."""

@@ -14,7 +14,7 @@ def departing(hover_z, **server):
 def test_a_takeoff_has_succeeded_when_the_vehicle_is_there():
     """The controller needs longer than duration/hover."""
     network, answer = departing(4.5, **{"duration/hover": 1.0})
-    network.advance_until(lambda: network.last("/in_flight_state") == "flying")
+    network.advance_until(lambda: network.last("/in_flight_flight_status") == "flying")
     assert not answer.done()
     network.advance_until(answer.done)
     assert answer.exception() is None
@@ -23,13 +23,13 @@ def test_a_takeoff_has_succeeded_when_the_vehicle_is_there():
 
 def test_a_vehicle_that_another_reference_has_is_not_waited_for():
     network, answer = departing(1.0)
-    network.advance_until(lambda: network.last("/in_flight_state") == "taking_off")
+    network.advance_until(lambda: network.last("/in_flight_flight_status") == "taking_off")
     controller = network.process("controller").node
     network.advance(2.0)
     controller._reference = (2.0, 0.0)
     network.advance_until(answer.done)
     assert answer.exception() is None
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert "m away from the hover point" in network.process("server").logged("info")[-1]
 
 

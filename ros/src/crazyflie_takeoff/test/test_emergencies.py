@@ -27,7 +27,7 @@ def test_emergency_stops_at_once_and_stays(network):
     assert network.vehicle.z == 0.0
     assert set(thrusts(network, called)) == {0.0}
     assert len(thrusts(network, called)) >= 290
-    assert network.last("/in_flight_state") == "on_ground"
+    assert network.last("/in_flight_flight_status") == "on_ground"
     assert len(network.on("/in_flight")) == 2
     with pytest.raises(ServiceError, match="emergency, /emergency was called"):
         network.call("/takeoff")
@@ -147,7 +147,7 @@ def test_takeoff_and_landing_at_once_end_on_the_ground_or_in_the_air():
     network.advance(0.5)
     hammer(network.process("server"), ["/takeoff", "/land"], [10, 10])
     network.advance(15.0)
-    assert network.last("/in_flight_state") in ("on_ground", "flying")
+    assert network.last("/in_flight_flight_status") in ("on_ground", "flying")
     assert network.vehicle.touchdown_speed < 0.5
     final = thrusts(network)
     assert max(final) <= 16.0

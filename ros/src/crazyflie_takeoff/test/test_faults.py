@@ -51,7 +51,7 @@ def test_a_short_loss_changes_nothing(network):
     assert "no control comes" in network.last("/in_flight_status")
     network.vehicle_node.sees = True
     network.advance(2.0)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert network.last("/in_flight_status") == "flying"
     assert network.vehicle.z == pytest.approx(1.0, abs=0.02)
 
@@ -70,7 +70,7 @@ def test_the_controller_dies(network):
 def test_a_controller_that_comes_back_within_three_seconds_goes_on(network):
     network.kill("controller")
     network.advance(2.8)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert network.vehicle.z == pytest.approx(1.0, abs=0.02)
     network.start("controller", ControllerNode())
     network.advance(2.0)
@@ -85,14 +85,14 @@ def test_an_estimator_that_comes_back_in_time_goes_on(network):
     assert 0.8 < network.vehicle.z < 1.0
     network.vehicle_node.sees = True
     network.advance(4.0)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert network.vehicle.z == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_backlog_of_states_is_no_touchdown(network):
     """A state near the ground that was measured long ago does not stop the motors."""
     network.kill("controller")
-    network.advance_until(lambda: "sinking" in network.last("/in_flight_filter"))
+    network.advance_until(lambda: "sinking" in network.last("/in_flight_filter_status"))
     network.vehicle_node.sees = False
     for _ in range(20):
         old = state(0.0)
@@ -109,7 +109,7 @@ def test_a_filter_that_is_to_hold_at_once_flies_all_the_same():
     network = HoverNetwork(SERVER, {"loss/hold_after": 0.0})
     network.take_off()
     network.advance(5.0)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
     figures = network.last_of("filter", "/diagnostics").status[0].values
     assert {each.key: each.value for each in figures}["takeovers"] == "0"
@@ -152,7 +152,7 @@ def test_the_filter_alone_brings_the_vehicle_down(network, pose):
     network.start_server()
     network.vehicle_node.sees = True
     network.advance(2.0)
-    assert network.last("/in_flight_state") == "on_ground"
+    assert network.last("/in_flight_flight_status") == "on_ground"
     # Who knows only the toggle is told by the new server.
     assert len(network.on("/in_flight")) == 2
 
@@ -172,7 +172,7 @@ def test_a_server_that_starts_during_the_descent_leaves_it_alone(network):
 def test_a_filter_that_dies_in_its_descent_leaves_a_landing(network):
     network.kill("controller")
     network.advance(4.0)
-    assert network.last("/in_flight_state") == "landing"
+    assert network.last("/in_flight_flight_status") == "landing"
     network.kill("filter")
     network.advance(0.3)
     network.start_filter()
@@ -190,7 +190,7 @@ def test_a_filter_that_was_gone_for_long_does_not_lift_the_vehicle_off_the_floor
     network.advance(5.0)
     assert network.vehicle.z == 0.0
     assert set(thrusts(network, begun)) == {0.0}
-    assert network.last("/in_flight_state") == "on_ground"
+    assert network.last("/in_flight_flight_status") == "on_ground"
     network.take_off()
 
 

@@ -1,7 +1,7 @@
 """Controls that are not to be obeyed, in whole flights: what else is published on their topics."""
 
 import pytest
-from flight_words import states, thrusts, until_on_ground
+from flight_words import states, texts, thrusts, until_on_ground
 from takeoff_helpers import GRAVITY, ControllerNode, HoverNetwork, control, feedback
 
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE
@@ -68,7 +68,7 @@ def test_one_controller_that_lifts_for_ever_is_limited_and_then_not_obeyed(netwo
     until_on_ground(network)
     assert top < 8.5
     assert max(thrusts(network, begun)) <= MAX_THRUST
-    told = [message.data for _, message in network.on("/in_flight_filter", begun)]
+    told = texts(m for _, m in network.on("/in_flight_filter_status", begun))
     assert any("the controls climb faster than 3 m/s; the filter lands" in text for text in told)
     assert network.vehicle.touchdown_speed < 0.6
 
@@ -82,8 +82,8 @@ def test_no_vehicle_climbs_above_the_highest_place(network):
 
     network.start("rogue", RogueNode(COMMANDED, law=law))
     assert 9.0 < climb_of(network, 15.0) < 10.2
-    network.advance_until(lambda: network.last("/in_flight_state") == "on_ground", 60.0)
-    told = [message.data for _, message in network.on("/in_flight_filter")]
+    network.advance_until(lambda: network.last("/in_flight_flight_status") == "on_ground", 60.0)
+    told = texts(m for _, m in network.on("/in_flight_filter_status"))
     assert any("the controls climb beyond 10.00 m" in text for text in told)
 
 
@@ -95,7 +95,7 @@ def test_a_second_takeoff_server_in_flight_lands_the_vehicle(network):
     assert network.vehicle.touchdown_speed < 0.6
     network.advance(3.0)
     assert network.vehicle.z == 0.0
-    told = [message.data for _, message in network.on("/in_flight_filter", begun)]
+    told = texts(m for _, m in network.on("/in_flight_filter_status", begun))
     assert any("two nodes publish takeoff controls, /rogue and /server" in text for text in told)
 
 
@@ -126,7 +126,7 @@ def test_a_landing_wins_over_who_keeps_the_vehicle_up(network, thrust):
     assert climb_of(network, 2.0) < 2.2
     until_on_ground(network)
     assert vehicle.touchdown_speed < 0.6
-    told = [message.data for _, message in network.on("/in_flight_filter")]
+    told = texts(m for _, m in network.on("/in_flight_filter_status"))
     assert any("the vehicle has not come down for 1.5 s of a landing" in text for text in told)
 
 
@@ -136,7 +136,7 @@ def test_a_controller_that_is_started_again_is_no_second_one(network):
         network.advance(0.3)
         network.start("controller", ControllerNode())
         network.advance(1.0)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert network.vehicle.z == pytest.approx(1.0, abs=0.02)
 
 
@@ -145,7 +145,7 @@ def test_another_controller_may_take_the_place_of_the_first(network):
     network.process("filter").publish(COMMANDED, control(GRAVITY))
     network.kill("controller")
     network.advance(1.0)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
 
 
 def test_attitude_and_yaw_rate_are_limited(network):

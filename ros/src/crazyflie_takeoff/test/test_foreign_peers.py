@@ -1,6 +1,7 @@
 """Server or filter with another implementation, which has only the toggle."""
 
 import pytest
+from flight_words import texts
 from std_msgs.msg import Empty
 from takeoff_helpers import BARE, FILTER, SERVER, HoverNetwork, Network, control, state
 
@@ -20,9 +21,9 @@ def test_server_with_a_foreign_filter_in_flight():
     for _ in range(150):
         network.process("server").publish("/state", state(1.0))
         network.advance(0.01)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert network.on("/control/takeoff") == []
-    assert network.on("/in_flight_state")[0][0] == pytest.approx(101.0, abs=0.03)
+    assert network.on("/in_flight_flight_status")[0][0] == pytest.approx(101.0, abs=0.03)
 
 
 def test_filter_with_a_foreign_server():
@@ -37,12 +38,12 @@ def test_filter_with_a_foreign_server():
     assert first == pytest.approx(100.0 + LISTENING_TIME, abs=0.02)
     process.publish("/in_flight", Empty())
     network.advance(0.01)
-    assert network.last("/in_flight_filter") == "flying"
+    assert network.last("/in_flight_filter_status") == "flying"
     process.publish("/in_flight", Empty())
     network.advance(0.01)
-    assert network.last("/in_flight_filter") == "unknown"
+    assert network.last("/in_flight_filter_status") == "unknown"
     network.advance(FRESH_TIME)
-    assert network.last("/in_flight_filter") == "commanded"
+    assert network.last("/in_flight_filter_status") == "commanded"
 
 
 def test_server_takes_the_place_of_a_foreign_one_in_flight():
@@ -56,7 +57,7 @@ def test_server_takes_the_place_of_a_foreign_one_in_flight():
     network.process("controller").publish("/ref", PositionVelocityStateStamped())
     network.start_server()
     network.advance(2.0)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert network.on("/in_flight") == []
 
 
@@ -67,4 +68,4 @@ def test_a_dead_servers_flight_state_is_not_news():
     status = FlightStatus(state=FlightStatus.ON_GROUND)
     network.process("filter").publish("/in_flight_flight_status", status)
     network.advance(1.0)
-    assert [m.data for _, m in network.on("/in_flight_filter")] == ["unknown", "on_ground"]
+    assert texts(m for _, m in network.on("/in_flight_filter_status")) == ["unknown", "on_ground"]

@@ -63,7 +63,7 @@ def test_a_height_that_is_old_is_no_touchdown(network):
     for _ in range(100):
         server.publish("/state", state(0.0, stamp=server.clock.stamp(network.time - 2.0)))
         network.advance(0.01)
-    assert network.last("/in_flight_state") == "descending"
+    assert network.last("/in_flight_flight_status") == "descending"
     network.unheard.clear()
     until_on_ground(network)
     assert 0.0 < network.vehicle.touchdown_speed < 0.5
@@ -118,7 +118,7 @@ def test_a_vehicle_from_a_table_lands_on_the_floor(table, speed):
 def test_the_filter_brings_a_vehicle_from_a_table_down_to_the_floor(table, height):
     network = above_a_table(table, height)
     network.kill("controller")
-    network.advance_until(lambda: network.last("/in_flight_state") == "on_ground", 60.0)
+    network.advance_until(lambda: network.last("/in_flight_flight_status") == "on_ground", 60.0)
     assert network.vehicle.z == 0.0
     assert network.vehicle.touchdown_speed < 0.6
     network.advance(0.2)
@@ -148,7 +148,7 @@ def test_a_vehicle_that_lands_on_a_table_is_down_there(faller):
         network.call("/land")
     else:
         network.kill("controller")
-    network.advance_until(lambda: network.last("/in_flight_state") == "on_ground")
+    network.advance_until(lambda: network.last("/in_flight_flight_status") == "on_ground")
     assert network.time - begin < 8.0
     assert network.vehicle.z == 0.75
     assert network.vehicle.touchdown_speed < 0.6

@@ -92,7 +92,7 @@ def test_the_flight_of_a_vehicle_that_cannot_fly_is_over(network, lose):
     lose(network)
     rest(network)
     network.advance(MAX_FAULT_TIME + MAX_FACT_AGE + 0.3)
-    assert network.last("/in_flight_state") == "on_ground"
+    assert network.last("/in_flight_flight_status") == "on_ground"
     assert len(network.on("/in_flight")) == 2
     over = network.time
     network.advance(20.0)
@@ -142,7 +142,7 @@ def test_a_short_loss_ends_no_flight(network, lose):
         network.driver.is_connected = True
         network.driver.tell()
     network.advance(5.0)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert network.vehicle.z == pytest.approx(1.0, abs=0.05)
 
 
@@ -150,7 +150,7 @@ def test_a_driver_that_never_spoke_ends_no_flight():
     network = HoverNetwork(SERVER, DRIVEN)
     network.take_off()
     network.advance(10.0)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
 
 
 @pytest.mark.parametrize("flying", [VehicleStatus.FLYING, 0])
@@ -162,7 +162,7 @@ def test_takeoffs_that_follow_each_other_are_not_ended(flying):
         network.take_off()
         network.driver.tell(supervisor=READY | flying)
         network.advance(5.0)
-        assert network.last("/in_flight_state") == "flying"
+        assert network.last("/in_flight_flight_status") == "flying"
         landing = network.call("/land")
         network.advance(10.0)
         landing.result(0)
@@ -181,4 +181,4 @@ def test_a_takeoff_of_a_vehicle_that_is_lost_fails(moment):
     network.advance(MAX_FAULT_TIME + 0.2)
     with pytest.raises(ServiceError, match="the flight was ended.*its state is: locked"):
         takeoff.result(0)
-    assert network.last("/in_flight_state") == "on_ground"
+    assert network.last("/in_flight_flight_status") == "on_ground"

@@ -97,7 +97,7 @@ def test_a_lost_control_is_noticed_in_time(moment):
     taken_over = moment.on("/control/final", last)[0][0]
     # First it fades what was passed on last.
     assert 0.05 < taken_over - last < 0.1
-    assert "no control comes" in moment.last("/in_flight_filter")
+    assert "no control comes" in moment.last("/in_flight_filter_status")
     # After that, every 10 ms.
     assert (
         len(moment.on("/control/final", taken_over)) >= round((moment.time - taken_over) * 100) - 1
@@ -110,7 +110,7 @@ def test_a_filter_that_is_to_hold_after_less_is_quicker(network):
     network.advance(1.0)
     network.vehicle_node.sees = False
     network.advance(0.045)
-    assert "no control comes" in network.last("/in_flight_filter")
+    assert "no control comes" in network.last("/in_flight_filter_status")
 
 
 def test_a_vehicle_that_tilts_over_is_stopped_at_once(moment):

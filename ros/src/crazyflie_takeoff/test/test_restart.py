@@ -49,7 +49,7 @@ def test_server_on_the_ground(network):
     begun = network.time
     restart(network, "server")
     network.advance(1.2)
-    assert network.last("/in_flight_state") == "on_ground"
+    assert network.last("/in_flight_flight_status") == "on_ground"
     assert set(thrusts(network, begun)) == {0.0}
     assert "on the ground" in refusal(network, "/land")
     network.take_off()
@@ -71,7 +71,7 @@ def test_server_on_the_ground_after_a_flight(network):
     assert set(thrusts(network, begun)) == {0.0}
     network.start_server()
     network.advance(1.2)
-    assert network.last("/in_flight_state") == "on_ground"
+    assert network.last("/in_flight_flight_status") == "on_ground"
     network.take_off()
 
 
@@ -83,7 +83,7 @@ def test_server_in_flight(network):
     for _ in range(50):
         network.advance(0.1)
         assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert thrusts(network, begun, "/control/takeoff") == []
     assert len(network.on("/in_flight")) == toggles
     assert network.on("/ref", begun) == []
@@ -106,8 +106,8 @@ def test_server_during_takeoff_when_the_height_is_known(seeing, moment, gap):
     seeing.advance(moment)
     begun = seeing.time
     restart(seeing, "server", gap)
-    seeing.advance_until(lambda: seeing.on("/in_flight_state", begun) != [])
-    seeing.advance_until(lambda: seeing.last("/in_flight_state") == "on_ground")
+    seeing.advance_until(lambda: seeing.on("/in_flight_flight_status", begun) != [])
+    seeing.advance_until(lambda: seeing.last("/in_flight_flight_status") == "on_ground")
     seeing.advance(0.5)
     assert seeing.vehicle.z == 0.0
     # Long after the server's death the vehicle may have fallen by itself.
@@ -128,7 +128,7 @@ def test_server_during_takeoff_when_the_height_is_unknown(moment):
     begun = network.time
     restart(network, "server")
     network.advance(6.0)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert thrusts(network, begun, "/control/takeoff") == []
     assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
     assert len(network.on("/in_flight")) == 1
@@ -147,8 +147,8 @@ def test_server_during_landing_when_the_height_is_known(seeing, moment, gap):
     seeing.advance(moment)
     begun = seeing.time
     restart(seeing, "server", gap)
-    seeing.advance_until(lambda: seeing.on("/in_flight_state", begun) != [])
-    seeing.advance_until(lambda: seeing.last("/in_flight_state") == "on_ground")
+    seeing.advance_until(lambda: seeing.on("/in_flight_flight_status", begun) != [])
+    seeing.advance_until(lambda: seeing.last("/in_flight_flight_status") == "on_ground")
     seeing.advance(0.5)
     assert seeing.vehicle.z == 0.0
     assert 0.0 < seeing.vehicle.touchdown_speed < 0.5
@@ -168,7 +168,7 @@ def test_server_during_landing_where_the_ground_is_not_at_zero(seeing, ground, m
     seeing.call("/land")
     seeing.advance(moment * (1.0 - ground) / 1.4)
     restart(seeing, "server", 0.1)
-    seeing.advance_until(lambda: seeing.last("/in_flight_state") == "on_ground")
+    seeing.advance_until(lambda: seeing.last("/in_flight_flight_status") == "on_ground")
     assert seeing.time - begun < (1.0 - ground) / 0.3 + 3.0
     seeing.advance(0.5)
     assert seeing.vehicle.z == 0.0
@@ -203,7 +203,7 @@ def test_a_ground_of_an_earlier_launch_does_not_make_a_vehicle_fly(seeing):
     seeing.advance(3.0)
     seeing.start_server()
     seeing.advance(3.0)
-    assert seeing.last("/in_flight_state") == "on_ground"
+    assert seeing.last("/in_flight_flight_status") == "on_ground"
 
 
 def test_server_during_the_ramp_when_the_height_is_unknown():
@@ -216,7 +216,7 @@ def test_server_during_the_ramp_when_the_height_is_unknown():
     begun = network.time
     restart(network, "server")
     network.advance(6.0)
-    assert network.last("/in_flight_state") == "flying"
+    assert network.last("/in_flight_flight_status") == "flying"
     assert thrusts(network, begun, "/control/takeoff") == []
     assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
     land = network.call("/land")
@@ -233,7 +233,7 @@ def test_filter_in_flight(network, gap):
     assert len(thrusts(network, begun)) >= 4
     network.advance(5.0)
     assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
-    assert network.last("/in_flight_filter") == "flying"
+    assert network.last("/in_flight_filter_status") == "flying"
     land = network.call("/land")
     network.advance_until(land.done)
     network.advance(1.0)
@@ -282,7 +282,7 @@ def test_both_at_once_are_a_fresh_launch(seeing):
     seeing.start_filter()
     seeing.start_server()
     seeing.advance(2.0)
-    assert seeing.last("/in_flight_state") == "on_ground"
+    assert seeing.last("/in_flight_flight_status") == "on_ground"
     assert set(thrusts(seeing, begun)) == {0.0}
 
 
@@ -294,6 +294,6 @@ def test_on_a_table_at_launch_with_a_reference():
     reference.state.z = 1.5
     network.process("controller").publish("/ref", reference)
     network.advance(5.0)
-    assert network.last("/in_flight_state") == "on_ground"
+    assert network.last("/in_flight_flight_status") == "on_ground"
     assert len(network.on("/control/lqr")) > 400
     assert set(thrusts(network, 0.0)) == {0.0}

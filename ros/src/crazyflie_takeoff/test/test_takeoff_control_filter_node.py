@@ -4,6 +4,7 @@ import math
 
 import pytest
 from dynamic_reconfigure.msg import Config, DoubleParameter
+from flight_words import texts
 from std_msgs.msg import Empty
 from std_srvs.srv import EmptyRequest
 from takeoff_helpers import FILTER, control
@@ -45,7 +46,7 @@ def thrusts(process):
 
 
 def memory(process):
-    return [message.data for message in process.published("/in_flight_filter")]
+    return texts(process.published("/in_flight_filter_status"))
 
 
 @pytest.mark.parametrize("name", FILTER)
@@ -56,7 +57,7 @@ def test_required_parameters(name):
     assert f"/filter/{name} is not set" in process.logged("error")[0]
 
 
-@pytest.mark.parametrize("name", [*FILTER, "topics/flight_status", "topics/filter_state"])
+@pytest.mark.parametrize("name", [*FILTER, "topics/flight_status", "topics/filter_status"])
 @pytest.mark.parametrize("value", ["", 3, "no name"])
 def test_bad_parameters_are_named(name, value):
     process = FakeProcess()

@@ -23,7 +23,6 @@ _STATUS = {
         rf"in_flight{VEHICLE}_filter_status|filter_status",
         "crazyflie_msgs/FilterStatus",
     ),
-    "flight_state": (rf"in_flight{VEHICLE}_state", "std_msgs/String"),
     "vehicle_status": (r"vehicle_status", "crazyflie_msgs/VehicleStatus"),
 }
 

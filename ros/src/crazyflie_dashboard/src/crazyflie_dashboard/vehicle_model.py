@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import roslib.message
-from std_msgs.msg import String
 
 from crazyflie_dashboard.discovery import FoundVehicle
 from crazyflie_dashboard.frames import Frames
@@ -34,7 +33,6 @@ _UNHEARD: dict[str, Any] = {
     "flight_status": FlightStatus(),
     "filter_status": FilterStatus(),
     "vehicle_status": VehicleStatus(link_quality=math.nan),
-    "flight_state": String(),
     "battery": (math.nan,),
 }
 

@@ -41,7 +41,7 @@ MISSIONS = ("/mission", "/second_mission")
 MISSION_PARAMETERS = {
     "topics/ref": "/ref",
     "topics/state": "/state",
-    "topics/flight_state": "/in_flight_state",
+    "topics/flight_status": "/in_flight_flight_status",
     "srv/takeoff": "/takeoff",
     "srv/land": "/land",
     "srv/emergency": "/emergency",

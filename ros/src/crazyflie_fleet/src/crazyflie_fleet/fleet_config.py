@@ -60,8 +60,8 @@ RESERVED_NAMES = frozenset(
     """
     battery cmd_full_state cmd_hover cmd_position cmd_stop cmd_vel cmd_velocity_world connected
     control driver emergency emergency_reset external_pose external_position go_to heading
-    high_level imu in_flight in_flight_filter in_flight_filter_status
-    in_flight_flight_status in_flight_hover_thrust in_flight_state in_flight_status land
+    high_level imu in_flight in_flight_filter_status
+    in_flight_flight_status in_flight_hover_thrust in_flight_status land
     magnetic_field packets pose positioning pressure ref ref_descent ref_descent_safe ref_safe rssi
     state state_status status takeoff takeoff_inhibition temperature
     true_pose vehicle_status

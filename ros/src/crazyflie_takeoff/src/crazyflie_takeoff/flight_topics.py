@@ -52,7 +52,6 @@ class FlightTopicParameters(Parameters):
     """Parameters that server and filter share."""
 
     in_flight_topic: str = topic("in_flight", "toggles between ground and flight")
-    own_filter_state_topic: str | None = named_after("in_flight", "_filter", "filter_state")
     own_flight_status_topic: str | None = named_after("in_flight", "_flight_status")
     own_filter_status_topic: str | None = named_after("in_flight", "_filter_status")
     own_hover_thrust_topic: str | None = named_after("in_flight", "_hover_thrust")
@@ -102,7 +101,6 @@ class FlightTopicParameters(Parameters):
         return f"{namespace}{slash}{name}"
 
     estimate_status_topic = derived_topic("estimate_status", "state", "_status")
-    filter_state_topic = derived_topic("filter_state", "in_flight", "_filter")
     flight_status_topic = derived_topic("flight_status", "in_flight", "_flight_status")
     filter_status_topic = derived_topic("filter_status", "in_flight", "_filter_status")
     hover_thrust_topic = derived_topic("hover_thrust", "in_flight", "_hover_thrust")

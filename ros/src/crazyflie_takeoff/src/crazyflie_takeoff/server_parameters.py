@@ -48,7 +48,6 @@ class TakeoffServerParameters(FlightTopicParameters):
         "the descent goes here, too; by default the name of reference + `_descent`",
         None,
     )
-    own_flight_state_topic: str | None = named_after("in_flight", "_state", "flight_state")
     own_status_topic: str | None = named_after("in_flight", "_status")
     battery_topic: str | None = topic(
         "battery", "voltage of the battery; without it the battery is not monitored", None
@@ -113,7 +112,6 @@ class TakeoffServerParameters(FlightTopicParameters):
     )
 
     descent_topic = derived_topic("descent", "reference", "_descent")
-    flight_state_topic = derived_topic("flight_state", "in_flight", "_state")
     status_topic = derived_topic("status", "in_flight", "_status")
 
     @property

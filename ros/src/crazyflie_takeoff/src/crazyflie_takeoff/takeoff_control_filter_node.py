@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from std_msgs.msg import Empty, Float64, Header, String
+from std_msgs.msg import Empty, Float64, Header
 from std_srvs.srv import Empty as EmptyService
 from typing_extensions import override
 
@@ -127,7 +127,7 @@ class TakeoffControlFilterNode(Node):
         self._wall_offset = 0.0  # Wall clock minus `handle.time`, as of the last tick (s).
         # Connection of the last commanded control; None if this process has sent it.
         self._connection: Any = self
-        self._status: tuple[object, ...] | None = None  # As it was published last.
+        self._published: tuple[object, ...] | None = None
         self._text = self._logged_explanation = ""
 
     @override
@@ -144,10 +144,7 @@ class TakeoffControlFilterNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._final = handle.publisher(parameters.final_control_topic, ControlStamped)
-        self._text_status = handle.publisher(parameters.filter_state_topic, String, latch=True)
-        self._typed_status = handle.publisher(
-            parameters.filter_status_topic, FilterStatus, latch=True
-        )
+        self._status = handle.publisher(parameters.filter_status_topic, FilterStatus, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._publish_status()
         self._advertise(handle, parameters.emergency_service, self._on_emergency)
@@ -375,21 +372,16 @@ class TakeoffControlFilterNode(Node):
         self._set_pace()
 
     def _publish_status(self):
-        status = self._content()
-        if status == self._status:
+        content = self._content()
+        if content == self._published:
             return
-        self._status = status
-        message = FilterStatus(Header(stamp=self._handle.stamp()), *status)
-        self._typed_status.publish(message)
-        explanation = message.takeoff_refusal or message.reason
-        text = ": ".join(filter(None, (_words(message), explanation)))
-        if text == self._text:
-            return
-        self._text = text
-        self._text_status.publish(String(text))
+        self._published = content
+        status = FilterStatus(Header(stamp=self._handle.stamp()), *content)
+        self._status.publish(status)
+        self._text, explanation = status_text(status), status.takeoff_refusal or status.reason
         # Only once, however the flight state changes meanwhile.
         if explanation not in ("", self._logged_explanation):
-            self._handle.warn(text)
+            self._handle.warn(self._text)
         self._logged_explanation = explanation
 
     def _content(self):
@@ -425,8 +417,8 @@ def _setpoint(message):
     return SafeSetpoint(c.roll, c.pitch, c.yaw_dot, c.thrust)
 
 
-def _words(status):
-    """Return the state as text, such as "sinking from flying"."""
+def status_text(status: FilterStatus) -> str:
+    """Return a status as text, such as "sinking from flying: no control comes"."""
     words = []
     if status.takeoff_refusal:
         words.append("refusing")
@@ -434,4 +426,5 @@ def _words(status):
         words.append(FilterState(status.state).name.lower())
     if status.flight_state:
         words.append(FlightState(status.flight_state).word)
-    return " from ".join(words) or ("commanded" if status.is_commanded else "unknown")
+    state = " from ".join(words) or ("commanded" if status.is_commanded else "unknown")
+    return ": ".join(filter(None, (state, status.takeoff_refusal or status.reason)))

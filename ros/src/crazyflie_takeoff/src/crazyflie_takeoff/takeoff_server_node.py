@@ -98,7 +98,6 @@ class TakeoffServerNode(Node):
         self._descent = handle.publisher(parameters.descent_topic, PositionVelocityStateStamped)
         self._hover_thrust = handle.publisher(parameters.hover_thrust_topic, Float64, latch=True)
         self._in_flight = handle.publisher(parameters.in_flight_topic, Empty)
-        self._state_topic = handle.publisher(parameters.flight_state_topic, String, latch=True)
         self._status = handle.publisher(parameters.flight_status_topic, FlightStatus, latch=True)
         self._text = handle.publisher(parameters.status_topic, String, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
@@ -394,7 +393,6 @@ class TakeoffServerNode(Node):
             is_new = reason and reason != self._logged_reason
             self._handle.info(f"{word}: {reason}" if is_new else word)
             self._logged_word, self._logged_reason = word, reason
-        self._state_topic.publish(String(state.word))
         self._inhibit_shutdown(state is not FlightState.ON_GROUND)
         self._publish_status()
 
@@ -404,7 +402,7 @@ class TakeoffServerNode(Node):
         if content == self._published:
             return
         state, reason, refusal = content
-        # Not before the state's own topics, and nothing while it is not known.
+        # Nothing while the state is not known.
         if state is not None and state is self._state:
             self._published = content
             status = stamped(FlightStatus, self._handle.stamp(), state=state, reason=reason)

@@ -2,9 +2,8 @@
 
 import pytest
 from sensor_msgs.msg import Joy
-from std_msgs.msg import String
 
-from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
 from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_utils.testing import peer
 
@@ -19,7 +18,10 @@ def joy(forward=0.0, left=0.0, button=None):
 def press(button, state):
     """Hold a button until the takeoff server is in a state."""
     peer.exchange(
-        {"/joy": joy(button=button)}, "/in_flight_state", String, lambda m: m.data == state
+        {"/joy": joy(button=button)},
+        "/in_flight_flight_status",
+        FlightStatus,
+        lambda status: status.state == state,
     )
 
 
@@ -44,12 +46,12 @@ def after(seconds):
 def flight():
     """Fly once; return the record, and where the vehicle was at the turns."""
     with ready_operator() as operator:
-        press(2, "flying")
+        press(2, FlightStatus.FLYING)
         places = [operator.position.copy()]
         hold(operator, lambda m: m.state.x > WALL - 0.7, forward=1.0)
         places += [hold(operator, after(seconds), forward=1.0) for seconds in (3.0, 0.5)]
         places.append(hold(operator, lambda m: m.state.y > 0.4, forward=1.0, left=1.0))
-        press(0, "on_ground")
+        press(0, FlightStatus.ON_GROUND)
         operator.hover(0.5)
         places.append(operator.position.copy())
         yield operator.finish(), places

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from std_msgs.msg import String
 
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_utils.testing import peer
 
@@ -16,8 +16,9 @@ PERIOD = 2.0 * math.pi * RADIUS / SPEED
 @pytest.fixture(scope="module")
 def flight():
     """Fly more than one circle; return the states on the last one, and where it landed."""
-    with ready_operator() as operator, peer.listening("/in_flight_state", String) as states:
-        states.next(lambda message: message.data == "flying")
+    topic = "/in_flight_flight_status"
+    with ready_operator() as operator, peer.listening(topic, FlightStatus) as flight:
+        flight.next(lambda status: status.state == FlightStatus.FLYING)
         operator.hover(PERIOD / 2.0)
         operator.hover(PERIOD)
         operator.land()

@@ -6,8 +6,8 @@ import numpy as np
 from geometry_msgs.msg import PointStamped, PoseStamped
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo
-from std_msgs.msg import String
 
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_utils.testing import peer
 
@@ -40,14 +40,14 @@ class Flight:
 def fly(target, begin, end):
     """Follow ``target`` on its path until ``end`` (s), land, and judge from ``begin`` on."""
     with (
-        peer.listening("/in_flight_state", String) as states,
+        peer.listening("/in_flight_flight_status", FlightStatus) as states,
         peer.listening("/target", PointStamped) as targets,
         peer.listening(f"/world/{target}/pose", PoseStamped) as poses,
         peer.listening("/camera/camera_info", CameraInfo) as infos,
         ready_operator() as operator,
     ):
         peer.wait_until(
-            lambda: any(message.data == "flying" for message in states.drain()),
+            lambda: any(status.state == FlightStatus.FLYING for status in states.drain()),
             "the takeoff",
             limit=90.0,
         )

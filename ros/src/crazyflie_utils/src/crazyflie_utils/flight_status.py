@@ -1,8 +1,6 @@
-"""The state of a vehicle's flight, as its takeoff server publishes it: typed, or as text."""
+"""The state of a vehicle's flight, as its takeoff server publishes it."""
 
 from collections.abc import Callable
-
-from std_msgs.msg import String
 
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.handle import NodeHandle
@@ -38,10 +36,6 @@ class FlightTopics(Parameters):
         None,
         name="flight_status",
     )
-    #: std_msgs/String: names of states in small letters; any other text is `FlightStatus.UNKNOWN`.
-    state: str | None = parameter(
-        TOPIC, "text of a takeoff server without flight status", None, name="flight_state"
-    )
 
     def derived(self, handle: NodeHandle, suffix: str) -> str:
         """Return a topic of the takeoff server; asks the master."""
@@ -51,8 +45,6 @@ class FlightTopics(Parameters):
         """Call ``callback(status)`` for each flight status."""
         status = self.status or self.derived(handle, "_flight_status")
         handle.subscribe(status, FlightStatus, callback)
-        if self.state is not None:
-            handle.subscribe(self.state, String, lambda message: callback(_from_text(message.data)))
 
 
 def in_flight_of(handle: NodeHandle, namespace: str) -> str:
@@ -71,7 +63,3 @@ def in_flight_of(handle: NodeHandle, namespace: str) -> str:
 
 def _namespace(handle):
     return handle.resolve("in").rpartition("/")[0]
-
-
-def _from_text(text):
-    return FlightStatus(state=getattr(FlightStatus, text.upper(), FlightStatus.UNKNOWN))

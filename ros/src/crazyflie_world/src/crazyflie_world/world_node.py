@@ -75,7 +75,7 @@ class WorldNode(Node[WorldNodeParameters]):
         self._broadcast = handle.broadcast_transforms()
         handle.publisher(parameters.markers_topic, MarkerArray, latch=True).publish(markers(world))
         flight = parameters.flight
-        if flight.in_flight or flight.status or flight.state:
+        if flight.in_flight or flight.status:
             flight.subscribe(handle, self._on_flight_status)
         else:
             self._begin = handle.time()

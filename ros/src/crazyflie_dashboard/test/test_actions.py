@@ -10,7 +10,6 @@ from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.msg import Config
 from fake_fleet import FakeFleet, FakeLane
 from geometry_msgs.msg import Point, Quaternion, Vector3
-from std_srvs.srv import Empty
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard.dashboard import Dashboard
@@ -19,7 +18,7 @@ from crazyflie_dashboard.master import MasterError
 from crazyflie_dashboard.page_data import Command, DryRunResult
 from crazyflie_dashboard.snapshot import Action
 from crazyflie_driver import srv
-from crazyflie_fleet.high_level_services import TAKEOFF_LEAD
+from crazyflie_fleet.high_level_services import COMMAND, TAKEOFF_LEAD
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.tf.frame_tree import StampedPose, encode_poses
@@ -69,38 +68,35 @@ def test_some_take_off_as_a_whole_or_not_at_all(fleet):
 
 
 def test_a_fleet_is_commanded_by_one_call(fleet):
-    for service, kind in (
-        ("high_level/takeoff", srv.Takeoff),
-        ("high_level/go_to", srv.GoTo),
-        ("land", Empty),
-    ):
-        fleet.offer(f"/all/{service}", kind)
-    assert fleet.command(Action.TAKEOFF, height=0.8) == dict.fromkeys(fleet.names, "")
-    assert [(name, r.height) for name, r in fleet.calls] == [("/all/high_level/takeoff", 0.8)]
+    fleet.offer(COMMAND, srv.CommandVehicles)
+    some = ["cf1", "cf3"]
+    assert fleet.command(Action.TAKEOFF, some, height=0.8) == dict.fromkeys(some, "")
+    ((name, request),) = fleet.calls
+    assert (name, request.names, request.command) == (COMMAND, some, "take off")
+    assert request.height == pytest.approx(0.8)
+    assert request.duration.to_sec() == pytest.approx(1.6 + TAKEOFF_LEAD)
     fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 0.0, 1.0))
-    fleet.calls.clear()
     outcomes = fleet.command(Action.GO_TO, goal=(1.5, 1.0, 1.0))
     assert outcomes == dict.fromkeys(fleet.names, "")
-    ((name, request),) = fleet.calls
-    assert (name, request.relative) == ("/all/high_level/go_to", True)
-    assert (request.goal.x, request.goal.y, request.goal.z) == pytest.approx((0.5, 1.0, 0.0))
-    fleet.calls.clear()
     fleet.command(Action.HOLD)
-    fleet.command(Action.LAND)
-    assert called(fleet) == ["/all/high_level/go_to", "/all/land"]
-    fleet.calls.clear()
-    fleet.command(Action.HOLD, ["cf1", "cf2"])
-    assert called(fleet) == ["/cf1/high_level/go_to", "/cf2/high_level/go_to"]
+    fleet.command(Action.LAND, some)
+    assert called(fleet) == [COMMAND] * 4
+    go, hold, land = (request for _, request in fleet.calls[1:])
+    assert [(p.x, p.y, p.z) for p in go.goals] == [(0.5 + k, 1.0, 1.0) for k in range(3)]
+    assert (hold.command, land.command, land.names) == ("hold", "land", some)
+    fleet.command(Action.LAND, ["cf2"])
+    assert called(fleet)[4:] == ["/cf2/high_level/land"]
 
 
-def test_a_fleet_of_which_one_refuses_to_go_is_held(fleet):
-    fleet.offer("/all/high_level/go_to", srv.GoTo)
+def test_the_answer_of_a_fleet_is_that_of_each_vehicle(fleet):
+    fleet.offer(COMMAND, srv.CommandVehicles)
     fleet.fly(cf1=(0.0, 0.0, 1.0), cf2=(1.0, 0.0, 1.0), cf3=(2.0, 0.0, 1.0))
-    fleet.refusals["/all/high_level/go_to"] = "1 of 3 vehicles: cf2: the vehicle is landing"
-    assert set(fleet.command(Action.GO_TO, goal=(1.5, 1.0, 1.0)).values()) == {
-        "1 of 3 vehicles: cf2: the vehicle is landing"
-    }
-    assert [(s, r.goal.y) for s, r in fleet.calls[1:]] == [("/all/high_level/go_to", 0.0)]
+    refusal = fleet.refusals[COMMAND] = "1 of 3 vehicles: cf2: the vehicle is landing"
+    outcomes = fleet.command(Action.GO_TO, goal=(1.5, 1.0, 1.0))
+    assert outcomes == dict.fromkeys(fleet.names, refusal)
+    # Nobody is on the way there.
+    del fleet.refusals[COMMAND]
+    assert fleet.command(Action.GO_TO, ["cf2"], goal=(1.0, -1.0, 1.0)) == {"cf2": ""}
 
 
 @pytest.mark.parametrize("goal", [(500.0, 0.0, 1.0), (0.0, -10.5, 1.0), (0.0, 0.0, 60.0)])

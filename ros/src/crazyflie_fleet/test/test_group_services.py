@@ -8,6 +8,7 @@ from std_srvs.srv import EmptyRequest
 
 from crazyflie_driver import srv
 from crazyflie_driver.trajectory_messages import to_message
+from crazyflie_fleet.fleet_services_node import START_LIMIT
 from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import at_rest
 from crazyflie_msgs.msg import FlightStatus
@@ -69,6 +70,56 @@ def test_a_takeoff_takes_the_time_that_it_is_given(swarm):
     swarm.process.call("/cf1/high_level/go_to", goal)
     swarm.process.advance(1.5)
     assert swarm.position("cf1") == pytest.approx((x + 0.5, y, 1.0), abs=0.1)
+
+
+def command(swarm, command, *names, **details):
+    request = srv.CommandVehicles._request_class(names=names, command=command, **details)
+    return swarm.call("/all/command", request)
+
+
+def test_some_vehicles_are_commanded_by_one_call(swarm):
+    command(swarm, "take off", "cf1", "cf2", height=0.6, duration=seconds(2.0))
+    assert swarm.heights() == pytest.approx([0.6, 0.6, 0.0], abs=0.05)
+    (x1, y1, _), (x2, y2, _) = swarm.position("cf1"), swarm.position("cf2")
+    goals = [Point(x1, y1 + 0.4, 0.6), Point(x2, y2, 0.9)]
+    command(swarm, "go to", "cf1", "cf2", goals=goals, yaws=[0.0, 0.0], duration=seconds(2.0))
+    swarm.process.advance(2.5)
+    assert swarm.position("cf1") == pytest.approx((x1, y1 + 0.4, 0.6), abs=0.05)
+    assert swarm.position("cf2") == pytest.approx((x2, y2, 0.9), abs=0.05)
+    command(swarm, "land", "cf2")
+    assert swarm.heights() == pytest.approx([0.6, 0.0, 0.0], abs=0.05)
+
+
+def test_some_vehicles_take_off_all_or_none(swarm):
+    swarm.process.advance(START_LIMIT)
+    status(swarm.process, "cf2", "the battery has 3.0 V")
+    takeoff = {"height": 0.6, "duration": seconds(2.0)}
+    with pytest.raises(ServiceError, match="no vehicle takes off: 1 of 3 vehicles: cf2: the batt"):
+        command(swarm, "take off", "cf1", "cf2", **takeoff)
+    command(swarm, "take off", "cf1", "cf3", **takeoff)
+    assert swarm.heights() == pytest.approx([0.6, 0.0, 0.6], abs=0.05)
+
+
+def test_when_one_refuses_to_go_the_others_hold(swarm):
+    command(swarm, "take off", "cf1", "cf3", height=0.6, duration=seconds(2.0))
+    before = swarm.position("cf1")
+    goals, yaws = [Point(1.0, 1.0, 0.6), Point(2.0, 0.0, 0.6)], [0.0, 0.0]
+    with pytest.raises(ServiceError, match="1 of 3 vehicles: cf2: .* on the ground"):
+        command(swarm, "go to", "cf1", "cf2", goals=goals, yaws=yaws, duration=seconds(2.0))
+    swarm.process.advance(2.5)
+    assert swarm.position("cf1") == pytest.approx(before, abs=0.05)
+    command(swarm, "hold", "cf1", "cf3")
+    with pytest.raises(ServiceError, match="cf1: .* there is no emergency"):
+        command(swarm, "reset", "cf1")
+
+
+@pytest.mark.parametrize(
+    ("what", "names", "complaint"),
+    [("land", ["cf1", "cf9"], "cf9: not of this"), ("go to", ["cf1"], "expected take off, land")],
+)
+def test_a_command_that_makes_no_sense_is_refused(swarm, what, names, complaint):
+    with pytest.raises(ServiceError, match=complaint):
+        command(swarm, what, *names)
 
 
 def test_trajectories_begin_at_the_same_moment(swarm):
@@ -165,7 +216,7 @@ def test_a_fault_of_a_takeoff_that_waits_is_one_of_the_node(swarm, monkeypatch):
     answer = swarm.process.call("/takeoff_all", EmptyRequest())
     node, aborted = swarm.nodes["/fleet"], []
     monkeypatch.setattr(node._lander, "abort", lambda: aborted.append(True))
-    monkeypatch.setattr(node, "_takeoff_refusals", lambda: {}["a bug"])
+    monkeypatch.setattr(node, "_takeoff_refusals", lambda names: {}["a bug"])
     swarm.process.advance(0.5)
     with pytest.raises(ServiceError, match="/fleet: KeyError"):
         answer.result(0)

@@ -17,7 +17,7 @@ from crazyflie_dashboard.page_data import MAX_COMMAND_AGE, Command, Outcomes, ga
 from crazyflie_dashboard.snapshot import Action, Triple, VehicleSnapshot
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import BUFFER
-from crazyflie_fleet.high_level_services import TAKEOFF_LEAD
+from crazyflie_fleet.high_level_services import COMMAND, TAKEOFF_LEAD
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.lights import COLOR_LED_DECKS, wrgb
 from crazyflie_takeoff.envelope import Box
@@ -32,19 +32,16 @@ _MIN_DURATION = 1.0  #: Shortest duration of a move (s).
 _MAX_SPEED = 2.0  #: Highest speed of a go-to command (m/s).
 HEIGHTS = 0.1, 5.0  #: Lowest and highest takeoff (m).
 
-#: Services that carry out an action for all vehicles of a fleet: the name below /all, and the last
-#: names of those of each vehicle.
-_GROUPS = {
-    Action.TAKEOFF: ("high_level/takeoff", srv.Takeoff, "/high_level/takeoff"),
-    Action.LAND: ("land", Empty, "/high_level/land"),
-    Action.HOLD: ("high_level/go_to", srv.GoTo, "/high_level/go_to"),
-    Action.GO_TO: ("high_level/go_to", srv.GoTo, "/high_level/go_to"),
-    Action.RESET: ("emergency_reset", Empty, "/emergency_reset"),
+#: Actions that a fleet carries out for several of its vehicles by one call, and the last name of
+#: the service of each vehicle, by which its fleet is known.
+_OF_FLEET = {
+    Action.TAKEOFF: "high_level/takeoff",
+    Action.LAND: "high_level/land",
+    Action.HOLD: "high_level/go_to",
+    Action.GO_TO: "high_level/go_to",
+    Action.RESET: "emergency_reset",
 }
-#: Speed above which vehicles are sent to their own goals: "relative" is where they are then (m/s).
-_AT_REST = 0.2
 _ROUNDING = 1e-6  #: Distance by which a goal may be out of bounds (m).
-_DIGITS = 6  #: Decimal places in which the ways of a formation agree (m).
 
 _HOLD_DURATION = 1.0  #: Duration of a move to a vehicle's own position (s).
 #: The firmware's parameter for lights, its value for all lights, and how long they are on (s).
@@ -118,20 +115,26 @@ class Actions:
         }
         if command.action == Action.GO_TO:
             return (yield from self._go_to(command, targets, scene.fixed_frame))
+        fleet = self._fleet(command, targets)
         if command.action == Action.TAKEOFF:
-            is_alone = len(command.vehicles) == 1 or bool(self._group(command, targets))
+            is_asked = fleet or len(command.vehicles) == 1
             reasons = {
-                name: self._why_it_stays_down(command.height, targets.get(name), is_alone)
+                name: self._why_it_stays_down(command.height, targets.get(name), is_asked)
                 for name in command.vehicles
             }
             if any(reasons.values()):
                 return _with_others(reasons, _WAITS)
-        answers = self._all(command, targets)
-        alone = [name for name in command.vehicles if name not in answers]
-        answers |= {n: self._begin(self._command(command, targets.get(n), n)) for n in alone}
-        if command.action == Action.TAKEOFF and len(alone) > 1:
-            own = {name: answers[name] for name in alone}
-            self._land_if_one_refuses(command, targets, own)
+        if command.action != Action.IDENTIFY:
+            for name in command.vehicles:
+                self._moves.pop(name, None)
+        if fleet:
+            request = _takeoff_request(command, targets[command.vehicles[0]])
+            return (yield from self._call_fleet(command, request.duration))
+        answers = {
+            n: self._begin(self._command(command, targets.get(n), n)) for n in command.vehicles
+        }
+        if command.action == Action.TAKEOFF and len(answers) > 1:
+            self._land_if_one_refuses(command, targets, answers)
         outcomes = yield from gathered(answers)
         if command.action == Action.TAKEOFF and any(outcomes.values()):
             outcomes = _with_others(outcomes, f"is landed: {_WAITS}")
@@ -145,33 +148,26 @@ class Actions:
     def _begin(self, steps):
         return follow(steps, self._handle.submit)
 
-    def _group(self, command, targets):
-        """Return the vehicles of a fleet that are all commanded, and are so by one service."""
-        if command.action not in _GROUPS:
-            return []
-        name, _, last = _GROUPS[command.action]
-        nodes = self._model.graph.services
-        node = nodes.get(f"/all/{name}")
-        # Others of the fleet, which the page does not show, would be commanded, too.
-        members = {
-            service.removesuffix(last)
-            for service, each in nodes.items()
-            if each == node and service.endswith(last) and not service.startswith("/all/")
+    def _fleet(self, command, targets):
+        """Return whether one fleet carries out the command for all its vehicles by one call."""
+        nodes, last = self._model.graph.services, _OF_FLEET.get(command.action)
+        owners = {
+            nodes.get(f"{targets[name].vehicle.namespace}/{last}") if name in targets else None
+            for name in command.vehicles
         }
-        chosen = {targets[n].vehicle.namespace: n for n in command.vehicles if n in targets}
-        return [chosen[each] for each in members] if members <= chosen.keys() else []
+        return len(command.vehicles) > 1 and owners == {nodes.get(COMMAND, "")}
 
-    def _all(self, command, targets):
-        """Command a fleet as a whole: return its answer, which is that of each of its vehicles."""
-        own = self._group(command, targets)
-        if len(own) < 2:
-            return {}
-        name, kind, _ = _GROUPS[command.action]
-        for each in own:
-            self._moves.pop(each, None)
-        service = Service(f"/all/{name}", kind)
-        request = _request(command, service, targets[own[0]])
-        return dict.fromkeys(own, self._begin(self._call(command, service, request)))
+    def _call_fleet(self, command, duration, **goals):
+        """Command vehicles of a fleet; return its answer, which is that of each of them."""
+        request = srv.CommandVehiclesRequest(
+            names=[*command.vehicles],
+            command=command.action.value,
+            height=command.height,
+            duration=duration,
+            **goals,
+        )
+        answer = self._begin(self._call(command, Service(COMMAND, srv.CommandVehicles), request))
+        return (yield from gathered(dict.fromkeys(command.vehicles, answer)))
 
     def _why_it_stays_down(self, height, target, is_asked):
         """Return why a vehicle cannot take off, or ""; one that is asked says so itself."""
@@ -230,7 +226,6 @@ class Actions:
         if command.action == Action.IDENTIFY:
             yield from self._light(service.name.rpartition("/")[0], command)
             return
-        self._moves.pop(name, None)
         go_to = _service(target, Action.GO_TO)
         if command.action == Action.TAKEOFF and go_to is not None and go_to.needs_commander:
             self._start_commander(target.vehicle)
@@ -284,18 +279,20 @@ class Actions:
         moves, requests = yield self._model.workers.submit(
             self._prepared, command, targets, bounds, moving, fixed, self._time()
         )
-        services = {service.name: (service, request) for service, request in requests.values()}
-        calls = {name: self._begin(self._call(command, *each)) for name, each in services.items()}
-        answers = {name: calls[service.name] for name, (service, _) in requests.items()}
         self._moves = {**moving, **moves}
+        if self._fleet(command, targets):
+            calls = [requests[name][1] for name in command.vehicles]
+            goals, yaws = [each.goal for each in calls], [each.yaw for each in calls]
+            outcomes = yield from self._call_fleet(
+                command, calls[0].duration, goals=goals, yaws=yaws
+            )
+            if any(outcomes.values()):
+                self._moves = {n: m for n, m in self._moves.items() if n not in outcomes}
+            return outcomes
+        answers = {name: self._begin(self._call(command, *each)) for name, each in requests.items()}
         outcomes = yield from gathered(answers)
         gone = [targets[name] for name, text in outcomes.items() if not text]
-        is_one = len(calls) == 1 < len(outcomes)
-        if is_one and not gone:
-            # Those that have not refused are on their way.
-            (service,) = calls
-            self._handle.call_service(service, srv.GoTo, _hold_request(), _TIMEOUT)
-        elif 0 < len(gone) < len(outcomes):
+        if 0 < len(gone) < len(outcomes):
             # The paths were checked for all vehicles together.
             self._hold(gone)
             outcomes = _with_others(outcomes, f"is held: {_STAYS}")
@@ -331,7 +328,7 @@ class Actions:
         distance = max(math.dist(places[name], goal) for name, goal in goals.items())
         duration = max(_MIN_DURATION, distance / command.speed)
         moves = {n: Move(places[n], goal, now, duration) for n, goal in goals.items()}
-        requests, shifts = {}, set()
+        requests = {}
         for name, space in spaces.items():
             target = targets[name]
             has_yaw = known.get(f"{space}/{_YAW}", target.vehicle.has_driver)
@@ -339,27 +336,13 @@ class Actions:
             yaw = rpy_from_quaternion(*target.now.rotation)[2]
             yaw = yaw if command.yaw is None else command.yaw
             goal, yaw = self._in_own_frame(name, goals[name], yaw, own.strip("/"), fixed)
-            start, _ = self._in_own_frame(name, places[name], 0.0, own.strip("/"), fixed)
-            shifts.add(tuple(round(b - a, _DIGITS) for a, b in zip(start, goal, strict=True)))
             _expect_inside(name, places[name], goals[name], goal, bounds[name])
             request = srv.GoToRequest(goal=Point(*goal), yaw=yaw if has_yaw else 0.0)
             request.duration = genpy.Duration.from_sec(duration)
             requests[name] = services[name], request
         buffers = {name: float(known[key]) for name, key in wanted.items() if key in known}
         expect_apart(moves, places, moving, buffers, now)
-        if command.yaw is None and len(shifts) == 1 and self._move_as_one(command, targets):
-            # One call: a hundred of them take longer than a command may be old.
-            request = srv.GoToRequest(relative=True, goal=Point(*shifts.pop()))
-            request.duration = genpy.Duration.from_sec(duration)
-            name, kind, _ = _GROUPS[Action.GO_TO]
-            requests = dict.fromkeys(requests, (Service(f"/all/{name}", kind), request))
         return moves, requests
-
-    def _move_as_one(self, command, targets):
-        """Return whether one service moves all, and no others, each from where it is at rest."""
-        chosen = [targets[name] for name in command.vehicles]
-        are_slow = all(math.hypot(*(each.now.velocity or (0.0,))) < _AT_REST for each in chosen)
-        return are_slow and len(self._group(command, targets)) == len(chosen) > 1
 
     def _in_own_frame(self, name, goal, yaw, own, fixed):
         if own == fixed:
@@ -472,16 +455,20 @@ def _request(command: Command, service: Service, target: Target) -> Any:
     if service.kind is SetBool:
         return SetBoolRequest(command.action == Action.ARM)
     if service.kind is srv.Takeoff:
-        duration = max(_MIN_DURATION, command.height / _CLIMB_SPEED)
-        if "flight_status" in target.vehicle.topics:
-            duration += TAKEOFF_LEAD
-        return srv.TakeoffRequest(0, command.height, genpy.Duration.from_sec(duration))
+        return _takeoff_request(command, target)
     if service.kind is srv.GoTo:
         return _hold_request()
     position = target.now.position
     height = _UNKNOWN_HEIGHT if position is None else position[2]
     duration = max(_MIN_DURATION, height / _CLIMB_SPEED)
     return srv.LandRequest(0, 0.0, genpy.Duration.from_sec(duration))
+
+
+def _takeoff_request(command, target):
+    duration = max(_MIN_DURATION, command.height / _CLIMB_SPEED)
+    if "flight_status" in target.vehicle.topics:
+        duration += TAKEOFF_LEAD
+    return srv.TakeoffRequest(0, command.height, genpy.Duration.from_sec(duration))
 
 
 def _hold_request():

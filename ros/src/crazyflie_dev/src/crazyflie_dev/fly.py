@@ -23,6 +23,8 @@ _DEFAULT_COUNT = 3  #: Number of vehicles.
 _PORT = "8642"  #: The page's, by default.
 _POLL = 0.1  #: Longest time until a signal, or the page, is noticed (s).
 LAUNCHED = ("crazyflie_examples", "sw_swarm.launch")
+#: On a computer that is too slow, or too busy, simulated time slows down; real time would be lost.
+_OPTIONS = ("rviz:=false", "dashboard:=true", "sim_time:=true")
 
 STEPS = """{n} simulated vehicles, and a page to fly them: {url}
   1. Click "Take control", then "All" and "Take off".
@@ -84,7 +86,7 @@ def fly(n: int, launch_arguments: list[str], log: Path) -> int:
 
     with subprocess.Popen(
         # In a session of its own: this program passes signals on, whichever way they come.
-        ["roslaunch", *LAUNCHED, f"n:={n}", "rviz:=false", "dashboard:=true", *launch_arguments],
+        ["roslaunch", *LAUNCHED, f"n:={n}", *_OPTIONS, *launch_arguments],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
         start_new_session=True,
     ) as launched:  # fmt: skip

@@ -3,12 +3,13 @@
 from concurrent.futures import Future
 from functools import partial
 
-from std_srvs.srv import Empty
+import genpy
+from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import FleetConfig
-from crazyflie_fleet.high_level_services import HIGH_LEVEL, START_TOPIC
+from crazyflie_fleet.high_level_services import COMMAND, HIGH_LEVEL, START_TOPIC
 from crazyflie_fleet.lander import Lander, Refusals
 from crazyflie_fleet.mission_watch import MISSION_TIMEOUT, MissionWatch
 from crazyflie_fleet.references_node import VehicleStates
@@ -22,6 +23,8 @@ from crazyflie_utils.steps import follow
 START_LIMIT = 60.0
 TAKEOFF_WAIT = 10.0  #: Longest time that one call waits (s of the machine's clock).
 _PERIOD = 0.2  #: Period of the checks of the vehicles meanwhile (s).
+
+_HOLD_TIME = 1.0  #: Duration of a move to a vehicle's own position (s).
 
 _FLYING = (FlightStatus.TAKING_OFF, FlightStatus.FLYING)
 _NOT_BEGUN = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
@@ -64,9 +67,10 @@ class FleetServicesNode(Node):
             (f"{HIGH_LEVEL}/start_trajectory", srv.StartTrajectory, self._command, START_TOPIC),
             (f"{HIGH_LEVEL}/notify_setpoints_stop", srv.NotifySetpointsStop, self._command),
         ):
-            answer = partial(self._answer, steps, service, service_type)
+            answer = partial(self._begin, steps, service, service_type)
             for name in (f"/all/{service}", *others):
                 handle.advertise_service(name, service_type, answer)
+        handle.advertise_service(COMMAND, srv.CommandVehicles, partial(self._begin, self._of_some))
         self._missions = MissionWatch(handle, self._on_lost_mission)
         handle.timer(_PERIOD, self._on_timer, steady=True)
 
@@ -84,12 +88,12 @@ class FleetServicesNode(Node):
         tick, self._tick = self._tick, Future()
         tick.set_result(None)
 
-    def _answer(self, steps, service, service_type, request):
+    def _begin(self, steps, *arguments):
         """Begin the steps of a service; an error that is no refusal is a fault of this node."""
 
         def guarded():
             try:
-                return (yield from steps(service, service_type, request))
+                return (yield from steps(*arguments))
             except ServiceError:
                 raise
             except Exception as error:
@@ -100,24 +104,54 @@ class FleetServicesNode(Node):
 
     # The steps of the services; ``service`` is that of each vehicle.
 
-    def _take_off(self, service, service_type, request):
+    def _of_some(self, request):
+        """Command the vehicles of a `CommandVehicles`."""
+        names, duration = request.names, request.duration
+        if unknown := [name for name in names if name not in self._fleet.names]:
+            raise ServiceError(f"{', '.join(unknown)}: not of this fleet; nothing was done")
+        go_to = f"{HIGH_LEVEL}/go_to"
+        if request.command == "take off":
+            climb = srv.TakeoffRequest(0, request.height, duration)
+            yield from self._take_off(f"{HIGH_LEVEL}/takeoff", srv.Takeoff, climb, names)
+        elif request.command == "land":
+            self._raise((yield self._lander.land(names)))
+        elif request.command == "reset":
+            yield from self._command("emergency_reset", Empty, EmptyRequest(), names)
+        elif request.command == "hold":
+            yield from self._command(go_to, srv.GoTo, _hold(), names)
+        elif request.command == "go to" and len(names) == len(request.goals) == len(request.yaws):
+            goals = zip(names, request.goals, request.yaws, strict=True)
+            moves = {name: srv.GoToRequest(0, False, *goal, duration) for name, *goal in goals}
+            refusals, _ = yield self._call(names, go_to, srv.GoTo, moves)
+            if refusals:
+                begun = [name for name in names if name not in refusals]
+                yield self._call(begun, go_to, srv.GoTo, _hold())
+            self._raise(refusals)
+        else:
+            raise ServiceError(
+                f"{request.command} of {len(names)} vehicles: {len(request.goals)} goals, "
+                f"{len(request.yaws)} yaws; expected take off, land, hold, reset, or go to with a "
+                "goal and a yaw of each"
+            )
+
+    def _take_off(self, service, service_type, request, names=None):
+        names = self._fleet.names if names is None else names
         if getattr(request, "groupMask", 0):
             # Only the nodes of the vehicles know their groups.
             return (yield from self._command(service, service_type, request))
         end = min(self._age + TAKEOFF_WAIT, START_LIMIT)
-        if self._age < end and (waiting := self._takeoff_refusals()):
+        if self._age < end and (waiting := self._takeoff_refusals(names)):
             self._handle.info(
                 f"takeoff waits for vehicles, {TAKEOFF_WAIT:g} s at most: {self._text(waiting)}"
             )
-        while refusals := self._takeoff_refusals():
+        while refusals := self._takeoff_refusals(names):
             if self._age >= end:
                 raise ServiceError(f"no vehicle takes off: {self._text(refusals)}")
             yield self._tick
-        names = self._fleet.names
         # Vehicles in flight refuse /NAME/takeoff; they go to the height of the firmware's takeoff.
         flying = [name for name in names if self._states.flight_state(name) in _FLYING]
         if flying and service_type is Empty:
-            names = tuple(name for name in names if name not in flying)
+            names = [name for name in names if name not in flying]
             if not names:
                 raise ServiceError("refused: all vehicles are flying already")
             rest = ", ".join(names)
@@ -127,11 +161,11 @@ class FleetServicesNode(Node):
             yield from self._abort(refusals, [name for name in names if name not in idle])
         self._raise(refusals)
 
-    def _takeoff_refusals(self):
+    def _takeoff_refusals(self, names):
         """Return why vehicles that do not fly yet refuse to take off: name to reason."""
         return {
             name: reason
-            for name in self._fleet.names
+            for name in names
             if self._states.flight_state(name) not in _FLYING
             and (reason := self._states.takeoff_refusals[self._states.numbers[name]])
         }
@@ -161,15 +195,17 @@ class FleetServicesNode(Node):
             )
         return (yield from self._command(service, service_type, request))
 
-    def _command(self, service, service_type, request):
-        refusals, _ = yield self._call(self._fleet.names, service, service_type, request)
+    def _command(self, service, service_type, request, names=None):
+        names = self._fleet.names if names is None else names
+        refusals, _ = yield self._call(names, service, service_type, request)
         self._raise(refusals)
 
     def _call(self, names, service, service_type, request, is_takeoff=False):
         """Call the services of vehicles; return the future of their refusals.
 
-        With them come the names of those that were on the ground when they refused. A takeoff
-        does not wait for all answers after the first of these.
+        The request is one for all, or a dictionary with that of each. With the refusals come the
+        names of those that were on the ground when they refused. A takeoff does not wait for all
+        answers after the first of these.
         """
         outcome: Future[tuple[Refusals, list[str]]] = Future()
         refusals: dict[str, str] = {}
@@ -185,8 +221,11 @@ class FleetServicesNode(Node):
             if (not waiting or (is_takeoff and idle)) and not outcome.done():
                 outcome.set_result((refusals, idle))
 
+        if not names:
+            outcome.set_result((refusals, idle))
         for name in names:
-            call = self._lander.call(name, service, service_type, request)
+            own = request[name] if isinstance(request, dict) else request
+            call = self._lander.call(name, service, service_type, own)
             call.add_done_callback(partial(on_answer, name))
         return outcome
 
@@ -213,3 +252,7 @@ class FleetServicesNode(Node):
     def _log_refusals(self, done):
         if done.result():
             self._handle.error(f"MAY STILL FLY: {self._text(done.result())}")
+
+
+def _hold():
+    return srv.GoToRequest(relative=True, duration=genpy.Duration.from_sec(_HOLD_TIME))

@@ -71,6 +71,8 @@ def setpoint_of(
 #: Namespace, below a vehicle's name, of the node; below /all of the same services for all.
 HIGH_LEVEL = "high_level"
 
+COMMAND = "/all/command"  #: Service of a fleet for some of its vehicles.
+
 #: Time from a takeoff until the references of its climb begin, for which the rest is left (s).
 TAKEOFF_LEAD = 1.5
 

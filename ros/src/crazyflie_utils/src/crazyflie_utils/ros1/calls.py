@@ -4,36 +4,51 @@ import ast
 import contextlib
 import socket
 import threading
-from collections.abc import Callable
+import xmlrpc.client
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future, InvalidStateError, wait
 from functools import partial
+from queue import SimpleQueue
 from time import monotonic
-from typing import Any
+from typing import Any, NamedTuple
 
-import rosgraph
 import rospy
 from rospy.impl.tcpros_base import TCPROSTransport
 
 from crazyflie_utils.refusal import ServiceError
+from crazyflie_utils.ros1.master_watch import NO_ANSWER, bounded_master
+from crazyflie_utils.topics import Serve
 
 #: Longest time that the caller of a service waits while simulated time stands still (s of the
 #: machine's clock).
 _STALL_LIMIT = 5.0
 
+_MASTER_LIMIT = 2.0  #: Longest time for an answer of the master (s).
 _MAX_CALLS = 8  #: Largest number of unanswered calls of one service.
 
 _in_thread = threading.local()
 
 
-class ServiceCaller:
-    """Calls services, each call in a thread of its own.
+class OwnService(NamedTuple):
+    """A service of this process, and what answers it."""
 
-    Services of this process, ``own``, are called without a connection: a fleet has a hundred.
+    service: rospy.Service
+    serve: Serve
+
+
+class ServiceCaller:
+    """Calls services of other processes, each call in a thread of its own.
+
+    Services of this process, ``own``, are called without a connection, all in one thread that waits
+    for no answer: a fleet has a hundred, and as many threads would hold up what answers them.
     """
 
     def __init__(self) -> None:
-        self.own: dict[str, rospy.Service] = {}
+        self.own: dict[str, OwnService] = {}
         self._calls: dict[str, threading.Semaphore] = {}
+        self._own_calls: SimpleQueue[tuple[OwnService, Any, Future[Any], Callable[[], None]]]
+        self._own_calls = SimpleQueue()
+        self._has_thread = False
 
     def call(
         self,
@@ -57,9 +72,17 @@ class ServiceCaller:
             _fail(future, f"{name} has not answered {_MAX_CALLS} earlier calls")
             return future
         connection = _Connection(rospy_name, service_type)
-        threading.Thread(
-            target=_call, args=(connection, request, limit, future, calls, own), daemon=True
-        ).start()
+
+        def call():
+            threading.Thread(
+                target=_call, args=(connection, request, limit, future), daemon=True
+            ).start()
+
+        future.add_done_callback(lambda _: calls.release())
+        if own is None:
+            call()
+        else:
+            self._call_own(own, request, future, call)
 
         def give_up(text, unless_sent):
             if connection.close(unless_sent):
@@ -71,6 +94,26 @@ class ServiceCaller:
             _after(start_limit, future, give_up, text, True)
         return future
 
+    def _call_own(self, own, request, future, call):
+        """Call a service of this process, or else ``call()`` the one that has taken its name."""
+        self._own_calls.put((own, request, future, call))
+        if not self._has_thread:
+            self._has_thread = True
+            threading.Thread(target=self._call_queued, daemon=True).start()
+
+    def _call_queued(self):
+        while True:
+            calls = [self._own_calls.get()]
+            while not self._own_calls.empty():
+                calls.append(self._own_calls.get())
+            ours = _ours([own.service for own, *_ in calls])
+            for own, request, future, call in calls:
+                if own.service.resolved_name in ours:
+                    answer = own.serve(request, future.done)
+                    answer.add_done_callback(partial(_pass_on, future))
+                else:
+                    call()
+
 
 class _Connection:
     """The connection of one call."""
@@ -78,13 +121,13 @@ class _Connection:
     def __init__(self, name: str, service_type: type):
         self.name, self._type = name, service_type
         self._transport: TCPROSTransport | None = None
-        self._is_sent = self.is_closed = False
+        self.is_sent = self.is_closed = False
         self._lock = threading.Lock()
 
     def close(self, unless_sent: bool = False) -> bool:
         """End the connection, for good; return whether that was done."""
         with self._lock:
-            if unless_sent and self._is_sent:
+            if unless_sent and self.is_sent:
                 return False
             self.is_closed = True
             if self._transport is not None:
@@ -102,7 +145,7 @@ class _Connection:
         transport.connect(address, port, proxy.uri)
         with self._lock:
             self._expect_open()
-            self._is_sent = True
+            self.is_sent = True
         transport.send_message(request, 1)
         (response,) = transport.receive_once()
         return response
@@ -164,12 +207,13 @@ def wait_for_answer(answer: Future[Any], name: str, time: Callable[[], float]) -
     return answer.result()
 
 
-def _call(connection, request, limit, future, calls, own):
+def _call(connection, request, limit, future):
     try:
-        if own is not None and _answers(own):
-            _in_thread.is_withdrawn = future.done
-            response = own.handler(request)
-        else:
+        try:
+            response = connection.exchange(request)
+        except Exception:
+            if connection.is_sent or connection.is_closed:
+                raise
             rospy.wait_for_service(connection.name, timeout=limit)
             response = connection.exchange(request)
     except Exception as error:
@@ -181,7 +225,14 @@ def _call(connection, request, limit, future, calls, own):
             future.set_result(response)
     finally:
         connection.close()
-        calls.release()
+
+
+def _pass_on(future, answer):
+    if error := answer.exception():
+        _fail(future, str(error))
+    else:
+        with contextlib.suppress(InvalidStateError):
+            future.set_result(answer.result())
 
 
 def _reason(error):
@@ -197,14 +248,17 @@ def _reason(error):
     return words.removeprefix("service cannot process request: ")
 
 
-def _answers(own):
-    """Return whether the master has no other service of this name, or is gone."""
+def _ours(services: Iterable[rospy.Service]) -> set[str]:
+    """Return the names for which the master has no service but these; all if it is gone."""
+    uris = {each.resolved_name: each.uri for each in services}
+    lookups: Any = xmlrpc.client.MultiCall(bounded_master(rospy.get_name(), _MASTER_LIMIT).handle)
+    for name in uris:
+        lookups.lookupService(rospy.get_name(), name)
     try:
-        return rosgraph.Master(rospy.get_name()).lookupService(own.resolved_name) == own.uri
-    except rosgraph.MasterException:
-        return False
-    except OSError:
-        return True
+        answers = zip(uris.items(), lookups(), strict=True)
+        return {name for (name, uri), (_, _, known) in answers if known == uri}
+    except NO_ANSWER:
+        return {*uris}
 
 
 def _fail(future, text):

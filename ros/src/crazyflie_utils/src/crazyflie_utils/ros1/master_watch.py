@@ -16,7 +16,7 @@ from rospy.impl import registration
 from typing_extensions import override
 
 #: What a request raises if its receiver is not there, or does not understand it.
-_NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
+NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
 
 _METHODS = {
     registration.Registration.PUB: "registerPublisher",
@@ -43,7 +43,7 @@ def register() -> None:
     try:
         outcome: Any = request()
         answers = [outcome[k] for k in range(len(registered))]
-    except _NO_ANSWER:
+    except NO_ANSWER:
         # One by one, each repeated until the master answers.
         for kind, name, type_or_uri in registered:
             listeners.notify_added(name, type_or_uri, kind)
@@ -97,7 +97,7 @@ def master_answers(limit: float = _ANSWER_LIMIT) -> bool:
     """Return whether the master answers within ``limit`` (s); one that is stopped does not."""
     try:
         bounded_master("/master_answers", limit).getPid()
-    except (*_NO_ANSWER, ValueError):
+    except (*NO_ANSWER, ValueError):
         return False
     return True
 
@@ -109,11 +109,11 @@ def living_node(name: str) -> str | None:
         uri = rosgraph.Master(caller).lookupNode(name)
         node = bounded_proxy(uri, _ANSWER_LIMIT)
         _, _, pid = node.getPid(caller)
-    except _NO_ANSWER:
+    except NO_ANSWER:
         return None
     try:
         _, _, answers_as = node.getName(caller)
-    except (*_NO_ANSWER, ValueError):
+    except (*NO_ANSWER, ValueError):
         # Only nodes in Python can say their names.
         answers_as = name
     # The port of a node that has died may be that of another one by now.
@@ -124,7 +124,7 @@ def namesake(names: set[str]) -> str | None:
     """Return which node of these names is running, with the remedy; None without any."""
     try:
         registrations = rosgraph.Master(rospy.get_name()).getSystemState()
-    except _NO_ANSWER:
+    except NO_ANSWER:
         # The master has just ended; the registration waits for a new one.
         return None
     registered = {node for kind in registrations for _, nodes in kind for node in nodes}
@@ -167,7 +167,7 @@ class MasterWatch:
             except rosgraph.MasterError:
                 is_known = False
             pid = self._pid if is_known and self._pid is not None else self._master.getPid()
-        except _NO_ANSWER:
+        except NO_ANSWER:
             if self._was_there:
                 rospy.logwarn("the ROS master does not answer; existing connections continue")
             self._was_there = False

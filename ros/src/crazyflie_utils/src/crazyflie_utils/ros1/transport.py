@@ -21,6 +21,7 @@ from crazyflie_utils.parameters.server import ParameterWriter
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.ros1 import patches
 from crazyflie_utils.ros1.calls import (
+    OwnService,
     ServiceCaller,
     WithdrawableService,
     wait_for_answer,
@@ -222,7 +223,7 @@ class RosTransport(Transport):
             service = WithdrawableService(self._rospy_name(name), service_type, answer)
         except rospy.ServiceException as error:
             raise ServiceError(str(error)) from None
-        self._caller.own[name] = service
+        self._caller.own[name] = OwnService(service, serve)
 
         def end():
             del self._caller.own[name]

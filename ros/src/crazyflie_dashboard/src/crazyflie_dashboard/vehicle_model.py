@@ -126,8 +126,8 @@ class VehicleModel:
         position, rotation, velocity, age = self._pose(frames, fixed)
         reference = self._newest.get("reference")
         control_at = self._arrivals.get("final_control", self._arrivals.get("cmd_vel"))
-        flight, held, driver, text, (volts,) = (self._newest[role] for role in _UNHEARD)
-        state, reason = self._words(flight, held, driver, text.data)
+        flight, held, driver, (volts,) = (self._newest[role] for role in _UNHEARD)
+        state, reason = self._words(flight, held, driver)
         is_flying = bool(driver.supervisor & VehicleStatus.FLYING)
         if "flight_status" in self.vehicle.topics:
             is_flying = flight.state not in _ON_GROUND
@@ -215,7 +215,7 @@ class VehicleModel:
         age = self._time() - self._arrivals[role]
         return row[:3], quaternion_from_rpy(*attitude), velocity, age
 
-    def _words(self, flight, held, driver, text):
+    def _words(self, flight, held, driver):
         """Return the state of the flight and its reason."""
         if held.state in _FILTER_WORDS:
             return _FILTER_WORDS[held.state], held.reason
@@ -226,7 +226,7 @@ class VehicleModel:
             return WORDS[flight.state], reason
         if "vehicle_status" in self._arrivals:
             return driver.text or "connected", driver.link_text
-        return text or "not known", ""
+        return "not known", ""
 
 
 def _known(number: float) -> float | None:

@@ -82,13 +82,6 @@ def test_motors_that_stop_are_no_landing_when_the_stream_ends():
     assert hand.said == ["SUP: Locked, reboot required"]
 
 
-def test_motors_that_stop_under_a_stream_are_a_landing(flying):
-    flying.motors_run = False
-    assert flying.run(2.1) is State.LANDED
-    flying.setpoint_age = 60.0
-    assert flying.run(10.0) is State.READY_TO_FLY
-
-
 def test_levelling_overrides_all_but_the_height(flying):
     flying.setpoint_age = 1.0
     flying.run(PERIOD)
@@ -169,12 +162,6 @@ def test_tumbling_while_levelling_out_locks(flying):
     assert not flying.supervisor.is_crashed
 
 
-def test_locked_overrides_everything(flying):
-    flying.supervisor.stop()
-    assert flying.run(2 * PERIOD) is State.LOCKED
-    assert flying.supervisor.override(Setpoint(thrust=40000.0)).thrust == 0.0
-
-
 @pytest.mark.parametrize(("force", "after"), [(0.4, 1.04), (-0.5, 0.16)])
 def test_tumbling(flying, force, after):
     flying.force = (0.5, 0.0, force)
@@ -207,20 +194,6 @@ def test_tumble_check_can_be_switched_off(flying):
     flying.supervisor.tumble_check = 0
     flying.force = (0.0, 0.0, -1.0)
     assert flying.run(3.0) is State.FLYING
-
-
-def test_armed_by_the_client():
-    hand = Hand(auto_arm=False)
-    assert hand.run(1.0) is State.PRE_FL_CHECKS_PASSED
-    assert hand.supervisor.arm(True)
-    assert hand.run(2 * PERIOD) is State.READY_TO_FLY
-    hand.motors_run = True
-    assert hand.run(PERIOD) is State.FLYING
-    hand.motors_run = False
-    assert hand.run(2.5) is State.LANDED
-    # Disarmed 3 s after landing.
-    assert hand.run(3.0) is State.PRE_FL_CHECKS_PASSED
-    assert not hand.supervisor.is_armed
 
 
 def test_disarming_the_landed_saves_the_wait(flying):

@@ -4,9 +4,8 @@ import struct
 
 import numpy as np
 import pytest
-from virtual_bench import Bench, attitude, generic
+from virtual_bench import Bench, generic
 
-from crazyflie_model.units import HOVER_PWM
 from crazyflie_virtual.crtp import Port
 from crazyflie_virtual.firmware.supervisor import LOW, State
 
@@ -55,27 +54,6 @@ def test_flies_to_positions_with_any_heading(yaw):
     bench.stream(generic(7, "ffff", 0.5, -0.5, 1.0, degrees), 4.0)
     bench.stream(generic(7, "ffff", 1.0, 0.0, 1.0, degrees), 5.0)
     assert bench.physics.position == pytest.approx((1.0, 0.0, 1.0), abs=0.1)
-
-
-@pytest.mark.parametrize(
-    ("tilt", "axis", "sign"),
-    [
-        ({"roll": 5.0}, 1, -1.0),
-        # On the wire the pitch is nose up: cflib has turned it round.
-        ({"pitch": -5.0}, 0, 1.0),
-    ],
-)
-def test_attitude_setpoints_accelerate_to_the_right_side(flying, tilt, axis, sign):
-    flying.unlock()
-    flying.stream(attitude(thrust=int(HOVER_PWM), **tilt), 0.6)
-    assert sign * flying.physics.velocity[axis] > 0.2
-    assert abs(flying.physics.velocity[1 - axis]) < 0.05
-
-
-def test_positive_yaw_rate_on_the_attitude_port_is_clockwise(flying):
-    flying.unlock()
-    flying.stream(attitude(yaw_rate=30.0, thrust=int(HOVER_PWM)), 0.6)
-    assert flying.firmware.estimate.yaw < -10.0
 
 
 def test_the_high_level_commander_has_no_watchdog(flying):

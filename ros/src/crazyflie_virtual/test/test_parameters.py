@@ -91,9 +91,11 @@ def test_every_parameter_can_be_read_and_fits_into_a_packet(bench):
         assert len(spec.group) + len(spec.name) <= 24
 
 
-@pytest.mark.parametrize("channel", [READ, WRITE, MISC])
-def test_nothing_is_asked(bench, channel):
-    assert bench.ask(Port.PARAMETERS, channel, b"") == []
+@pytest.mark.parametrize(
+    ("channel", "data"), [(READ, b""), (WRITE, b""), (MISC, b""), (MISC, b"\0ring\0effect\0")]
+)
+def test_what_asks_nothing_is_not_answered(bench, channel, data):
+    assert bench.ask(Port.PARAMETERS, channel, data) == []
 
 
 def test_stored_parameters_outlive_a_restart(bench):

@@ -36,12 +36,6 @@ def go_to(cf, goal):
     cf.goTo(goal, 0.0, 5.0)
 
 
-def test_without_avoidance_two_that_swap_collide():
-    swarm = hovering()
-    swap(swarm, go_to)
-    assert collisions(swarm, 5.0)
-
-
 @pytest.mark.parametrize("dt", [0.01, 0.1])
 def test_two_that_swap_pass_each_other_and_arrive(dt):
     swarm = hovering(f"--dt {dt}")
@@ -50,16 +44,6 @@ def test_two_that_swap_pass_each_other_and_arrive(dt):
     swap(swarm, go_to)
     assert not collisions(swarm, 5.0)
     assert positions(swarm) == pytest.approx(goals, abs=1e-4)
-
-
-def test_two_that_are_sent_to_crossing_goals_arrive():
-    swarm = hovering("--dt 0.01")
-    avoid_each_other(swarm)
-    goals = np.array([[-1.0, 1.0, 1.0], [1.0, 1.0, 1.0]])
-    for cf, goal in zip(swarm.allcfs.crazyflies, goals, strict=True):
-        go_to(cf, goal)
-    assert not collisions(swarm, 7.5)
-    assert positions(swarm) == pytest.approx(goals, abs=1e-6)
 
 
 def test_smaller_ellipsoids_come_closer():

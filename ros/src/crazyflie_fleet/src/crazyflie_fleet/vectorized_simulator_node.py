@@ -1,5 +1,6 @@
 """ROS interface of many simulated vehicles of one model."""
 
+import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -87,7 +88,12 @@ def batch_control(
 ) -> NDArray[np.float64]:
     """Return the controls, shape (n, 4), of an `IntegralStateFeedback` without an integrator.
 
-    Shapes: K (4, 7), u_ref (4,), and (n, 7) of the states x and references x_ref.
+    Parameters
+    ----------
+    K : ndarray, shape (4, 7)
+    u_ref : ndarray, shape (4,)
+    x, x_ref : ndarray, shape (n, 7)
+        States and references.
     """
     error = heading_error(split(x), split(x_ref))
     return join(limited(linear_control(K.tolist(), u_ref.tolist(), error)))
@@ -120,6 +126,7 @@ class VectorizedSimulatorNode(Node):
         self._model = model
         self._ticks = 0
         self._measured: tuple[float, NDArray[np.float64]] | None = None
+        self._broadcast_time = math.nan
         self._references: list[GovernedReferences] = []
         self._states: list[Publisher] = []
         self._controls: list[Publisher] = []
@@ -144,7 +151,7 @@ class VectorizedSimulatorNode(Node):
         self._start = handle.time()
         places = [vehicle.position for vehicle in self._vehicles]
         self._batch = VectorizedVehicles(MODELS[self._model](), places, self._start)
-        self._broadcast = handle.broadcast_poses()
+        self._broadcast = handle.broadcast_poses(self._broadcast_poses)
         self._all_states = handle.publisher("~" + ALL_STATES, Float64MultiArray)
         if parameters.clock.publish:
             self._set_clock = handle.clock_publisher()
@@ -206,13 +213,17 @@ class VectorizedSimulatorNode(Node):
         states = self._batch.states
         before, self._measured = self._measured, (time, states)
         if self._handle.has_pose_consumers():
-            self._broadcast_poses(time, states)
+            self._broadcast_poses()
         header = Header(0, self._handle.stamp(time), self._parameters.fixed_frame)
         if before is not None and time > before[0]:
             self._control(header, _estimates(*before, time, states))
 
-    def _broadcast_poses(self, time, states):
-        frame, stamp = self._parameters.fixed_frame, self._handle.nanoseconds(time)
+    def _broadcast_poses(self):
+        """Broadcast the present poses, once."""
+        if self._measured is None or self._broadcast_time == self._measured[0]:
+            return
+        self._broadcast_time, states = self._measured
+        frame, stamp = self._parameters.fixed_frame, self._handle.nanoseconds(self._broadcast_time)
         tilts = self._batch.tilts.tolist()
         self._broadcast(
             [

@@ -179,7 +179,7 @@ class SimulatorNode(Node[SimulatorParameters]):
         self._vehicle = SimulatedVehicle(
             self._dynamics, position, self._start, self.max_tilt, self.delay
         )
-        self._broadcast = handle.broadcast_poses()
+        self._broadcast = handle.broadcast_poses(lambda: self._catch_up(handle.time()))
         if self._publishes_clock:
             self._set_clock = handle.clock_publisher()
         handle.advertise_service("~reset", Empty, self._on_reset)

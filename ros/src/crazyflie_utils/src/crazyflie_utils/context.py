@@ -242,7 +242,7 @@ class ProcessContext:
             MAX_CLOCK_DELAY_SIMULATED if use_sim_time else 0.0,
         )
         # The poses of all vehicles that are simulated in one tick form one message.
-        tf = self.transforms.gather, self.transforms.send_gathered
+        tf = self.transforms.before_timers, self.transforms.send_gathered
         self._steady = TimerQueue(self.executor, machine_clock, *tf, transport.collect)
         self._simulated = SimulatedTimers(self.executor, self.clock, *tf)
         self._clock_publisher: Publisher | None = None

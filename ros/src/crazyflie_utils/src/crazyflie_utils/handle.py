@@ -24,6 +24,7 @@ from crazyflie_utils.parameters.declaration import (
 from crazyflie_utils.parameters.server import PrivateParameters, Reconfiguration
 from crazyflie_utils.parameters.types import ParameterType
 from crazyflie_utils.refusal import RefusalError, ServiceError
+from crazyflie_utils.tf.frame_tree import StampedPose
 from crazyflie_utils.timers import Timer
 from crazyflie_utils.topics import LatestMessage, Publisher, Subscriber
 from crazyflie_utils.vectors import is_finite, number_getter
@@ -58,8 +59,7 @@ class NodeHandle:
         #: For the node that publishes /clock; see `ProcessContext`.
         self.clock_publisher, self.next_event = process.clock_publisher, process.next_event
         tf = process.transforms
-        #: Methods of `Transforms`, like the next six.
-        self.broadcast_transforms, self.broadcast_poses = tf.broadcaster, tf.pose_broadcaster
+        self.broadcast_transforms = tf.broadcaster  #: Methods of `Transforms`, like the next five.
         self.broadcast_static_transforms = tf.static_broadcaster
         self.listen_to_transforms, self.listen_to_poses = tf.listener, tf.pose_listener
         self.has_pose_consumers = tf.has_pose_consumers
@@ -350,6 +350,17 @@ class NodeHandle:
     def random_seed(self) -> int:
         """Return a random seed, 32 bits: callbacks draw no random numbers elsewhere."""
         return self._process.transport.random_seed()
+
+    def broadcast_poses(
+        self, refresh: Callable[[], None] | None = None
+    ) -> Callable[[list[StampedPose]], None]:
+        """Announce /tf and return ``broadcast(list of StampedPose)``; see `Transforms`.
+
+        For ``refresh()`` see `Transforms.add_source`.
+        """
+        if refresh is not None:
+            self._process.transforms.add_source(self.guard(refresh))
+        return self._process.transforms.pose_broadcaster()
 
     def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:
         """Call ``callback()`` for new poses of a frame, once in ``period`` (s, by stamps)."""

@@ -47,7 +47,7 @@ class OfflineProcess(Process):
         self.clock.set(start)
         self.machine_clock = SimulatedClock()
         self.machine_clock.set(start)
-        tf = self.transforms.gather, self.transforms.send_gathered
+        tf = self.transforms.before_timers, self.transforms.send_gathered
         self._steady = TimerQueue(self.executor, self.machine_clock, *tf)
         self.machine_clock.on_change(lambda now, _: self._steady.run_due(now))
         if recorder is not None:

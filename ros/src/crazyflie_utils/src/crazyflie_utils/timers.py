@@ -309,16 +309,16 @@ _number = attrgetter("number")
 class TimerQueue:
     """Timers by a clock, in the order of their deadlines; `run_due` runs them, or a thread.
 
-    ``before()`` and ``after()`` are called before and after several timers that are due at once,
-    and ``collect()``, which submits what waits, before all that are.
+    ``before(count)`` returns the work to run before as many timers that are due at once;
+    ``after()`` is called after several, and ``collect()``, which submits what waits, before all.
     """
 
     def __init__(
         self,
         executor: Executor,
         clock: SteadyClock | SimulatedClock,
-        before: Callable[[], None] | None = None,
-        after: Callable[[], None] | None = None,
+        before: Callable[[int], list[Callable[[], None]]] = lambda count: [],
+        after: Callable[[], None] = lambda: None,
         collect: Callable[[], None] = lambda: None,
     ):
         self._executor = executor
@@ -408,9 +408,11 @@ class TimerQueue:
     def _due_works(self, now, times):
         due = self._take_due(self._clock.time() if now is None else now)
         works = [timer.fire for timer in due for _ in range(1 if timer.period > 0.0 else times)]
-        if len(due) > 1:
-            works = [*filter(None, (self._before, *works, self._after))]
+        if due:
+            yield from self._before(len(due))
         yield from works
+        if len(due) > 1:
+            yield self._after
 
     def rebase(self, now: float) -> None:
         """Set every deadline one period after ``now`` (s): time has been reset."""

@@ -118,7 +118,7 @@ class _RosProcess(Process):
         self.machine = _ReplayClock(rows, executor)
         simulated = SimulatedClock() if clock == "simulated" else self.machine
         super().__init__(transport, clock == "simulated", simulated, executor=executor)
-        tf = self.transforms.gather, self.transforms.send_gathered
+        tf = self.transforms.before_timers, self.transforms.send_gathered
         self._steady = TimerQueue(executor, self.machine, *tf)
 
     @override

@@ -63,6 +63,7 @@ class Transforms:
         self._subscriber: Subscriber | None = None
         self._listeners: dict[str, list[_Listener]] = {}
         self._arrived: list[_Listener] = []
+        self._sources: list[Callable[[], None]] = []
         # Each external broadcaster has a thread of its own.
         self._lock = threading.RLock()
 
@@ -98,9 +99,17 @@ class Transforms:
         if self._publisher is None:
             self._publisher = self._topics.publisher("/tf", TFMessage, latch=False)
 
+    def add_source(self, refresh: Callable[[], None]) -> None:
+        """Call ``refresh()`` before timers of the process, if any node of it looks poses up.
+
+        That is early enough to broadcast poses while `has_pose_consumers` is false.
+        """
+        self._sources.append(refresh)
+
     def has_pose_consumers(self) -> bool:
-        """Return whether anybody, here or in other processes, uses the poses of a broadcaster."""
-        return self._publisher.has_subscribers()
+        """Return whether poses are used when they are broadcast, not only by lookups here."""
+        own = int(self._subscriber is not None)
+        return bool(self._listeners) or self._publisher.has_subscribers(own)
 
     def _broadcast_poses(self, poses):
         # A message is made only if it is received outside of this class.
@@ -116,6 +125,14 @@ class Transforms:
             self._send(poses)
         else:
             self._gathered += poses
+
+    def before_timers(self, count: int) -> list[Callable[[], None]]:
+        """Return the work before ``count`` timers that are due at once.
+
+        Of several, the poses that they broadcast are collected for one message.
+        """
+        works = [] if self._subscriber is None else [*self._sources]
+        return [self.gather, *works] if count > 1 else works
 
     def gather(self) -> None:
         """Collect the poses that are broadcast from now on for one message."""

@@ -13,7 +13,7 @@ from crazyflie_fleet.connect_node import FleetConnectNode
 from crazyflie_fleet.mocap_process import make_nodes
 from crazyflie_utils import ParameterError, ServiceError
 from crazyflie_utils.testing import FakeProcess
-from mocap_optitrack.parameters import MocapParameters
+from mocap_optitrack.mocap_parameters import MocapParameters
 
 FLEET = """
 robots:

@@ -8,7 +8,7 @@ from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters.types import TEXT as TEXT_TYPE
 from crazyflie_utils.parameters.types import Integer
 from crazyflie_utils.testing import FakeProcess
-from mocap_optitrack.parameters import MocapParameters
+from mocap_optitrack.mocap_parameters import MocapParameters
 
 TEXT = """\
 /motion_capture_tracking:

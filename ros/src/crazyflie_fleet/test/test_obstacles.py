@@ -23,7 +23,7 @@ from crazyflie_msgs.msg import (
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped as State
 from crazyflie_utils import ParameterError
 from crazyflie_utils.testing import FakeProcess
-from mocap_optitrack.parameters import MocapParameters
+from mocap_optitrack.mocap_parameters import MocapParameters
 
 FLEET = """
 robots:

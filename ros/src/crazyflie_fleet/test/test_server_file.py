@@ -6,7 +6,7 @@ from crazyflie_driver.parameters import CrazyflieServerParameters
 from crazyflie_fleet import driver_process, mocap_process
 from crazyflie_utils import ParameterError
 from crazyflie_utils.testing import FakeProcess
-from mocap_optitrack.parameters import MocapParameters
+from mocap_optitrack.mocap_parameters import MocapParameters
 
 SERVER = """\
 /crazyflie_server:

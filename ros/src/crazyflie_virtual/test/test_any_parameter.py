@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from virtual_bench import Bench, attitude
 
 from crazyflie_virtual.crtp import Packet, Port
-from crazyflie_virtual.parameters import parameter_specs
+from crazyflie_virtual.firmware_parameters import parameter_specs
 from crazyflie_virtual.toc import FLOAT
 
 SPECS = parameter_specs()

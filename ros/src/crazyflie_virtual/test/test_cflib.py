@@ -10,8 +10,8 @@ from virtual_client import LIMIT, Client, connected_vehicle
 
 from crazyflie_utils.testing.programs import wait_until
 from crazyflie_virtual.firmware.supervisor import State
+from crazyflie_virtual.firmware_parameters import parameter_specs
 from crazyflie_virtual.log import log_variables
-from crazyflie_virtual.parameters import parameter_specs
 from crazyflie_virtual.settings import FIRST_PORT
 
 

@@ -6,7 +6,7 @@ import pytest
 from virtual_bench import Bench
 
 from crazyflie_virtual.crtp import Port
-from crazyflie_virtual.parameters import parameter_specs
+from crazyflie_virtual.firmware_parameters import parameter_specs
 
 NAMES = [f"{spec.group}.{spec.name}" for spec in parameter_specs()]
 

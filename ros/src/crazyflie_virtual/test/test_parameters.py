@@ -8,7 +8,7 @@ import pytest
 from virtual_bench import Bench
 
 from crazyflie_virtual.crtp import Port
-from crazyflie_virtual.parameters import parameter_specs
+from crazyflie_virtual.firmware_parameters import parameter_specs
 from crazyflie_virtual.toc import FLOAT
 
 TABLE, READ, WRITE, MISC = 0, 1, 2, 3

@@ -12,7 +12,7 @@ from virtual_bench import Bench, attitude
 
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.crtp import Packet, Port
-from crazyflie_virtual.parameters import parameter_specs
+from crazyflie_virtual.firmware_parameters import parameter_specs
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
 

@@ -8,8 +8,8 @@ from recording import recorded
 from virtual_bench import Bench
 
 from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.firmware_parameters import parameter_specs
 from crazyflie_virtual.log import log_variables
-from crazyflie_virtual.parameters import parameter_specs
 
 TABLE, READ, WRITE, MISC = 0, 1, 2, 3
 CONTROL, DATA = 1, 2

@@ -8,9 +8,9 @@ import pytest
 from test_cflib_examples import OTHERS, RUNNING
 
 from crazyflie_utils.parameters.command_line import parse_arguments
+from crazyflie_virtual.firmware_parameters import parameter_specs
 from crazyflie_virtual.log import log_variables
 from crazyflie_virtual.mocap import MocapSettings
-from crazyflie_virtual.parameters import parameter_specs
 from crazyflie_virtual.settings import VehicleSettings, switches
 
 

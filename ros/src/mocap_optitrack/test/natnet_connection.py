@@ -8,8 +8,8 @@ import pytest
 
 from crazyflie_virtual.mocap import MocapServer, MocapSettings
 from crazyflie_virtual.server import Observation
+from mocap_optitrack.mocap_parameters import NatNetParameters
 from mocap_optitrack.natnet_source import NatNetSource
-from mocap_optitrack.parameters import NatNetParameters
 
 LIMIT = 60.0
 GROUP = "239.255.42.99"

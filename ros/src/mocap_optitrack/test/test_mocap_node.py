@@ -16,8 +16,8 @@ from mocap_optitrack.client_nodes import ViconBridgeNode, VrpnClientNode
 from mocap_optitrack.frames import Frame, SeenBody
 from mocap_optitrack.library_source import LibrarySource
 from mocap_optitrack.mocap_node import MocapNode
+from mocap_optitrack.mocap_parameters import NatNetParameters
 from mocap_optitrack.natnet_source import NatNetSource
-from mocap_optitrack.parameters import NatNetParameters
 
 SHIPPED = Path(__file__).parents[1] / "config" / "mocap.yaml"
 

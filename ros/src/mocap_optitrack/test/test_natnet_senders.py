@@ -12,8 +12,8 @@ from natnet_connection import GROUP, LIMIT, connection, is_named, server, wait_f
 from crazyflie_utils.testing.programs import free_port
 from crazyflie_virtual import natnet
 from mocap_optitrack import natnet_source as module
+from mocap_optitrack.mocap_parameters import NatNetParameters
 from mocap_optitrack.natnet_source import NatNetSource
-from mocap_optitrack.parameters import NatNetParameters
 from mocap_optitrack.source import SourceError
 
 

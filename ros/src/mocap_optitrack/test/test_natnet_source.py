@@ -15,8 +15,8 @@ from crazyflie_virtual import natnet
 from crazyflie_virtual.mocap import MocapServer, MocapSettings
 from crazyflie_virtual.natnet import VERSIONS
 from mocap_optitrack import natnet_source as module
+from mocap_optitrack.mocap_parameters import NatNetParameters
 from mocap_optitrack.natnet_source import NatNetSource
-from mocap_optitrack.parameters import NatNetParameters
 from mocap_optitrack.source import SourceError
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from mocap_optitrack.bodies import RIGID_BODIES, RigidBody
-from mocap_optitrack.parameters import ADDRESS, GROUP, STREAM_VERSION, MocapParameters
+from mocap_optitrack.mocap_parameters import ADDRESS, GROUP, STREAM_VERSION, MocapParameters
 
 ROBOT = {
     "pose": "Robot_1/pose",

@@ -8,7 +8,7 @@ from crazyflie_model.angles import Triple
 from crazyflie_py.swarm import DEFAULT_COLOR, SwarmVehicle
 from crazyflie_virtual.body import Physics
 from crazyflie_virtual.firmware.firmware import Firmware
-from crazyflie_virtual.parameters import NO_LIMITS, ParameterPort, parameter_specs
+from crazyflie_virtual.firmware_parameters import NO_LIMITS, ParameterPort, parameter_specs
 from crazyflie_virtual.settings import VehicleSettings, switches
 
 _log = logging.getLogger(__name__)

@@ -12,9 +12,9 @@ from crazyflie_virtual.body import LOW_CHARGE, OFF, STEP, Battery, Physics
 from crazyflie_virtual.crtp import FirmwareAssertionError, Packet, Port
 from crazyflie_virtual.firmware.decks import lighthouse_pages
 from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
+from crazyflie_virtual.firmware_parameters import ParameterPort
 from crazyflie_virtual.log import LogPort, log_variables
 from crazyflie_virtual.memory import LighthouseMemory, Memory, MemoryPort
-from crazyflie_virtual.parameters import ParameterPort
 from crazyflie_virtual.settings import VehicleSettings, switches
 from crazyflie_world import world_file
 

@@ -16,7 +16,7 @@ from crazyflie_utils.parameters.types import BOOLEAN, FRAME, PORT, TEXT, ListOf
 from mocap_optitrack.bodies import RigidBody
 from mocap_optitrack.frames import Frame
 from mocap_optitrack.mocap_node import MocapNode, transform_of
-from mocap_optitrack.parameters import MocapParameters, NatNetParameters
+from mocap_optitrack.mocap_parameters import MocapParameters, NatNetParameters
 
 _VRPN_PORT = 3883
 

@@ -27,8 +27,8 @@ from mocap_optitrack.bodies import RigidBody
 from mocap_optitrack.frames import Frame
 from mocap_optitrack.health import ERROR, Health
 from mocap_optitrack.library_source import LibrarySource
+from mocap_optitrack.mocap_parameters import NATNET, MocapParameters
 from mocap_optitrack.natnet_source import NatNetSource
-from mocap_optitrack.parameters import NATNET, MocapParameters
 from mocap_optitrack.source import Receiver
 from mocap_optitrack.tracker import BodyPose, Tracker
 

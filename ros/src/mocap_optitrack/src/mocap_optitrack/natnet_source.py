@@ -12,7 +12,7 @@ from typing_extensions import override
 
 from mocap_optitrack import natnet_messages as natnet
 from mocap_optitrack.frames import Frame
-from mocap_optitrack.parameters import NatNetParameters
+from mocap_optitrack.mocap_parameters import NatNetParameters
 from mocap_optitrack.source import Source, SourceError
 
 

@@ -137,6 +137,10 @@ class FakeDashboard:
     def watch(self, page, vehicles):
         self.watched = tuple(vehicles)
 
+    def limits(self, vehicles):
+        box = Box((-2.0, -2.0, 0.0), (2.0, 2.5, 3.0))
+        return (box, "the room of the world file") if vehicles else None
+
     def plots(self, page, until=None):
         times = tuple(-60 + 0.1 * k for k in range(600))
         own = (

@@ -21,6 +21,7 @@ assert runner == "crazyflie_mission_api.mission_runner"
 if word == "dry_run":
     passed = "bad" not in path
     result = dict(passed=passed, text="far" if passed else "cf1: y is 3 m", duration=4.0)
+    result["steps"] = [[0.0, "takeoff: cf1"], [1.5, "land: cf1"]]
     result["paths"] = dict(cf1=[[0, 0, 0], [0, 0, 1]])
     print("from crazyflie_mission_api: loading")
     line = json.dumps(dict(dry_run=result))
@@ -127,13 +128,15 @@ def test_one_mission_flies_at_a_time_until_it_is_stopped(missions, script):
     missions.dry_run(mission, ("cf1",), {}).result(LIMIT)
     end = missions.fly(mission, ("cf1",), {})
     assert missions.running[0].startswith("waits.py")
+    assert [each[:2] for each in missions.steps] == [("takeoff: cf1", 1.5), ("land: cf1", 2.5)]
     wait_until(lambda: "waits.py · takeoff: cf1" in missions.running[0])
+    assert [each.state for each in missions.steps] == ["now", "next"]
     with pytest.raises(RefusalError, match=r"waits.py is still flying; wait for its end"):
         missions.fly(mission, ("cf1",), {})
     missions.stop()
     Path(f"{mission}.ground").touch()
     assert end.result(LIMIT) == ""
-    assert missions.running == ()
+    assert missions.running == missions.steps == ()
     with pytest.raises(RefusalError, match="no mission that a dashboard has started is flying"):
         missions.stop()
 

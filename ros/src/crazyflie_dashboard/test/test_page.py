@@ -21,7 +21,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 from crazyflie_dashboard.history import History
-from crazyflie_dashboard.snapshot import Action, LogLine, Placed, Sentence
+from crazyflie_dashboard.snapshot import Action, LogLine, Placed, Sentence, Step
 from crazyflie_dashboard.surroundings import grouped
 from crazyflie_takeoff.envelope import Box
 
@@ -814,6 +814,35 @@ def test_the_page_is_light_or_dark_as_the_system_is(browser, driver):
     has("dark")
 
 
+def test_the_bar_has_the_steps_of_a_mission(browser, server):
+    steps = (Step("takeoff: cf1", 2.0, "done"), Step("go_to: cf1", 4.0, "now"))
+    server.dashboard.set_vehicles(
+        vehicle("cf1", 0.0), missions=("square.py · 4 s left",), steps=steps
+    )
+    wait_for(lambda: browser.count(".steps span") == 2, "steps")
+    assert browser.text(".steps .now") == "go_to: cf1"
+    widths = [browser.find(f".steps .{state}").rect["width"] for state in ("done", "now")]
+    assert widths[1] > 1.8 * widths[0]
+    server.dashboard.set_vehicles(vehicle("cf1", 0.0))
+    wait_for(lambda: browser.count(".steps") == 0, "no steps")
+
+
+def test_the_address_has_what_is_selected(browser, driver, server):
+    server.dashboard.set_vehicles(vehicle("cf1", 0.0), vehicle("cf2", 0.0))
+    browser.choose("cf2")
+    browser.has("x -2 to 2, y -2 to 2.5, z 0 to 3 m: the room of the world file", ".limits")
+    wait_for(lambda: driver.current_url.endswith("vehicles=cf2"), "the selection in the address")
+    driver.switch_to.new_window("tab")
+    try:
+        driver.get(server.url + "?vehicles=cf2")
+        wait_for(lambda: browser.find(f"{browser.card('cf2')}.chosen"), "cf2 is selected")
+    finally:
+        driver.close()
+        driver.switch_to.window(driver.window_handles[0])
+    browser.press("None")
+    wait_for(lambda: "vehicles" not in driver.current_url, "no selection in the address")
+
+
 def test_the_bar_has_one_height(browser, driver, server):
     try:
         for width in (1400, 900, 390):
@@ -823,5 +852,10 @@ def test_the_bar_has_one_height(browser, driver, server):
                 server.dashboard.set_vehicles(vehicle("cf1", 0.0), missions=missions)
                 wait_for(lambda m=missions: browser.count(".timebar .mission") == len(m), width)
                 assert browser.find(".bar").rect["height"] == 52
+                take = browser.find(".take").rect
+                assert take["x"] + take["width"] <= width, (width, missions)
+                emergency = browser.find(".emergency-all")
+                inner = "arguments[0].scrollWidth <= arguments[0].clientWidth"
+                assert driver.execute_script(f"return {inner}", emergency), (width, missions)
     finally:
         driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

@@ -23,7 +23,9 @@ except KeyboardInterrupt:
 """
 REPORT = """
 import pathlib, sys
-*folders, _, out = map(pathlib.Path, sys.argv[1:])
+is_compared = sys.argv[-1] == "--compare"
+*folders, _, out = map(pathlib.Path, sys.argv[1 : -1 if is_compared else None])
+assert is_compared == (len(folders) == 2)
 assert all((each / "flight.bag").exists() for each in folders)
 out.mkdir(parents=True)
 names = ", ".join(each.name for each in folders)

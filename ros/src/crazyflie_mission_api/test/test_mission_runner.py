@@ -69,6 +69,7 @@ def test_a_dry_run_has_a_path_and_moves_no_vehicle(run, vehicle):
     assert found["text"].startswith("cf1 fly for ")
     assert found["paths"]["cf1"][0] == [0.0, 0.0, 0.0]
     assert [0.5, 0.0, 1.2] in found["paths"]["cf1"]
+    assert [text for _, text in found["steps"]][-1] == "land: cf1"
     # From one point to the next 0.2 s, in steps of 0.05 s.
     assert 0.2 <= found["duration"] / len(found["paths"]["cf1"]) <= 0.25
     assert "flown" not in output

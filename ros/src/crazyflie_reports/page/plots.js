@@ -67,7 +67,7 @@ class Plot {
       // A commanded or reference value has the color of what follows it.
       label: name, stroke: COLORS[(first < 0 ? k : first) % COLORS.length], width: 1.4,
       // Of a flight that is laid over this one.
-      dash: /(what if|recorded)$/.test(name) ? [1, 2] : name.includes(" ") ? [5, 3] : undefined,
+      dash: / (what if|recorded|first|second)$/.test(name) ? [1, 2] : name.includes(" ") ? [5, 3] : undefined,
       paths: name.endsWith("reference") ? uPlot.paths.stepped({ align: 1 }) : undefined,
       points: name.endsWith("reference") ? { show: false } : { size: 4 },
       value: (_, value) => value === null || value === undefined ? "–" : value.toFixed(2),

@@ -49,10 +49,10 @@ class Replay {
     }, { passive: false });
   }
 
-  // Show a flight of the recording, with others of the same time around it.
+  // Show a flight of the recording, with others of the same time, or that it is compared with, around it.
   choose(flight) {
     this.flight = flight;
-    const flights = [...this.recording.flights, ...(this.recording.others ?? [])];
+    const flights = [...this.recording.flights, ...(flight.others ?? [])];
     this.others = flights.filter((each) => each !== flight && each.path
       && each.vehicle !== flight.vehicle && each.start < flight.start + flight.duration
       && each.start + each.duration > flight.start);

@@ -174,7 +174,7 @@ added(document.getElementById("summary"), "div",
   `${counted(count, "flight")} in ${counted(columns.length, "recording")}. Times count from each takeoff, s. “!”: not normal; “–”: not known. `
   + "Drag the scene to turn it; on plots: click to set the time, drag or wheel to zoom, double click for all. "
   + "Dashed: reference or command; a line that is broken: nothing was recorded there."
-  + (REPORT.recordings.some((each) => each.others) ? " Dotted, and grey in the replay: the other flight." : ""), "quiet");
+  + (REPORT.recordings.some((each) => each.flights.some((flight) => flight.others)) ? " Dotted, and grey in the replay: the other flight." : ""), "quiet");
 for (const column of columns) if (column.recording.flights.length) column.choose(column.recording.flights[0]);
 begin();
 seek(Number(location.hash.slice(1)) || 0);  // report.html#7.5 begins at 7.5 s.

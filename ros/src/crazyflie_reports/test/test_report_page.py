@@ -45,9 +45,9 @@ def narrow():
         yield browser
 
 
-def open_report(browser, folder, bag, moment=5.0, *others):
+def open_report(browser, folder, bag, moment=5.0, *others, **options):
     """Show the report of a bag, and of additional ones, at a time of its replay (s)."""
-    make([bag, *others], folder / "out")
+    make([bag, *others], folder / "out", **options)
     browser.get_log("browser")
     browser.get("about:blank")
     browser.get_log("performance")
@@ -184,6 +184,20 @@ def test_the_legend_shows_the_values_of_the_time_of_the_replay(wide, tmp_path):
     assert tell(wide, values)[3] == "1.00"
     # A reference is valid until the next one.
     assert tell(wide, values)[6] == "1.00"
+
+
+def test_flights_of_two_recordings_are_laid_over_each_other(wide, tmp_path):
+    first = bags.flight_bag(tmp_path / "a.bag")
+    second = bags.flight_bag(tmp_path / "b.bag")
+    open_report(wide, tmp_path, first, 5.0, second, compares=True)
+    for k, other in enumerate(("second", "first")):
+        column = f"columns[{k}]"
+        names = tell(wide, f"{column}.plots[0].data.curves.map((each) => each.name)")
+        assert f"{names[0]} {other}" in names
+        # Grey in the replay, from the same moment on.
+        assert tell(wide, f"{column}.replay.others.map((each) => each.vehicle)") == [other]
+        assert tell(wide, f"{column}.replay.others[0].start - {column}.flight.start") == 0
+    assert "the other flight" in tell(wide, "document.getElementById('summary').textContent")
 
 
 def test_nothing_of_the_list_is_cut_off_where_two_recordings_share_the_width(wide, tmp_path):

@@ -2,6 +2,7 @@
 
 import math
 import subprocess
+from collections.abc import Iterable
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -139,6 +140,18 @@ class Actions:
         if command.action == Action.TAKEOFF and any(outcomes.values()):
             outcomes = _with_others(outcomes, f"is landed: {_WAITS}")
         return outcomes
+
+    def limits(self, names: Iterable[str]) -> tuple[Box, str] | None:
+        """Return the smallest box of goals of vehicles (m), and what it is in words."""
+        scene, models = self._model.scene.vehicles, self._model.models
+        known = [Target(models[n].vehicle, scene[n]) for n in names if n in models and n in scene]
+        if not known:
+            return None
+        # Most have the same ones: the room.
+        bounds = {self._bounds(target) for target in known}
+        lower = (max(each.box.lower[k] for each in bounds) for k in range(3))
+        upper = (min(each.box.upper[k] for each in bounds) for k in range(3))
+        return Box(tuple(lower), tuple(upper)), " and ".join(sorted({b.what for b in bounds}))
 
     def close(self) -> None:
         """End the commanders that were started here; each lives until its vehicle has landed."""

@@ -33,6 +33,7 @@ from crazyflie_dashboard.plots import fields_of
 from crazyflie_dashboard.progress import Commands, Progress
 from crazyflie_dashboard.recording import Recorded, Recording
 from crazyflie_dashboard.snapshot import Scene
+from crazyflie_takeoff.envelope import Box
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.steps import follow
@@ -91,7 +92,7 @@ class Dashboard:
         self._lane = lane
         self._parameters = LiveParameters(self._model)
         self._missions = missions.Missions()
-        self._model.missions = lambda: self._missions.running
+        self._model.missions = lambda: (self._missions.running, self._missions.steps)
         self._recording = Recording()
         self._model.recording = lambda: (self._recording.text, self._recording.length)
         self._open: dict[int, PageState] = {}
@@ -173,6 +174,10 @@ class Dashboard:
         outcome = self._control(page, command.words, self._actions.carry_out, command, said=said)
         outcome.add_done_callback(lambda done: self._commands.answered(number, done))
         return outcome
+
+    def limits(self, vehicles: Iterable[str]) -> tuple[Box, str] | None:
+        """Return where goals of these vehicles may be (m), and what limits them, in words."""
+        return self._actions.limits(vehicles)
 
     def progress(self) -> tuple[Progress, ...]:
         """Return the last commands and missions of all pages, and what has become of them."""
@@ -279,7 +284,7 @@ class Dashboard:
         return self._recording.report_on(names) if names else self._recording.report
 
     def make_report(self, names: tuple[str, ...]) -> "Future[str]":
-        """Make a report on a recording, or on two side by side."""
+        """Make a report on a recording, or on two that are compared."""
         return self._do(lambda: self._workers.submit(self._recording.make_report, names))
 
     def examine(self) -> "Future[None]":

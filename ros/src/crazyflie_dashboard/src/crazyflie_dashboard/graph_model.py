@@ -28,6 +28,7 @@ from crazyflie_dashboard.snapshot import (
     Placed,
     Scene,
     Sentence,
+    Step,
     Triple,
     VehicleSnapshot,
 )
@@ -78,7 +79,8 @@ class GraphModel:
         #: paths, sentences, missions, recording: Parts of the scene that are set from outside.
         self.paths: Mapping[str, tuple[Triple, ...]] = {}
         self.sentences: tuple[Sentence, ...] = ()
-        self.missions: Callable[[], tuple[str, ...]] = tuple
+        self.missions: Callable[[], tuple[tuple[str, ...], tuple[Step, ...]]]
+        self.missions = lambda: ((), ())
         self.recording: Callable[[], tuple[str, str]] = lambda: ("", "")
         #: Called with each new scene.
         self.on_scene: Callable[[Scene], object] = lambda scene: None
@@ -217,7 +219,7 @@ class GraphModel:
             model.now = self._snapshot(name, fixed)
             if model.plots is not None:
                 model.plots.take_pose(model.now, "state" in model.vehicle.topics)
-        recording, recorded = self.recording()
+        (running, steps), (recording, recorded) = self.missions(), self.recording()
         others = []
         for name in frames.poses.keys() - own:
             pose = frames.in_fixed(name, fixed)
@@ -236,7 +238,8 @@ class GraphModel:
             sentences=self._own_sentences() + self._diagnostics.sentences() + self.sentences,
             log=tuple(self._log),
             images=tuple(sorted(t for t, kind in self.graph.topics.items() if kind in IMAGES)),
-            missions=self.missions(),
+            missions=running,
+            steps=steps,
             recording=recording,
             recorded=recorded,
         )

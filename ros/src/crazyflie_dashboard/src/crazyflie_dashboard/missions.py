@@ -19,7 +19,7 @@ from typing import Any
 import rospkg
 
 from crazyflie_dashboard.page_data import DryRunResult
-from crazyflie_dashboard.snapshot import Triple
+from crazyflie_dashboard.snapshot import Step, Triple
 from crazyflie_utils.refusal import RefusalError
 
 #: Program that flies missions and dry runs; the beginning of the line with a dry run's result, and
@@ -67,6 +67,7 @@ class MissionFlight:
         known = json.loads(record.read_text())
         self.title: str = known["title"]
         self.command = ""  #: The last one.
+        self._begun, self._since = 0, time.monotonic()  # Count of its commands; begin of the last.
         self.is_stopped: bool = known["is_stopped"]
         self.said = ""  #: The end of its output.
         #: Its process if it is a child of this one.
@@ -84,9 +85,9 @@ class MissionFlight:
         title: str,
         command: list[str],
         environment: Mapping[str, str],
-        ends: float | None = None,
+        dry_run: DryRunResult | None = None,
     ) -> "MissionFlight":
-        """Start a mission, with its files in a folder, that ends at a time.time() (s) if known."""
+        """Start a mission, whose dry run may be known, with its files in a folder."""
         folder.mkdir(parents=True, exist_ok=True)
         for old in folder.glob("*.out"):
             if not old.with_suffix(".json").exists():
@@ -96,7 +97,9 @@ class MissionFlight:
             process = _start(command, environment, output)
         record = folder / f"{process.pid}.json"
         started.rename(record.with_suffix(".out"))
-        known = {"title": title, "pid": process.pid, "began": _began(process.pid), "ends": ends}
+        duration, steps = (dry_run.duration, dry_run.steps) if dry_run else (None, ())
+        known = {"title": title, "pid": process.pid, "began": _began(process.pid), "steps": steps}
+        known["duration"] = duration
         record.write_text(json.dumps({**known, "master": _master(), "is_stopped": False}))
         flight = MissionFlight(record)
         flight.child = process
@@ -105,9 +108,25 @@ class MissionFlight:
     @property
     def text(self) -> str:
         """Its title with its last command, and the time that is left, as far as they are known."""
-        ends = self._known.get("ends")
-        left = "" if ends is None else f"{max(0.0, ends - time.time()):.0f} s left"
+        took, left = time.monotonic() - self._since, ""
+        if steps := self.steps:
+            rest = sum(each.duration for each in steps if each.state == "next")
+            now = sum(each.duration for each in steps if each.state == "now")
+            left = f"{rest + max(0.0, now - took):.0f} s left"
         return " · ".join(filter(None, (self.title, self.command, left)))
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """Its commands, by the dry run."""
+        steps, last = self._known.get("steps", ()), self._known.get("duration") or 0.0
+        begins = [begin for begin, _ in steps]
+        states = ("done", "now", "next")
+        return tuple(
+            Step(
+                text, max(0.0, end - begin), states[(k > self._begun - 1) + (k >= self._begun - 1)]
+            )
+            for k, ((begin, text), end) in enumerate(zip(steps, [*begins[1:], last], strict=True))
+        )
 
     def wait(self) -> int:
         """Wait for its end; return its exit status, or 0 if another process started it."""
@@ -118,7 +137,8 @@ class MissionFlight:
                 for line in output:
                     self.said = (self.said + line)[-_MAX_OUTPUT:]
                     if match := _COMMAND.match(line):
-                        self.command = match[1]
+                        self.command, self._begun = match[1], self._begun + 1
+                        self._since = time.monotonic()
         status = 0 if self.child is None else self.child.wait()
         self._record.unlink(missing_ok=True)
         return status
@@ -175,7 +195,7 @@ class Missions:
         self._folder = folder or Path(rospkg.get_ros_home()) / "crazyflie_missions"
         self._lock = threading.Lock()
         self._flights: list[MissionFlight] = []
-        self._passed: dict[tuple[Any, ...], tuple[Mapping[str, Triple], float | None]] = {}
+        self._passed: dict[tuple[Any, ...], tuple[Mapping[str, Triple], DryRunResult]] = {}
         for record in self._folder.glob("*.json"):
             try:
                 flight = MissionFlight(record)
@@ -190,6 +210,12 @@ class Missions:
         """Running missions as texts, see `MissionFlight.text`."""
         with self._lock:
             return tuple(each.text for each in self._flights)
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The commands of the first of them."""
+        with self._lock:
+            return next((each.steps for each in self._flights), ())
 
     def dry_run(
         self, mission: Path, vehicles: tuple[str, ...], places: Mapping[str, Triple]
@@ -208,7 +234,7 @@ class Missions:
                 return
             if done.passed:
                 with self._lock:
-                    self._passed[key] = dict(places), done.duration
+                    self._passed[key] = dict(places), done
             result.set_result(done)
 
         threading.Thread(target=work, daemon=True).start()
@@ -231,7 +257,7 @@ class Missions:
             if self._flights:
                 title = self._flights[0].title
                 raise RefusalError(f"{title} is still flying; wait for its end, or stop it")
-            before, duration = self._passed.get(_key(mission, vehicles), (None, None))
+            before, dry_run = self._passed.get(_key(mission, vehicles), (None, None))
             if before is None:
                 raise RefusalError(f"{mission.name}: expected a dry run of it that has passed")
             for name, place in before.items():
@@ -241,8 +267,7 @@ class Missions:
                         "another one"
                     )
         environment = _environment(vehicles)
-        ends = None if duration is None else time.time() + duration
-        flight = MissionFlight.begin(self._folder, mission.name, command, environment, ends)
+        flight = MissionFlight.begin(self._folder, mission.name, command, environment, dry_run)
 
         def finish(status):
             # Stopped while Python itself was starting: nothing has flown.
@@ -312,7 +337,8 @@ def _run(command: list[str], environment: Mapping[str, str], limit: float) -> Dr
             except ValueError:
                 return DryRunResult(False, f"its result is damaged: {line[:_MAX_OUTPUT]}")
             paths = {name: tuple(map(tuple, path)) for name, path in found["paths"].items()}
-            return DryRunResult(found["passed"], found["text"], paths, found.get("duration"))
+            steps = tuple(map(tuple, found.get("steps", ())))
+            return DryRunResult(found["passed"], found["text"], paths, found.get("duration"), steps)
     if process.returncode == 0 and "--sim" in command:
         return DryRunResult(True, "flown by ideal vehicles")
     return DryRunResult(False, _last(output, process.returncode))

@@ -75,6 +75,7 @@ class DryRunResult:
     text: str
     paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)
     duration: float | None = None  #: s.
+    steps: tuple[tuple[float, str], ...] = ()  #: When each command begins (s), and its text.
 
 
 @dataclass(frozen=True)

@@ -94,7 +94,7 @@ class Recording:
         return report if report is not None and report.exists() else None
 
     def make_report(self, names: Sequence[str]) -> str:
-        """Make a report on one recording, or on two side by side; wait for it.
+        """Make a report on one recording, or on two laid over each other; wait for it.
 
         Raises
         ------
@@ -182,6 +182,7 @@ class Recording:
 
     def _make(self, recordings, out):
         command = [*_NICE, self._programs("flight_report"), *recordings, "--out", out]
+        command += ["--compare"] * (len(recordings) > 1)
         done = subprocess.run(
             list(map(str, command)), capture_output=True, text=True, timeout=_REPORT_LIMIT
         )

@@ -130,6 +130,14 @@ class LogLine:
     text: str
 
 
+class Step(NamedTuple):
+    """A command of a mission that flies, and how long it takes by the dry run (s)."""
+
+    text: str
+    duration: float
+    state: str  #: "done", "now" or "next".
+
+
 @dataclass(frozen=True)
 class Scene:
     """Everything that a page shows at one moment."""
@@ -149,5 +157,6 @@ class Scene:
     log: tuple[LogLine, ...] = ()  #: The newest ones, oldest first.
     images: tuple[str, ...] = ()  #: Topics of cameras.
     missions: tuple[str, ...] = ()  #: Running missions, as `Missions.running`.
+    steps: tuple[Step, ...] = ()  #: Of the first of these missions, if its dry run has shown them.
     recording: str = ""  #: State of a recording that was begun here.
     recorded: str = ""  #: Its time and size.

@@ -55,6 +55,7 @@ class Surroundings:
         self._topics: set[str] = set()
         # Topic -> drawn solids by frame, and number of parts.
         self._markers: dict[str, tuple[list[tuple[str, Solids]], int]] = {}
+        self._rooms: dict[str, Box | None] = {}  # By fixed frame, until markers change.
         self._paths: dict[str, tuple[str, tuple[Triple, ...]]] = {}
         self._fences: dict[str, Box] = {}
         self._held: dict[str, frozenset[str]] = {}
@@ -62,6 +63,8 @@ class Surroundings:
     def follow(self, graph: Graph) -> None:
         """Subscribe to topics that are new on the graph; drop those that have gone."""
         gone = self._topics - graph.topics.keys()
+        if gone:
+            self._rooms.clear()
         for known in (self._markers, self._paths, self._fences, self._held):
             for key in [key for key in known if key.partition(" ")[0] in gone]:
                 del known[key]
@@ -126,6 +129,11 @@ class Surroundings:
 
     def room(self, fixed: str) -> Box | None:
         """Return the box around the objects of a world file (m); None if none of them is high."""
+        if fixed not in self._rooms:
+            self._rooms[fixed] = self._room(fixed)
+        return self._rooms[fixed]
+
+    def _room(self, fixed):
         solids = [
             each
             for topic, (found, _) in self._markers.items()
@@ -165,6 +173,7 @@ class Surroundings:
 
     def _draw(self, topic, message):
         self._markers[topic] = grouped(message.markers)
+        self._rooms.clear()
         for key in [key for key in self._paths if key.partition(" ")[0] == topic]:
             del self._paths[key]
         for marker in message.markers:

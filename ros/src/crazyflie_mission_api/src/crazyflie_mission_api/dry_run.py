@@ -324,6 +324,7 @@ def dry_run(group: VehicleGroup, mission: Callable[[VehicleGroup], Any]) -> floa
         {name: vehicle.start_skew for name, vehicle in group._vehicles.items()},
         group.observer.step,
     )
+    run.observer.begin = group.observer.plan  # type: ignore[method-assign]
     # Their present positions.
     obstacles = group.obstacles()
     run.obstacles = lambda: obstacles

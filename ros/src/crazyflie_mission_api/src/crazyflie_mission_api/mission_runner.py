@@ -4,8 +4,8 @@
 
 FILE is a script with its arguments, or a trajectory (CSV) and the names of vehicles. ``fly`` prints
 each command as it begins. ``dry_run`` goes as far as ``fleet.fly(mission)``, and no vehicle moves.
-Its result is a line of JSON: {"dry_run": {"passed": bool, "text": str, "duration": s, "paths":
-{vehicle: [[x, y, z], ...]}}}.
+Its result is a line of JSON: {"dry_run": {"passed": bool, "text": str, "duration": s, "steps":
+[[s, command], ...], "paths": {vehicle: [[x, y, z], ...]}}}.
 """
 
 import argparse
@@ -43,11 +43,9 @@ class _Printer(MissionObserver):
     @override
     def begin(self, command: str, vehicles: list[str], time: float) -> None:
         self._first = time if self._first is None else self._first
-        count = len(vehicles)
-        names = ", ".join(vehicles) if count <= _SHOWN_NAMES else f"{count} vehicles"
         # The program that reads the output may have ended; the vehicles must still land.
         with contextlib.suppress(OSError):
-            print(f"{time - self._first:7.1f} s  {command}: {names}", flush=True)
+            print(f"{time - self._first:7.1f} s  {_words(command, vehicles)}", flush=True)
 
 
 class _DryRunReport(MissionObserver):
@@ -59,6 +57,11 @@ class _DryRunReport(MissionObserver):
         self._paths: dict[str, list[list[float]]] = {}
         self._last = -_PERIOD
         self._warnings: list[str] = []
+        self._steps: list[tuple[float, str]] = []
+
+    @override
+    def plan(self, command: str, vehicles: list[str], time: float) -> None:
+        self._steps.append((round(time, 2), _words(command, vehicles)))
 
     @override
     def step(self, group: Any) -> None:
@@ -75,7 +78,7 @@ class _DryRunReport(MissionObserver):
     @override
     def passed(self, vehicles: list[str], duration: float) -> None:
         text = "; ".join([f"{', '.join(vehicles)} fly for {duration:.0f} s", *self._warnings])
-        _print_result(True, text, duration, self._paths)
+        _print_result(True, text, duration, self._paths, self._steps)
         raise Done
 
 
@@ -129,9 +132,14 @@ def _fly_trajectory(path: str, names: list[str]) -> None:
         fleet.fly(mission)
 
 
-def _print_result(passed, text, duration=0.0, paths=None):
+def _words(command, vehicles):
+    count = len(vehicles)
+    return f"{command}: {', '.join(vehicles) if count <= _SHOWN_NAMES else f'{count} vehicles'}"
+
+
+def _print_result(passed, text, duration=0.0, paths=None, steps=()):
     result = {"passed": passed, "text": text, "duration": duration, "paths": paths or {}}
-    print(json.dumps({"dry_run": result}), flush=True)
+    print(json.dumps({"dry_run": {**result, "steps": steps}}), flush=True)
 
 
 if __name__ == "__main__":

@@ -21,6 +21,9 @@ class MissionObserver:
     def begin(self, command: str, vehicles: list[str], time: float) -> None:
         """Process the beginning of a command to vehicles, at their time (s)."""
 
+    def plan(self, command: str, vehicles: list[str], time: float) -> None:
+        """Process the beginning of a command of a dry run, at its time (s)."""
+
     def step(self, group: Any) -> None:
         """Process a time step of a dry run; ``group`` is its `DryRun`."""
 

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from crazyflie_reports import bag_log, bag_mcap, report_page
+from crazyflie_reports import bag_log, bag_mcap, laid_over, report_page
 from crazyflie_reports.bag_file import BagError
 from crazyflie_reports.bag_flights import flights, vehicle_namespaces
 from crazyflie_reports.bag_topics import ROLES
@@ -105,12 +105,14 @@ def make(
     folder: Path,
     names: dict[str, str] | None = None,
     has_mcap: bool = False,
+    compares: bool = False,
 ) -> list[str]:
     """Write a report on recordings; return the errors.
 
     A path is a bag, a folder of bags that follow each other, or a log of a vehicle's micro SD card,
     which is added to the bag that it matches; for ``names`` see `bag_log.read`. With ``has_mcap``
-    each recording is also written as MCAP. `ReportError`: none of the recordings can be read, or
+    each recording is also written as MCAP; with ``compares`` flights of two recordings are laid
+    over each other. `ReportError`: none of the recordings can be read, or
     the folder cannot be written.
     """
     report, problems, written = Report(), [], []
@@ -139,6 +141,8 @@ def make(
                     written.append(bag_mcap.write(log, _new_folder(folder / MCAP, log.name)))
         if not report.recordings:
             raise ReportError("\n".join(problems))
+        if compares and len(report.recordings) == 2:
+            laid_over.lay_over(report.recordings, is_same_time=False)
         report.write(folder)
     except OSError as error:
         raise ReportError(f"the report cannot be written into {folder}: {error.strerror}") from None
@@ -174,6 +178,9 @@ def main() -> int:
     parser.add_argument(
         "--mcap", action="store_true", help="also write recordings for Foxglove and Lichtblick"
     )
+    parser.add_argument(
+        "--compare", action="store_true", help="lay flights of two recordings over each other"
+    )
     options = parser.parse_args()
     names = dict(each.partition("=")[::2] for each in options.topic)
     if unknown := [each for each in names if each not in roles or not names[each]]:
@@ -184,7 +191,7 @@ def main() -> int:
         except re.error as error:
             parser.error(f"--topic {role}={name}: expected a regular expression; {error}")
     try:
-        problems = make(options.bags, options.out, names, options.mcap)
+        problems = make(options.bags, options.out, names, options.mcap, options.compare)
     except ReportError as error:
         problems = [str(error)]
     print(*problems, sep="\n", file=sys.stderr, end="\n" if problems else "")

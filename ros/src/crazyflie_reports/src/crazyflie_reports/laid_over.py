@@ -1,4 +1,4 @@
-"""Two recordings of the same time in one report: each flight has the curves of the other one."""
+"""Two recordings in one report: each flight has the curves of the other one."""
 
 import math
 from typing import Any
@@ -6,44 +6,46 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crazyflie_reports.bag_report import Report
 from crazyflie_reports.report_page import MOST_POINTS, curve
 
-NAMES = ("recorded", "what if")  #: What the recordings of a report are called on the page.
-_KEYS = "start", "duration", "path"  # Of a flight that is drawn, and not listed.
+#: What recordings of the same time, and those that are compared, are called on the page.
+NAMES, COMPARED = ("recorded", "what if"), ("first", "second")
 
 Rows = NDArray[np.float64]
+Recordings = list[dict[str, Any]]
 
 
-def lay_over(report: Report) -> None:
-    """Add to each flight of two recordings the curves and paths of the other recording."""
-    recordings = report.recordings
-    added = [
-        (plot, each)
-        for recording, other, name in zip(recordings, recordings[::-1], NAMES[::-1], strict=True)
+def lay_over(recordings: Recordings, is_same_time: bool = True) -> None:
+    """Add to each flight of two recordings the curves and the path of the other recording's flight.
+
+    That is the vehicle's flight at the same time, or the one of the same number: times count from
+    each takeoff then.
+    """
+    names = NAMES if is_same_time else COMPARED
+    pairs = [
+        (flight, same, same["start"] - flight["start"] if is_same_time else 0.0, name)
+        for recording, other, name in zip(recordings, recordings[::-1], names[::-1], strict=True)
         for flight in recording["flights"]
         for same in other["flights"]
-        if _is_same(flight, same)
-        for plot, each in _curves(flight, same, name)
+        if flight["vehicle"] == same["vehicle"]
+        and (_overlap(flight, same) if is_same_time else flight["number"] == same["number"])
     ]
+    added = [each for pair in pairs for each in _curves(*pair)]
     for plot, each in added:
         plot["curves"].append(each)
-    for recording, other, name in zip(recordings, recordings[::-1], NAMES[::-1], strict=True):
-        flights = other["flights"]
-        recording["others"] = [
-            {"vehicle": name, **{key: each[key] for key in _KEYS}} for each in flights
-        ]
+    for flight, same, shift, name in pairs:
+        other = {"vehicle": name, "start": flight["start"] + shift}
+        others = flight.setdefault("others", [])
+        others.append({**other, **{key: same[key] for key in ("duration", "path")}})
 
 
-def _is_same(flight, other):
+def _overlap(flight, other):
     end = flight["start"] + flight["duration"], other["start"] + other["duration"]
-    is_while = flight["start"] < end[1] and other["start"] < end[0]
-    return is_while and flight["vehicle"] == other["vehicle"]
+    return flight["start"] < end[1] and other["start"] < end[0]
 
 
-def _curves(flight, other, name):
+def _curves(flight, other, shift, name):
     """Yield plot and curve for each of the other flight, but for its references."""
-    shift = other["start"] - flight["start"]
     plots = {each["title"]: each for each in flight["plots"]}
     for each in other["plots"]:
         for found in each["curves"]:
@@ -52,12 +54,12 @@ def _curves(flight, other, name):
                 yield plots[each["title"]], {**found, "name": f"{found['name']} {name}", "t": times}
 
 
-def add_controls(report: Report, topic: str, rows: tuple[Rows, Rows]) -> None:
+def add_controls(recordings: Recordings, topic: str, rows: tuple[Rows, Rows]) -> None:
     """Add plots of a topic of controls to all flights, before `lay_over`.
 
     ``rows`` are those of both recordings: time (s) and the fields of a control.
     """
-    for recording, values in zip(report.recordings, rows, strict=True):
+    for recording, values in zip(recordings, rows, strict=True):
         for flight in recording["flights"]:
             flight["plots"] += _plots_of_controls(topic, values, flight["start"])
 

@@ -178,8 +178,8 @@ def _compare(options, out, place):
     if own and not pairs:
         raise InputError(f"the nodes do not fly: {[*sent.refusals, rerun.last_warning()][0]}")
     for topic in sorted(_controls_of(interfaces)):
-        add_controls(report, topic, _rows(given, sent, topic))
-    lay_over(report)
+        add_controls(report.recordings, topic, _rows(given, sent, topic))
+    lay_over(report.recordings)
     report.write(out)
     changes = [
         (f"{before.vehicle.name}, flight {before.number}", _changes(before, after))

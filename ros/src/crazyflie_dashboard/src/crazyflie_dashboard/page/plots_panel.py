@@ -143,12 +143,7 @@ class PlotsPanel:
 
     def _tick(self, event: ValueChangeEventArguments) -> None:
         self._ticked = list(event.value)
-        # The address has the layout: it can be kept and sent.
-        text = json.dumps(",".join(self._ticked))
-        ui.run_javascript(
-            "const u = new URL(location); u.searchParams.set('plots', "
-            f"{text}); history.replaceState(null, '', u)"
-        )
+        self._session.show_in_address(plots=self._ticked)
         self.refresh(self._session.scene())
 
     def _picture(self, kind: str) -> None:

@@ -1,4 +1,4 @@
-"""The recordings, with their reports, and two of them side by side."""
+"""The recordings, with their reports, and comparisons of two."""
 
 from urllib.parse import urlencode
 

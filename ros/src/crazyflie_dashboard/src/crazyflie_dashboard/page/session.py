@@ -1,6 +1,7 @@
 """One open page: its number, its chosen vehicles, and its requests."""
 
 import asyncio
+import json
 import time
 from collections.abc import Callable, Iterable, MutableMapping
 from concurrent.futures import Future
@@ -43,6 +44,8 @@ class Session:
         #: Called once, when the page is connected, with what it had before it was loaded again.
         self.on_restore: list[Callable[[dict[str, Any]], None]] = []
         self._client = client
+        asked = client.request.query_params.get("vehicles", "")
+        self._asked = tuple(filter(None, asked.split(",")))
         client.on_connect(self._connect)
         client.on_disconnect(self._disconnect)
         client.on_delete(self._disconnect)
@@ -60,7 +63,9 @@ class Session:
         self.page = self.dashboard.pages.open(tell, tab or "")
         if restore:
             kept = dict(self._kept())
-            self.chosen, self.watched = set(kept.get("chosen", ())), kept.get("watched")
+            self.chosen, self.watched = set(kept.get("chosen", self._asked)), kept.get("watched")
+            if self.chosen:
+                self.show_in_address(vehicles=self.chosen)
             for each in restore:
                 each(kept)
         self.dashboard.watch(self.page, self.plotted)
@@ -128,6 +133,13 @@ class Session:
             self.watched = names[-1]
         self.dashboard.watch(self.page, self.plotted)
         self.keep(chosen=sorted(self.chosen), watched=self.watched)
+        self.show_in_address(vehicles=self.chosen_names)
+
+    def show_in_address(self, **lists: Iterable[str]) -> None:
+        """Put lists of words into the address of the page, which can be kept and sent."""
+        words = {name: ",".join(each) for name, each in lists.items()}
+        if self._client.has_socket_connection:
+            self._client.run_javascript(f"setAddress({json.dumps(words)})")
 
     async def result(self, future: "Future[Result]") -> Result | None:
         """Wait for a result; return None after showing the reason of a refusal."""

@@ -4,7 +4,10 @@
 const LEAST = 60;  // Shortest time that the bar shows, s.
 
 export default {
-  template: `<div class="timebar" :class="{ past: ago !== null }">
+  template: `<div class="bar-and-steps"><div v-if="bar.steps.length" class="steps" role="list" aria-label="steps of the mission">
+      <span v-for="([text, duration, state], k) in bar.steps" :key="k" :class="state" role="listitem" :aria-current="state === 'now' ? 'step' : null"
+        :title="text + ', ' + duration.toFixed(1) + ' s'" :style="{ flexGrow: Math.max(0.1, duration) }">{{ text }}</span></div>
+    <div class="timebar" :class="{ past: ago !== null }">
     <div class="track">
       <input type="range" :min="-span" max="0" step="0.2" :value="-(ago ?? 0)" aria-label="time that is shown, s before now"
         @input="$emit('seek', Number($event.target.value) < 0 ? -Number($event.target.value) : null)">
@@ -15,7 +18,7 @@ export default {
     <span v-if="recording" class="recording">● {{ recording }}</span>
     <span class="when">{{ ago === null ? "now" : Math.round(ago) + " s ago" }}</span>
     <button :disabled="ago === null" @click="$emit('seek', null)">Now</button>
-  </div>`,
+  </div></div>`,
   props: { bar: Object },
   computed: {
     ago() { return this.bar.ago; },

@@ -8,7 +8,7 @@ from nicegui.events import GenericEventArguments
 
 from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.progress import Progress, Stage
-from crazyflie_dashboard.snapshot import Scene
+from crazyflie_dashboard.snapshot import Scene, Step
 
 STEP = 5.0  #: Steps in which the length of the bar grows (s).
 LEVELS = {Stage.REFUSED: "error", Stage.ENDED: "warn"}
@@ -20,7 +20,7 @@ class TimeBar(ValueElement, component="timebar.js"):  # type: ignore[call-arg]
     VALUE_PROP = "bar"
 
     def __init__(self, session: Session) -> None:
-        super().__init__(value=_bar(0.0, None, [], "", ""))
+        super().__init__(value=_bar(0.0, None, [], "", "", []))
         self._session = session
         self.on("seek", self._seek, throttle=0.1)
 
@@ -36,16 +36,20 @@ class TimeBar(ValueElement, component="timebar.js"):  # type: ignore[call-arg]
         # Rounded: a mark that moves all the time would be sent all the time.
         events = [[STEP * round((now - at) / STEP), level, text] for at, level, text in marks]
         ago = None if past is None else round(now - past, 1)
-        self.value = _bar(
-            kept, ago, events, " · ".join(live.missions), live.recorded or live.recording
-        )
+        mission, recording = " · ".join(live.missions), live.recorded or live.recording
+        self.value = _bar(kept, ago, events, mission, recording, live.steps)
 
     def _seek(self, event: GenericEventArguments) -> None:
         self._session.look_back(event.args)
 
 
 def _bar(
-    kept: float, ago: float | None, events: Sequence[Any], mission: str, recording: str
+    kept: float,
+    ago: float | None,
+    events: Sequence[Any],
+    mission: str,
+    recording: str,
+    steps: Sequence[Step],
 ) -> dict[str, Any]:
     return {
         "kept": kept,
@@ -53,6 +57,7 @@ def _bar(
         "events": events,
         "mission": mission,
         "recording": recording,
+        "steps": [list(step) for step in steps],
     }
 
 

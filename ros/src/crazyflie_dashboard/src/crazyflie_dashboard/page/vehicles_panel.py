@@ -15,6 +15,7 @@ from crazyflie_dashboard.progress import REACHED
 from crazyflie_dashboard.snapshot import Action, Scene, VehicleSnapshot
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_msgs.msg import FlightStatus
+from crazyflie_takeoff.envelope import Box
 from crazyflie_utils.flight_status import WORDS
 
 #: Names of the rates that are shown, by the topics' roles.
@@ -71,6 +72,7 @@ class VehiclesPanel:
             self._near = self._button("Go", self._go).props("icon=near_me color=accent")
         for field in (*self._goal, self._yaw):
             field.on_value_change(self._draw_goal)
+        self._limits = ui.label().classes("hint limits")
         ui.label(
             "Click on the floor to set a goal, drag its handle, then press Go. Several vehicles "
             "keep their formation. Hold stops them where they are; a mission goes on with its next "
@@ -102,6 +104,7 @@ class VehiclesPanel:
             allow(button, obstacle or why_not(action, chosen))
         self._reset.set_visibility(any(each.is_emergency for each in chosen))
         self._hide_goal_that_is_reached(chosen)
+        self._limits.text = limits_text(self._session.dashboard.limits(names))
         left = {
             name: text
             for row in self._session.dashboard.progress()
@@ -193,6 +196,15 @@ class VehiclesPanel:
         names = self._session.chosen_names
         if await self._session.command(Action.GO_TO, names, event.args, goal=tuple(goal), yaw=yaw):
             self._sent = tuple(goal)
+
+
+def limits_text(limits: tuple[Box, str] | None) -> str:
+    """Return the limits of goals in words."""
+    if limits is None:
+        return ""
+    box, what = limits
+    sides = zip("xyz", box.lower, box.upper, strict=True)
+    return f"{', '.join(f'{axis} {a:.4g} to {b:.4g}' for axis, a, b in sides)} m: {what}"
 
 
 def attitude(vehicle: VehicleSnapshot) -> list[int]:

@@ -9,7 +9,7 @@ from std_msgs.msg import Float32, String
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_driver.srv import GoToRequest
-from crazyflie_fleet import landing
+from crazyflie_fleet import landing_rounds
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import ServiceError
 from crazyflie_utils.flight_status import WORDS
@@ -186,7 +186,7 @@ def test_a_vehicle_that_cannot_leave_stays_in_the_air_and_is_named():
 def test_a_landing_that_fails_is_answered(monkeypatch):
     swarm = Swarm(fleet={"n": 2})
     swarm.call("/all/takeoff")
-    monkeypatch.setattr(landing.Scene, "next_round", lambda _: {}["a bug"])
+    monkeypatch.setattr(landing_rounds.Scene, "next_round", lambda _: {}["a bug"])
     with pytest.raises(
         ServiceError, match="2 of 2 vehicles: cf1, cf2: the landing of the fleet has f"
     ):

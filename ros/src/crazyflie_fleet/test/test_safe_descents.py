@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from crazyflie_fleet.landing import SafeDescents
+from crazyflie_fleet.landing_rounds import SafeDescents
 
 #: One above another, and a third far from both; buffers are 0.15 m each.
 PLACES = np.array([(0.0, 0.0, 2.0), (0.1, 0.0, 1.0), (5.0, 5.0, 1.0)])

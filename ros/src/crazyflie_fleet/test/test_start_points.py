@@ -62,7 +62,9 @@ def test_takeoffs_end_above_where_the_vehicle_is_seen():
     assert (followed.x, followed.y, followed.z) == (3.0, 0.0, 1.0)
 
 
-@pytest.mark.parametrize("failing", ["references_node.close_pairs", "landing.SafeDescents.begin"])
+@pytest.mark.parametrize(
+    "failing", ["references_node.close_pairs", "landing_rounds.SafeDescents.begin"]
+)
 def test_references_pass_while_the_check_of_starts_or_a_descent_fails(failing, monkeypatch):
     def fail(*arguments):
         raise ValueError("fails")

@@ -15,7 +15,7 @@ from typing_extensions import override
 from crazyflie_driver.srv import GoTo, GoToRequest
 from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_fleet.high_level_services import KEEP_HEADING
-from crazyflie_fleet.landing import (
+from crazyflie_fleet.landing_rounds import (
     SIDE_SPEED,
     LandingSide,
     Place,
@@ -41,7 +41,7 @@ Refusals = Mapping[str, str]
 
 
 class Lander(LandingSide):
-    """The landings of a fleet, see `landing`; ``states`` are those of all its vehicles."""
+    """The landings of a fleet, see `landing_rounds`; ``states`` are those of all its vehicles."""
 
     arrival_timeout = 5.0
 

@@ -14,7 +14,7 @@ from typing_extensions import override
 
 from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig, close_pairs
 from crazyflie_fleet.high_level_services import reference_message
-from crazyflie_fleet.landing import SafeDescents
+from crazyflie_fleet.landing_rounds import SafeDescents
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
 from crazyflie_fleet.vehicle_nodes import (
     DESCENT,

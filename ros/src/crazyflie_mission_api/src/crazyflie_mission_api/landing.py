@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from typing_extensions import override
 
-from crazyflie_fleet.landing import LandingSide, Place, Scene, land_in_rounds
+from crazyflie_fleet.landing_rounds import LandingSide, Place, Scene, land_in_rounds
 from crazyflie_mission_api.group_state import GroupState
 from crazyflie_mission_api.limits import EVERYWHERE
 from crazyflie_mission_api.mission_vehicle import Move, never
@@ -25,7 +25,7 @@ _PERIOD = 0.05  #: Period of the checks of vehicles that land (s).
 def land_all(group: GroupState, is_checked: bool) -> dict[str, str]:
     """Land the vehicles of a group that fly; return why some have not landed: name to reason.
 
-    Without a check vehicles land even if two come too near. See `crazyflie_fleet.landing`.
+    Without a check vehicles land even if two come too near. See `crazyflie_fleet.landing_rounds`.
     """
     landing = _Landing(group, is_checked)
     landing.stop_moving()

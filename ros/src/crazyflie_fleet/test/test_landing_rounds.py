@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
 
-from crazyflie_fleet.landing import MAX_DETOUR, Scene
+from crazyflie_fleet.landing_rounds import MAX_DETOUR, Scene
 
 SCALE = np.array([1.0, 1.0, 0.5])
 
